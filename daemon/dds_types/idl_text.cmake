@@ -1,4 +1,5 @@
-# Writes the IDL file as a C++ string; cut into pieces because compilers need not take literals beyond 65536 bytes.
+# Writes the IDL file as a C++ string, one literal per line: compilers need not accept literals of
+# more than 65536 bytes.
 file(READ ${IDL} text)
 string(REGEX REPLACE "\n$" "" text "${text}")
 string(REPLACE "\n" "\n)idl\"\nR\"idl(" text "${text}")

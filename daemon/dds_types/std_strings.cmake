@@ -1,5 +1,6 @@
-# fastddsgen makes fixed_string<N> of string<N>: a Fast DDS header in everybody's include path, and silent truncation of
-# what is too long. With std::string the types need Fast CDR only, and encode() can see and refuse what is too long.
+# Replaces fixed_string<N>, which fastddsgen generates for string<N>, by std::string. fixed_string
+# needs a header of Fast DDS in every include path and silently truncates longer text. With
+# std::string the types need Fast CDR only, and encode() can detect and refuse longer text.
 foreach(file ${HEADER} ${SOURCE})
   file(READ ${file} text)
   string(REPLACE "#include <fastrtps/utils/fixed_size_string.hpp>\n" "" text "${text}")

@@ -1,8 +1,11 @@
-/* How to apply abbe's correction, with Cyclone DDS in C and the types idlc makes of abbe_v1.idl:
+/* Shows how to apply abbe's correction, with Cyclone DDS in C and the types that idlc generates
+   from abbe_v1.idl:
+
      cyclone_subscriber DOMAIN [KEYS]
-   prints for every Compensation of every machine whether it may be applied. KEYS is the folder of one
-   subscriber that `abbe dds keys` made, where abbed has keys, too. One thread; Cyclone DDS calls the listener
-   from another. */
+
+   It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
+   of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. The program has one
+   thread; Cyclone DDS calls the listener from another one. */
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -18,32 +21,32 @@ enum { MOST_MACHINES = 16, MOST_PUBLISHERS = 8, MOST_WRITERS = 32 };
 
 static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1000000);
 
-/* ModelState is repeated every second, also if nothing changes. */
+/* abbe-dds repeats ModelState every second, even if it does not change. */
 static const int64_t longest_silence_ns = INT64_C(1500000000);
 
-/* What one DDS participant says about one machine. It lives and dies for itself. */
+/* State of one publisher (a DDS participant) of one machine, independent of other publishers. */
 struct publisher {
   dds_guid_t participant;
-  int64_t first_ns, last_ns; /* of its samples; last_ns 0: free */
-  int64_t alone_ns;          /* it sent since the last sample of the pinned publisher */
+  int64_t first_ns, last_ns; /* times of its samples; last_ns 0: entry is free */
+  int64_t alone_ns;          /* time it has sent since the last sample of the pinned publisher */
   bool foreign;
   abbe_v1_ModelState state;
-  dds_instance_handle_t state_from; /* its writer; 0: no state counts */
-  int64_t state_heard_ns;
+  dds_instance_handle_t state_from; /* writer of `state`; 0: there is no valid state */
+  int64_t state_received_ns;
   int64_t first_vector_ns, last_vector_ns, least_offset_ns; /* see delay_of(); 0: no vector yet */
   bool inherited;
 };
 
-/* There may be several machines in a domain. Only what the pinned publisher says is used. */
+/* A domain may have several machines. Only samples of the pinned publisher are used. */
 struct machine {
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
-  int64_t rival_reported_ns;
+  int64_t foreign_reported_ns;
 };
 static struct machine machines[MOST_MACHINES];
 
-/* Writers of ModelState that keep their lease; 0 is free. */
+/* Writers of ModelState that are alive (DDS liveliness); 0: entry is free. */
 static dds_instance_handle_t alive[MOST_WRITERS];
 static pthread_mutex_t alive_lock = PTHREAD_MUTEX_INITIALIZER;
 
@@ -55,8 +58,9 @@ static void replace_writer(dds_instance_handle_t old, dds_instance_handle_t with
   }
 }
 
-/* Called for every change of one writer. */
-static void liveliness_changed(dds_entity_t reader, const dds_liveliness_changed_status_t status, void* arg) {
+/* Called when the liveliness of one writer changes. */
+static void liveliness_changed(dds_entity_t reader, const dds_liveliness_changed_status_t status,
+                               void* arg) {
   (void)reader, (void)arg;
   pthread_mutex_lock(&alive_lock);
   if (status.alive_count_change > 0) replace_writer(0, status.last_publication_handle);
@@ -78,7 +82,7 @@ static int64_t now_in_ns(void) {
   return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-/* NULL: more machines than we have room for. */
+/* NULL: more than MOST_MACHINES machines. */
 static struct machine* find_machine(const char* name) {
   for (int i = 0; i < MOST_MACHINES; ++i) {
     if (machines[i].name[0] == '\0') strcpy(machines[i].name, name);
@@ -100,42 +104,46 @@ static void print_participant(const char* format, const char* machine, const dds
   printf(format, machine, text);
 }
 
-/* A new one takes the place of the one heard longest ago, but not of the pinned one. Its vectors are measured
-   against those of the pinned one, which after a restart had the same clock. */
+/* A new publisher replaces the one whose last sample is oldest, but never the pinned one. It takes
+   over the delay measurement of the pinned one: after a restart of abbe-dds the clock is the
+   same. */
 static struct publisher* find_publisher(struct machine* m, const dds_guid_t* participant) {
-  struct publisher* place = NULL;
+  struct publisher* entry = NULL;
   for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
     if (p->last_ns != 0 && same_participant(&p->participant, participant)) return p;
-    if (p != m->pinned && (place == NULL || p->last_ns < place->last_ns)) place = p;
+    if (p != m->pinned && (entry == NULL || p->last_ns < entry->last_ns)) entry = p;
   }
-  memset(place, 0, sizeof *place);
-  place->participant = *participant;
-  place->first_ns = place->last_ns = now_in_ns();
-  if (m->pinned == NULL) return place;
-  place->first_vector_ns = m->pinned->first_vector_ns;
-  place->last_vector_ns = m->pinned->last_vector_ns;
-  place->least_offset_ns = m->pinned->least_offset_ns;
-  place->inherited = place->first_vector_ns != 0;
-  return place;
+  memset(entry, 0, sizeof *entry);
+  entry->participant = *participant;
+  entry->first_ns = entry->last_ns = now_in_ns();
+  if (m->pinned == NULL) return entry;
+  entry->first_vector_ns = m->pinned->first_vector_ns;
+  entry->last_vector_ns = m->pinned->last_vector_ns;
+  entry->least_offset_ns = m->pinned->least_offset_ns;
+  entry->inherited = entry->first_vector_ns != 0;
+  return entry;
 }
 
-/* The publisher a sample came from counts for the machine: it is the one heard first, or the one before has
-   been silent for 300 ms (10 s for a foreign, which sent beside it) while this one sent for 30 ms. Reasons and
-   limits are in publisher_pin.hpp and dds.md. */
+/* True if `p`, which sent a sample now, is the pinned publisher of the machine. The first publisher
+   is pinned. Another one replaces it when the pinned one has been silent for 300 ms and the other
+   one has sent for 30 ms; 10 s instead of 300 ms for a foreign publisher, that is one that sent
+   while the pinned one did. Reasons and limits: publisher_pin.hpp and dds.md. */
 static bool is_pinned(struct machine* m, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
   p->last_ns = now_ns;
+
   if (m->pinned != p) {
     const int64_t silence_ns = m->pinned == NULL ? INT64_MAX : now_ns - m->pinned->last_ns;
     p->alone_ns += pause_ns < 10 * millisecond_ns ? pause_ns : 10 * millisecond_ns;
     const bool next = silence_ns >= (p->foreign ? 10 * second_ns : 300 * millisecond_ns) &&
                       p->alone_ns >= 30 * millisecond_ns;
     if (!next && m->pinned != NULL) return false;
-    if (m->pinned != NULL) m->pinned->last_ns = 0; /* forgotten */
+    if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
     m->pinned = p;
     p->foreign = false;
     print_participant("%s: publisher is %s\n", m->name, &p->participant);
   }
+
   for (struct publisher* other = m->publishers; other < m->publishers + MOST_PUBLISHERS; ++other) {
     if (other == p || other->last_ns == 0) continue;
     other->foreign |= now_ns - other->first_ns >= 100 * millisecond_ns;
@@ -144,15 +152,18 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
   return true;
 }
 
-static void report_foreign_sync(struct machine* m, const struct publisher* p) {
+static void report_foreign_publisher(struct machine* m, const struct publisher* p) {
   const int64_t now_ns = now_in_ns();
-  if (!p->foreign || (m->rival_reported_ns != 0 && now_ns - m->rival_reported_ns < 10 * second_ns)) return;
-  m->rival_reported_ns = now_ns;
-  print_participant("%s: rival publisher %s is ignored\n", m->name, &p->participant);
+  if (!p->foreign ||
+      (m->foreign_reported_ns != 0 && now_ns - m->foreign_reported_ns < 10 * second_ns))
+    return;
+  m->foreign_reported_ns = now_ns;
+  print_participant("%s: another publisher %s is ignored\n", m->name, &p->participant);
 }
 
-/* The publisher of a sample; NULL: its writer has gone already. */
-static struct publisher* publisher_of(struct machine* m, dds_entity_t reader, dds_instance_handle_t writer) {
+/* The publisher of a sample; NULL: its writer does not exist any more. */
+static struct publisher* publisher_of(struct machine* m, dds_entity_t reader,
+                                      dds_instance_handle_t writer) {
   dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(reader, writer);
   if (m == NULL || endpoint == NULL) {
     if (endpoint != NULL) dds_builtintopic_free_endpoint(endpoint);
@@ -163,21 +174,23 @@ static struct publisher* publisher_of(struct machine* m, dds_entity_t reader, dd
   return p;
 }
 
-/* What a lost writer said counts no longer, also when it comes back: it repeats its state within a second. */
-static void forget_the_dead(void) {
+/* Discards the states of writers that are not alive. If a writer becomes alive again, it repeats
+   its state within a second. */
+static void discard_dead_states(void) {
   for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
     for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
-      const bool heard = now_in_ns() - p->state_heard_ns < longest_silence_ns;
-      if (p->state_from == 0 || (heard && is_alive(p->state_from))) continue;
+      const bool recent = now_in_ns() - p->state_received_ns < longest_silence_ns;
+      if (p->state_from == 0 || (recent && is_alive(p->state_from))) continue;
       p->state_from = 0;
       if (p == m->pinned) printf("%s: not alive\n", m->name);
     }
   }
 }
 
-/* How much longer a vector was on its way than the quickest one of its publisher: in the network, in a socket
-   while this process stood still, until we looked. The two clocks need not agree; they may drift apart by
-   200 ppm. What was measured before of another publisher holds if the first vector is within 20 ms of it. */
+/* Delay of a vector from publication to now, relative to the fastest vector of its publisher. It
+   includes the network and the time in the socket while this process was suspended. The clocks of
+   the two computers may differ in offset, and in rate by 200 ppm. A measurement taken over from
+   another publisher is kept if the first vector differs from it by at most 20 ms. */
 static int64_t delay_of(const abbe_v1_Compensation* c, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), since_last_ns = now_ns - p->last_vector_ns;
   const int64_t offset_ns = now_ns - (c->host_time_ns + c->age_ns);
@@ -191,43 +204,47 @@ static int64_t delay_of(const abbe_v1_Compensation* c, struct publisher* p) {
   return offset_ns - p->least_offset_ns;
 }
 
-/* The rule of abbe_v1.idl. age_ns: with what the vector waited since it was published. */
-static const char* why_not(const abbe_v1_Compensation* c, int64_t age_ns, const struct publisher* p) {
+/* The rule of abbe_v1.idl: NULL if the vector may be applied, else the reason. age_ns: age of the
+   vector including the delay after its publication. */
+static const char* why_not(const abbe_v1_Compensation* c, int64_t age_ns,
+                           const struct publisher* p) {
   if (!is_alive(p->state_from)) return "the ModelState publisher is not alive";
   if (p->state.state != abbe_v1_MODEL_ACTIVE || c->state != abbe_v1_MODEL_ACTIVE)
     return "the model is not ACTIVE";
   if (strcmp(c->model_id, p->state.model_id) != 0) return "the vector is of another model";
-  if (!c->inside) return "outside the volume the data covered";
-  if (!c->tool_ok) return "the model does not hold for this tool";
-  /* The quickest vector of the first 0.2 s is the measure: those before may all have waited. */
+  if (!c->inside) return "outside the volume of the calibration data";
+  if (!c->tool_ok) return "the model is not valid for this tool";
+  /* The fastest vector of the first 0.2 s gives the reference delay: single vectors may be late. */
   if (p->last_vector_ns - p->first_vector_ns <= second_ns / 5)
-    return "how quick the way can be is not known yet";
+    return "the reference delay is not known yet";
   if (age_ns > c->validity_ns) return "too old";
   return NULL;
 }
 
-/* Also of a publisher that is not pinned: it may be the next one. */
-static void keep(const abbe_v1_ModelState* state, dds_entity_t reader, dds_instance_handle_t writer) {
+/* Keeps the state also of a publisher that is not pinned: it may be pinned later. */
+static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
+                 dds_instance_handle_t writer) {
   struct machine* m = find_machine(state->machine);
   struct publisher* p = publisher_of(m, reader, writer);
   if (p == NULL) return;
   p->state = *state;
   p->state_from = writer;
-  p->state_heard_ns = now_in_ns();
+  p->state_received_ns = now_in_ns();
   if (!is_pinned(m, p)) {
-    report_foreign_sync(m, p);
+    report_foreign_publisher(m, p);
     return;
   }
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
-static void decide(const abbe_v1_Compensation* c, dds_entity_t reader, dds_instance_handle_t writer) {
+static void decide(const abbe_v1_Compensation* c, dds_entity_t reader,
+                   dds_instance_handle_t writer) {
   struct machine* m = find_machine(c->machine);
   struct publisher* p = publisher_of(m, reader, writer);
   if (p == NULL) return;
   const int64_t age_ns = c->age_ns + delay_of(c, p);
   if (!is_pinned(m, p)) {
-    report_foreign_sync(m, p);
+    report_foreign_publisher(m, p);
     return;
   }
   const char* reason = why_not(c, age_ns, p);
@@ -239,7 +256,8 @@ static void decide(const abbe_v1_Compensation* c, dds_entity_t reader, dds_insta
   }
 }
 
-static void set_plugin(dds_qos_t* qos, const char* kind, const char* library, const char* function) {
+static void set_plugin(dds_qos_t* qos, const char* kind, const char* library,
+                       const char* function) {
   char name[64], value[64];
   snprintf(name, sizeof name, "dds.sec.%s.library.path", kind);
   dds_qset_prop(qos, name, library);
@@ -257,7 +275,8 @@ static void set_file(dds_qos_t* qos, const char* name, const char* folder, const
   dds_qset_prop(qos, name, value);
 }
 
-/* DDS Security: who has no keys of the same authority can neither publish to us nor read. */
+/* DDS Security: only participants with keys of the same authority can publish to this one or read
+   it. */
 static dds_qos_t* qos_with_keys(const char* folder) {
   dds_qos_t* qos = dds_create_qos();
   set_plugin(qos, "auth", "dds_security_auth", "authentication");
@@ -272,20 +291,23 @@ static dds_qos_t* qos_with_keys(const char* folder) {
   return qos;
 }
 
-/* Which of two participants dropped the other in an outage must not matter: with keys the one that was not
-   dropped does not authenticate again. So the lease is that of abbe-dds, 40 s. Cyclone DDS announces itself
-   2 s before its lease ends, at the latest every 30 s: here every second. What CYCLONEDDS_URI gives stays in
-   force for the rest. */
+/* With keys, if only one of two participants drops the other in a network outage, the other one
+   does not authenticate again. Therefore both need the same lease: that of abbe-dds, 40 s. By
+   default Cyclone DDS announces itself 2 s before its lease ends, at least every 30 s; here every
+   second. Other settings of CYCLONEDDS_URI remain valid. */
 static void configure_for_keys(dds_domainid_t domain) {
   const char* given = getenv("CYCLONEDDS_URI");
   char config[8192];
   snprintf(config, sizeof config,
-           "%s%s<Discovery><LeaseDuration>40s</LeaseDuration><SPDPInterval>1s</SPDPInterval></Discovery>",
+           "%s%s<Discovery><LeaseDuration>40s</LeaseDuration>"
+           "<SPDPInterval>1s</SPDPInterval></Discovery>",
            given != NULL ? given : "", given != NULL ? "," : "");
-  if (dds_create_domain(domain, config) < 0) fputs("Cyclone DDS does not accept the configuration\n", stderr);
+  if (dds_create_domain(domain, config) < 0)
+    fputs("Cyclone DDS does not accept the configuration\n", stderr);
 }
 
-/* ModelState is reliable, kept for late joiners, and its writer must say within a second that it is alive. */
+/* ModelState is reliable and retained for late joiners; its writer must assert liveliness every
+   second. */
 static dds_entity_t read_state(dds_entity_t participant) {
   dds_entity_t topic =
       dds_create_topic(participant, &abbe_v1_ModelState_desc, "abbe/v1/ModelState", NULL, NULL);
@@ -328,7 +350,7 @@ int main(int argc, char** argv) {
   puts("waiting");
   for (;;) {
     dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(50));
-    forget_the_dead();
+    discard_dead_states();
     while (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
       if (info.valid_data) keep(state, states, info.publication_handle);
     }

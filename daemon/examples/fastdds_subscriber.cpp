@@ -1,8 +1,12 @@
-// How to apply abbe's correction, with Fast DDS and the types fastddsgen makes of abbe_v1.idl:
+// Shows how to apply abbe's correction, with Fast DDS and the types that fastddsgen generates from
+// abbe_v1.idl:
+//
 //   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]]
-// prints for every Compensation of every machine whether it may be applied. KEYS is the folder of one
-// subscriber that `abbe dds keys` made, where abbed has keys, too. Fast DDS calls the listener from threads
-// of its own. To be copied with abbe/dds/publisher_pin.hpp and message_filter (daemon/dds).
+//
+// It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
+// of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. Fast DDS calls the
+// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp and
+// message_filter (daemon/dds).
 #include <unistd.h>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -40,20 +44,20 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-/// ModelState is repeated every second, also if nothing changes.
+/// abbe-dds repeats ModelState every second, even if it does not change.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
-/// How much longer a vector was on its way than the quickest one of its publisher: in the network,
-/// in a socket while this process stood still, waiting for the lock. The two clocks need not agree;
-/// they may drift apart by 200 ppm.
+/// Delay of a vector from publication to now, relative to the fastest vector of its publisher. It
+/// includes the network, the time in the socket while this process was suspended, and the wait for
+/// the lock. The clocks of the two computers may differ in offset, and in rate by 200 ppm.
 class Delay {
  public:
   std::int64_t of_ns(const Compensation& c) {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const std::int64_t now_ns = SteadyClock::now().time_since_epoch().count();
     const std::int64_t offset_ns = now_ns - (c.host_time_ns() + c.age_ns());
-    // Another clock than the publisher's before, unless the first vector shows the same within
-    // 20 ms.
+    // If the first vector differs by more than 20 ms, the publisher has another clock than the
+    // previous one: the measurement starts again.
     if (inherited_ && std::abs(offset_ns - least_ns_) > kSecond_ns / 50) first_ns_ = 0;
     inherited_ = false;
     if (first_ns_ == 0) first_ns_ = last_ns_ = now_ns, least_ns_ = offset_ns;
@@ -62,9 +66,11 @@ class Delay {
     known_ = now_ns - first_ns_ > kSecond_ns / 5;
     return offset_ns - least_ns_;
   }
-  /// The quickest vector of the first 0.2 s is the measure: those before may all have waited.
+  /// True after 0.2 s: the fastest vector of that time gives the reference delay, single vectors
+  /// may be late.
   [[nodiscard]] bool known() const { return known_; }
-  /// For the publisher that comes after this one: abbe-dds after a restart has the same clock.
+  /// The initial measurement for the next publisher: after a restart of abbe-dds the clock is the
+  /// same.
   [[nodiscard]] Delay for_next_publisher() const {
     Delay next = *this;
     next.inherited_ = next.first_ns_ != 0;
@@ -76,23 +82,24 @@ class Delay {
   std::int64_t first_ns_ = 0, last_ns_ = 0, least_ns_ = 0;
 };
 
-/// What one participant says about one machine. It lives and dies for itself.
+/// State of one publisher (a DDS participant) of one machine, independent of other publishers.
 struct Publisher {
   ModelState state;
-  Writer state_from;  ///< unknown: no state counts
+  Writer state_from;  ///< writer of `state`; unknown: there is no valid state
   SteadyClock::time_point heard{};
   Delay delay;
 };
 
-/// There may be several machines in a domain. Only what the pinned publisher says is used.
+/// A domain may have several machines. Only samples of the pinned publisher are used.
 struct Machine {
   PublisherPin pin;
   std::map<ParticipantId, Publisher> publishers;
-  std::optional<SteadyClock::time_point> foreign_sync_reported;
+  std::optional<SteadyClock::time_point> foreign_publisher_reported;
 };
 
-/// The rule of abbe_v1.idl. `alive`: the writer of the state keeps its lease. `age_ns`: with what
-/// the vector waited since it was published.
+/// The rule of abbe_v1.idl: nullptr if the vector may be applied, else the reason. `alive`: the
+/// writer of the state is alive (DDS liveliness). `age_ns`: age of the vector including the delay
+/// after its publication.
 const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher& publisher,
                     bool alive) {
   const ModelState& state = publisher.state;
@@ -100,16 +107,16 @@ const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher&
   if (state.state() != abbe::v1::MODEL_ACTIVE || c.state() != abbe::v1::MODEL_ACTIVE)
     return "the model is not ACTIVE";
   if (c.model_id() != state.model_id()) return "the vector is of another model";
-  if (!c.inside()) return "outside the volume the data covered";
-  if (!c.tool_ok()) return "the model does not hold for this tool";
-  if (!publisher.delay.known()) return "how quick the way can be is not known yet";
+  if (!c.inside()) return "outside the volume of the calibration data";
+  if (!c.tool_ok()) return "the model is not valid for this tool";
+  if (!publisher.delay.known()) return "the reference delay is not known yet";
   if (age_ns > c.validity_ns()) return "too old";
   return nullptr;
 }
 
 class Listener : public DataReaderListener {
-  /// Called for every change of one writer. What a lost writer said counts no longer, also when it
-  /// comes back: it repeats its state within a second.
+  /// Called when the liveliness of one writer changes. The state of a lost writer is discarded. If
+  /// the writer becomes alive again, it repeats its state within a second.
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
@@ -142,7 +149,7 @@ class Listener : public DataReaderListener {
 
   struct Source {
     Publisher& publisher;
-    bool pinned;  ///< else what it says is kept and not used
+    bool pinned;  ///< if false, its samples are kept but not used
   };
   Source heard(const std::string& name, const Writer& writer) {
     using Verdict = PublisherPin::Verdict;
@@ -156,31 +163,32 @@ class Listener : public DataReaderListener {
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();
     if (verdict == Verdict::NewlyPinned)
       std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
-    if (verdict == Verdict::Foreign) report_foreign_sync(name, machine, id);
+    if (verdict == Verdict::Foreign) report_foreign_publisher(name, machine, id);
     std::erase_if(machine.publishers,
                   [&](const auto& p) { return !machine.pin.remembers(p.first); });
 
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// Its address is for instance in the output of `abbe watch`.
-  static void report_foreign_sync(const std::string& name, Machine& machine,
-                                  const ParticipantId& id) {
+  /// `abbe watch` also prints the address of the publisher.
+  static void report_foreign_publisher(const std::string& name, Machine& machine,
+                                       const ParticipantId& id) {
     constexpr std::chrono::seconds kReportPeriod{10};
     const auto now = SteadyClock::now();
-    if (machine.foreign_sync_reported && now - *machine.foreign_sync_reported < kReportPeriod)
+    if (machine.foreign_publisher_reported &&
+        now - *machine.foreign_publisher_reported < kReportPeriod)
       return;
-    machine.foreign_sync_reported = now;
-    std::printf("%s: rival publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
+    machine.foreign_publisher_reported = now;
+    std::printf("%s: another publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
   }
 
-  /// Also of a publisher that is not pinned: it may be the next one.
+  /// Keeps the state also of a publisher that is not pinned: it may be pinned later.
   void keep(const ModelState& state, const Writer& writer) {
     const auto [publisher, pinned] = heard(state.machine(), writer);
     publisher.state = state;
     publisher.state_from = writer;
     publisher.heard = SteadyClock::now();
-    alive_.insert(writer);  // Fast DDS may report two changes at once in the wrong order
+    alive_.insert(writer);  // Fast DDS may report simultaneous changes in the wrong order
     if (!pinned) return;
     std::printf("%s: state %u %s\n", state.machine().c_str(), static_cast<unsigned>(state.state()),
                 state.reason().c_str());
@@ -203,10 +211,11 @@ class Listener : public DataReaderListener {
 
   std::mutex mutex_;
   std::map<std::string, Machine> machines_;
-  std::set<Writer> alive_;  ///< of ModelState
+  std::set<Writer> alive_;  ///< writers of ModelState that are alive
 };
 
-/// DDS Security: who has no keys of the same authority can neither publish to us nor read.
+/// DDS Security: only participants with keys of the same authority can publish to this one or read
+/// it.
 void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
@@ -223,8 +232,8 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-/// What anyone on the domain can announce ends a process with Fast DDS 2.9
-/// (abbe/dds/message_filter.hpp).
+/// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
+/// them (abbe/dds/message_filter.hpp).
 void filter_messages(DomainParticipantQos& qos) {
   auto& transports = qos.transport();
   if (transports.user_transports.empty()) {
@@ -236,9 +245,9 @@ void filter_messages(DomainParticipantQos& qos) {
     transport = abbe::dds::with_message_filter(transport);
 }
 
-/// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not take and
-/// older Fast DDS may not survive.
-TypeSupport quiet(TopicDataType* type) {
+/// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not accept and
+/// which may crash older versions of Fast DDS.
+TypeSupport without_type_object(TopicDataType* type) {
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
   return TypeSupport(type);
@@ -257,8 +266,8 @@ int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   auto* factory = DomainParticipantFactory::get_instance();
   DomainParticipantQos participant_qos;
-  // The default of 20 s is shorter than a pause of this process may last: abbe-dds would drop this
-  // participant, which would not announce its readers again.
+  // The default lease of 20 s may be shorter than a suspension of this process: abbe-dds would then
+  // drop this participant, and this participant would not announce its readers again.
   participant_qos.wire_protocol().builtin.discovery_config.leaseDuration =
       eprosima::fastrtps::Duration_t(40, 0);
   if (argc > 2 && (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||
@@ -278,14 +287,15 @@ int main(int argc, char** argv) {
   DataReaderQos durable;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
-  // abbe-dds asserts it only while abbed is alive
+  // abbe-dds asserts liveliness only while abbed is alive
   durable.liveliness().kind = MANUAL_BY_TOPIC_LIVELINESS_QOS;
   durable.liveliness().lease_duration = eprosima::fastrtps::Duration_t(1, 0);
 
-  const bool ok = read_topic(participant, subscriber, quiet(new abbe::v1::ModelStatePubSubType),
-                             "abbe/v1/ModelState", durable, &listener) &&
-                  read_topic(participant, subscriber, quiet(new abbe::v1::CompensationPubSubType),
-                             "abbe/v1/Compensation", live, &listener);
+  const bool ok =
+      read_topic(participant, subscriber, without_type_object(new abbe::v1::ModelStatePubSubType),
+                 "abbe/v1/ModelState", durable, &listener) &&
+      read_topic(participant, subscriber, without_type_object(new abbe::v1::CompensationPubSubType),
+                 "abbe/v1/Compensation", live, &listener);
   if (!ok) return 4;
   std::puts("waiting; end with Ctrl-C");
   for (;;) ::pause();

@@ -1,5 +1,5 @@
-// abbed: the daemon. Runs in the foreground, logs to stderr, tells systemd when it is ready and
-// that it is alive.
+// abbed: the daemon. Runs in the foreground, logs to stderr, notifies systemd when it is ready and
+// feeds its watchdog.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -23,17 +23,15 @@ namespace {
 using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
 using namespace std::chrono_literals;
 
-constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kDefect = 70;
+constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT (or the configuration is good), 2 usage, 3 the "
-    "configuration "
-    "is bad or cannot be read,\n"
-    "4 the system refused something (socket, directory, port, priority), 70 the hub hangs (also "
-    "when it "
-    "does not end\nwithin 5 s after a signal) or a defect ended abbed: systemd starts it anew.";
+    "Exit codes: 0 stopped by SIGTERM or SIGINT (--check-config: the configuration is valid);\n"
+    "2 usage; 3 the configuration is invalid or cannot be read; 4 the system refused a socket,\n"
+    "directory, port or priority; 70 the hub hangs, or does not end within 5 s after a signal, or\n"
+    "an internal error: systemd restarts abbed.";
 
-constexpr auto kCycle = 20ms;  // how often abbe-dds is looked after
+constexpr auto kCycle = 20ms;  // period of the main loop, which supervises abbe-dds
 
 int refuse(const Error& error) {
   fmt::print(stderr, "abbed: {}\n", error.text);
@@ -46,7 +44,7 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>{in}, {}};
 }
 
-/// abbe-dds stands beside abbed; else the PATH is asked.
+/// abbe-dds in the folder of abbed; if it is not there, the one in PATH.
 std::string dds_program() {
   std::error_code error;
   const auto beside =
@@ -62,7 +60,7 @@ Result<void> check_dds_keys(const std::filesystem::path& security) {
   return {};
 }
 
-/// Blocked before any thread is started, so that only the main thread ever takes them.
+/// Blocks the signals before any thread is started, so that only the main thread receives them.
 sigset_t block_stop_signals() {
   sigset_t stop;
   sigemptyset(&stop);
@@ -76,20 +74,23 @@ int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
   bool hangs = false;
-  const timespec turn{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kCycle}.count()};
+  const timespec period{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kCycle}.count()};
 
   for (;;) {
-    if (sigtimedwait(&stop, nullptr, &turn) > 0) return kDone;
+    if (sigtimedwait(&stop, nullptr, &period) > 0) return kDone;
     abbed.cycle();
+
     if (const bool hung = !abbed.alive(); hung != hangs) {
       hangs = hung;
       fmt::print(stderr, "abbed: {}\n",
-                 hangs ? "the hub has not turned for a second" : "the hub turns again");
+                 hangs ? "the hub hangs: it has completed no cycle for 1 s" : "the hub runs again");
     }
     if (hangs) {
-      if (!feed_period) continue;  // nobody to start us anew: keep what still works
-      return kDefect;
+      // Without a watchdog nothing restarts abbed: the threads that still work go on.
+      if (!feed_period) continue;
+      return kInternal;
     }
+
     if (const auto now = std::chrono::steady_clock::now(); feed_period && now >= next_feed) {
       tell_alive();
       next_feed = now + *feed_period;
@@ -99,16 +100,15 @@ int run(Abbed& abbed, const sigset_t& stop) {
 
 int abbed_main(int argc, char** argv) {
   CLI::App app{
-      "Watches a machine tool or measuring machine, identifies its geometric errors and publishes "
-      "their "
-      "compensation."};
+      "Acquires data from a machine tool or measuring machine, identifies its geometric errors and "
+      "publishes their compensation."};
   app.footer(kExitCodes);
   app.set_version_flag("--version", ABBE_VERSION);
   std::string file = "/etc/abbe/abbed.toml";
   bool check_only = false;
-  app.add_option("-c,--config", file, "the configuration")->capture_default_str();
+  app.add_option("-c,--config", file, "configuration file")->capture_default_str();
   app.add_flag("--check-config", check_only,
-               "only check the configuration, say everything that is wrong with it");
+               "only check the configuration, print all of its errors and exit");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -116,31 +116,35 @@ int abbed_main(int argc, char** argv) {
   }
 
   auto config = load_config(file);
-  // Also where it cannot be read: it does not come back by itself, and systemd would start abbed
-  // for ever.
+  // BadInput also if the file cannot be read: with Io systemd would restart abbed again and again,
+  // although only a person can repair the file.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
   if (check_only) {
     if (auto usable = check_dds_keys(config->dds.security); !usable) return refuse(usable.error());
-    fmt::print("{}: good\n", file);
+    fmt::print("{}: valid\n", file);
     return kDone;
   }
+
   const sigset_t stop = block_stop_signals();
-  // A file that may not grow (RLIMIT_FSIZE, LimitFSIZE=) is for the recorder to report like a full
-  // disk, by the EFBIG of its write; the signal's default would end acquisition with it.
+  // At a file size limit (RLIMIT_FSIZE, LimitFSIZE=) the write of the recorder fails with EFBIG,
+  // and the recorder reports it like a full disk. The default action of SIGXFSZ would end abbed.
   ::signal(SIGXFSZ, SIG_IGN);
   auto abbed = Abbed::start(std::move(*config),
                             {.configuration_text = text_of(file), .dds_program = dds_program()});
   if (!abbed) return refuse(abbed.error());
+
   for (const auto& warning : (*abbed)->warnings())
     fmt::print(stderr, "abbed: warning: {}\n", warning);
   fmt::print(stderr, "abbed: running, configuration {}\n", file);
   tell_ready("running");
+
   const int code = run(**abbed, stop);
   tell_stopping();
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
 
-  if (background_tasks_running()) {  // an identification between two looks at its stop
+  // An identification checks its stop flag only from time to time: do not wait for it.
+  if (background_tasks_running()) {
     std::fflush(nullptr);
     ::_exit(code);
   }
@@ -153,8 +157,8 @@ int abbed_main(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return abbed_main(argc, argv);
-  } catch (const std::exception& defect) {
-    fmt::print(stderr, "abbed: ended by a defect: {}\n", defect.what());
-    return kDefect;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "abbed: internal error: {}\n", error.what());
+    return kInternal;
   }
 }

@@ -98,7 +98,7 @@ TEST_F(CliCalibrateProbe, RefusesPlacesThatLieOnNoLine) {
   record(touches);
   const auto [exit, out] = calibrate("");
   EXPECT_EQ(exit, 1);
-  EXPECT_THAT(out, HasSubstr("do not lie on a line"));
+  EXPECT_THAT(out, HasSubstr("are not linear in the feed"));
 }
 
 TEST_F(CliCalibrateProbe, LooksAtOneProbeIfAsked) {

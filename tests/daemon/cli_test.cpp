@@ -136,7 +136,7 @@ TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {
   const auto gate = nlohmann::json::parse(again.out).at("gate");
   EXPECT_FALSE(gate.at("accepted"));
   EXPECT_THAT(gate.at("reasons").at(0).get<std::string>(),
-              HasSubstr("the active model still holds"));
+              HasSubstr("the active model remains valid"));
 }
 
 TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
@@ -373,7 +373,7 @@ TEST_F(Cli, RefusesAToolTheModelDoesNotHoldFor) {
                                     (folder_ / "out/model.json").string(), points.string()));
   EXPECT_EQ(ran.exit, 1);
   EXPECT_THAT(ran.out, IsEmpty());
-  EXPECT_THAT(ran.err, HasSubstr("does not hold for it"));
+  EXPECT_THAT(ran.err, HasSubstr("is not valid for it"));
 }
 
 TEST_F(Cli, ExitsWith1WhenThePathIsAnother) {

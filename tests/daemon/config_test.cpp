@@ -439,7 +439,7 @@ TEST(ConfigProbe, NeedsChannelsOfACounterCard) {
 
 TEST(ConfigProbe, RefusesWhatNoProbeCanDo) {
   EXPECT_THAT(faults_of(kMachine + kCardWithProbe + "[probe]\nconfirm_ms = 1\nchatter_ms = 2\n"),
-              ElementsAre(HasSubstr("chatter limit not below the confirmation")));
+              ElementsAre(HasSubstr("the chatter time must be below the confirmation")));
 }
 
 TEST(ConfigCmm, IsReadInSi) {
@@ -474,8 +474,8 @@ TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
   EXPECT_THAT(with("encoder"),
               ElementsAre(HasSubstr("encoder.name: two devices are called \"encoder\"")));
   for (const char* own : {"recorder", "models", "dds"})
-    EXPECT_THAT(with(own),
-                ElementsAre(AllOf(HasSubstr("tracker.name"), HasSubstr("the daemon calls"))));
+    EXPECT_THAT(with(own), ElementsAre(AllOf(HasSubstr("tracker.name"),
+                                             HasSubstr("reserved for a part of the daemon"))));
 }
 
 TEST(Config, RecordingsAreCutAndKeptForEverUnlessToldOtherwise) {

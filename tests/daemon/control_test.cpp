@@ -239,7 +239,7 @@ TEST_F(Control, AListenerThatAcceptsNobodyIsGivenUp) {
   first.connect(socket());
   const auto answer = ask_daemon(socket(), {{"do", "status"}}, 20ms);
   ASSERT_FALSE(answer);
-  EXPECT_NE(answer.error().text.find("accepted nobody in 20 ms"), std::string::npos)
+  EXPECT_NE(answer.error().text.find("accepted no connection in 20 ms"), std::string::npos)
       << answer.error().text;
 
   // alive, though deaf: its socket is left to it

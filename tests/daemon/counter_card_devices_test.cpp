@@ -98,7 +98,7 @@ TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
       << "rounded to a count of 10 nm";
   EXPECT_FALSE(batch.raw.empty());
   EXPECT_EQ(devices->health(time.now()).front().status.name, "counter_card");
-  EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet seen on hardware")));
+  EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet verified on hardware")));
 }
 
 TEST(CounterCardDevices, NameTheCardThatIsNotTheConfiguredOne) {

@@ -171,7 +171,7 @@ TEST_F(WarmArray, StandsInEveryResult) {
   EXPECT_EQ(document->artefact->u_temperature_K, 0.5);
   EXPECT_THAT(text_of(folder_ / "out/report.html"),
               AllOf(HasSubstr("24.000 C, u = 0.500 K"), HasSubstr("1.000046000")));
-  EXPECT_THAT(ran.out, Not(HasSubstr("counts as")));
+  EXPECT_THAT(ran.out, Not(HasSubstr("taken as 20 C")));
 }
 
 TEST_F(WarmArray, NeedsBothTemperatureAndExpansion) {
@@ -205,9 +205,9 @@ TEST_F(WarmArray, HasFaultsOfItsFileNamedWithTheLine) {
   const std::string whole =
       sim::format_calibrator_toml(sim::reference_ball_array(), {.alpha_per_K = kAlpha_per_K});
   expect_fault(std::regex_replace(whole, std::regex{"\nu_alpha_um_per_m_K[^\n]*"}, ""),
-               "calibrator.toml:4:20: calibrator.alpha_um_per_m_K: needs u_alpha_um_per_m_K, too");
+               "calibrator.toml:4:20: calibrator.alpha_um_per_m_K: also needs u_alpha_um_per_m_K");
   expect_fault(std::regex_replace(whole, std::regex{"\nalpha_um_per_m_K[^\n]*"}, ""),
-               "calibrator.u_alpha_um_per_m_K: needs alpha_um_per_m_K, too");
+               "calibrator.u_alpha_um_per_m_K: also needs alpha_um_per_m_K");
   expect_fault(std::regex_replace(whole, std::regex{"\nu_alpha_um_per_m_K = "},
                                   "\nu_alpha_um_per_m_K = -1 #"),
                "calibrator.u_alpha_um_per_m_K");
@@ -249,7 +249,7 @@ TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
   EXPECT_EQ(refused.exit, 3);
   EXPECT_THAT(refused.err,
               AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
-                    HasSubstr("artefact_sensor \"plate\" stands in no file of touches"),
+                    HasSubstr("artefact_sensor \"plate\" is in no file of touches"),
                     HasSubstr("give --artefact-C and --u-artefact-K")));
 
   const auto notes_of = [](const Ran& ran) {
@@ -257,7 +257,7 @@ TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
     return nlohmann::json::parse(ran.out)["gate"]["notes"].dump();
   };
 
-  const std::string unknown = "how warm the array was is not known";
+  const std::string unknown = "the temperature of the array is not known";
   EXPECT_THAT(notes_of(identify("--artefact-C 24 --u-artefact-K 0.5")), Not(HasSubstr(unknown)));
   forget_expansion();
   EXPECT_THAT(notes_of(identify()), HasSubstr(unknown));

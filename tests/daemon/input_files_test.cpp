@@ -92,7 +92,7 @@ TEST_F(InputFiles, RefuseALineThatWasCutOff) {
   EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1,2,3"),
               ElementsAre(HasSubstr(":3:8: the last line")));
   EXPECT_THAT(tracker_faults("time_s,x_mm,y_mm,z_mm\n0,1,2,3\n1,1\n"),
-              ElementsAre(HasSubstr("2 values where 4 belong")));
+              ElementsAre(HasSubstr("2 values, expected 4")));
 }
 
 TEST_F(InputFiles, RefuseAnEmptyFileAndAHeaderAlone) {
@@ -111,7 +111,7 @@ TEST_F(InputFiles, ShowAtMostTwentyFaults) {
 
 TEST_F(InputFiles, SuspectDegrees) {
   EXPECT_THAT(tracker_faults("time_s,range_mm,azimuth_rad,elevation_rad\n0,2000,90,45\n"),
-              ElementsAre(HasSubstr("azimuth_rad: beyond a full turn"),
+              ElementsAre(HasSubstr("azimuth_rad: more than one revolution"),
                           HasSubstr("elevation_rad: beyond the vertical")));
 }
 

@@ -86,7 +86,8 @@ TEST(Journal, AJournalThatTakesNothingDoesNotHoldItUpAndLearnsHowManyItMissed) {
   ASSERT_LT(kept, 20);
   (*sink)->write(kEntry);
   const auto next = journal.receive();
-  EXPECT_THAT(next, HasSubstr(fmt::format("{} lines before this were not taken", 20 - kept)));
+  EXPECT_THAT(next,
+              HasSubstr(fmt::format("the journal lost {} entries before this one", 20 - kept)));
   EXPECT_THAT(next, HasSubstr(fmt::format("ABBE_NOT_TAKEN={}\n", 20 - kept)));
   (*sink)->write(kEntry);
   EXPECT_THAT(journal.receive(), Not(HasSubstr("ABBE_NOT_TAKEN")));
@@ -231,7 +232,7 @@ TEST_F(StateObserverTest, DdsSecurityThatIsOffIsNoFaultOfADevice) {
   auto& security = now_.streams.emplace_back().status;
   security.name = "dds_security";
   security.state = "off";
-  security.last_fault = "DDS Security is off: `abbe dds keys` makes keys";
+  security.last_fault = "DDS Security is off: make keys with `abbe dds keys`";
   const auto entries = look();
   ASSERT_THAT(entries, SizeIs(1));
   EXPECT_EQ(entries[0].urgency, Urgency::Warning);

@@ -277,7 +277,7 @@ TEST_F(TrackerControl, OrdersWithoutATrackerAreRefused) {
               HasSubstr("there is no tracker, [tracker] host, in the configuration"));
   const auto shown = abbe("status");
   EXPECT_EQ(shown.exit, 5);
-  EXPECT_THAT(shown.err, HasSubstr("there is no tracker"));
+  EXPECT_THAT(shown.err, HasSubstr("has no tracker"));
 }
 
 TEST_F(TrackerControl, TheConfiguredReflectorIsSetAndTheBeamSentHomeAfterInitialize) {
@@ -293,7 +293,7 @@ TEST_F(TrackerControl, TheCommandGivesOrdersAndPrintsWhatCameOfThem) {
   const auto list = abbe("reflector list");
 
   EXPECT_EQ(list.exit, 0) << list.err;
-  EXPECT_THAT(list.out, AllOf(HasSubstr("the controller knows 3 reflectors"),
+  EXPECT_THAT(list.out, AllOf(HasSubstr("the controller lists 3 reflectors"),
                               HasSubstr("   0  SMR 1.5 inch                      in use")));
   const auto set = abbe("reflector set 'SMR 0.5 inch'");
   EXPECT_EQ(set.exit, 0) << set.err;

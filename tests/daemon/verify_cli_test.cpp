@@ -150,7 +150,7 @@ TEST_F(VerifyCli, SaysFirstThatABadModelMakesItWorse) {
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, StartsWith("verdict     WORSE with the model: do not use it"));
   const auto page = text_of(folder_ / "out/report.html");
-  EXPECT_LT(page.find("WORSE with the model"), page.find("What is left at the measured points"));
+  EXPECT_LT(page.find("WORSE with the model"), page.find("Residuals at the measured points"));
 }
 
 std::string watched_portal() {

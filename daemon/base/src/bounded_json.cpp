@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The byte after the string that begins at `quote`, or the end of a text that does not close it.
+/// Index after the string that begins at `quote`; text.size() if the string is not closed.
 std::size_t end_of_string(std::string_view text, std::size_t quote) {
   for (std::size_t i = quote + 1; i < text.size(); ++i) {
     if (text[i] == '\\')
@@ -20,7 +20,7 @@ std::size_t end_of_string(std::string_view text, std::size_t quote) {
   return text.size();
 }
 
-/// Depth and values as any parser would count them up to its first error.
+/// Counts depth and values as a parser would up to its first syntax error.
 Result<void> check_structure(std::string_view text, std::string_view what,
                              const JsonBounds& bounds) {
   std::size_t depth = 0;
@@ -44,8 +44,9 @@ Result<void> check_structure(std::string_view text, std::string_view what,
   return {};
 }
 
-/// "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ...": from
-/// "syntax" on.
+/// Removes the prefix of a parser message:
+///   "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ..."
+/// becomes "syntax error ...".
 std::string_view cause_of(std::string_view text) {
   const std::size_t place = text.find("column ");
   const std::size_t colon = text.find(": ", place == std::string_view::npos ? 0 : place);
@@ -62,7 +63,7 @@ Result<void> check_json(std::string_view text, std::string_view what, const Json
 }
 
 Result<json> parse_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
-  if (auto sound = check_json(text, what, bounds); !sound) return tl::unexpected(sound.error());
+  if (auto valid = check_json(text, what, bounds); !valid) return tl::unexpected(valid.error());
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {

@@ -5,7 +5,7 @@
 namespace abbe::daemon {
 namespace {
 
-constexpr std::chrono::minutes kSmallStep{5};
+constexpr std::chrono::minutes kLargestStep{5};
 
 std::chrono::nanoseconds read_clock(clockid_t clock) {
   timespec now{};
@@ -20,8 +20,8 @@ ClockReading read_clocks() {
 }
 
 bool ClockSteps::look(const ClockReading& now) {
-  const auto moved = now.utc - now.since_boot - start_;
-  stepped_ = stepped_ || moved > kSmallStep || moved < -kSmallStep;
+  const auto step = now.utc - now.since_boot - start_;
+  stepped_ = stepped_ || step > kLargestStep || step < -kLargestStep;
   return stepped_;
 }
 

@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kLongestAnswer = 64u << 20;  // 10^5 standstills of a verification take 20 MB
+constexpr std::size_t kLongestAnswer = 64u << 20;  // a verification with 10^5 standstills: 20 MB
 
 Error no_answer(const std::filesystem::path& path, std::string seen) {
   return {ErrorCode::Io, fmt::format("daemon at {}: {}", path.string(), seen)};
@@ -32,15 +32,16 @@ Result<void> send_line(int fd, const std::string& line, const std::filesystem::p
   for (std::size_t sent = 0; sent < line.size();) {
     const ssize_t n = ::send(fd, line.data() + sent, line.size() - sent, MSG_NOSIGNAL);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0 && errno == EAGAIN) return tl::unexpected(no_answer(path, "takes no request"));
+    if (n < 0 && errno == EAGAIN)
+      return tl::unexpected(no_answer(path, "does not accept the request"));
     if (n <= 0) return tl::unexpected(no_answer(path, std::strerror(errno)));
     sent += static_cast<std::size_t>(n);
   }
   return {};
 }
 
-/// Milliseconds until `end`, at least 0.
-int rest_until(Clock::time_point end) {
+/// From now until `end`, at least 0.
+int remaining_ms(Clock::time_point end) {
   return static_cast<int>(std::max<std::int64_t>(
       0, std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count()));
 }
@@ -53,17 +54,17 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
 
   for (;;) {
     pollfd wait{fd, POLLIN, 0};
-    const int ready = ::poll(&wait, 1, rest_until(end));
+    const int ready = ::poll(&wait, 1, remaining_ms(end));
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0)
       return tl::unexpected(no_answer(path, fmt::format("no answer in {} ms", time_out.count())));
     const ssize_t n = ::read(fd, buffer.data(), buffer.size());
     if (n <= 0) return tl::unexpected(no_answer(path, "closed the connection without an answer"));
-    const std::string_view came{buffer.data(), static_cast<std::size_t>(n)};
-    line += came.substr(0, came.find('\n'));
-    if (came.find('\n') != std::string_view::npos) return line;
+    const std::string_view received{buffer.data(), static_cast<std::size_t>(n)};
+    line += received.substr(0, received.find('\n'));
+    if (received.find('\n') != std::string_view::npos) return line;
     if (line.size() > kLongestAnswer)
-      return tl::unexpected(no_answer(path, "answered without an end"));
+      return tl::unexpected(no_answer(path, "the answer is too long"));
   }
 }
 
@@ -73,16 +74,18 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
                         std::chrono::milliseconds time_out) {
   auto fd = connect_unix(socket_path, time_out);
   if (!fd) return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
+
   set_send_time_out(fd->get(), time_out);
   if (auto sent = send_line(fd->get(), line_of(request), socket_path); !sent)
     return tl::unexpected(sent.error());
   const auto line = receive_line(fd->get(), time_out, socket_path);
   if (!line) return tl::unexpected(line.error());
+
   auto parsed = parse_json(*line, "answer", {.bytes = kLongestAnswer, .values = kLongestAnswer});
   if (!parsed) return tl::unexpected(no_answer(socket_path, parsed.error().text));
   json& answer = *parsed;
   if (!answer.is_object())
-    return tl::unexpected(no_answer(socket_path, "answered something that is not a JSON object"));
+    return tl::unexpected(no_answer(socket_path, "the answer is not a JSON object"));
   const auto ok = answer.find("ok");
   if (ok == answer.end() || *ok != true) return tl::unexpected(error_of_refusal(answer));
 

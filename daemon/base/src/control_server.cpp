@@ -33,20 +33,22 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostUnread = 1u << 20;  // of answers; a client that reads none gets no more
-constexpr auto kRest = std::chrono::milliseconds{200};  // without descriptors for a newcomer
-constexpr int kNewcomersAtOnce = 16;
+// Bytes of answers that a client has not read; above this its next requests wait.
+constexpr std::size_t kMostUnread = 1u << 20;
+// Pause before the next accept() when no file descriptors are left.
+constexpr auto kAcceptPause = std::chrono::milliseconds{200};
+constexpr int kAcceptsPerCycle = 16;
 
 using Clock = std::chrono::steady_clock;
 
 struct Client {
   FileDescriptor fd;
   ControlPeer peer;
-  Clock::time_point active;  ///< when a byte last came or left
+  Clock::time_point active;  ///< time of the last received or sent byte
   std::string inbox = {};
   std::string outbox = {};
 
-  [[nodiscard]] bool asks() const { return inbox.find('\n') != std::string::npos; }
+  [[nodiscard]] bool has_request() const { return inbox.find('\n') != std::string::npos; }
   [[nodiscard]] bool may_be_answered() const { return outbox.size() < kMostUnread; }
 };
 
@@ -58,8 +60,8 @@ std::string name_of(uid_t uid) {
   return found != nullptr ? found->pw_name : fmt::format("uid {}", uid);
 }
 
-/// socket(7): SO_PEERGROUPS says by ERANGE how many there are. A kernel that does not know it:
-/// none.
+/// SO_PEERGROUPS, socket(7): fails with ERANGE and reports the size if the buffer is too small. An
+/// empty list if the kernel does not support it.
 std::vector<gid_t> supplementary_groups_at(int fd) {
   std::vector<gid_t> groups(64);
   for (;;) {
@@ -96,9 +98,12 @@ class Server final : public ControlServer {
     thread_ = std::thread([this] {
       try {
         serve();
-      } catch (
-          const std::exception& defect) {  // nobody is answered any more; everything else goes on
-        fmt::print(stderr, "abbed: the control socket ended by a defect: {}\n", defect.what());
+      } catch (const std::exception& error) {
+        // Only the control socket stops; measuring and recording continue.
+        fmt::print(stderr,
+                   "abbed: the control socket stopped with an internal error: {}; commands get no "
+                   "answer until abbed is restarted\n",
+                   error.what());
       }
     });
   }
@@ -116,14 +121,17 @@ class Server final : public ControlServer {
   void serve() {
     for (;;) {
       const auto now = Clock::now();
-      // The listener stays readable while a newcomer cannot be taken: a descriptor of -1 is not
-      // looked at.
-      const bool rests = rest_until_ > now;
+
+      // While accept() is paused the listener would stay readable and poll() would return at once:
+      // its descriptor is replaced by -1, which poll() ignores.
+      const bool accept_paused = accept_paused_until_ > now;
       std::vector<pollfd> waits{{wake_.get(), POLLIN, 0},
-                                {rests ? -1 : listener_.get(), POLLIN, 0}};
+                                {accept_paused ? -1 : listener_.get(), POLLIN, 0}};
       for (const Client& c : clients_) waits.push_back({c.fd.get(), events_of(c), 0});
+
       if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR) return;
       if (waits[0].revents != 0) return;
+
       std::size_t i = 2;
       for (auto c = clients_.begin(); c != clients_.end(); ++i)
         c = cycle(*c, waits[i].revents) ? std::next(c) : clients_.erase(c);
@@ -132,11 +140,11 @@ class Server final : public ControlServer {
     }
   }
 
-  /// Until a client has to be closed or a newcomer may be taken; -1: for ever.
+  /// Time until an idle client must be closed or accept() resumes; -1: no limit.
   [[nodiscard]] int time_out_ms(Clock::time_point now) const {
-    auto until = rest_until_ > now ? rest_until_ : Clock::time_point::max();
+    auto until = accept_paused_until_ > now ? accept_paused_until_ : Clock::time_point::max();
     for (const Client& c : clients_) {
-      if (c.asks() && c.may_be_answered()) return 0;
+      if (c.has_request() && c.may_be_answered()) return 0;
       until = std::min(until, c.active + limits_.idle);
     }
     if (until == Clock::time_point::max()) return -1;
@@ -144,17 +152,17 @@ class Server final : public ControlServer {
         0, std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
   }
 
-  /// What was asked is answered before more is read.
+  /// While a complete request waits for its answer, nothing more is read from the client.
   static short events_of(const Client& c) {
-    return static_cast<short>((c.asks() ? 0 : POLLIN) | (c.outbox.empty() ? 0 : POLLOUT));
+    return static_cast<short>((c.has_request() ? 0 : POLLIN) | (c.outbox.empty() ? 0 : POLLOUT));
   }
 
   void accept_some() {
-    for (int i = 0; i < kNewcomersAtOnce; ++i) {
+    for (int i = 0; i < kAcceptsPerCycle; ++i) {
       FileDescriptor fd{::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
       if (!fd) {
         if (errno != EAGAIN && errno != EINTR && errno != ECONNABORTED)
-          rest_until_ = Clock::now() + kRest;
+          accept_paused_until_ = Clock::now() + kAcceptPause;
         return;
       }
       ControlPeer peer = peer_at(fd.get());
@@ -168,49 +176,51 @@ class Server final : public ControlServer {
         std::ranges::count_if(clients_, [uid](const Client& c) { return c.peer.uid == uid; }));
   }
 
-  void make_place_for(uid_t newcomer) {
-    if (connections_of(newcomer) >= limits_.of_one_user) {
-      close_oldest_of(newcomer);
+  void make_place_for(uid_t user) {
+    if (connections_of(user) >= limits_.of_one_user) {
+      close_longest_idle_of(user);
     } else if (clients_.size() >= limits_.connections) {
       const auto most = std::ranges::max_element(
           clients_, {}, [this](const Client& c) { return connections_of(c.peer.uid); });
-      close_oldest_of(most->peer.uid);
+      close_longest_idle_of(most->peer.uid);
     }
   }
 
-  void close_oldest_of(uid_t uid) {
-    auto oldest = clients_.end();
+  void close_longest_idle_of(uid_t uid) {
+    auto longest_idle = clients_.end();
     for (auto c = clients_.begin(); c != clients_.end(); ++c)
-      if (c->peer.uid == uid && (oldest == clients_.end() || c->active < oldest->active))
-        oldest = c;
-    if (oldest == clients_.end()) return;
-    say_goodbye(*oldest,
-                fmt::format("closed for a newer connection: at most {} are open, {} of one user",
-                            limits_.connections, limits_.of_one_user));
-    clients_.erase(oldest);
+      if (c->peer.uid == uid &&
+          (longest_idle == clients_.end() || c->active < longest_idle->active))
+        longest_idle = c;
+    if (longest_idle == clients_.end()) return;
+    send_closing_line(
+        *longest_idle,
+        fmt::format("closed for a newer connection: at most {} are open, {} of one user",
+                    limits_.connections, limits_.of_one_user));
+    clients_.erase(longest_idle);
   }
 
   void close_idle(Clock::time_point now) {
     std::erase_if(clients_, [&](const Client& c) {
       if (now - c.active < limits_.idle) return false;
-      say_goodbye(c, fmt::format("closed: idle for {} ms", limits_.idle.count()));
+      send_closing_line(c, fmt::format("closed: idle for {} ms", limits_.idle.count()));
       return true;
     });
   }
 
-  /// A whole line or nothing: answers that were not read are not torn.
-  static void say_goodbye(const Client& c, std::string why) {
+  /// Sends a whole line or nothing: the line must not follow a partly sent answer.
+  static void send_closing_line(const Client& c, std::string why) {
     if (!c.outbox.empty()) return;
     const std::string line =
         line_of(refusal({ErrorCode::Refused, "control socket: " + std::move(why)}));
     (void)!::send(c.fd.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
 
-  /// One answer a turn, so that nobody waits for a client that asks much. False when the client is
-  /// gone or misbehaves.
+  /// Answers at most one request per cycle, so that a client with many requests does not delay the
+  /// others. False if the client disconnected or its request is too long.
   bool cycle(Client& c, short revents) {
-    if (!c.asks() && revents != 0 && !read(c)) return false;
-    if (c.asks() && c.may_be_answered()) {
+    if (!c.has_request() && revents != 0 && !read(c)) return false;
+    if (c.has_request() && c.may_be_answered()) {
       const std::size_t end = c.inbox.find('\n');
       c.outbox += line_of(answer(c.inbox.substr(0, end), c.peer));
       c.active = Clock::now();
@@ -244,12 +254,12 @@ class Server final : public ControlServer {
     json& request = *parsed;
     if (!request.is_object() || !request.contains("do") || !request["do"].is_string()) {
       return refusal(
-          {ErrorCode::Usage, R"(expected one JSON object a line with a string member "do")"});
+          {ErrorCode::Usage, R"(expected one JSON object per line with a string member "do")"});
     }
-    request["user"] = peer.user;  // whatever the client said there
+    request["user"] = peer.user;  // overwrites a "user" sent by the client
     try {
       return handler_(request, peer);
-    } catch (const std::exception& e) {  // a member of the wrong type, as nlohmann::json says it
+    } catch (const std::exception& e) {  // nlohmann::json: a member has the wrong type
       return refusal({ErrorCode::Usage, fmt::format("request \"{}\": {}",
                                                     request["do"].get<std::string>(), e.what())});
     }
@@ -261,7 +271,7 @@ class Server final : public ControlServer {
   std::filesystem::path path_;
   Handler handler_;
   std::list<Client> clients_;
-  Clock::time_point rest_until_{};
+  Clock::time_point accept_paused_until_{};
   std::thread thread_;
 };
 

@@ -6,11 +6,11 @@
 
 namespace abbe::daemon {
 
-ExitDeadline::ExitDeadline(std::chrono::nanoseconds patience, int exit_code, std::string message)
-    : thread_([this, patience, exit_code, text = std::move(message)] {
-        if (met_.wait_for(patience)) return;
-        (void)!::write(STDERR_FILENO, text.data(),
-                       text.size());  // stdio may be locked by what hangs
+ExitDeadline::ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, std::string message)
+    : thread_([this, time_limit, exit_code, text = std::move(message)] {
+        if (met_.wait_for(time_limit)) return;
+        // write(), not stdio: the hanging thread may hold the lock of stderr.
+        (void)!::write(STDERR_FILENO, text.data(), text.size());
         ::_exit(exit_code);
       }) {}
 

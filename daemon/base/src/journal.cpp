@@ -17,10 +17,10 @@
 namespace abbe::daemon {
 namespace {
 
-// A journal that is stopped takes nothing; abbed must end all the same.
-constexpr std::chrono::milliseconds kJournalPatience{50};
+// Limits the wait for a journal that does not read its socket, so that abbed can still exit.
+constexpr std::chrono::milliseconds kJournalSendTimeOut{50};
 
-/// A value with a line break goes behind its length, 64 bits, little-endian first.
+/// NAME=VALUE; a value with a line break is preceded by its length, 64 bits, little-endian.
 void append_field(std::string& datagram, std::string_view name, std::string_view value) {
   datagram += name;
   if (value.find('\n') == std::string_view::npos) {
@@ -41,21 +41,20 @@ class NativeJournal final : public JournalSink {
   void write(const JournalEntry& entry) override {
     std::string datagram;
     append_field(datagram, "MESSAGE",
-                 refused_ == 0
-                     ? entry.message
-                     : fmt::format("{}; {} lines before this were not taken by the journal",
-                                   entry.message, refused_));
+                 lost_ == 0 ? entry.message
+                            : fmt::format("{}; the journal lost {} entries before this one",
+                                          entry.message, lost_));
     append_field(datagram, "PRIORITY", std::to_string(static_cast<int>(entry.urgency)));
     append_field(datagram, "SYSLOG_IDENTIFIER", "abbed");
     append_field(datagram, "MESSAGE_ID", entry.message_id);
     for (const auto& [name, value] : entry.fields) append_field(datagram, name, value);
-    if (refused_ > 0) append_field(datagram, "ABBE_NOT_TAKEN", std::to_string(refused_));
-    refused_ = ::write(socket_.get(), datagram.data(), datagram.size()) < 0 ? refused_ + 1 : 0;
+    if (lost_ > 0) append_field(datagram, "ABBE_NOT_TAKEN", std::to_string(lost_));
+    lost_ = ::write(socket_.get(), datagram.data(), datagram.size()) < 0 ? lost_ + 1 : 0;
   }
 
  private:
   FileDescriptor socket_;
-  std::uint64_t refused_ = 0;  ///< entries before this one that the journal did not take
+  std::uint64_t lost_ = 0;  ///< consecutive entries lost before the next one
 };
 
 class TextJournal final : public JournalSink {
@@ -65,8 +64,8 @@ class TextJournal final : public JournalSink {
   void write(const JournalEntry& entry) override {
     std::string line = fmt::format("abbed: {} [", entry.message);
     for (const auto& [name, value] : entry.fields)
-      if (name != "ABBE_FAULT")
-        line += fmt::format("{}={} ", name, value);  // it stands in the message
+      if (name != "ABBE_FAULT")  // the message contains it
+        line += fmt::format("{}={} ", name, value);
     line.back() = ']';
     std::ranges::replace_if(
         line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
@@ -78,8 +77,8 @@ class TextJournal final : public JournalSink {
   int fd_;
 };
 
-/// JOURNAL_STREAM is "DEVICE:INODE" of the stream that leads to the journal.
-bool stderr_is_in_the_journal() {
+/// JOURNAL_STREAM is "DEVICE:INODE" of the stream that is connected to the journal.
+bool stderr_leads_to_journal() {
   const char* stream = std::getenv("JOURNAL_STREAM");
   struct stat status {};
   if (stream == nullptr || ::fstat(STDERR_FILENO, &status) != 0) return false;
@@ -91,7 +90,7 @@ bool stderr_is_in_the_journal() {
 Result<std::unique_ptr<JournalSink>> native_journal(const std::filesystem::path& socket) {
   auto connected = connect_unix_datagrams(socket);
   if (!connected) return tl::unexpected(connected.error());
-  set_send_time_out(connected->get(), kJournalPatience);
+  set_send_time_out(connected->get(), kJournalSendTimeOut);
   return std::make_unique<NativeJournal>(std::move(*connected));
 }
 
@@ -100,7 +99,7 @@ std::unique_ptr<JournalSink> text_journal(int fd) {
 }
 
 std::unique_ptr<JournalSink> open_journal() {
-  if (stderr_is_in_the_journal())
+  if (stderr_leads_to_journal())
     if (auto journal = native_journal()) return std::move(*journal);
   return text_journal(STDERR_FILENO);
 }

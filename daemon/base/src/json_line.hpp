@@ -5,8 +5,8 @@
 
 namespace abbe::daemon {
 
-/// One line of the control API. Devices and file names may hold bytes that are no UTF-8: replaced,
-/// never thrown.
+/// One line of the control API. Invalid UTF-8, which device messages and file names may contain, is
+/// replaced; nothing is thrown.
 inline std::string line_of(const nlohmann::json& message) {
   return message.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
 }

@@ -24,14 +24,14 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// The lines of a text with their numbers; comments and blank lines are skipped.
+/// Iterates over the lines of a text and counts them; skips comments and blank lines.
 class Lines {
  public:
   explicit Lines(std::string_view text) : text_(text) {
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // the byte order mark some editors write
+    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // byte order mark
   }
 
-  /// False at the end. `ended` says whether the line had its newline.
+  /// False at the end of the text. Then ended() is false if the last line has no newline.
   bool next(std::string_view& line) {
     while (at_ < text_.size()) {
       const auto newline = text_.find('\n', at_);
@@ -59,10 +59,10 @@ class Lines {
 
 struct Cell {
   std::string_view text;
-  std::size_t column = 1;  // of its first character in the line, from 1
+  std::size_t column = 1;  // of the first character, counted from 1
 };
 
-/// Cuts the next cell off the line; false when there is none left.
+/// Iterates over the cells of a line; next() returns false after the last one.
 class Cells {
  public:
   explicit Cells(std::string_view line) : line_(line) {}
@@ -97,7 +97,7 @@ std::size_t count_present(const TableForm& form, const std::vector<Cell>& header
       }));
 }
 
-/// The form with most columns in the header: what the file was meant to be.
+/// The form with the most columns in this header. Faults are then reported against this form.
 std::size_t choose_form(const std::vector<TableForm>& forms, const std::vector<Cell>& header) {
   const auto best = std::max_element(forms.begin(), forms.end(), [&](const auto& a, const auto& b) {
     return count_present(a, header) < count_present(b, header);
@@ -111,7 +111,7 @@ std::vector<std::string_view> names(const TableForm& form) {
   return result;
 }
 
-/// For each cell of a row, the column of the form it belongs to.
+/// For each cell of a row, the index of its column in the form.
 std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cell>& header,
                                     std::size_t line, Faults& faults) {
   const auto known = names(form);
@@ -125,7 +125,7 @@ std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cel
       faults.add(line, header[i].column, header[i].text,
                  "unknown column" + suggestion(header[i].text, known));
     else if (seen[column])
-      faults.add(line, header[i].column, header[i].text, "column stands twice");
+      faults.add(line, header[i].column, header[i].text, "column occurs twice");
     else
       seen[column] = true, target[i] = column;
   }
@@ -138,11 +138,11 @@ std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cel
   return target;
 }
 
-/// What is wrong with a cell, or nothing and its value.
+/// Sets `value`. Returns what is wrong with the cell; empty if it is valid.
 std::string_view parse_cell(std::string_view text, double& value) {
   if (text.empty()) return "empty";
-  if (text.front() == '+')
-    text.remove_prefix(1);  // from_chars does not take it, spreadsheets write it
+  // Spreadsheets write "+"; std::from_chars does not accept it.
+  if (text.front() == '+') text.remove_prefix(1);
   const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (fault == std::errc::result_out_of_range) return "out of range";
   if (fault != std::errc{} || end != text.data() + text.size()) return "not a number";
@@ -165,7 +165,7 @@ class RowReader {
       if (count < target_.size()) read_cell(cell, number, target_[count], row);
     if (count != target_.size())
       faults_.add(number, line.size() + 1, "",
-                  fmt::format("{} values where {} belong", count, target_.size()));
+                  fmt::format("{} values, expected {}", count, target_.size()));
     if (faults_.count() != faults_before) table.mark_unsound();
   }
 
@@ -195,8 +195,8 @@ class RowReader {
 void check_end(const Lines& lines, std::string_view last, Faults& faults) {
   if (!lines.ended())
     faults.add(lines.number(), last.size() + 1, "",
-               "the last line does not end: the file may be cut off (end it with a newline if it "
-               "is whole)");
+               "the last line does not end with a newline: the file may be cut off (if it is "
+               "complete, add a newline)");
 }
 
 }  // namespace
@@ -221,17 +221,19 @@ std::optional<NumberTable> parse_numbers(std::string_view text, const std::vecto
     faults.add(1, 1, "", "the file is empty");
     return std::nullopt;
   }
+
   const auto header = all_cells(line);
   const auto index = choose_form(forms, header);
   const auto& form = forms[index];
   auto target = map_header(form, header, lines.number(), faults);
-  if (faults.any()) return std::nullopt;  // the rows of an unknown header would all be wrong
+  if (faults.any()) return std::nullopt;  // every row would be reported as a fault
 
   std::vector<bool> present(form.size(), false);
   for (const auto column : target) present[column] = true;
   NumberTable table(index, std::move(present));
   table.reserve(text.size() / (line.size() + 1));
   RowReader reader(form, std::move(target), faults);
+
   auto last = line;
   while (lines.next(line)) {
     reader.read(line, lines.number(), table);
@@ -240,6 +242,7 @@ std::optional<NumberTable> parse_numbers(std::string_view text, const std::vecto
   }
   check_end(lines, last, faults);
   if (progress) progress(1.0);
+
   return table;
 }
 

@@ -30,7 +30,7 @@ Error error_of_refusal(const nlohmann::json& answer) {
   const auto code =
       word == kCodes.end() ? ErrorCode::Refused : static_cast<ErrorCode>(word - kCodes.begin());
   const std::string text = text_of(answer, "error");
-  return {code, text.empty() ? "refused without a reason" : text};
+  return {code, text.empty() ? "the daemon refused the request and gave no reason" : text};
 }
 
 }  // namespace abbe::daemon

@@ -41,7 +41,7 @@ std::string finish(EVP_MD_CTX* context) {
 }  // namespace
 
 Sha256::Sha256() : state_(std::make_unique<State>()) {
-  // Both fail only when memory is gone: SHA-256 is part of the default provider.
+  // Both fail only for lack of memory: SHA-256 is part of the default provider.
   if (state_->context == nullptr || EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr) != 1)
     throw std::bad_alloc();
 }

@@ -29,7 +29,7 @@ bool write_all(int fd, std::string_view text) {
   return true;
 }
 
-/// The name in the folder is on the disk only after the folder itself is.
+/// Syncs the folder: only then the new name of a file is on the disk.
 bool sync_folder(const std::filesystem::path& folder) {
   const FileDescriptor fd(
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -45,8 +45,8 @@ Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t have = 0;
   for (;;) {
-    if (have == text.size())
-      text.resize(text.size() + 65536);  // a pipe, or a file that still grows
+    // The size is unknown (pipe), or the file became longer after fstat().
+    if (have == text.size()) text.resize(text.size() + 65536);
     const auto got = ::read(fd.get(), text.data() + have, text.size() - have);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return io_failure("read", file);
@@ -71,12 +71,12 @@ Result<std::string> read_regular_file(const std::filesystem::path& file) {
   constexpr off_t kMost_bytes = off_t{1} << 30;
   const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   struct stat status {};
-  // ENXIO: a socket, or a device without anything behind it.
+  // ENXIO: a socket, or a device file without a device.
   if (!fd && errno != ENXIO) return io_failure("read", file);
   if (!fd || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
     return fail(ErrorCode::BadInput, fmt::format("read {}: is not a regular file", file.string()));
   if (status.st_size > kMost_bytes)
-    return fail(ErrorCode::BadInput, fmt::format("read {}: has more than 1 GiB", file.string()));
+    return fail(ErrorCode::BadInput, fmt::format("read {}: larger than 1 GiB", file.string()));
   return read_all(fd, status, file);
 }
 
@@ -88,42 +88,42 @@ struct Ownership {
   mode_t mode;
 };
 
-void give(int fd, const Ownership& to) noexcept {
+void set_ownership(int fd, const Ownership& to) noexcept {
   struct stat status {};
   if (::fstat(fd, &status) != 0) return;
   if (status.st_uid != to.owner && ::fchown(fd, to.owner, to.group) == 0) status.st_gid = to.group;
-  // Not root: the group still may be one of ours.
+  // Without root rights the group may be set if this process is a member of it.
   if (status.st_gid != to.group) (void)!::fchown(fd, static_cast<uid_t>(-1), to.group);
   (void)::fchmod(fd, to.mode);
 }
 
-std::optional<Ownership> of_a_file_in(const std::filesystem::path& folder) noexcept {
+std::optional<Ownership> ownership_in_folder(const std::filesystem::path& folder) noexcept {
   constexpr mode_t kFileModes = 0664;
   struct stat status {};
   if (::stat(folder.empty() ? "." : folder.c_str(), &status) != 0) return std::nullopt;
   return Ownership{status.st_uid, status.st_gid, status.st_mode & kFileModes};
 }
 
-/// Nothing but a regular file is replaced with its owner and mode.
+/// Owner and mode of `file` if it is a regular file; else those that its folder gives.
 std::optional<Ownership> ownership_of(const std::filesystem::path& file) noexcept {
   struct stat status {};
   if (::lstat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode))
-    return of_a_file_in(file.parent_path());
+    return ownership_in_folder(file.parent_path());
   return Ownership{status.st_uid, status.st_gid, status.st_mode & 0777U};
 }
 
-/// The folder belongs to somebody else when root writes into it: a link laid there in wait is not
-/// followed.
+/// Creates `file` and never follows a link: when root writes into a folder of another user, that
+/// user could have placed a link there.
 FileDescriptor create_fresh(const std::filesystem::path& file) {
   constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
-  ::unlink(file.c_str());  // left by a process of the same number that was killed
+  ::unlink(file.c_str());  // left by a killed process with the same process id
   return FileDescriptor{::open(file.c_str(), kFlags, 0600)};
 }
 
 }  // namespace
 
 void take_after_folder(int fd, const std::filesystem::path& folder) noexcept {
-  if (const auto ownership = of_a_file_in(folder)) give(fd, *ownership);
+  if (const auto ownership = ownership_in_folder(folder)) set_ownership(fd, *ownership);
 }
 
 Result<void> create_folder(const std::filesystem::path& folder) {
@@ -132,14 +132,15 @@ Result<void> create_folder(const std::filesystem::path& folder) {
   if (auto above = create_folder(folder.parent_path()); !above) return above;
   if (::mkdir(folder.c_str(), 0777) != 0)
     return errno == EEXIST ? Result<void>{} : io_failure("create", folder);
+
   struct stat above {};
   const auto parent = folder.parent_path();
   const FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
 
-  // Only root makes folders in another's folder that the other must be able to use.
+  // A folder that root creates in the folder of another user must be usable by that user.
   if (fd && ::geteuid() == 0 && ::stat(parent.empty() ? "." : parent.c_str(), &above) == 0 &&
       above.st_uid != 0)
-    give(fd.get(), {above.st_uid, above.st_gid, above.st_mode & 0777U});
+    set_ownership(fd.get(), {above.st_uid, above.st_gid, above.st_mode & 0777U});
 
   return {};
 }
@@ -149,7 +150,7 @@ Result<void> replace_file(const std::filesystem::path& file, std::string_view te
   {
     const FileDescriptor fd = create_fresh(fresh);
     if (fd.get() < 0) return io_failure("write", fresh);
-    if (const auto ownership = ownership_of(file)) give(fd.get(), *ownership);
+    if (const auto ownership = ownership_of(file)) set_ownership(fd.get(), *ownership);
     if (!write_all(fd.get(), text) || ::fsync(fd.get()) != 0) {
       const auto failure = io_failure("write", fresh);
       ::unlink(fresh.c_str());

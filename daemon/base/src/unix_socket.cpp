@@ -45,15 +45,15 @@ Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
   if (!address) return tl::unexpected(address.error());
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
   if (!fd) return tl::unexpected(failed("connect", path));
-  set_send_time_out(
-      fd.get(),
-      time_out);  // unix(7): connect() waits for a place in the backlog at most so long
-  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // the socket API's own idiom
+
+  // unix(7): SO_SNDTIMEO limits how long connect() waits for a place in the backlog.
+  set_send_time_out(fd.get(), time_out);
+  const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // as the socket API requires
 
   if (::connect(fd.get(), generic, sizeof *address) != 0) {
     if (errno != EAGAIN) return tl::unexpected(failed("connect", path));
     return fail(ErrorCode::Io,
-                fmt::format("connect {}: the process that listens there accepted nobody in {} ms",
+                fmt::format("connect {}: the listening process accepted no connection in {} ms",
                             path.string(), time_out.count()));
   }
 
@@ -94,7 +94,7 @@ Result<FileDescriptor> listen_unix(const std::filesystem::path& path) {
     std::filesystem::remove(path, error);
   } else if (type != std::filesystem::file_type::not_found) {
     return fail(ErrorCode::Io,
-                fmt::format("listen {}: there is something that is not a socket", path.string()));
+                fmt::format("listen {}: the path exists and is not a socket", path.string()));
   }
 
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)};

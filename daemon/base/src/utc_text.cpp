@@ -9,7 +9,7 @@ namespace abbe::daemon {
 using namespace std::chrono;
 
 namespace {
-/// Whole years that nanoseconds since 1970 hold in 64 bits.
+/// First and last whole year that 64 bits of nanoseconds since 1970 can represent.
 constexpr int first_year = 1678, last_year = 2261;
 }  // namespace
 
@@ -36,7 +36,7 @@ std::optional<protocol::UtcTime> utc_from_text(std::string_view text) {
     return std::nullopt;
   const protocol::UtcTime time =
       sys_days{date} + hours{h} + minutes{mi} + seconds{s} + nanoseconds{ns};
-  if (to_text(time) != text) return std::nullopt;  // sscanf takes signs and spaces, too
+  if (to_text(time) != text) return std::nullopt;  // sscanf also accepts signs and spaces
 
   return time;
 }

@@ -19,12 +19,12 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using std::chrono::steady_clock;
 
-constexpr auto kLookAtTouches = 200ms;
+constexpr auto kTouchPollPeriod = 200ms;
 
-json as_json(const std::vector<calib::Vector3>& way) {
-  json places = json::array();
-  for (const auto& p : way) places.push_back({p.x(), p.y(), p.z()});
-  return places;
+json as_json(const std::vector<calib::Vector3>& path) {
+  json positions = json::array();
+  for (const auto& p : path) positions.push_back({p.x(), p.y(), p.z()});
+  return positions;
 }
 
 json as_json(const evemu::ArtefactPlan& plan) {
@@ -52,37 +52,40 @@ Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
   return out;
 }
 
-/// Whether the daemon heard it. That nothing is under way any more is as good.
+/// True if the touching is cancelled. Refused counts as well: no touching was running.
 bool cancel(const std::filesystem::path& socket) {
   const auto answer = ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
   return answer || answer.error().code == ErrorCode::Refused;
 }
 
-Touched look_on(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
+Touched follow_touches(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
   ProgressBar bar;
   Touched so_far;
-  bool told = false;
+  bool cancelled = false;
 
-  for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kLookAtTouches)) {
-    if (interrupted() && !told) told = cancel(socket);
+  for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kTouchPollPeriod)) {
+    if (interrupted() && !cancelled) cancelled = cancel(socket);
     const auto answer = ask_daemon(socket, {{"do", "touches"}});
     if (!answer) {
-      if (steady_clock::now() - answered < kPatienceWithoutDaemon) continue;
+      if (steady_clock::now() - answered < kDaemonTimeout) continue;
       (void)cancel(socket);
       so_far.reason = answer.error().text;
       return so_far;
     }
+
     answered = steady_clock::now();
     Touched now = touched(*answer, plan);
     const bool running = (*answer)["running"].get<bool>();
-    const bool others =
+    const bool other_plan =
         (*answer)["asked"] != plan.touches.size() || now.touches.size() < so_far.touches.size() ||
         (!running && now.reason.empty() && now.touches.size() < plan.touches.size());
-    if (others) {
+    if (other_plan) {
       so_far.reason =
-          "the touches are lost: the daemon was started anew, or makes those of somebody else";
+          "the touches are lost: the daemon restarted, or another client has begun a touching; run "
+          "the command again";
       return so_far;
     }
+
     so_far = std::move(now);
     if (!running) return so_far;
     bar.show("touching",
@@ -104,11 +107,11 @@ Result<Touched> touch_artefact(const std::filesystem::path& socket,
   mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   const auto started = ask_daemon(socket, as_json(plan));
   if (!started) {
-    // An answer that did not come does not say that nothing was begun.
+    // Without an answer the daemon may have started the touching all the same.
     if (started.error().code == ErrorCode::Io) (void)cancel(socket);
     return tl::unexpected(started.error());
   }
-  return look_on(socket, plan);
+  return follow_touches(socket, plan);
 }
 
 }  // namespace abbe::daemon

@@ -1,8 +1,8 @@
 #pragma once
-/// The part of `abbe calibrate artefact` that moves the machine: asks the running daemon for the
-/// touches of a plan and looks on. A machine that nobody watches any more must not go on moving:
-/// whatever ends the looking on (a signal, a daemon that does not answer) ends the touching, and
-/// the daemon ends it by itself when nobody asks for 2 s.
+/// The part of `abbe calibrate artefact` that moves the machine: requests the touches of a plan
+/// from the running daemon and follows them. The machine must not move unsupervised: a signal, or a
+/// daemon that does not answer, ends the following and with it the touching, and the daemon itself
+/// ends the touching if no client asks for the touches for 2 s.
 
 #include <filesystem>
 #include <string>
@@ -13,18 +13,19 @@
 
 namespace abbe::daemon {
 
-/// What the machine made of the plan; `reason` is empty when it made all of it.
+/// The touches that were made; `reason` is empty if the whole plan was executed.
 struct Touched {
   std::vector<calib::evemu::Touch> touches;
   double u_position_m = 0.0;
   std::string reason;
 };
 
-/// Where the machine stands. Refused: no [cmm], or a machine that is not ready.
+/// The position of the machine's tip, m. Refused: no [cmm], or the machine is not ready.
 [[nodiscard]] Result<calib::Vector3> machine_position(const std::filesystem::path& socket);
 
-/// Returns when it is over: all touched, refused, cancelled (SIGINT, SIGTERM, SIGHUP, SIGQUIT), or
-/// the daemon did not answer for 5 s. An error: nothing was begun.
+/// Returns when the plan is complete, or a touch was refused, or the touching was cancelled
+/// (SIGINT, SIGTERM, SIGHUP, SIGQUIT), or the daemon did not answer for 5 s. An error: the touching
+/// was not started.
 [[nodiscard]] Result<Touched> touch_artefact(const std::filesystem::path& socket,
                                              const calib::evemu::ArtefactPlan& plan);
 

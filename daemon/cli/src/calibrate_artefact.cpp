@@ -1,6 +1,6 @@
-/// `abbe calibrate artefact`: a ball array measured by the measuring machine of the running daemon:
-/// touched where its nominal description says, fitted, and written as calibrator.toml with
-/// uncertainties.
+/// `abbe calibrate artefact`: calibrates a ball array on the measuring machine of the running
+/// daemon: touches it at the positions of its nominal description, fits balls and faces, and writes
+/// calibrator.toml with uncertainties.
 
 #include <fmt/format.h>
 
@@ -38,7 +38,7 @@ struct CalibrateArtefactArguments {
   bool json = false;
 };
 
-/// The nominal artefact where it stands on the machine's table.
+/// The nominal artefact in the coordinates of the machine.
 struct Placed {
   evemu::Calibrator nominal;
   std::array<evemu::FaceToTouch, 2> faces;
@@ -57,8 +57,8 @@ Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
   for (std::size_t i = 0; i < out.faces.size(); ++i) {
     if (!file->faces[i]) {
       return fail(ErrorCode::BadInput,
-                  fmt::format("{}: block {}: x_mm, y_mm, z_mm are missing: the middle of "
-                              "the face that is to be touched",
+                  fmt::format("{}: block {}: x_mm, y_mm, z_mm are missing: add the middle of "
+                              "the face to be touched",
                               arguments.calibrator, i + 1));
     }
     out.faces[i] = {T_machine_artefact.R * file->faces[i]->centre_m + T_machine_artefact.t_m,
@@ -78,9 +78,10 @@ Result<void> keep(const Touched& touched, const std::string& file) {
   return replace_file(file, text);
 }
 
-/// A calibrator.toml of an earlier run goes on naming the touches it is from: those that came to
-/// nothing go into a file of their own.
-Error kept_aside(Error error, const Touched& touched, const std::filesystem::path& touches) {
+/// Writes the touches of an incomplete run to a separate file and adds its name to the error. The
+/// touches file itself stays unchanged, because a calibrator.toml of an earlier run names it.
+Error with_partial_touches(Error error, const Touched& touched,
+                           const std::filesystem::path& touches) {
   if (touched.touches.empty()) {
     error.details.push_back("no touch was made");
     return error;
@@ -89,7 +90,7 @@ Error kept_aside(Error error, const Touched& touched, const std::filesystem::pat
   file.replace_extension(".partial" + touches.extension().string());
   const auto kept = keep(touched, file.string());
   error.details.push_back(
-      kept ? fmt::format("{} touches until then: {}", touched.touches.size(), file.string())
+      kept ? fmt::format("{} touches were made before: {}", touched.touches.size(), file.string())
            : kept.error().text);
   return error;
 }
@@ -119,29 +120,34 @@ int calibrate(CalibrateArtefactArguments arguments) {
   if (arguments.touches.empty())
     arguments.touches =
         std::filesystem::path(arguments.out).replace_extension(".touches.csv").string();
+
   const auto artefact = placed(arguments);
   if (!artefact) return report(artefact.error());
   const auto socket = socket_path(arguments.where);
   if (!socket) return report(socket.error());
-  const auto stands = machine_position(*socket);
-  if (!stands) return report(stands.error());
-  const auto plan = evemu::plan_artefact_touches(artefact->nominal, artefact->faces, *stands,
+  const auto tip_m = machine_position(*socket);
+  if (!tip_m) return report(tip_m.error());
+  const auto plan = evemu::plan_artefact_touches(artefact->nominal, artefact->faces, *tip_m,
                                                  {.points_per_ball = arguments.points,
                                                   .points_per_face = arguments.face_points,
                                                   .clearance_m = 1e-3 * arguments.clearance_mm});
   if (!plan) return report({ErrorCode::Usage, plan.error().text, {}});
+
   const auto made = touch_artefact(*socket, *plan);
   if (!made) return report(made.error());
   if (!made->reason.empty())
-    return report(
-        kept_aside({ErrorCode::DataInsufficient,
-                    made->reason,
-                    {"the tip may stand low: raise it above everything before another run"}},
-                   *made, arguments.touches));
+    return report(with_partial_touches(
+        {ErrorCode::DataInsufficient,
+         made->reason,
+         {"the tip may be low: raise it above artefact and fixture before the next run"}},
+        *made, arguments.touches));
+
   const auto found = evemu::calibrated_artefact(artefact->nominal, artefact->faces, made->touches,
                                                 made->u_position_m);
-  if (!found) return report(kept_aside(error_of(found.error()), *made, arguments.touches));
+  if (!found)
+    return report(with_partial_touches(error_of(found.error()), *made, arguments.touches));
   if (const auto kept = keep(*made, arguments.touches); !kept) return report(kept.error());
+
   std::array<std::optional<BlockFace>, 2> faces;
   for (std::size_t i = 0; i < faces.size(); ++i)
     faces[i] = BlockFace{artefact->faces[i].centre_m, artefact->faces[i].half_size_m};
@@ -162,47 +168,49 @@ int calibrate(CalibrateArtefactArguments arguments) {
 void add_calibrate_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateArtefactArguments>();
   auto* command = parent.add_subcommand("artefact",
-                                        "A ball array on the measuring machine of the running "
-                                        "daemon ([cmm]): touches its balls on their "
-                                        "upper\n"
-                                        "half and its blocks on the faces that the file names, and "
-                                        "writes it as measured, with uncertainties.\n"
-                                        "The machine moves: first straight up from where it "
-                                        "stands, in the end up again; the ways lead around "
-                                        "the\n"
-                                        "balls and above everything, around nothing else. Ctrl-C, "
-                                        "a closed terminal or nobody asking for 2 s "
-                                        "end it\n"
-                                        "after the touch that is under way; the tip may stand low "
-                                        "then. Exit code 1 then, and when a touch "
-                                        "was\n"
-                                        "refused or the machine or the daemon went away: the "
-                                        "touches until then are kept (.partial.csv), and\n"
-                                        "what an earlier run has written stays.");
+                                        "Calibrate a ball array on the measuring machine of the "
+                                        "running daemon ([cmm]): touch the upper half\n"
+                                        "of its balls and the block faces that the file names, and "
+                                        "write the measured array with uncertainties.\n"
+                                        "THE MACHINE MOVES: first straight up from its position, "
+                                        "at the end up again. Its paths lead around\n"
+                                        "the balls and above the whole array; they avoid no other "
+                                        "obstacle. Ctrl-C, a closed terminal, or 2 s\n"
+                                        "without contact between this command and the daemon end "
+                                        "the run after the current touch; the tip may\n"
+                                        "then be low. Exit code 1 in these cases, and if a touch "
+                                        "is refused or machine or daemon do not answer\n"
+                                        "any more: the touches made before are kept "
+                                        "(.partial.csv), files of an earlier run stay unchanged.");
   command
       ->add_option(
           "--calibrator", arguments->calibrator,
           "nominal description: calibrator.toml, its blocks with x_mm, y_mm, z_mm, half_size_mm")
       ->required();
-  command->add_option("-o,--output", arguments->out, "the artefact as measured")
+  command->add_option("-o,--output", arguments->out, "file for the measured artefact")
       ->capture_default_str();
   command->add_option(
       "--touches", arguments->touches,
-      "where the touches go (default: beside the output); .partial.csv if it fails");
-  command->add_option("--at", arguments->at_mm, "where the artefact's origin stands, mm: x,y,z")
+      "file for the touches (default: in the folder of the output); .partial.csv if the run fails");
+  command
+      ->add_option("--at", arguments->at_mm,
+                   "x,y,z: position of the artefact's origin in the machine, mm")
       ->delimiter(',')
       ->expected(3)
       ->required();
-  command->add_option("--turn", arguments->turn_deg, "how far it is turned about z, degrees");
-  command->add_option("--points", arguments->points, "on a ball, at least 5")
+  command->add_option("--turn", arguments->turn_deg, "rotation of the artefact about z, degrees");
+  command->add_option("--points", arguments->points, "touches per ball, at least 5")
       ->capture_default_str();
-  command->add_option("--block-points", arguments->face_points, "on a block's face, at least 4")
+  command
+      ->add_option("--block-points", arguments->face_points, "touches per block face, at least 4")
       ->capture_default_str();
-  command->add_option("--clearance", arguments->clearance_mm, "of the tip on its ways, mm")
+  command
+      ->add_option("--clearance", arguments->clearance_mm,
+                   "distance between tip and artefact on the paths, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   add_socket_options(*command, arguments->where);
-  command->add_flag("--json", arguments->json, "the result as JSON");
+  command->add_flag("--json", arguments->json, "print the result as JSON");
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });
 }
 

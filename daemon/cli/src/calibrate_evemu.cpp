@@ -1,5 +1,5 @@
-/// `abbe calibrate evemu`: the running daemon guides through the touching of a ball array and
-/// identifies.
+/// `abbe calibrate evemu`: the running daemon guides the operator through the touches of a ball
+/// array and identifies the machine's errors.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -21,10 +21,11 @@ struct CalibrateEvemuArguments {
   FollowOptions follow;
   std::string calibrator, reference;
   double u_reference_um = 1.0;
-  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: as the daemon's configuration says
+  std::size_t points_per_ball = 0, points_per_block = 0;  // 0: from the daemon's configuration
 };
 
-/// The plan, where not said here, is the daemon's: left out.
+/// The request. Parts of the plan that the arguments do not give are left out, so that the daemon
+/// takes them from its configuration.
 Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
@@ -54,7 +55,7 @@ Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
 int calibrate(const CalibrateEvemuArguments& arguments) {
   if (arguments.follow.cancel) return cancel_calibration(arguments.follow);
   if (arguments.calibrator.empty())
-    return report({ErrorCode::Usage, "calibrate evemu: --calibrator is needed", {}});
+    return report({ErrorCode::Usage, "calibrate evemu: --calibrator is required", {}});
   const auto task = task_of(arguments);
   return task ? run_calibration(arguments.follow, *task) : report(task.error());
 }
@@ -65,13 +66,14 @@ void add_calibrate_evemu(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateEvemuArguments>();
   auto* command = parent.add_subcommand(
       "evemu",
-      "Local calibration with a ball array: says position by position what to touch next (ball 1,\n"
-      "block 1, block 2, ball 2 ...), notices missed, doubled and wrong touches, then identifies.\n"
-      "Ctrl-C ends the looking on (exit code 130), --cancel the calibration.");
+      "Local calibration with a ball array: shows position by position what to touch next\n"
+      "(ball 1, block 1, block 2, ball 2 ...), reports missed, repeated and wrong touches, then\n"
+      "identifies the model. Ctrl-C stops following (exit code 130); the calibration continues.\n"
+      "--cancel ends the calibration.");
   auto* calibrator = command->add_option("--calibrator", arguments->calibrator, "calibrator.toml");
   auto* reference = command->add_option(
       "--rotation-reference", arguments->reference,
-      "errors.csv of points where V is known independently: turns the model onto them");
+      "errors.csv of points where V is known independently: the model is rotated to fit them");
   command
       ->add_option("--u-reference-um", arguments->u_reference_um, "standard uncertainty of that V")
       ->needs(reference)

@@ -1,6 +1,6 @@
 /// `abbe calibrate probe`: delay and lobing of a touch probe from the touches of a recording. The
-/// recording is made by the running daemon while somebody touches one place at three feeds (the
-/// delay), or a sphere from all sides at the measuring feed (the lobing).
+/// running daemon makes the recording while the operator touches one place at three feeds (for the
+/// delay), or a sphere from all sides at the measuring feed (for the lobing).
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -61,8 +61,8 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
   return touches;
 }
 
-/// Chance alone exceeds this misfit once in a thousand times with three feeds; residuals smaller
-/// than any probe repeats are no reason to refuse.
+/// Refuses a fit whose lack of fit is significant: with three feeds, random scatter exceeds the
+/// limit with a probability of 0.001. Residuals below the repeatability of any probe are accepted.
 std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
   constexpr double kMostLackOfFit = 10.8;
   constexpr double kRepeats_m = 0.1e-6;
@@ -70,9 +70,9 @@ std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
   return Error{
       ErrorCode::DataInsufficient,
       fmt::format(
-          "probe delay: the places do not lie on a line over the feed (misfit {:.1f}, residuals "
-          "{:.3f} um): more than one place, something moved, or a latch not yet in step with its "
-          "clock",
+          "probe delay: the positions are not linear in the feed (lack of fit {:.1f}, residuals "
+          "{:.3f} um): more than one place was touched, something moved, or the latch was not yet "
+          "synchronised with its clock; record the touches again",
           fit.misfit, 1e6 * fit.residual_rms_m),
       {}};
 }
@@ -96,11 +96,10 @@ int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
   }
 
   fmt::print(
-      "# {} touches at {} feeds; misfit {:.2f} (about 1: the places lie on a line), in u_delay_us "
-      "with the "
-      "{:.0f} degrees of freedom\n",
+      "# {} touches at {} feeds; lack of fit {:.2f} (about 1: the positions are linear in the "
+      "feed), included in u_delay_us with the {:.0f} degrees of freedom\n",
       fit.touches, fit.feeds, fit.misfit, fit.dof);
-  fmt::print("# to be added to the delay_us they were made with; scatter {:.3f} um\n",
+  fmt::print("# add this delay_us to the delay_us of the recording; scatter {:.3f} um\n",
              1e6 * fit.u_scatter_m);
   fmt::print("delay_us = {:.3f}\nu_delay_us = {:.3f}\njitter_us = {:.3f}\n", 1e6 * fit.delay_s,
              1e6 * fit.u_delay_s, 1e6 * fit.u_jitter_s);
@@ -148,8 +147,8 @@ int fit(const CalibrateProbeArguments& arguments,
   return print_delay(*fit, arguments.json);
 }
 
-/// Touches that are missing or wrong may be those that would not have fitted: the result is shown,
-/// and refused.
+/// From a damaged recording the result is printed and refused: the lost touches could be the ones
+/// that do not fit.
 int calibrate(const CalibrateProbeArguments& arguments) {
   const auto touches = touches_of(arguments);
   if (!touches) return report(touches.error());
@@ -166,17 +165,17 @@ void add_calibrate_probe(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateProbeArguments>();
   auto* command = parent.add_subcommand(
       "probe",
-      "A touch probe from recorded touches: its delay from one place touched at three feeds, or, "
-      "with a "
-      "sphere's radius, its effective tip radius and lobing.\n"
-      "Exit code 1, with the result all the same, if the recording is damaged inside.");
-  command->add_option("--recording", arguments->recording, "a recording with touches")->required();
+      "Calibrate a touch probe from recorded touches: its delay, from one place touched at three\n"
+      "feeds; or with --sphere-radius-mm its effective tip radius and lobing.\n"
+      "If the recording is damaged before its end, the result is printed and the exit code is 1.");
+  command->add_option("--recording", arguments->recording, "recording with the touches")
+      ->required();
   command->add_option("--probe", arguments->probe, "only touches of this probe; 0: all");
   command->add_option("--sphere-radius-mm", arguments->sphere_radius_mm,
-                      "qualify on a sphere of this radius");
+                      "radius of the touched sphere: qualify the probe");
   command->add_option("--u-sphere-radius-um", arguments->u_sphere_radius_um,
-                      "its standard uncertainty");
-  command->add_flag("--json", arguments->json, "the result as JSON");
+                      "standard uncertainty of the radius");
+  command->add_flag("--json", arguments->json, "print the result as JSON");
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });
 }
 

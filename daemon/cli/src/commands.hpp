@@ -1,6 +1,7 @@
 #pragma once
-/// One function per subcommand: it adds itself to `parent`; when it was called, its callback leaves
-/// the exit code in `exit`. Options that hold a value live as long as the callback does.
+/// One function per subcommand. It adds the subcommand to `parent`; the callback of the subcommand
+/// runs it and stores the exit code in `exit`. The variables of the options live as long as the
+/// callback.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

@@ -14,7 +14,7 @@ namespace abbe::daemon {
 void add_socket_options(CLI::App& command, DaemonSocket& where) {
   auto* socket = command.add_option("--socket", where.socket, "control socket of abbed")
                      ->capture_default_str();
-  command.add_option("-c,--config", where.config, "take the socket from this abbed.toml")
+  command.add_option("-c,--config", where.config, "read the socket from this abbed.toml")
       ->excludes(socket);
 }
 

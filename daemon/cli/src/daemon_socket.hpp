@@ -1,5 +1,5 @@
 #pragma once
-/// How a command finds the running daemon: --socket, or the configuration that names it.
+/// How a command finds the running daemon: by --socket, or by the socket in the configuration.
 
 #include <CLI/App.hpp>
 #include <chrono>
@@ -11,8 +11,8 @@
 
 namespace abbe::daemon {
 
-/// For so long whoever waits for something goes on asking a daemon that does not answer.
-inline constexpr std::chrono::seconds kPatienceWithoutDaemon{5};
+/// A command that follows the daemon gives up after this time without an answer.
+inline constexpr std::chrono::seconds kDaemonTimeout{5};
 
 struct DaemonSocket {
   std::string socket = "/run/abbe/control.sock";
@@ -21,7 +21,7 @@ struct DaemonSocket {
 
 void add_socket_options(CLI::App& command, DaemonSocket& where);
 [[nodiscard]] Result<std::filesystem::path> socket_path(const DaemonSocket& where);
-/// Who gives this command: the user's name, for the record.
+/// The name of the user who runs this command, for the records of the daemon and the store.
 [[nodiscard]] std::string user_name();
 
 }  // namespace abbe::daemon

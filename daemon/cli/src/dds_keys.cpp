@@ -1,4 +1,5 @@
-/// `abbe dds keys`: keys and permissions with which strangers are kept out of the DDS domain.
+/// `abbe dds keys`: makes keys and permissions for DDS Security, so that only participants with
+/// such keys can publish and read in the DDS domain.
 
 #include <fmt/format.h>
 
@@ -24,8 +25,7 @@ void print_next_steps(const KeyArguments& arguments) {
       std::filesystem::absolute(arguments.folder).lexically_normal().string();
   fmt::print(
       "made {}: a certificate authority, and identities for the daemon and {} subscriber{}, valid "
-      "for {} "
-      "days\n",
+      "for {} days\n",
       folder, arguments.subscribers, arguments.subscribers == 1 ? "" : "s", arguments.days);
   fmt::print(
       "next:\n"
@@ -33,9 +33,9 @@ void print_next_steps(const KeyArguments& arguments) {
       "  2. in abbed.toml, under [dds]:  security = \"{0}/daemon\"     then restart abbed\n"
       "  3. copy {0}/subscriber-1 to the first subscriber's computer; there:\n"
       "       abbe watch --security subscriber-1\n"
-      "  4. move {0}/ca.key to a safe place away from this computer: whoever has it can make "
-      "identities\n"
-      "From then on nobody without such an identity can publish or read; `abbe status` shows it.\n",
+      "  4. move {0}/ca.key to a safe place away from this computer: with this file anyone can "
+      "make identities\n"
+      "Then only participants with such an identity can publish or read; see `abbe status`.\n",
       folder);
 }
 
@@ -54,18 +54,18 @@ int make_keys(const KeyArguments& arguments) {
 void add_dds_keys(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<KeyArguments>();
   auto* command = parent.add_subcommand("keys",
-                                        "Make keys and permissions for DDS Security: without an "
-                                        "identity from here nobody publishes or reads");
+                                        "Make keys and permissions for DDS Security: only "
+                                        "participants with such an identity can publish or read");
   command
       ->add_option("-o,--out", arguments->folder,
-                   "new folder; nothing that is there is overwritten")
+                   "new folder for the keys; existing files are not overwritten")
       ->required();
   command
       ->add_option("--subscribers", arguments->subscribers,
-                   "how many subscribers get an identity of their own")
+                   "number of subscribers; each gets its own identity")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  command->add_option("--days", arguments->days, "how long the identities are valid")
+  command->add_option("--days", arguments->days, "validity of the identities, days")
       ->capture_default_str()
       ->check(CLI::Range(1, 36500));
   command->callback([arguments, &exit] { exit = make_keys(*arguments); });

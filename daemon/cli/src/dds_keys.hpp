@@ -1,5 +1,5 @@
 #pragma once
-/// `abbe dds keys`: adds itself to `parent`; see commands.hpp.
+/// `abbe dds keys`: adds the subcommand to `parent`; see commands.hpp.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

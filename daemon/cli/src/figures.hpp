@@ -1,5 +1,5 @@
 #pragma once
-/// Figures of vectors as --json gives them.
+/// Statistics of vectors in the format of --json.
 
 #include <nlohmann/json.hpp>
 

@@ -16,20 +16,20 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-constexpr auto kLook = 200ms;  // how often a person's progress bar moves
+constexpr auto kStatusPollPeriod = 200ms;  // also the period of the progress bar
 
-int say_how_to_cancel(const Following& following) {
-  constexpr int kInterrupted = 128 + SIGINT;  // what a shell reports
+int print_how_to_cancel(const Following& following) {
+  constexpr int kInterrupted = 128 + SIGINT;  // the exit code that a shell reports for SIGINT
   if (following.cancel.empty()) {
-    fmt::print(stderr, "abbe: {} goes on; no command ends it\n", following.what);
+    fmt::print(stderr, "abbe: {} continues; no command ends it\n", following.what);
   } else {
-    fmt::print(stderr, "abbe: {} goes on; end it with: {} --socket {}\n", following.what,
+    fmt::print(stderr, "abbe: {} continues; to end it: {} --socket {}\n", following.what,
                following.cancel, following.socket.string());
   }
   return kInterrupted;
 }
 
-/// Whether it is still the daemon that was asked first.
+/// Detects a restart of the daemon: compares the process of each status with that of the first.
 class SameDaemon {  // NOLINT(bugprone-exception-escape): an empty json throws nothing
  public:
   bool is(const json& status) {
@@ -49,21 +49,22 @@ int follow(const Following& following, ProgressBar& bar) {
   SameDaemon same;
   auto answered = std::chrono::steady_clock::now();
 
-  for (;; std::this_thread::sleep_for(kLook)) {
+  for (;; std::this_thread::sleep_for(kStatusPollPeriod)) {
     if (interrupted()) {
       bar.clear();
-      return say_how_to_cancel(following);
+      return print_how_to_cancel(following);
     }
 
     const auto status = ask_daemon(following.socket, {{"do", "status"}});
     const auto now = std::chrono::steady_clock::now();
-    if (!status && now - answered < kPatienceWithoutDaemon) continue;
+    if (!status && now - answered < kDaemonTimeout) continue;
 
     if (!status || !same.is(*status)) {
       bar.clear();
       return report(
           status ? Error{ErrorCode::Io,
-                         fmt::format("{} is lost: the daemon was started anew", following.what)}
+                         fmt::format("{} is lost: the daemon restarted; run the command again",
+                                     following.what)}
                  : status.error());
     }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Looking on while the daemon works, until it is done: the same for calibrations, the search for
-/// reference marks and orders to a tracker.
+/// Follows a task of the daemon until it has ended. Used for calibrations, the search for reference
+/// marks and orders to a tracker.
 
 #include <filesystem>
 #include <functional>
@@ -14,15 +14,15 @@ namespace abbe::daemon {
 
 struct Following {
   std::filesystem::path socket;
-  std::string what;    ///< "the calibration": said when somebody stops looking on
-  std::string cancel;  ///< the command that would end it; empty: none does
-  /// Given the answer to "status": the exit code once it is over, and what came of it said.
+  std::string what;    ///< "the calibration": the task in messages to the user
+  std::string cancel;  ///< the command that ends the task; empty: there is none
+  /// Called with the answer to "status". Prints the progress. Once the task has ended, prints its
+  /// result and returns the exit code; nullopt before that.
   std::function<std::optional<int>(const nlohmann::json& status)> look;
 };
 
-/// Asks for the status again and again. Ctrl-C ends the looking on, not the work (exit code 130).
-/// Io if the daemon does not answer for 5 s, or is another one than before: what it was doing is
-/// lost then.
+/// Requests the status periodically. Ctrl-C stops the following, not the task (exit code 130). Io
+/// if the daemon does not answer for 5 s, or has restarted: the task is lost then.
 [[nodiscard]] int follow(const Following& following, ProgressBar& bar);
 
 }  // namespace abbe::daemon

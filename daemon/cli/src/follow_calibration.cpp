@@ -21,9 +21,11 @@ using nlohmann::json;
 
 int print_session_verdict(const json& session, bool as_json) {
   const std::string state = session["state"];
-  // A session ends in a verdict; a daemon without one is not the one that was asked.
+  // A session never ends in "idle": the daemon has restarted.
   if (state == "idle")
-    return report({ErrorCode::Io, "the calibration is lost: the daemon was started anew", {}});
+    return report({ErrorCode::Io,
+                   "the calibration is lost: the daemon restarted; run the command again",
+                   {}});
   if (as_json) {
     fmt::print("{}\n", session.dump(1));
   } else {
@@ -33,35 +35,35 @@ int print_session_verdict(const json& session, bool as_json) {
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
-/// One line whenever the daemon is about something else: "warming: waiting for the machine to stand
-/// at ...", and one for everything it noticed meanwhile.
-class Narrator {
+/// Prints one line whenever state or reason of the session change ("warming: waiting for the
+/// machine to stand at ..."), and one line per new note.
+class SessionLog {
  public:
-  void tell_notes(ProgressBar& bar, const json& session) {
+  void print_notes(ProgressBar& bar, const json& session) {
     const auto noted = session.value("noted", std::size_t{0});
     const json notes = session.value("notes", json::array());
-    if (noted < noted_) noted_ = 0;  // another session
+    if (noted < noted_) noted_ = 0;  // the counter belongs to another session
     const std::size_t fresh = std::min(noted - noted_, notes.size());
     if (fresh > 0) bar.clear();
     for (std::size_t i = notes.size() - fresh; i < notes.size(); ++i)
       fmt::print(stderr, "  {}\n", notes[i].get<std::string>());
     noted_ = noted;
   }
-  void tell(ProgressBar& bar, const std::string& state, const std::string& reason) {
+  void print_state(ProgressBar& bar, const std::string& state, const std::string& reason) {
     std::string line = fmt::format("{}: {}", state, reason);
-    if (line == told_) return;
+    if (line == printed_) return;
     bar.clear();
     fmt::print(stderr, "{}\n", line);
-    told_ = std::move(line);
+    printed_ = std::move(line);
   }
 
  private:
-  std::string told_;
+  std::string printed_;
   std::size_t noted_ = 0;
 };
 
-/// The session with this number, running or ended; another one's verdict is not ours. 0: of a
-/// daemon that does not number them.
+/// The session with this number, running or ended; nullopt if the daemon has it no more. Number 0:
+/// an older daemon without session numbers; its current session is returned.
 std::optional<json> session_in(const json& status, std::uint64_t id) {
   if (id == 0 || status["session"].value("id", std::uint64_t{0}) == id) return status["session"];
   for (const json& ended : status.value("ended_sessions", json::array()))
@@ -72,26 +74,26 @@ std::optional<json> session_in(const json& status, std::uint64_t id) {
 int follow_session(const std::filesystem::path& socket, const std::string& method, std::uint64_t id,
                    bool as_json) {
   ProgressBar bar;
-  Narrator narrator;
+  SessionLog log;
   const auto look = [&](const json& status) -> std::optional<int> {
     const auto found = session_in(status, id);
     if (!found) {
       bar.clear();
-      return report(
-          {ErrorCode::Io,
-           fmt::format(
-               "calibration {} has ended, and its verdict is not kept after so many others: "
-               "`abbe model list` shows what it may have left",
-               id)});
+      return report({ErrorCode::Io,
+                     fmt::format("calibration {} has ended, but the daemon has discarded its "
+                                 "verdict, because later calibrations have ended since: `abbe "
+                                 "model list` shows its model, if it gave one",
+                                 id)});
     }
+
     const json& session = *found;
     const std::string state = session["state"];
-    narrator.tell_notes(bar, session);
+    log.print_notes(bar, session);
     if (state == "active" || state == "refused" || state == "idle") {
       bar.clear();
       return print_session_verdict(session, as_json);
     }
-    narrator.tell(bar, state, session["reason"]);
+    log.print_state(bar, state, session["reason"]);
     bar.show(state, session["progress"].get<double>());
     return std::nullopt;
   };
@@ -108,10 +110,10 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
 void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* excluded) {
   add_socket_options(command, options.where);
   command.add_flag("--detach", options.detach,
-                   "return as soon as the daemon waits for the machine");
-  command.add_flag("--cancel", options.cancel, "end the calibration that is running")
+                   "return as soon as the daemon has begun the calibration");
+  command.add_flag("--cancel", options.cancel, "end the running calibration")
       ->excludes(excluded);
-  command.add_flag("--json", options.json, "the verdict as JSON");
+  command.add_flag("--json", options.json, "print the verdict as JSON");
 }
 
 int cancel_calibration(const FollowOptions& options) {

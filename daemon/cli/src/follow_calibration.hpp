@@ -1,5 +1,5 @@
 #pragma once
-/// What every `abbe calibrate METHOD` that runs in the daemon does alike: options, asking,
+/// The common part of every `abbe calibrate METHOD` that runs in the daemon: options, request,
 /// following to the verdict, cancelling.
 
 #include <CLI/App.hpp>
@@ -17,13 +17,14 @@ struct FollowOptions {
   bool json = false;
 };
 
-/// --config, --socket, --detach, --cancel, --json. `excluded`: what makes no sense with --cancel.
+/// Adds --config, --socket, --detach, --cancel, --json. `excluded`: the option that cannot be
+/// combined with --cancel.
 void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* excluded);
 
-/// Ends the calibration that is running; returns the exit code.
+/// Ends the running calibration; returns the exit code.
 int cancel_calibration(const FollowOptions& options);
-/// Asks for `task` and, unless detached, follows it: what it waits for, what it noticed, its
-/// verdict. Returns the exit code.
+/// Requests `task` from the daemon and, unless detached, follows it: prints the next step, the
+/// notes and the verdict. Returns the exit code.
 int run_calibration(const FollowOptions& options, nlohmann::json task);
 
 }  // namespace abbe::daemon

@@ -30,7 +30,7 @@ Result<std::optional<ModelDocument>> active_model(const std::string& store) {
   return active;
 }
 
-void ModelToBeat::say(calib::Verdict& verdict) const {
+void ModelToBeat::add_note(calib::Verdict& verdict) const {
   if (!left_out.empty()) verdict.notes.push_back(left_out);
 }
 

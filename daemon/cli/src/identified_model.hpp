@@ -1,5 +1,5 @@
 #pragma once
-/// What every "abbe identify" does with its model, whatever method made it.
+/// The common part of every `abbe identify METHOD`: storing the model, printing the verdict.
 
 #include <filesystem>
 #include <map>
@@ -13,38 +13,40 @@
 
 namespace abbe::daemon {
 
-/// The active model of the store the result will be kept in; none if `store` is empty.
+/// The active model of the store in which the result will be kept; nullopt if `store` is empty.
 [[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);
 
-/// What a candidate must do better than.
+/// The model with which the gate compares a candidate.
 struct ModelToBeat {
-  const calib::VolumetricModel* model = nullptr;
-  std::string
-      left_out;  ///< why the active model is not asked; empty: there is none, or it is asked
+  const calib::VolumetricModel* model = nullptr;  ///< null: no comparison
+  /// why the active model is not compared; empty: it is compared, or there is none
+  std::string left_out;
 
-  void say(calib::Verdict& verdict) const;  ///< adds `left_out` to its notes
+  void add_note(calib::Verdict& verdict) const;  ///< adds `left_out` to the notes of `verdict`
 };
 
-/// The active model if it was made for the machine of `config`: another configuration's is STALE
-/// there, and must not lock out the one that replaces it.
+/// The active model, if it was made for the machine of `config`. A model of another configuration
+/// is STALE there and must not prevent its replacement.
 [[nodiscard]] ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config);
 
-/// Adds the model to the store, by whom and by `command`; nothing if `store` is empty.
+/// Adds the model to the store and records the user and `command`. Does nothing if `store` is
+/// empty.
 [[nodiscard]] Result<void> keep(const std::string& store, const ModelDocument& document,
                                 const calib::Verdict& verdict, const std::string& command);
 
-/// model.json and `more` (file name to text) into the folder, which is created if needed. Error Io.
+/// Writes model.json and the files `more` (file name to text) into the folder, which is created if
+/// needed. Error Io.
 [[nodiscard]] Result<void> write_results(const std::filesystem::path& folder,
                                          const ModelDocument& document,
                                          const std::map<std::string, std::string>& more);
 
-/// Whether it is accepted, why not, and what else to know.
+/// Whether the gate accepts the model, the reasons if not, and the notes.
 [[nodiscard]] nlohmann::json verdict_json(const calib::Verdict& verdict);
 
-/// The held-out residuals and what the gate would do, on stdout.
+/// Prints the held-out residuals and the decision of the gate to stdout.
 void print_verdict(const calib::Verdict& verdict);
 
-/// 0, or that of a refusal: the results are written either way.
+/// 0, or the exit code of a refusal.
 [[nodiscard]] int exit_code(const calib::Verdict& verdict);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
-/// `abbe identify artefact`: the calibrator file of a ball array, from touches of one position on a
-/// good machine.
+/// `abbe identify artefact`: makes the calibrator file of a ball array from touches in one position
+/// on an accurate machine.
 
 #include <fmt/format.h>
 
@@ -42,8 +42,9 @@ Result<Precalibrated> precalibrate(const IdentifyArtefactArguments& arguments) {
     if (touch.position != touches->touches.front().position)
       return fail(
           ErrorCode::BadInput,
-          fmt::format("{}: positions {} and {}: an artefact is calibrated in one",
+          fmt::format("{}: positions {} and {}: an artefact is calibrated in one position",
                       arguments.touches, touches->touches.front().position, touch.position));
+
   std::optional<double> u_touch_m;
   if (arguments.u_touch_um) u_touch_m = *arguments.u_touch_um / kUmPerM;
   auto calibrator = calib::evemu::precalibrated(arguments.name, touches->touches,
@@ -56,12 +57,12 @@ Result<Precalibrated> precalibrate(const IdentifyArtefactArguments& arguments) {
   return Precalibrated{std::move(*calibrator), touches->source, touches->touches.size()};
 }
 
-/// Whoever calibrates with the file is to see where it came from, and what its uncertainties leave
-/// out.
+/// The comment at the head of the file: the origin of the data, and what the uncertainties do not
+/// include.
 std::string head_of(const Precalibrated& found) {
   return fmt::format(
       "# from {} touches of one position: {}, SHA-256 {}\n"
-      "# u: standard uncertainty (k = 1) of the fits; the machine's own errors are not in it\n",
+      "# u: standard uncertainty (k = 1) of the fits; it does not include the machine's errors\n",
       found.touches, found.source.name, found.source.sha256);
 }
 
@@ -89,33 +90,34 @@ void add_identify_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyArtefactArguments>();
   auto* command = parent.add_subcommand(
       "artefact",
-      "The calibrator file of a ball array from touches of one position on a good machine");
+      "Make the calibrator file of a ball array from touches in one position on an accurate "
+      "machine");
   command
       ->add_option("--touches", arguments->touches,
                    "touches.csv: position,kind,index,x_mm,y_mm,z_mm")
       ->required();
-  command->add_option("--name", arguments->name, "of the artefact")->required();
-  command->add_option("--tip-radius-mm", arguments->tip_radius_mm, "of these touches")
+  command->add_option("--name", arguments->name, "name of the artefact")->required();
+  command->add_option("--tip-radius-mm", arguments->tip_radius_mm, "tip radius of these touches")
       ->check(CLI::NonNegativeNumber)
       ->required();
   command
       ->add_option(
           "--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
-          "of the probe that will touch it on the machine to be calibrated; default: the same")
+          "tip radius on the machine to be calibrated; default: that of --tip-radius-mm")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option(
           "--u-touch-um", arguments->u_touch_um,
-          "standard uncertainty of a touch, for balls of 4 touches and blocks of 3; more of them "
-          "show it themselves")
+          "standard uncertainty of a touch, needed for balls with 4 touches and blocks with 3; "
+          "from more touches it is estimated")
       ->check(CLI::PositiveNumber);
   command
       ->add_option("--outward-1", arguments->outward_1,
-                   "x,y,z: roughly where the face of block 1 looks")
+                   "x,y,z: approximate outward normal of the face of block 1")
       ->capture_default_str();
   command->add_option("--outward-2", arguments->outward_2, "the same for block 2")
       ->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "calibrator.toml")->required();
+  command->add_option("-o,--out", arguments->out, "file to write: calibrator.toml")->required();
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 

@@ -39,7 +39,8 @@ namespace evemu = calib::evemu;
 
 struct IdentifyEvemuArguments {
   std::string machine, touches, calibrator, errors, recording, reference, keep, out;
-  std::optional<std::string> estimator, folds;  // these four: else what [evemu] says
+  // without a value: that of [evemu]
+  std::optional<std::string> estimator, folds;
   std::optional<int> order, positions;
   std::optional<double> artefact_C;
   double u_artefact_K = 0.0;
@@ -47,14 +48,14 @@ struct IdentifyEvemuArguments {
   bool rotation_known = false, scales_corrected = false, accept_shape_only = false, json = false;
 };
 
-/// What was measured, whatever it comes from.
+/// The measured data, from files or from a recording.
 struct Input {
   Config config;
   std::vector<InputFile> sources;
   evemu::Observations observations;
   std::optional<RotationPoints> reference;
-  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {
-  };  ///< a damaged recording
+  /// refuses the model if the recording is damaged
+  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
   std::string recording_gap{};
 };
 
@@ -67,7 +68,7 @@ struct Outcome {
   std::string recording_gap;
 };
 
-/// Without an option, what [evemu] says; a sensor's values are in no file.
+/// From the option, else the fixed temperature of [evemu]; the values of a sensor are in no file.
 std::optional<evemu::ArtefactTemperature> artefact_temperature(
     const IdentifyEvemuArguments& arguments, const EvemuConfig& config) {
   if (arguments.artefact_C)
@@ -78,19 +79,19 @@ std::optional<evemu::ArtefactTemperature> artefact_temperature(
   return std::nullopt;
 }
 
-/// The sensor of the configuration, where it said nothing that could be read; empty: it was not
-/// asked.
-std::string silent_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
+/// A message if the configuration gives the artefact's temperature by a sensor, but the input is a
+/// file of touches, which has no sensor values. Empty otherwise.
+std::string missing_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
   const auto& artefact = config.evemu.artefact;
   if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor)
     return {};
-  return fmt::format("[evemu] artefact_sensor \"{}\" stands in no file of touches",
+  return fmt::format("[evemu] artefact_sensor \"{}\" is in no file of touches",
                      config.temperatures[*artefact->sensor]);
 }
 
 Result<void> check_artefact(const IdentifyEvemuArguments& arguments,
                             const evemu::Calibrator& calibrator, bool temperature_known,
-                            const std::string& silent) {
+                            const std::string& missing) {
   const auto fault = warmth_fault(
       calibrator, arguments.calibrator,
       !temperature_known     ? ""
@@ -98,7 +99,7 @@ Result<void> check_artefact(const IdentifyEvemuArguments& arguments,
                              : "[evemu] artefact_C",
       fmt::format(
           "{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
-          silent.empty() ? "" : silent + "; ", arguments.machine));
+          missing.empty() ? "" : missing + "; ", arguments.machine));
   return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
 }
 
@@ -124,17 +125,19 @@ Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evem
                              const evemu::ObserveOptions& options, Input& input) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
-  if (auto fine = check_artefact(arguments, calibrator->calibrator,
-                                 options.artefact_temperature.has_value(),
-                                 silent_sensor(arguments, input.config));
-      !fine)
-    return fine;
+  if (auto valid = check_artefact(arguments, calibrator->calibrator,
+                                  options.artefact_temperature.has_value(),
+                                  missing_sensor(arguments, input.config));
+      !valid)
+    return valid;
+
   const auto touches = read_touches_csv(arguments.touches);
   if (!touches) return tl::make_unexpected(touches.error());
   if (auto inside = check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
                                  input.config.machine);
       !inside)
     return inside;
+
   input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
   auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
   if (!observed)
@@ -153,6 +156,7 @@ Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu
                                  input.config.machine);
       !inside)
     return inside;
+
   input.sources.push_back(errors->source);
   const auto rotation =
       arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
@@ -178,14 +182,16 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   if (!hash) return tl::make_unexpected(hash.error());
   Input input;
   input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
+
   const auto* what = arguments.touches.empty() ? "errors" : "touches";
-  if (const auto fine = check_scales("identify evemu", what, *config, arguments.scales_corrected);
-      !fine)
-    return tl::make_unexpected(fine.error());
+  if (const auto valid = check_scales("identify evemu", what, *config, arguments.scales_corrected);
+      !valid)
+    return tl::make_unexpected(valid.error());
   if (const auto given = require_target(config->machine); !given)
     return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
   const auto machine = evemu_machine(config->machine);
   if (!machine) return tl::make_unexpected(machine.error());
+
   auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
   options.artefact_temperature = artefact_temperature(arguments, config->evemu);
   input.config = std::move(*config);
@@ -196,7 +202,7 @@ Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
   return input;
 }
 
-/// The last run of the recording that was touched to its end.
+/// The last run of the recording in which all touches were made.
 Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
   std::optional<EvemuRun> last;
   ProgressBar bar;
@@ -209,12 +215,12 @@ Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
                                     }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   if (last) return std::move(*last);
-  std::string why = "none was asked for";
+  std::string why = "none was requested";
   for (const auto& c : replayed->calibrations)
     if (c.ended.method == "evemu") why = c.ended.reason;
 
   return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: holds no complete calibration with a ball array: {}",
+              fmt::format("{}: contains no complete calibration with a ball array: {}",
                           recording.source.name, why));
 }
 
@@ -225,6 +231,7 @@ Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
     return tl::make_unexpected(given.error());
   const auto machine = evemu_machine(recording->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
+
   const auto run = last_complete_run(*recording);
   if (!run) return tl::make_unexpected(run.error());
   auto options =
@@ -232,6 +239,7 @@ Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
   options.artefact_temperature = run->artefact;
   auto observed = evemu::observe(run->touches, run->asked.calibrator, *machine, options);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
+
   Input input{std::move(recording->config),
               {recording->source},
               std::move(*observed),
@@ -258,8 +266,8 @@ Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& inpu
   return {};
 }
 
-/// A word, or a file with one fold number for each of the 3 rows of every ball, by position and
-/// ball.
+/// `given` is a keyword, or a file with one fold number for each of the 3 rows of every ball, in
+/// the order of position and ball.
 Result<evemu::SparseOptions> sparse_options(const std::string& given,
                                             std::vector<InputFile>& sources) {
   evemu::SparseOptions options;
@@ -297,26 +305,29 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   if (!judging) return tl::make_unexpected(judging.error());
   if (const auto read = read_reference(arguments, *input); !read)
     return tl::make_unexpected(read.error());
+
   auto solution = evemu::solve(input->observations, judging->solve);
   if (solution && input->reference)
     solution = evemu::with_rotation_reference(
         std::move(*solution), {input->reference->points, input->reference->sigma_m});
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
+
   const auto other = to_beat(*active, input->config);
   auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  other.say(*verdict);
+  other.add_note(*verdict);
   input->judge_source(*verdict);
-  if (const auto silent = silent_sensor(arguments, input->config); !silent.empty())
-    verdict->notes.push_back(
-        fmt::format("how warm the array was is not known: {}; --artefact-C says it", silent));
+  if (const auto missing = missing_sensor(arguments, input->config); !missing.empty())
+    verdict->notes.push_back(fmt::format(
+        "the temperature of the array is not known: {}; give it with --artefact-C", missing));
 
   return Outcome{
       std::move(input->config), std::move(input->sources), std::move(input->observations),
       std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
 }
 
-/// The surface lambda and gamma were chosen from; cells no path reached are left out.
+/// The cross-validation error over lambda and gamma, from which they were chosen; cells that no
+/// solution path reached are left out.
 std::string to_surface_csv(const evemu::SparseChoice& choice) {
   std::string text = "gamma,lambda,error_um2\n";
   constexpr double kUm2PerMm2 = 1e6;
@@ -360,11 +371,11 @@ nlohmann::json artefact_json(const evemu::ArtefactUncertainty& artefact) {
 
 std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
   const auto& e = artefact.expansion;
-  return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) longer by {:.2f} um per metre (u = {:.2f})",
+  return e ? fmt::format(", at {:.3f} C (u = {:.3f} K) expanded by {:.2f} um per m (u = {:.2f})",
                          e->temperature_K - kZeroCelsius_K, e->u_temperature_K,
                          kUmPerM * (calib::expansion_factor(*e) - 1.0),
                          kUmPerM * calib::u_expansion_factor(*e))
-           : ", its temperature not known: counts as at 20 C";
+           : ", temperature not known: taken as 20 C";
 }
 
 void print_json(const Outcome& outcome, const ModelDocument& document,
@@ -416,7 +427,7 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
 
   if (const auto& choice = outcome.solution->sparse)
     fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
-               choice->curvature < 0.0 ? "; not convex there: other solutions may be near" : "");
+               choice->curvature < 0.0 ? "; not convex there: other solutions may be close" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
   fmt::print(
@@ -447,26 +458,27 @@ int run(const IdentifyEvemuArguments& arguments) {
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
   auto* machine = command.add_option("--machine", arguments.machine,
-                                     "machine.toml, or the daemon's abbed.toml");
+                                     "machine.toml or the daemon's abbed.toml");
   auto* touches =
       command.add_option("--touches", arguments.touches,
                          "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
   auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
   auto* errors =
       command.add_option("--errors", arguments.errors,
-                         "errors.csv instead: position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
+                         "instead of touches, errors.csv: "
+                         "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
   auto* recording = command.add_option("--recording", arguments.recording,
-                                       "what the daemon recorded (.mcap) instead: its last "
-                                       "complete run with a ball array, with the\n"
-                                       "recorded configuration unless --machine is given");
+                                       "instead of files, a recording of the daemon (.mcap): its "
+                                       "last complete run with a ball array,\n"
+                                       "with the recorded configuration unless --machine is given");
   touches->needs(machine, calibrator);
   calibrator->needs(touches);
   auto* artefact_C =
       command.add_option("--artefact-C", arguments.artefact_C,
-                         "how warm the array was, where calibrator.toml has alpha_um_per_m_K;\n"
-                         "default: [evemu] artefact_C");
-  auto* u_artefact_K =
-      command.add_option("--u-artefact-K", arguments.u_artefact_K, "its standard uncertainty");
+                         "temperature of the array, C, for a calibrator.toml with alpha_um_per_m_K;"
+                         "\ndefault: [evemu] artefact_C");
+  auto* u_artefact_K = command.add_option("--u-artefact-K", arguments.u_artefact_K,
+                                          "standard uncertainty of --artefact-C, K");
   artefact_C->needs(calibrator, u_artefact_K)->check(CLI::Range(-50.0, 100.0));
   u_artefact_K->needs(artefact_C)->check(CLI::Range(0.0, 50.0));
   errors->needs(machine)->excludes(touches);
@@ -474,29 +486,32 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
   recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
   command
       .add_option("--estimator", arguments.estimator,
-                  "bayes-pose: priors by order, shared noise of Ball1, random pose rotations;\n"
-                  "ols: least squares; ridge: one prior for all;\n"
+                  "bayes-pose: priors by order, common noise of Ball1, random pose rotations;\n"
+                  "ols: least squares; ridge: one prior for all coefficients;\n"
                   "lasso, mcp, scad: penalised, chosen by cross-validation over 50 x 100 values;\n"
-                  "default: that of [evemu], which is bayes-pose")
+                  "default: that of [evemu], or bayes-pose")
       ->check(CLI::IsMember({"bayes-pose", "ols", "ridge", "lasso", "mcp", "scad"}));
   command.add_option(
       "--folds", arguments.folds,
-      "what lasso, mcp and scad hold out together: position, ball, row (as published: leaks the\n"
-      "noise rows share), or a file of one fold number a row; default: that of [evemu]: position");
-  command.add_option("--order", arguments.order, "of the polynomials; default: that of [evemu]: 3")
+      "what lasso, mcp and scad hold out together: position, ball, row (as published, but rows\n"
+      "have common noise), or a file with one fold number per row; default: that of [evemu], or\n"
+      "position");
+  command
+      .add_option("--order", arguments.order,
+                  "order of the polynomials; default: that of [evemu], or 3")
       ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
   command
       .add_option(
           "--positions", arguments.positions,
-          "positions of the artefact that must be there; default: those that were asked for: 8")
+          "required number of artefact positions; default: the requested ones, or 8")
       ->check(CLI::Range(2, 1000));
   command
       .add_flag("--rotation-known", arguments.rotation_known,
-                "the errors' directions do not come from the artefact's blocks")
+                "the directions of the errors do not come from the artefact's blocks")
       ->needs(errors);
   command.add_option(
       "--rotation-reference", arguments.reference,
-      "errors.csv of points where V is known independently: turns the model onto them");
+      "errors.csv of points where V is known independently: the model is rotated to fit them");
   command
       .add_option("--u-reference-um", arguments.u_reference_um,
                   "standard uncertainty of the reference's V")
@@ -504,11 +519,11 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
       ->capture_default_str();
   command.add_flag(
       "--accept-shape-only", arguments.accept_shape_only,
-      "judge the model although its rotation about Ball1 is unknown; as [gate] accept =\n"
+      "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"
       "[\"evemu-shape-only\"]");
   command.add_option("--keep", arguments.keep,
-                     "also keep the model in this store, judged against the model active there");
-  command.add_flag("--json", arguments.json, "the summary as one JSON object");
+                     "also add the model to this store, and compare it with its active model");
+  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
   command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
       ->required();
 }
@@ -519,12 +534,12 @@ void add_identify_evemu(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyEvemuArguments>();
   auto* command =
       parent.add_subcommand("evemu",
-                            "From a ball array touched at several positions.\n"
-                            "Writes model.json, coefficients.csv and report.html to OUT and says "
-                            "how well the model predicts positions it was "
-                            "not fitted to.\n"
-                            "Exit code 5 if the gate would refuse it; everything is written all "
-                            "the same.");
+                            "Identify a model from a ball array touched in several positions.\n"
+                            "Writes model.json, coefficients.csv and report.html to OUT and prints "
+                            "how well the model predicts\n"
+                            "positions that were not used in the fit. Exit code 5 if the gate "
+                            "would refuse the model; the files\n"
+                            "are written in any case.");
   add_options(*command, *arguments);
 
   command->callback([arguments, &exit] {

@@ -39,8 +39,8 @@ constexpr double kPpmPer1 = 1e6;
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, out;
   std::string estimator = "two-step";
-  std::size_t block_samples = 0;      // 0: by travel
-  std::optional<double> u_scale_ppm;  // else that of [tracker]
+  std::size_t block_samples = 0;      // 0: blocks by travel
+  std::optional<double> u_scale_ppm;  // without a value: that of [tracker]
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
 };
@@ -124,20 +124,21 @@ double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   return config.tracker ? config.tracker->u_scale : 0.0;
 }
 
-/// As a session of the daemon does before the machine drives; outside the travel with line and
-/// column.
+/// The same checks that a session of the daemon makes before the machine drives. The message for a
+/// vertex outside the travel gives line and column.
 Result<void> check_path(const std::string& file, const PathFile& path,
                         const MachineConfig& machine) {
   if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine);
       !inside)
     return inside;
-  auto fine = check_otf_path(path.vertices_m, machine);
-  if (!fine) fine.error().text = fmt::format("{}: {}", file, fine.error().text);
-  return fine;
+  auto valid = check_otf_path(path.vertices_m, machine);
+  if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
+  return valid;
 }
 
-/// At how many vertices the scales were compared with the path where the machine stood; of a run
-/// without readings none. What contradicts the path is an error.
+/// Compares the readings of the scales with the path at every vertex where the machine stood still.
+/// Returns the number of these vertices; 0 without an encoder file. An error if readings contradict
+/// the path.
 Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, const Files& files) {
   if (!files.encoder) return 0;
   return compare_with_path(arguments.encoder, files.encoder->rows, files.path.vertices_m,
@@ -148,35 +149,38 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
-  if (const auto fine =
+  if (const auto valid =
           check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
-      !fine)
-    return tl::make_unexpected(fine.error());
-  if (const auto fine = check_path(arguments.path, files->path, files->config.machine); !fine)
-    return tl::make_unexpected(fine.error());
-  const auto stood = vertices_compared(arguments, *files);
-  if (!stood) return tl::make_unexpected(stood.error());
+      !valid)
+    return tl::make_unexpected(valid.error());
+  if (const auto valid = check_path(arguments.path, files->path, files->config.machine); !valid)
+    return tl::make_unexpected(valid.error());
+  const auto compared = vertices_compared(arguments, *files);
+  if (!compared) return tl::make_unexpected(compared.error());
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
+
   otf::Options options =
       otf_options(files->tracker.points, files->config.machine, files->config.gate);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
+
   otf::Noise noise = otf_noise(files->config.machine);
   noise.u_scale = u_scale(arguments, files->config);
   auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
                              noise, options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
+
   const auto other = to_beat(active, files->config);
   auto verdict = otf::judge(found->observations, found->solution, other.model,
                             gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
-  other.say(*verdict);
-  if (files->encoder && *stood == 0)
+  other.add_note(*verdict);
+  if (files->encoder && *compared == 0)
     verdict->notes.emplace_back(
-        "the scales were compared with the path to 2 mm only: the machine stands at no vertex");
+        "the scales were compared with the path to 2 mm only: the machine stops at no vertex");
   if (auto air = unmeasured_air_text(files->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
@@ -184,9 +188,9 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                     std::move(files->sources));
 }
 
-/// The last run of the recording that was driven to its end.
+/// The last run of the recording in which the whole path was driven.
 Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
-  std::string why = replayed.calibrations.empty() ? "no calibration was asked for" : "";
+  std::string why = replayed.calibrations.empty() ? "no calibration was requested" : "";
   for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
     if (c->outcome && *c->outcome) {
       if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome)) return std::move(*otf);
@@ -195,7 +199,7 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
     if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
   }
   return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: holds no complete calibration: {}", file, why));
+              fmt::format("{}: contains no complete calibration: {}", file, why));
 }
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
@@ -211,7 +215,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   if (!replayed) return tl::make_unexpected(replayed.error());
   auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
   if (!candidate) return tl::make_unexpected(candidate.error());
-  other.say(candidate->verdict);
+  other.add_note(candidate->verdict);
   auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
   outcome.document.recording_gap = recording->reader.damage();
 
@@ -297,41 +301,38 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyOtfArguments>();
   auto* command = parent.add_subcommand(
       "otf",
-      "From laser tracker points taken on the fly along a path.\n"
-      "Writes model.json, tables.csv and report.html to OUT and says how well the model "
-      "predicts legs it was not fitted to.\n"
-      "Exit code 5 if the gate would refuse it, as it does where the recording is damaged inside; "
-      "everything\n"
-      "is written all the same.");
+      "Identify a model from laser tracker points measured on the fly along a path.\n"
+      "Writes model.json, tables.csv and report.html to OUT and prints how well the model\n"
+      "predicts legs that were not used in the fit. Exit code 5 if the gate would refuse the\n"
+      "model, also if the recording is damaged before its end; the files are written in any case.");
   auto* machine = command->add_option("--machine", arguments->machine,
-                                      "machine.toml, or the daemon's abbed.toml");
+                                      "machine.toml or the daemon's abbed.toml");
   auto* path = command->add_option("--path", arguments->path,
-                                   "path.csv: x_mm,y_mm,z_mm, the vertices that were driven");
+                                   "path.csv: x_mm,y_mm,z_mm, the vertices of the driven path");
   auto* tracker =
       command->add_option("--tracker", arguments->tracker,
                           "tracker.csv: time_s,range_mm,azimuth_rad,elevation_rad[,status]\n"
                           "or time_s,x_mm,y_mm,z_mm[,status]");
   auto* encoder = command->add_option(
       "--encoder", arguments->encoder,
-      "encoder.csv: time_s,x_mm,y_mm,z_mm, what the scales read along the path, any clock; "
-      "compared with\n"
-      "the vertices of the path, to [gate] path_tolerance_mm where the machine stands");
+      "encoder.csv: time_s,x_mm,y_mm,z_mm, scale readings along the path, times of any clock;\n"
+      "compared with the vertices of the path, to [gate] path_tolerance_mm where the machine "
+      "stands still");
   auto* recording = command->add_option(
       "--recording", arguments->recording,
-      "what the daemon recorded (.mcap) instead of path and tracker: its last complete run, with\n"
-      "the recorded configuration unless --machine is given");
+      "instead of path and tracker, a recording of the daemon (.mcap): its last complete run,\n"
+      "with the recorded configuration unless --machine is given");
   auto* u_scale =
       command
           ->add_option("--u-scale-ppm", arguments->u_scale_ppm,
-                       "standard uncertainty all ranges have in common (index of the air): 0.2 for "
-                       "0.2 K and 30 Pa; default: that of [tracker], else 0")
+                       "relative standard uncertainty common to all ranges (refractive index of "
+                       "air), ppm: 0.2 for 0.2 K and 30 Pa; default: that of [tracker], or 0")
           ->check(CLI::NonNegativeNumber);
   auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
   auto* orientation =
       command->add_flag("--accept-path-orientation", arguments->accept_path_orientation,
-                        "judge the model although nothing excludes that the path is turned "
-                        "by 180 degrees (two signs\nreversed); "
-                        "as [gate] accept = [\"path-orientation\"]");
+                        "do not refuse the model because the path might be rotated by 180 degrees "
+                        "(two signs\nreversed); as [gate] accept = [\"path-orientation\"]");
   recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
   path->needs(machine, tracker);
   tracker->needs(path);
@@ -339,16 +340,16 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   recording->excludes(path)->excludes(tracker)->excludes(encoder);
   command->add_option(
       "--keep", arguments->keep,
-      "also keep the model in this store, judged against the model active there; activate it with\n"
-      "abbe model activate");
+      "also add the model to this store, and compare it with its active model; to activate it,\n"
+      "use abbe model activate");
   command->add_option("--estimator", arguments->estimator, "two-step: align, then adjust")
       ->check(CLI::IsMember({"two-step"}))
       ->capture_default_str();
   command
       ->add_option("--block-samples", arguments->block_samples,
-                   "samples per block mean; default: 8.3 mm of travel")
+                   "samples averaged in a block; default: blocks of 8.3 mm of travel")
       ->check(CLI::Range(10, 1000));
-  command->add_flag("--json", arguments->json, "the summary as one JSON object");
+  command->add_flag("--json", arguments->json, "print the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")
       ->required();
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Signals of a person at work: whoever waits ends what it does in good order.
+/// Signals of the user, such as Ctrl-C, as a flag: a command that waits polls it and ends cleanly.
 
 #include <initializer_list>
 

@@ -1,5 +1,4 @@
-/// `abbe machine`: what a person does with the measuring machine of the running daemon: look, stop,
-/// release.
+/// `abbe machine`: commands for the measuring machine of the running daemon: where, stop, release.
 
 #include <fmt/format.h>
 
@@ -31,10 +30,8 @@ int release_machine(const DaemonSocket& where) {
   const auto answer = ask_machine(where, {{"release", true}});
   if (!answer) return report(answer.error());
   fmt::print(
-      "released: {}\nthe machine may move again, and home if [cmm] home = true; `abbe status` "
-      "shows when it "
-      "is "
-      "ready\n",
+      "released: {}\nthe machine may move again (also to home, if [cmm] home = true); `abbe "
+      "status` shows when it is ready\n",
       (*answer)["released"].get<std::string>());
   return 0;
 }
@@ -48,12 +45,12 @@ int show_machine(const DaemonSocket& where) {
   const auto answer = ask_machine(where, json::object());
   if (!answer) return report(answer.error());
   if ((*answer)["release_awaited"].get<bool>()) {
-    fmt::print("awaits a release by a person (`abbe machine release`): {}\n",
+    fmt::print("release required: check the machine, then run `abbe machine release`: {}\n",
                (*answer)["reason"].get<std::string>());
   }
 
   if (!answer->contains("tip_m")) {
-    fmt::print("where the tip stands was not reported\n");
+    fmt::print("the machine has not reported the position of the tip\n");
     return 0;
   }
 
@@ -68,7 +65,7 @@ int show_machine(const DaemonSocket& where) {
 
 void add_machine(CLI::App& parent, int& exit) {
   auto* group = parent.add_subcommand(
-      "machine", "The measuring machine of the running daemon: look, stop, release");
+      "machine", "Control the measuring machine of the running daemon: where, stop, release");
   group->require_subcommand(1);
 
   const auto add = [&](const char* name, const char* text, int (*run)(const DaemonSocket&)) {
@@ -78,19 +75,17 @@ void add_machine(CLI::App& parent, int& exit) {
     command->callback([where, run, &exit] { exit = run(*where); });
   };
 
-  add("where", "Where the tip stands, and whether the machine awaits a release", show_machine);
+  add("where", "Show the position of the tip, and whether the machine needs a release",
+      show_machine);
   add("stop",
-      "Stop every motion that abbed asked for, where it is (AbortE); nothing moves before a "
-      "release",
+      "Stop every motion that abbed has commanded (AbortE); the machine does not move again\n"
+      "before `abbe machine release`",
       stop_machine);
   add("release",
-      "After an error of severity 2 or more, an emergency stop or an aborted motion nothing moves "
-      "and "
-      "nothing is\n"
-      "cleared before a person has looked at the machine: this says so. Errors are cleared, the "
-      "session "
-      "begins\n"
-      "anew, and the machine is sent home if it is not and [cmm] home = true.",
+      "Confirm that a person has checked the machine. After an error of severity 2 or more, an\n"
+      "emergency stop or an aborted motion, abbed moves nothing and clears no error before this\n"
+      "command. Then it clears the errors, opens the session again, and sends the machine home if\n"
+      "it is not homed and [cmm] home = true.",
       release_machine);
 }
 

@@ -1,4 +1,4 @@
-/// `abbe model compare A B`: how far two models are apart where both hold.
+/// `abbe model compare A B`: the difference of two models where both are valid.
 
 #include <fmt/format.h>
 
@@ -26,7 +26,7 @@ struct Comparison {
   calib::ModelDifference difference;
 };
 
-/// The nodes of both models that lie in the validity volume of both.
+/// The nodes of both models that are in the validity volume of both.
 std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
                                           const calib::VolumetricModel& b) {
   std::vector<calib::Vector3> points;
@@ -43,6 +43,7 @@ Result<Comparison> compare(const ModelCompareArguments& arguments) {
   if (!a) return tl::make_unexpected(a.error());
   const auto b = model_named(arguments.b, arguments.store);
   if (!b) return tl::make_unexpected(b.error());
+
   const auto points = common_points(a->model, b->model);
   const auto difference =
       calib::rigid_free_difference(a->model, b->model, a->model.tool_offsets_m().front(), points);
@@ -70,7 +71,7 @@ int run(const ModelCompareArguments& arguments) {
     return 0;
   }
 
-  fmt::print("|V(A) - V(B)| at {} nodes where both hold, um\n", found->points);
+  fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found->points);
   fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
   print("as stated", d.as_stated);
   print("without a rigid motion", d.rigid_free);
@@ -84,16 +85,17 @@ void add_model_compare(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelCompareArguments>();
   auto* command = parent.add_subcommand(
       "compare",
-      "How far two models are apart at the nodes where both hold, for the tool of A; as they "
-      "stand, and\n"
-      "without the rigid motion of the whole volume that no measurement can see.");
+      "Print the difference of two models at the nodes where both are valid, for the tool of A:\n"
+      "as stated, and without the rigid motion of the whole volume, which no measurement can "
+      "determine.");
   command
       ->add_option("A", arguments->a,
-                   "model.json; or, of the store, an id, the beginning of one, \"active\"")
+                   "model.json; or a model of the store: its id, the beginning of its id, or "
+                   "\"active\"")
       ->required();
-  command->add_option("B", arguments->b, "the other one")->required();
+  command->add_option("B", arguments->b, "the other model, given like A")->required();
   add_store_options(*command, arguments->store);
-  command->add_flag("--json", arguments->json, "as one JSON object");
+  command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 

@@ -23,8 +23,8 @@ struct ModelEvalArguments {
   bool correction = false;
 };
 
-/// One row: position, vector, standard uncertainty, inside. The correction moves with V, and so has
-/// its uncertainty.
+/// One row: position, vector, standard uncertainty, inside. The correction is a function of V and
+/// has the same uncertainty.
 Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
                         const calib::Vector3& tool_m, bool correction) {
   const calib::Vector3 position_m(q[0], q[1], q[2]);
@@ -55,6 +55,7 @@ Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   if (!points) return tl::make_unexpected(points.error());
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
+
   std::string text = arguments.correction
                          ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
                          : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
@@ -84,21 +85,23 @@ void add_model_eval(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelEvalArguments>();
   auto* command =
       parent.add_subcommand("eval",
-                            "The volumetric error at given axis positions, as CSV on stdout.\n"
-                            "e = actual - nominal at the scale reading; u its standard uncertainty "
-                            "(k = 1) in the model's gauge;\n"
-                            "inside: 1 where the model's data reach.");
+                            "Print the volumetric error at given axis positions as CSV to stdout.\n"
+                            "e = actual - nominal at the scale reading; u: its standard "
+                            "uncertainty (k = 1) in the model's gauge;\n"
+                            "inside: 1 if the position is in the validity volume of the model.");
   command
       ->add_option("MODEL", arguments->model,
-                   "model.json; or, of the store, an id, the beginning of one, \"active\"")
+                   "model.json; or a model of the store: its id, the beginning of its id, or "
+                   "\"active\"")
       ->required();
   add_store_options(*command, arguments->store);
   command->add_option("--points", arguments->points, "points.csv: x_mm,y_mm,z_mm, scale readings")
       ->required();
   command->add_option("--tool", arguments->tool,
-                      "x,y,z: tool offset in mm; default: the one of the calibration");
+                      "x,y,z: tool offset in mm; default: that of the calibration");
   command->add_flag("--correction", arguments->correction,
-                    "what to add to a command instead: c = -e(p + c), solved to 1 nm");
+                    "print the correction c to be added to a commanded position p instead: c = "
+                    "-e(p + c), solved to 1 nm");
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }
 

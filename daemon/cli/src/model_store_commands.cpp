@@ -1,4 +1,4 @@
-/// `abbe model list|show|activate|rollback`: a machine's store of models.
+/// `abbe model list|show|activate|rollback`: commands for the model store of a machine.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -144,30 +144,31 @@ int rollback(const ModelStoreArguments& arguments) {
 
 void add_model_list(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
-  auto* command = parent.add_subcommand("list", "All models of the store, newest first");
+  auto* command = parent.add_subcommand("list", "List all models of the store, newest first");
   add_store_options(*command, arguments->store);
-  command->add_flag("--json", arguments->json, "as a JSON array");
+  command->add_flag("--json", arguments->json, "print a JSON array");
   command->callback([arguments, &exit] { exit = list(*arguments); });
 }
 
 void add_model_show(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command =
-      parent.add_subcommand("show", "One model: where it came from, how good it is, its tables");
-  command->add_option("ID", arguments->id, "id, the beginning of one, or \"active\"")->required();
+      parent.add_subcommand("show", "Show a model: its origin, its quality and its tables");
+  command->add_option("ID", arguments->id, "model id, the beginning of an id, or \"active\"")
+      ->required();
   add_store_options(*command, arguments->store);
-  command->add_flag("--json", arguments->json, "the whole model.json");
+  command->add_flag("--json", arguments->json, "print the whole model.json");
   command->callback([arguments, &exit] { exit = show(*arguments); });
 }
 
 void add_model_activate(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command =
-      parent.add_subcommand("activate", "Make a model the active one; who did it and why is kept");
-  command->add_option("ID", arguments->id, "id, or the beginning of one")->required();
+      parent.add_subcommand("activate", "Activate a model; the store records user and reason");
+  command->add_option("ID", arguments->id, "model id, or the beginning of an id")->required();
   add_store_options(*command, arguments->store);
-  command->add_option("--why", arguments->why, "the reason, for the record; needed with --force");
-  command->add_flag("--force", arguments->force, "also a model the gate refused");
+  command->add_option("--why", arguments->why, "reason, for the record; required with --force");
+  command->add_flag("--force", arguments->force, "activate a model that the gate refused");
 
   command->callback([arguments, &exit] {
     exit = arguments->force && arguments->why.empty()
@@ -179,9 +180,9 @@ void add_model_activate(CLI::App& parent, int& exit) {
 
 void add_model_rollback(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
-  auto* command = parent.add_subcommand("rollback", "Go back to the model that was active before");
+  auto* command = parent.add_subcommand("rollback", "Activate the previously active model again");
   add_store_options(*command, arguments->store);
-  command->add_option("--why", arguments->why, "the reason, for the record");
+  command->add_option("--why", arguments->why, "reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A recording, and the configuration to go through it with.
+/// A recording, and the configuration with which it is replayed.
 
 #include <string>
 

@@ -1,5 +1,5 @@
-/// `abbe reference`: the running daemon finds where the axes' counters began, from their
-/// distance-coded marks.
+/// `abbe reference`: references the axes: the running daemon finds the position of count 0 of their
+/// counters from distance-coded reference marks.
 
 #include <fmt/format.h>
 
@@ -50,20 +50,20 @@ std::string line_of(const json& axis) {
                      axis["reason"].get<std::string>());
 }
 
-/// One line on stderr whenever there is news of an axis.
-class ReferenceNarrator {
+/// Prints one line to stderr whenever the state of an axis has changed.
+class ReferenceLog {
  public:
-  void tell(const json& reference) {
+  void print_changes(const json& reference) {
     for (const json& axis : reference["axes"]) {
       std::string line = line_of(axis);
-      if (told_[axis["axis"]] == line) continue;
+      if (printed_[axis["axis"]] == line) continue;
       fmt::print(stderr, "{}\n", line);
-      told_[axis["axis"]] = std::move(line);
+      printed_[axis["axis"]] = std::move(line);
     }
   }
 
  private:
-  std::map<std::string, std::string> told_;
+  std::map<std::string, std::string> printed_;  // last line by axis
 };
 
 int print_result(const json& reference, bool as_json) {
@@ -78,11 +78,11 @@ int print_result(const json& reference, bool as_json) {
 
 int follow_search(const std::filesystem::path& socket, bool as_json) {
   ProgressBar no_bar{false};
-  ReferenceNarrator narrator;
+  ReferenceLog log;
   const auto look = [&](const json& status) -> std::optional<int> {
     const json& found = status["reference"];
     if (!found["running"].get<bool>()) return print_result(found, as_json);
-    narrator.tell(found);
+    log.print_changes(found);
     return std::nullopt;
   };
 
@@ -110,27 +110,29 @@ int reference(const ReferenceArguments& arguments) {
 void add_reference(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ReferenceArguments>();
   auto* command = parent.add_subcommand("reference",
-                                        "Find where the axes' counters began, from distance-coded "
-                                        "marks: then drive each axis slowly over at\n"
-                                        "least four marks in one direction. Ends when every axis "
-                                        "of [reference] has its datum. Ctrl-C ends "
-                                        "the\n"
-                                        "looking on (exit code 130), --cancel the search.");
+                                        "Reference the axes from distance-coded reference marks: "
+                                        "run this command, then drive each axis slowly\n"
+                                        "over at least four marks in one direction. Ends when "
+                                        "every axis of [reference] is referenced.\n"
+                                        "Ctrl-C stops following (exit code 130); the search "
+                                        "continues. --cancel ends the search.");
   add_socket_options(*command, arguments->where);
-  auto* cancel = command->add_flag("--cancel", arguments->cancel, "end the search that is running");
+  auto* cancel = command->add_flag("--cancel", arguments->cancel, "end the running search");
   auto* here = command->add_flag(
       "--here", arguments->here,
-      "no search: axes without marks stand where they read their offset, now; refused while they\n"
-      "move, while the card is silent, and while a calibration takes readings");
+      "reference the axes without marks at their present position: they are where they read their\n"
+      "offset. Refused while they move, while the counter card sends no data, and while a\n"
+      "calibration takes readings");
   here->excludes(cancel);
-  command->add_option("--axis", arguments->axes, "with --here: only these")->needs(here);
+  command->add_option("--axis", arguments->axes, "with --here: only these axes")->needs(here);
   command
       ->add_option("--u-um", arguments->u_um,
-                   "with --here: its standard uncertainty, um, of a rotary axis urad; 100: by eye")
+                   "with --here: standard uncertainty of the position, um (rotary axis: urad); "
+                   "100: set by eye")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->needs(here);
-  command->add_flag("--json", arguments->json, "the result as JSON");
+  command->add_flag("--json", arguments->json, "print the result as JSON");
   command->callback([arguments, &exit] { exit = reference(*arguments); });
 }
 

@@ -1,5 +1,5 @@
-/// `abbe replay FILE`: a recording once more through receivers, assembler, session and
-/// identification.
+/// `abbe replay FILE`: passes a recording through receivers, assembler, session and identification
+/// again.
 
 #include <fmt/format.h>
 
@@ -90,7 +90,7 @@ void print_report(const RecordingReader& recording, const ReplayReport& r, doubl
     fmt::print("DAMAGED      {}\n", damage);
   if (r.undecodable > 0) fmt::print("DAMAGED      {} messages cannot be decoded\n", r.undecodable);
   if (recording.configuration_check() == MetadataCheck::Unchecked)
-    fmt::print("unchecked    the recorded configuration has no checksum\n");
+    fmt::print("unchecked    the recorded configuration has no checksum: damage is not detected\n");
   for (const auto& id : r.live_model_ids) fmt::print("live         model {}\n", id);
   if (!r.live_model_ids.empty())
     fmt::print("{}\n", same_as_live(r) ? "the same as live" : "NOT the same as live");
@@ -117,7 +117,7 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
   fmt::print("{}\n", out.dump(1));
 }
 
-/// With another configuration another model is what was asked for.
+/// With another configuration (-c) the model may differ from the live one.
 int exit_code_of(const RecordingReader& recording, const ReplayReport& report,
                  const ReplayArguments& arguments) {
   constexpr int kDone = 0, kNoAnswer = 1;
@@ -134,6 +134,7 @@ int run(const ReplayArguments& arguments) {
   if (!recording) return report(recording.error());
   for (const auto& loss : recording->losses())
     fmt::print(stderr, "{}: {}\n", arguments.file, loss.what);
+
   const auto config = config_of(arguments, *recording);
   if (!config) return report(config.error());
   ProgressBar bar;
@@ -168,25 +169,25 @@ void add_replay(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ReplayArguments>();
   auto* command = parent.add_subcommand(
       "replay",
-      "A recording once more: the same snapshots, the same model.\n"
-      "Exit code 1 if a calibration gives no model, or (unless -c is given) another than live, or "
-      "if the\n"
-      "recording is damaged inside; 3 if the recorded configuration is, and no -c is given.");
+      "Replay a recording: the same snapshots and the same model as live.\n"
+      "Exit code 1 if a calibration gives no model, or (without -c) another model than live, or\n"
+      "if the recording is damaged before its end; 3 if the recorded configuration is damaged and\n"
+      "-c is not given.");
   command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
       ->required();
   command->add_flag("--raw", arguments->raw,
-                    "from the raw device bytes instead of the decoded samples");
+                    "replay the raw device bytes instead of the decoded samples");
   command
       ->add_option("--speed", arguments->speed,
-                   "recorded seconds per second; 0: as fast as possible")
+                   "recorded time per real time; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   command->add_option("-c,--config", arguments->config,
-                      "another configuration than the recorded one");
-  auto* as_json = command->add_flag("--json", arguments->json, "as one JSON object");
+                      "use this configuration instead of the recorded one");
+  auto* as_json = command->add_flag("--json", arguments->json, "print one JSON object");
   command
       ->add_flag("--samples", arguments->samples,
-                 "print every sample as a line instead of the report")
+                 "print one line per sample instead of the report")
       ->excludes(as_json);
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }

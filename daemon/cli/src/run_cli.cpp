@@ -22,19 +22,15 @@ namespace abbe::daemon {
 namespace {
 
 constexpr std::string_view kFooter =
-    "Programs of their own: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n"
-    "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or a "
-    "replay "
-    "gave "
-    "another model;\n"
-    "2 usage; 3 bad input file; 4 input or output failed; 5 refused, by the gate or by what the "
-    "daemon is "
-    "doing;\n"
-    "130 interrupted while following a calibration, which goes on.\n"
-    "Lengths are mm, small errors um, angles rad or urad, times s: the unit stands in every column "
-    "and key.";
+    "Separate programs: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n"
+    "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or\n"
+    "a replay gave another model; 2 usage; 3 invalid input file; 4 input or output failed;\n"
+    "5 refused by the gate, or because of the state of the daemon; 130 interrupted while\n"
+    "following a calibration, which continues.\n"
+    "Units: lengths mm, small errors um, angles rad or urad, times s; every column and key names\n"
+    "its unit.";
 
-/// Subcommands that are programs, as git has them.
+/// Subcommands that are separate programs, as with git.
 constexpr std::array<std::string_view, 2> kPrograms{"sim", "watch"};
 
 std::filesystem::path own_folder() {
@@ -42,7 +38,7 @@ std::filesystem::path own_folder() {
   return std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
 }
 
-/// Does not return if the program is there.
+/// Replaces this process by the program. Returns only if the program cannot be run.
 Error exec_program(std::string_view name, int argc, const char* const* argv) {
   const auto program = fmt::format("abbe-{}", name);
   const auto beside = (own_folder() / program).string();
@@ -54,14 +50,14 @@ Error exec_program(std::string_view name, int argc, const char* const* argv) {
   arguments.push_back(nullptr);
   ::execv(beside.c_str(), arguments.data());
   ::execvp(program.c_str(), arguments.data());
-  return {ErrorCode::Io, fmt::format("run {}: neither beside abbe nor in PATH: {}", program,
-                                     std::strerror(errno))};
+  return {ErrorCode::Io, fmt::format("run {}: neither in the folder of abbe nor in PATH: {}",
+                                     program, std::strerror(errno))};
 }
 
 void add_commands(CLI::App& app, int& exit) {
   add_status(app, exit);
   auto* calibrate =
-      app.add_subcommand("calibrate", "Calibrate the machine that the running daemon watches");
+      app.add_subcommand("calibrate", "Calibrate the machine of the running daemon");
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_evemu(*calibrate, exit);
@@ -79,7 +75,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);
   auto* model = app.add_subcommand(
-      "model", "Evaluate models, and look after the store of a machine's models");
+      "model", "Evaluate models, and manage the model store of a machine");
   model->require_subcommand(1);
   add_model_eval(*model, exit);
   add_model_compare(*model, exit);
@@ -87,7 +83,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_model_show(*model, exit);
   add_model_activate(*model, exit);
   add_model_rollback(*model, exit);
-  auto* dds = app.add_subcommand("dds", "Keep strangers out of the DDS domain");
+  auto* dds = app.add_subcommand("dds", "Set up DDS Security");
   dds->require_subcommand(1);
   add_dds_keys(*dds, exit);
 }
@@ -95,8 +91,8 @@ void add_commands(CLI::App& app, int& exit) {
 int parse_and_run(int argc, const char* const* argv) {
   int exit = 0;
   CLI::App app{
-      "abbe identifies the geometric errors of machine tools and measuring machines, and keeps the "
-      "models."};
+      "abbe identifies the geometric errors of machine tools and measuring machines, and stores "
+      "the models."};
   app.name("abbe");
   app.set_version_flag("--version", "abbe " ABBE_VERSION);
   app.footer(std::string{kFooter});
@@ -109,7 +105,7 @@ int parse_and_run(int argc, const char* const* argv) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     return report(
-        {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help behind any command"}});
+        {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help after any command"}});
   }
 
   return exit;

@@ -1,7 +1,7 @@
 #pragma once
-/// Samples as lines of text, one each, for people and for golden recordings: time in ms from the
-/// beginning of the recording, what is to be known about it by name, then the values. The same
-/// samples give the same text.
+/// Formats samples as text, one line per sample, for people and for golden recordings: time in ms
+/// since the beginning of the recording, names of the set flags, then the values. The same samples
+/// give the same text.
 
 #include <cstdio>
 

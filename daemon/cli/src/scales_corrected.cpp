@@ -21,7 +21,7 @@ Result<void> check_scales(std::string_view command, std::string_view what, const
       ErrorCode::BadInput,
       fmt::format(
           "{}: [[thermal]] is configured, and the files hold no temperatures: use --recording, "
-          "or give {} corrected for the temperature of the scales and say "
+          "or give {} corrected for the temperature of the scales and add "
           "--scales-corrected",
           command, what));
 }

@@ -1,7 +1,8 @@
 #pragma once
-/// Readings from files under a configuration with [[thermal]]: the daemon applies a model to
-/// readings corrected for the temperature of the scales, so a model of uncorrected ones holds what
-/// the scales grew by, and it would be corrected twice.
+/// Readings from files with a configuration that has [[thermal]]. The daemon applies a model to
+/// readings that are corrected for the temperature of the scales. A model identified from
+/// uncorrected readings contains the thermal expansion of the scales, which would then be corrected
+/// twice.
 
 #include <CLI/App.hpp>
 #include <string_view>
@@ -11,11 +12,11 @@
 
 namespace abbe::daemon {
 
-/// --scales-corrected into `corrected`.
+/// Adds the option --scales-corrected, which sets `corrected`.
 CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected);
 
-/// BadInput unless [[thermal]] is absent, or somebody says that what `what` names ("the path") is
-/// corrected.
+/// BadInput if the configuration has [[thermal]] and the user has not stated (`corrected`) that the
+/// readings of `what` ("the path") are corrected.
 [[nodiscard]] Result<void> check_scales(std::string_view command, std::string_view what,
                                         const Config& config, bool corrected);
 

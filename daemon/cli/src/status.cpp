@@ -1,4 +1,4 @@
-/// `abbe status`: what the running daemon sees, does and publishes.
+/// `abbe status`: shows model, session, devices and DDS state of the running daemon.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -57,10 +57,10 @@ void print_environment(const json& e) {
 }
 
 void print_reference(const json& reference) {
-  fmt::print("reference  {}", reference["running"].get<bool>() ? "looking for marks" : "");
+  fmt::print("reference  {}", reference["running"].get<bool>() ? "searching for marks; " : "");
   for (const json& axis : reference["axes"])
     fmt::print("{} {}", axis["axis"].get<std::string>(),
-               axis["known"].get<bool>() ? "known " : "not known ");
+               axis["known"].get<bool>() ? "referenced " : "not referenced ");
   fmt::print("\n");
 }
 
@@ -72,14 +72,14 @@ void print_next(const json& next) {
 
 void print_release_awaited(const json& awaited) {
   fmt::print(
-      "{}    {}\n           nothing moves before a person has looked at the machine; then: {}\n",
+      "{}    {}\n           the machine does not move before a person has checked it and run: {}\n",
       coloured("RELEASE", kRed, STDOUT_FILENO), awaited["reason"].get<std::string>(),
       awaited["command"].get<std::string>());
 }
 
 void print_dds(const json& dds) {
   const bool connected = dds["connected"].get<bool>();
-  const auto state = dds.value("state", std::string{});  // not from an abbed of before
+  const auto state = dds.value("state", std::string{});  // older versions of abbed do not send it
   fmt::print("dds        {}, {} messages",
              connected                    ? "connected"
              : state == "does not answer" ? "abbe-dds does not answer"
@@ -92,7 +92,7 @@ void print_dds(const json& dds) {
   if (dds.contains("last_end"))
     fmt::print("           last end: {}\n", dds["last_end"].get<std::string>());
   if (const auto refused = dds.value("refused_connections", std::uint64_t{0}); refused > 0)
-    fmt::print("           {} connections to its socket by other processes were refused\n",
+    fmt::print("           {} connections of other processes to its socket were refused\n",
                refused);
   const auto security = dds.value("security", std::string{"on"});
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
@@ -114,9 +114,11 @@ void print_status(const json& status) {
   if (status.contains("reference")) print_reference(status["reference"]);
 
   if (const json axes = status.value("axes_without_zero", json::array()); !axes.empty()) {
-    fmt::print("zero       of");
+    fmt::print("axes      ");
     for (const json& axis : axes) fmt::print(" {}", axis.get<std::string>());
-    fmt::print(" not known: `abbe reference --here` where they read their offset\n");
+    fmt::print(
+        " not referenced: move them to where they read their offset, then run `abbe reference "
+        "--here`\n");
   }
 
   if (status.contains("environment")) print_environment(status["environment"]);
@@ -150,9 +152,10 @@ void add_status(CLI::App& parent, int& exit) {
   auto where = std::make_shared<DaemonSocket>();
   auto as_json = std::make_shared<bool>(false);
   auto* command =
-      parent.add_subcommand("status", "What the running daemon sees, does and publishes");
+      parent.add_subcommand("status",
+                            "Show model, session, devices and DDS state of the running daemon");
   add_socket_options(*command, *where);
-  command->add_flag("--json", *as_json, "as one JSON object");
+  command->add_flag("--json", *as_json, "print one JSON object");
   command->callback([where, as_json, &exit] { exit = status(*where, *as_json); });
 }
 

@@ -10,7 +10,8 @@ namespace abbe::daemon {
 void add_store_options(CLI::App& command, StoreOption& where) {
   auto* store =
       command.add_option("--store", where.folder, "folder of the store")->capture_default_str();
-  command.add_option("-c,--config", where.config, "the store of this abbed.toml")->excludes(store);
+  command.add_option("-c,--config", where.config, "use the store of this abbed.toml")
+      ->excludes(store);
 }
 
 Result<ModelStore> open_store(const StoreOption& where) {

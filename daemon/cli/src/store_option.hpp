@@ -1,6 +1,5 @@
 #pragma once
-/// How a command finds the store of models: --store, or the configuration of the daemon it belongs
-/// to.
+/// How a command finds the model store: by --store, or by the configuration of the daemon.
 
 #include <CLI/App.hpp>
 #include <string>
@@ -17,8 +16,8 @@ struct StoreOption {
 void add_store_options(CLI::App& command, StoreOption& where);
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
 
-/// A file, or else a model of the store: its id, the beginning of one, "active". What looks like a
-/// path is never looked up there.
+/// Reads a model file, or a model of the store by its id, the beginning of its id, or "active". A
+/// name that looks like a path is never looked up in the store.
 [[nodiscard]] Result<ModelDocument> model_named(const std::string& name, const StoreOption& where);
 
 }  // namespace abbe::daemon

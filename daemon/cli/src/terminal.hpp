@@ -1,5 +1,5 @@
 #pragma once
-/// What may be written where: colour and progress are for people at a terminal, never for files and
+/// Output to the user. Colour and progress are written to a terminal only, never to files and
 /// pipes.
 
 #include <chrono>
@@ -10,19 +10,19 @@
 
 namespace abbe::daemon {
 
-/// A terminal that shows colours, and nobody set NO_COLOR (no-color.org).
+/// True if `fd` is a terminal with colours and NO_COLOR (no-color.org) is not set.
 [[nodiscard]] bool shows_colour(int fd);
 
-inline constexpr int kRed = 1, kGreen = 2, kYellow = 3;  // as ANSI counts colours
+inline constexpr int kRed = 1, kGreen = 2, kYellow = 3;  // ANSI colour numbers
 
-/// `text` in a colour, or plain where the terminal would show it as garbage.
+/// `text` in a colour, or unchanged if shows_colour(fd) is false.
 [[nodiscard]] std::string coloured(std::string_view text, int colour, int fd);
 
-/// "abbe: error: ..." and the details, one a line, on stderr; returns the exit code.
+/// Prints "abbe: error: ..." and the details, one per line, to stderr; returns the exit code.
 int report(const Error& error);
 
-/// A bar on stderr, redrawn when its percentage changes; silent unless stderr is a terminal. Erases
-/// itself.
+/// A progress bar on stderr, redrawn when its percentage changes. Prints nothing unless stderr is a
+/// terminal. The destructor erases the bar.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted = true);

@@ -1,4 +1,4 @@
-/// `abbe tracker`: what a person does with the laser tracker of the running daemon.
+/// `abbe tracker`: commands for the laser tracker of the running daemon.
 
 #include <fmt/format.h>
 
@@ -38,7 +38,7 @@ void print_reflectors(const json& order) {
                r["in_use"].get<bool>() ? "  in use" : "");
 }
 
-/// What came of an order that has ended; returns the exit code.
+/// Prints the outcome of an order that has ended; returns the exit code.
 int print_outcome(const json& order, bool as_json) {
   const std::string outcome = text_at(order, "outcome");
   if (outcome != "done")
@@ -54,13 +54,13 @@ int print_outcome(const json& order, bool as_json) {
   return 0;
 }
 
-/// Waits until the daemon reports the order, which its answer numbers.
+/// Sends the order to the daemon and waits until the daemon reports its outcome.
 int give_order(const TrackerArguments& arguments, const json& request) {
   const auto socket = socket_path(arguments.where);
   if (!socket) return report(socket.error());
   const auto given = ask_daemon(*socket, request);
   if (!given) return report(given.error());
-  const json number = given->at("order");
+  const json number = given->at("order");  // identifies the order in the status
 
   const auto look = [&](const json& status) -> std::optional<int> {
     for (const json& order :
@@ -71,7 +71,9 @@ int give_order(const TrackerArguments& arguments, const json& request) {
     }
     return report(
         {ErrorCode::Io,
-         fmt::format("tracker: order {} is too old: what came of it is not kept", number.dump())});
+         fmt::format("tracker: the outcome of order {} is lost: the daemon keeps only the latest "
+                     "orders; see `abbe tracker status`",
+                     number.dump())});
   };
 
   ProgressBar no_bar{false};
@@ -122,7 +124,7 @@ int show_tracker(const TrackerArguments& arguments) {
   if (!status) return report(status.error());
   if (!status->contains("tracker"))
     return report({ErrorCode::Refused,
-                   "tracker: there is no tracker, [tracker] host, in the daemon's configuration"});
+                   "tracker: the daemon's configuration has no tracker: set [tracker] host"});
 
   if (arguments.json) {
     fmt::print("{}\n", status->at("tracker").dump(1));
@@ -139,44 +141,44 @@ void add_tracker(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<TrackerArguments>();
   auto* group =
       parent.add_subcommand("tracker",
-                            "The laser tracker of the running daemon. Orders stop the measurement, "
-                            "wait for the tracker's answer and "
-                            "start\n"
-                            "the measurement again. They are refused while a calibration takes "
-                            "readings. Exit code 5: refused, 4: no "
-                            "answer.");
+                            "Control the laser tracker of the running daemon. An order stops the "
+                            "measurement, waits for the answer of\n"
+                            "the tracker and starts the measurement again. Orders are refused "
+                            "while a calibration takes readings.\n"
+                            "Exit code 5: refused; 4: no answer.");
   group->require_subcommand(1);
 
   const auto add = [&](CLI::App& to, const char* name, const char* text,
                        int (*run)(const TrackerArguments&)) {
     auto* command = to.add_subcommand(name, text);
     add_socket_options(*command, arguments->where);
-    command->add_flag("--json", arguments->json, "as one JSON object");
+    command->add_flag("--json", arguments->json, "print one JSON object");
     command->callback([arguments, run, &exit] { exit = run(*arguments); });
     return command;
   };
 
-  add(*group, "status", "Its state, why no points come, and the latest orders", show_tracker);
+  add(*group, "status", "Show its state, the reason if no points arrive, and the latest orders",
+      show_tracker);
   add(*group, "initialize",
-      "Initialize the tracker: the head turns and the beam is dropped. To the bird bath after it, "
-      "if "
-      "[tracker]\n"
-      "home_after_initialize = true",
+      "Initialize the tracker: the head rotates and the beam leaves the reflector. Then the beam\n"
+      "goes to the bird bath, if [tracker] home_after_initialize = true",
       initialize_tracker);
-  add(*group, "home", "The beam to the bird bath (GoBirdBath)", send_tracker_home);
-  add(*group, "find", "Search for a reflector around where the beam points (FindReflector)",
+  add(*group, "home", "Point the beam at the bird bath (GoBirdBath)", send_tracker_home);
+  add(*group, "find", "Search for a reflector near the direction of the beam (FindReflector)",
       find_reflector)
       ->add_option("--distance-m", arguments->distance_m,
-                   "about how far away the reflector is, m; at most 200")
+                   "approximate distance of the reflector, m; at most 200")
       ->required();
-  auto* reflector = group->add_subcommand("reflector", "The reflectors that the controller knows");
+  auto* reflector =
+      group->add_subcommand("reflector", "List or set the reflectors defined in the controller");
   reflector->require_subcommand(1);
-  add(*reflector, "list", "Id and name of each, and which one is in use", list_reflectors);
+  add(*reflector, "list", "List id and name of each reflector, and the one in use",
+      list_reflectors);
   add(*reflector, "set",
-      "Measure to another reflector. It stays set; only [tracker] reflector is set again when "
-      "abbed starts",
+      "Measure to another reflector. The setting stays until it is changed; abbed sets only\n"
+      "[tracker] reflector again when it starts",
       set_reflector)
-      ->add_option("reflector", arguments->reflector, "its name or id")
+      ->add_option("reflector", arguments->reflector, "name or id of the reflector")
       ->required();
 }
 

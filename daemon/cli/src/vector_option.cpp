@@ -11,7 +11,7 @@ namespace abbe::daemon {
 namespace {}  // namespace
 
 Result<calib::Vector3> parse_mm(const std::string& option, const std::string& text) {
-  const auto nonsense = [&] {
+  const auto malformed = [&] {
     return fail(ErrorCode::Usage, fmt::format("{} \"{}\": must be x,y,z in mm", option, text));
   };
 
@@ -22,13 +22,13 @@ Result<calib::Vector3> parse_mm(const std::string& option, const std::string& te
   for (int i = 0; i < 3; ++i) {
     double value_mm = 0.0;
     const auto [next, fault] = std::from_chars(at, end, value_mm);
-    if (fault != std::errc{} || !std::isfinite(value_mm)) return nonsense();
+    if (fault != std::errc{} || !std::isfinite(value_mm)) return malformed();
     vector_m[i] = value_mm / kMmPerM;
     at = next;
-    if (i < 2 && (at == end || *at++ != ',')) return nonsense();
+    if (i < 2 && (at == end || *at++ != ',')) return malformed();
   }
 
-  if (at != end) return nonsense();
+  if (at != end) return malformed();
   return vector_m;
 }
 
@@ -41,8 +41,8 @@ Result<calib::Vector3> tool_of(const std::string& text, const calib::VolumetricM
   }
   if (!model.holds_for_tool(tool_m))
     return fail(ErrorCode::DataInsufficient,
-                fmt::format("tool offset {}, {}, {} mm: the model was identified with another and "
-                            "does not hold for it",
+                fmt::format("tool offset {}, {}, {} mm: the model was identified with another tool "
+                            "offset and is not valid for it",
                             tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
   return tool_m;
 }

@@ -8,11 +8,12 @@
 
 namespace abbe::daemon {
 
-/// In m. Usage if it is anything but three finite numbers; `option` names it in the error.
+/// Returns the vector in m. Error Usage unless `text` is three finite numbers; `option` is the name
+/// of the option in the message.
 [[nodiscard]] Result<calib::Vector3> parse_mm(const std::string& option, const std::string& text);
 
-/// --tool, or the model's own if `text` is empty. DataInsufficient if the model does not hold for
-/// it.
+/// The tool offset given by --tool (`text`), or that of the model if `text` is empty.
+/// DataInsufficient if the model is not valid for it.
 [[nodiscard]] Result<calib::Vector3> tool_of(const std::string& text,
                                              const calib::VolumetricModel& model);
 

@@ -23,33 +23,35 @@ using nlohmann::json;
 
 using Keep = std::function<Result<void>(const VerificationFile&)>;
 
-constexpr auto kLookAtPoints = 200ms;
+constexpr auto kPointPollPeriod = 200ms;
 
-void tell(std::size_t number, const json& point) {
+void print_point(std::size_t number, const json& point) {
   const calib::Vector3 q_mm = 1e3 * vector_of(point.at("reading_m"));
   fmt::print(stderr, "{:>4}: {:.3f}, {:.3f}, {:.3f} mm, {} tracker points, scatter {:.1f} um\n",
              number, q_mm.x(), q_mm.y(), q_mm.z(), point.at("tracker_points").get<std::size_t>(),
              1e6 * point.at("scatter_m").get<double>());
 }
 
-/// One look at the daemon: new points are told and kept. Why no more come; empty: they may.
-Result<std::string> look(const std::filesystem::path& socket, const json& number, const char* step,
-                         VerificationFile& out, const Keep& keep) {
+/// Requests the new points from the daemon, prints and keeps them. Returns why the daemon collects
+/// no more points; empty if it still does.
+Result<std::string> poll_points(const std::filesystem::path& socket, const json& number,
+                                const char* step, VerificationFile& out, const Keep& keep) {
   const auto answer = ask_daemon(
       socket,
       {{"do", "verification"}, {"step", step}, {"number", number}, {"from", out.points.size()}});
   if (!answer) return tl::make_unexpected(answer.error());
   for (const json& point : answer->at("points")) {
     out.points.push_back({vector_of(point.at("reading_m")), vector_of(point.at("tracker_m"))});
-    tell(out.points.size(), point);
+    print_point(out.points.size(), point);
   }
   if (!answer->at("points").empty())
     if (const auto kept = keep(out); !kept) return tl::make_unexpected(kept.error());
   return answer->value("stopped", std::string{});
 }
 
-/// A daemon that went away takes no points with it.
-Result<LivePoints> what_there_is(VerificationFile& points, const Error& error) {
+/// After an error: the points collected so far with the error as `cut_short`; without any points,
+/// the error.
+Result<LivePoints> points_so_far(VerificationFile& points, const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);
   Error cut_short{ErrorCode::Io,
                   fmt::format("after {} points: {}", points.points.size(), error.text)};
@@ -64,6 +66,7 @@ Result<LivePoints> points_of_recording(const std::string& file) {
   const Config& config = recording->config;
   if (const auto possible = check_verification(config); !possible)
     return fail(ErrorCode::DataInsufficient, fmt::format("{}: {}", file, possible.error().text));
+
   StandstillPoints standstills{standstill_options(config)};
   ProgressBar bar;
   const auto replayed =
@@ -72,6 +75,7 @@ Result<LivePoints> points_of_recording(const std::string& file) {
               .snapshots = [&standstills](const protocol::Snapshot& s) { standstills.take(s); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
   standstills.finish();
+
   LivePoints out{{recording->source, {}, {}}, {}};
   for (const auto& p : standstills.points()) out.file.points.push_back(p.mean);
   if (const auto damage = recording->reader.damage(); !damage.empty())
@@ -87,20 +91,21 @@ Result<LivePoints> points_of_daemon(const std::filesystem::path& socket, std::si
   const json number = begun->at("number");
   mark_interruptions({SIGINT, SIGTERM, SIGHUP});
   fmt::print(stderr,
-             "abbe: stand still for some seconds at every point; Ctrl-C after the last one\n");
+             "abbe: keep the machine still for some seconds at every point; press Ctrl-C after the "
+             "last one\n");
   VerificationFile out;
   const auto all = [&] { return interrupted() || (count != 0 && out.points.size() >= count); };
 
-  for (; !all(); std::this_thread::sleep_for(kLookAtPoints)) {
-    const auto looked = look(socket, number, "look", out, keep);
-    if (!looked) return what_there_is(out, looked.error());
-    if (looked->empty()) continue;
-    fmt::print(stderr, "abbe: {}\n", *looked);
+  for (; !all(); std::this_thread::sleep_for(kPointPollPeriod)) {
+    const auto stopped = poll_points(socket, number, "look", out, keep);
+    if (!stopped) return points_so_far(out, stopped.error());
+    if (stopped->empty()) continue;
+    fmt::print(stderr, "abbe: {}\n", *stopped);
     break;
   }
 
-  if (const auto ended = look(socket, number, "end", out, keep); !ended)
-    return what_there_is(out, ended.error());
+  if (const auto ended = poll_points(socket, number, "end", out, keep); !ended)
+    return points_so_far(out, ended.error());
   return LivePoints{std::move(out), {}};
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Where the points of `abbe verify` come from when not out of a file.
+/// The points of `abbe verify` from a recording or from the running daemon.
 
 #include <cstddef>
 #include <filesystem>
@@ -13,18 +13,18 @@
 namespace abbe::daemon {
 
 struct LivePoints {
-  VerificationFile file;  ///< from no file: `source` has no name
-  /// Why some are missing: the daemon went away (Io), the recording is damaged inside
-  /// (DataInsufficient).
+  VerificationFile file;  ///< for points of the daemon `source` has no name
+  /// Why points are missing: the daemon does not answer any more (Io), or the recording is damaged
+  /// before its end (DataInsufficient).
   std::optional<Error> cut_short;
 };
 
-/// The standstills of a recording.
+/// One point per standstill in the recording.
 [[nodiscard]] Result<LivePoints> points_of_recording(const std::string& file);
 
-/// The standstills of the machine the daemon watches, one line on stderr for each, until there are
-/// `count` (0: as many as the daemon collects) or somebody presses Ctrl-C (or SIGTERM, SIGHUP).
-/// `keep` gets all of them whenever there are new ones; what it says ends the collection.
+/// One point per standstill of the daemon's machine, until there are `count` points (0: as many as
+/// the daemon collects), or Ctrl-C, SIGTERM or SIGHUP. Prints one line per point to stderr. `keep`
+/// is called with all points whenever there are new ones; its error ends the collection.
 [[nodiscard]] Result<LivePoints> points_of_daemon(
     const std::filesystem::path& socket, std::size_t count,
     const std::function<Result<void>(const VerificationFile&)>& keep);

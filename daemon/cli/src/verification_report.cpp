@@ -46,11 +46,11 @@ const char* words(verify::Effect effect) {
   return "";
 }
 
-std::size_t points_that_gained(const verify::Comparison& c) {
-  std::size_t gained = 0;
+std::size_t points_improved(const verify::Comparison& c) {
+  std::size_t improved = 0;
   for (std::size_t i = 0; i < c.inside.size(); ++i)
-    gained += c.left_after_m[i].norm() < c.left_before_m[i].norm() ? 1 : 0;
-  return gained;
+    improved += c.left_after_m[i].norm() < c.left_before_m[i].norm() ? 1 : 0;
+  return improved;
 }
 
 void add_verdict(HtmlReport& page, const Verification& v) {
@@ -60,11 +60,11 @@ void add_verdict(HtmlReport& page, const Verification& v) {
 
 void add_left(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
-  page.heading("What is left at the measured points");
+  page.heading("Residuals at the measured points");
   if (!v.cut_short.empty()) page.paragraph("Points are missing: " + v.cut_short + ".");
   page.paragraph(fmt::format(
-      "{} of {} measured points lie where the model holds. Without and with compensation, each "
-      "after its own best rigid motion of the instrument: how well both could be set up.",
+      "{} of {} measured points are in the volume where the model is valid. Each row is computed "
+      "after the rigid motion of the instrument that fits it best.",
       c.inside.size(), v.observations.readings_m.size()));
 
   const auto row = [](const char* what, const calib::VectorStatistics& s) {
@@ -73,13 +73,14 @@ void add_left(HtmlReport& page, const Verification& v) {
 
   page.table({"", "mean", "rms", "largest"},
              {row("without compensation", c.before), row("with the model", c.after)});
-  page.chart(Histogram{"left at the measured points",
+  page.chart(Histogram{"residuals at the measured points",
                        "um",
                        {{"without compensation", lengths_um(c.left_before_m)},
                         {"with the model", lengths_um(c.left_after_m)}}});
 }
 
-/// One wrong row, a jump of the beam for example, stands out here.
+/// The points with the largest residuals: a single wrong row, for example after a jump of the beam,
+/// is visible here.
 void add_farthest(HtmlReport& page, const Verification& v) {
   constexpr std::size_t kShown = 5;
   const auto& c = v.comparison;
@@ -101,7 +102,7 @@ void add_farthest(HtmlReport& page, const Verification& v) {
                     um_text(c.left_after_m[order[i]].norm())});
   }
 
-  page.table({"farthest from the model", "reading", "left"}, rows);
+  page.table({"largest residuals", "reading", "residual"}, rows);
 }
 
 void add_frame(HtmlReport& page, const Verification& v) {
@@ -110,29 +111,27 @@ void add_frame(HtmlReport& page, const Verification& v) {
   page.heading("Frames");
   page.paragraph(
       o.frame == verify::Frame::BestFit
-          ? "Nobody knows where the instrument stood but through these points: its frame was "
-            "fitted onto the "
-            "readings. That takes out of V_las the rigid motion that fits it best (six numbers): "
-            "nothing can "
-            "be said here of where the volume lies or how it is turned, only of its shape."
+          ? "The position and orientation of the instrument are known only from these points: its "
+            "frame was fitted to the readings. The fit removes from V_las the rigid motion that "
+            "fits it best (six numbers). The comparison therefore shows the shape of the volume "
+            "only, not its position or rotation."
           : "The instrument's axes were given as those of the machine: V_las keeps its rotation.");
   page.paragraph(
-      "\"As stated\" compares with V as the model has it. \"Turned\" gives the model the small "
-      "rigid motion "
-      "that fits V_las best, so that shapes are compared: a model from a ball array whose rotation "
-      "nobody "
-      "referenced, and any model against a fitted frame, can only be judged like this.");
+      "\"As stated\" compares with V of the unchanged model. \"Turned\" first applies to the model "
+      "the small rigid motion that fits V_las best, so that only shapes are compared. A model from "
+      "a ball array without rotation reference, and any model in a fitted frame, can only be "
+      "judged by \"turned\".");
   const Eigen::Quaterniond q(o.T_machine_tracker.R);
   page.facts({{"instrument in the machine", mm(o.T_machine_tracker.t_m)},
               {"its rotation (quaternion w, x, y, z)",
                fmt::format("{:.9f}, {:.9f}, {:.9f}, {:.9f}", q.w(), q.x(), q.y(), q.z())},
               {"origin, where V is set to zero",
-               c.origin_m ? mm(*c.origin_m) : std::string{"none: means are taken out"}},
+               c.origin_m ? mm(*c.origin_m) : std::string{"none: the means are subtracted"}},
               {"model turned by (rotation about the origin)", urad(c.turned.tail<3>())},
               {"grid: multiples of", mm(c.step_m)},
-              {"left out nearer to the origin than",
+              {"points are left out if nearer to the origin than",
                fmt::format("{:.1f} mm", kMmPerM * c.least_distance_m)},
-              {"what interpolating V_las linearly costs (seen on the model itself)",
+              {"error of interpolating V_las linearly (computed on the model)",
                um_text(c.interpolation_rms_m) + " rms"}});
 }
 
@@ -152,14 +151,12 @@ std::vector<std::string> ratio_row(const char* what, const verify::RatioStatisti
 }
 
 void add_ratio(HtmlReport& page, const verify::Comparison& c) {
-  page.heading("R_resmag: what is left of every vector");
+  page.heading("R_resmag: residual relative to the measured vector");
   if (const auto why = why_no_ratio(c)) return page.paragraph("Not given: " + *why + ".");
   page.paragraph(
-      "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model helps, "
-      "above it "
-      "harms [Li OMM, eqs. 20, 21]. What \"turned\" and \"as stated\" mean, and why the second one "
-      "may be "
-      "near 1 for a good model, is said under \"Frames\".");
+      "|V_las - V_model| / |V_las| on a grid inside the model's volume; below 1 the model reduces "
+      "the error, above 1 it increases it [Li OMM, eqs. 20, 21]. Section \"Frames\" explains "
+      "\"turned\" and \"as stated\", and why the latter may be near 1 for a good model.");
   page.table({"", "points", "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1"},
              {ratio_row("turned", c.R_turned), ratio_row("as stated", c.R_stated)});
   std::vector<double> stated, turned;
@@ -222,7 +219,7 @@ void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double 
   page.chart(chart);
 }
 
-/// As Fig. 12 of [Li OMM]: measured, model, and what is left, in planes across z, x and y.
+/// As Fig. 12 of [Li OMM]: measured vectors, model and residual in planes normal to z, x and y.
 void add_planes(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   calib::Vector3 low = c.grid.front().q_m, high = low;
@@ -235,19 +232,18 @@ void add_planes(HtmlReport& page, const Verification& v) {
   }
 
   const calib::Vector3 wanted = v.planes_m.value_or(0.5 * (low + high));
-  constexpr double kOfTheVolume = 0.1;  // the longest arrow, against the diagonal
-  const double magnification = round_number(kOfTheVolume * (high - low).norm() / longest_m);
+  constexpr double kLongestArrow = 0.1;  // as a fraction of the diagonal of the volume
+  const double magnification = round_number(kLongestArrow * (high - low).norm() / longest_m);
   page.heading("Vectors in three planes");
   page.paragraph(
-      "From each reading (dot) towards the true place. Measured, as the turned model has it, and "
-      "their "
-      "difference, all drawn alike.");
+      "Arrows from each reading (dot) towards the true position: measured, from the turned model, "
+      "and the residual (their difference), all at the same scale.");
 
   for (const Eigen::Index across : {2, 0, 1}) {
     const Plane plane = plane_of(c, across, wanted(across));
     add_vectors(page, plane, "measured", magnification, [](const auto& g) { return g.V_las_m; });
     add_vectors(page, plane, "model", magnification, [](const auto& g) { return g.turned_m; });
-    add_vectors(page, plane, "left", magnification,
+    add_vectors(page, plane, "residual", magnification,
                 [](const auto& g) -> calib::Vector3 { return g.V_las_m - g.turned_m; });
   }
 }
@@ -255,17 +251,16 @@ void add_planes(HtmlReport& page, const Verification& v) {
 }  // namespace
 
 std::string verdict_text(const verify::Comparison& c) {
-  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points gained",
+  return fmt::format("{}: {:.3f} um rms left, {:.3f} um without it; {} of {} points improved",
                      words(verify::effect_at_points(c)), kUmPerM * c.after.rms_m,
-                     kUmPerM * c.before.rms_m, points_that_gained(c), c.inside.size());
+                     kUmPerM * c.before.rms_m, points_improved(c), c.inside.size());
 }
 
 std::optional<std::string> why_no_ratio(const verify::Comparison& c) {
   if (verify::ratios_hold(c)) return std::nullopt;
   return fmt::format(
-      "interpolating between the measured points costs {:.3f} um rms, not small against the {:.3f} "
-      "um left; "
-      "more points nearer to each other make it smaller",
+      "the error of interpolating between the measured points, {:.3f} um rms, is not small against "
+      "the residual of {:.3f} um rms; measure more points at smaller distances",
       kUmPerM * c.interpolation_rms_m, kUmPerM * c.after.rms_m);
 }
 
@@ -283,8 +278,8 @@ std::string verification_report(const ModelDocument& document, const Verificatio
 
 std::string to_grid_csv(const verify::Comparison& c) {
   std::string text = "x_mm,y_mm,z_mm";
-  for (const char* who : {"las", "model", "turned"})
-    for (const char* axis : kNames) text += fmt::format(",{}_{}_um", who, axis);
+  for (const char* source : {"las", "model", "turned"})
+    for (const char* axis : kNames) text += fmt::format(",{}_{}_um", source, axis);
   text += ",R_stated,R_turned\n";
   for (const auto& g : c.grid) {
     for (Eigen::Index i = 0; i < 3; ++i) text += fmt::format("{:.17g},", kMmPerM * g.q_m(i));

@@ -1,4 +1,4 @@
-/// `abbe verify MODEL`: a model against independent measurements.
+/// `abbe verify MODEL`: compares a model with independent measurements.
 
 #include <fmt/format.h>
 
@@ -72,8 +72,8 @@ Result<void> create_folder(const std::filesystem::path& folder) {
   return {};
 }
 
-/// Into OUT, where there is one, before anything can go wrong with them: nobody measures twice
-/// gladly.
+/// Saves the points to OUT, if given, before they are evaluated: a later error does not lose the
+/// measurement.
 Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {
   if (arguments.out.empty()) return {};
   if (auto made = create_folder(arguments.out); !made) return made;
@@ -104,7 +104,7 @@ Result<LivePoints> points_of(const VerifyArguments& arguments) {
   return points_of_daemon(*socket, arguments.count, keep_them);
 }
 
-/// `cut_short` also if the points do not suffice because of it.
+/// If points are missing, sets `cut_short`, also on an error: the missing points may be its cause.
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());
@@ -112,6 +112,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   if (!document) return tl::make_unexpected(document.error());
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
+
   Verification v;
 
   if (!arguments.planes.empty()) {
@@ -123,12 +124,14 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   auto points = points_of(arguments);
   if (!points) return tl::make_unexpected(points.error());
   cut_short = std::move(points->cut_short);
+
   VerificationFile& file = points->file;
   auto observed = verify::observe(
       file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
   if (!observed) return tl::make_unexpected(error_of(observed.error()));
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
+
   v.observations = std::move(*observed);
   v.comparison = std::move(*compared);
   if (!file.source.name.empty()) v.inputs = {file.source};
@@ -199,7 +202,7 @@ void print_ratios(const verify::Comparison& c) {
              "mean", "std", "min", "25 %", "median", "75 %", "max", "above 1");
   print_ratio("  turned", c.R_turned);
   print_ratio("  as stated", c.R_stated);
-  fmt::print("grid        interpolation alone costs {:.3f} um rms\n",
+  fmt::print("grid        error of the interpolation alone {:.3f} um rms\n",
              kUmPerM * c.interpolation_rms_m);
 }
 
@@ -209,16 +212,17 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
   fmt::print("verdict     {}\n", verdict_text(c));
   fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document),
              outcome.document.machine, outcome.document.method);
-  fmt::print("points      {}, {} of them where the model holds\n", v.observations.readings_m.size(),
-             c.inside.size());
+  fmt::print("points      {}, {} of them where the model is valid\n",
+             v.observations.readings_m.size(), c.inside.size());
   fmt::print(
       "left        {:.3f} um rms (largest {:.3f}) without compensation, {:.3f} um ({:.3f}) with "
       "the model\n",
       kUmPerM * c.before.rms_m, kUmPerM * c.before.max_m, kUmPerM * c.after.rms_m,
       kUmPerM * c.after.max_m);
   fmt::print("frame       {}; model turned by {:.1f}, {:.1f}, {:.1f} urad\n",
-             arguments.frame == "fit" ? "fitted to the readings: V's best rigid motion is not seen"
-                                      : "the machine's axes",
+             arguments.frame == "fit"
+                 ? "fitted to the readings: the best-fit rigid motion of V is not observable"
+                 : "the machine's axes",
              kUradPerRad * c.turned(3), kUradPerRad * c.turned(4), kUradPerRad * c.turned(5));
   print_ratios(c);
 
@@ -253,26 +257,26 @@ int run(const VerifyArguments& arguments) {
 void add_options(CLI::App& command, VerifyArguments& arguments) {
   command
       .add_option("MODEL", arguments.model,
-                  "model.json; or, of the store, an id, the beginning of one, \"active\"")
+                  "model.json; or a model of the store: its id, the beginning of its id, or "
+                  "\"active\"")
       ->required();
   add_store_options(command, arguments.store);
   auto* points = command.add_option(
       "--points", arguments.points,
       "verification.csv: x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm: scale reading and\n"
-      "independent measurement there, each in its own frame; with [[thermal]] the readings a model "
-      "is\n"
-      "applied to: corrected for the temperature of the scales");
+      "independent measurement of each point, each in its own frame; with [[thermal]] the\n"
+      "readings must be corrected for the temperature of the scales");
   auto* recording =
       command.add_option("--recording", arguments.recording,
-                         "what the daemon recorded (.mcap): wherever the machine stood still");
+                         "recording of the daemon (.mcap): one point per machine standstill");
   auto* live = command.add_flag(
       "--live", arguments.live,
-      "wherever the machine that the running daemon watches stands still, until Ctrl-C");
-  command.add_option("--count", arguments.count, "with --live: ends after so many points")
+      "one point per machine standstill that the running daemon detects, until Ctrl-C");
+  command.add_option("--count", arguments.count, "with --live: end after this number of points")
       ->needs(live);
   command
       .add_option("--socket", arguments.socket,
-                  "with --live: control socket of abbed; or from --config")
+                  "with --live: control socket of abbed; --config gives it, too")
       ->needs(live)
       ->capture_default_str();
   points->excludes(recording)->excludes(live);
@@ -280,28 +284,28 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
   command
       .add_option(
           "--frame", arguments.frame,
-          "fit: the tracker's frame is fitted to the readings; machine: its axes are the machine's")
+          "fit: fit the tracker's frame to the readings; machine: its axes are the machine's axes")
       ->check(CLI::IsMember({"fit", "machine"}))
       ->capture_default_str();
   command.add_option("--tool", arguments.tool,
                      "x,y,z: tool offset in mm; default: that of the calibration");
   command.add_option(
       "--origin-mm", arguments.origin,
-      "x,y,z where V is set to zero; default: Ball1, or, for other methods, nowhere");
+      "x,y,z: point where V is set to zero; default: Ball1, or for other methods none");
   command.add_option("--grid-mm", arguments.grid,
-                     "x,y,z: steps of the grid; default: 20 steps an axis");
+                     "x,y,z: steps of the grid; default: 20 steps per axis");
   command
       .add_option(
           "--least-distance-mm", arguments.least_distance_mm,
-          "leave out what is nearer to the origin; default: a tenth of the volume's diagonal")
+          "leave out points nearer to the origin; default: a tenth of the volume's diagonal")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--planes-mm", arguments.planes,
-                     "x,y,z of the report's planes of vectors; default: the middle of the grid");
-  command.add_flag("--json", arguments.json, "the summary as one JSON object");
+                     "x,y,z: planes of the vectors in the report; default: the middle of the grid");
+  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
   command.add_option(
       "-o,--out", arguments.out,
-      "folder for report.html and grid.csv, and for the points of --recording and --live in\n"
-      "verification.csv; created if needed");
+      "folder for report.html and grid.csv, and for verification.csv with the points of\n"
+      "--recording or --live; created if needed");
 }
 
 }  // namespace
@@ -310,13 +314,11 @@ void add_verify(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<VerifyArguments>();
   auto* command = parent.add_subcommand(
       "verify",
-      "Compare a model with independent measurements, of a laser tracker for example: first the "
-      "verdict,\n"
-      "better or worse with the model; then what is left with and without it; where interpolating "
-      "between\n"
-      "the points costs little, R_resmag = |what is left| / |what was there| on a grid inside its "
-      "volume.\n"
-      "Exit code 1, with the result all the same, if the recording is damaged inside.");
+      "Compare a model with independent measurements, for example of a laser tracker. Prints the\n"
+      "verdict (better or worse with the model), the residuals with and without the model, and,\n"
+      "if the points are dense enough to interpolate, R_resmag = |residual| / |measured error| on\n"
+      "a grid inside the model's volume. If the recording is damaged before its end, the result\n"
+      "is printed and the exit code is 1.");
   add_options(*command, *arguments);
 
   command->callback([arguments, &exit] {
@@ -326,7 +328,7 @@ void add_verify(CLI::App& parent, int& exit) {
       exit = report({ErrorCode::Usage, "verify: give --points, --recording or --live"});
     else if (arguments->live && arguments->out.empty())
       exit =
-          report({ErrorCode::Usage, "verify --live: -o is needed, for the points to be kept in"});
+          report({ErrorCode::Usage, "verify --live: -o is required: the points are saved there"});
     else
       exit = run(*arguments);
   });

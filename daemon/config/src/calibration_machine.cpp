@@ -36,9 +36,8 @@ Result<void> require_target(const MachineConfig& machine) {
       ErrorCode::BadInput,
       fmt::format(
           "machine {}: [target] offset_mm is missing: add [target] with offset_mm = [x, y, z], the "
-          "reflector's or stylus tip's centre as seen from the tool reference point, in mm along "
-          "the "
-          "machine's axes; [0, 0, 0] where both are one point",
+          "centre of the reflector or stylus tip relative to the tool reference point, in mm along "
+          "the machine axes; [0, 0, 0] if the two points coincide",
           machine.name));
 }
 

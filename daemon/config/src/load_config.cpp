@@ -16,16 +16,14 @@ namespace {
 Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
   read_machine(root, config.machine);
-  read_daemon(
-      root, base,
-      config);  // before the devices: what may be said of them depends on [daemon] simulated
+  read_daemon(root, base, config);  // before the devices: they depend on [daemon] simulated
   read_tracker(root, config);
   read_encoder(root, config);
   read_counter_card(root, config);
   read_reference(root, config);
   read_probe(root, config);
   read_cmm(root, config);
-  read_environment(root, config);  // after the devices whose names must differ
+  read_environment(root, config);  // after the devices: all names must differ
   read_thermal(root, config);
   read_air(root, config);
   read_recording(root, base, config);

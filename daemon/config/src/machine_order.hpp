@@ -1,6 +1,6 @@
 #pragma once
-/// Everybody behind the device that reads the axes takes an axis by its place in a sample: the
-/// order in the file must not matter.
+/// Order of the axes in samples. The users of a sample select an axis by its index, so the index
+/// must not depend on the order in the configuration file.
 
 #include <fmt/format.h>
 
@@ -13,8 +13,9 @@
 
 namespace abbe::daemon {
 
-/// Puts what reads the axes (each with its axis' name at `name`) in the order of the machine.
-/// Faults what is missing of X, Y and Z: "axis Y has no node".
+/// Sorts the elements that read the axes (nodes or channels; the member `name` holds the axis name)
+/// in the order of the machine's axes. Adds a fault for each of X, Y and Z that is missing: "axis Y
+/// has no node".
 template <class Reads>
 void put_in_order_of_the_machine(const MachineConfig& machine, std::string Reads::*name,
                                  Section& device, std::string_view key, std::string_view what,
@@ -23,7 +24,7 @@ void put_in_order_of_the_machine(const MachineConfig& machine, std::string Reads
     if (std::ranges::find(all, needed, name) == all.end())
       device.fault(key, fmt::format("axis {} has no {}", needed, what));
   const auto known = [&](const Reads& one) { return machine.find_axis(one.*name) != nullptr; };
-  if (!std::ranges::all_of(all, known)) return;  // said already
+  if (!std::ranges::all_of(all, known)) return;  // reported already
   const auto place = [&](const Reads& one) {
     return machine.find_axis(one.*name) - machine.axes.data();
   };

@@ -1,7 +1,7 @@
 #pragma once
-/// What goes out and is recorded in messages of bounded size (abbe_v1.idl) must fit from the start:
-/// a name too long would lose every message that carries it, a thousand times a second and for
-/// ever.
+/// Names that are published and recorded in messages with bounded strings (abbe_v1.idl) are checked
+/// when the configuration is read: a name that is too long would make every message with it
+/// invalid.
 
 #include <cstddef>
 #include <string>
@@ -12,7 +12,8 @@
 
 namespace abbe::daemon {
 
-/// The IDL's bound of a member of T; the member is there, or the name is misspelt here.
+/// The IDL's bound of a member of T. 0 if T has no such member: then the name in the call is
+/// misspelt.
 template <class T>
 [[nodiscard]] std::size_t bound_of(std::string_view member) {
   for (const auto& known : member_bounds<T>())
@@ -20,15 +21,15 @@ template <class T>
   return 0;
 }
 
-/// A text that travels in messages: faults one that is longer than `most_bytes` or has a NUL
-/// inside.
+/// Reads a text that is published in messages. Adds a fault if it is longer than `most_bytes` or
+/// contains a NUL.
 inline bool get_bounded(Section& section, std::string_view key, std::string& out,
                         std::size_t most_bytes, Need need = Need::Optional) {
   if (!section.get(key, out, need)) return false;
   if (out.size() > most_bytes)
     section.fault(key, "must be at most " + std::to_string(most_bytes) +
-                           " bytes long: it travels in messages of bounded size");
-  if (out.find('\0') != std::string::npos) section.fault(key, "has a NUL inside");
+                           " bytes long, to fit into the published messages");
+  if (out.find('\0') != std::string::npos) section.fault(key, "contains a NUL");
   return true;
 }
 

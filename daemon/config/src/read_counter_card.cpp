@@ -14,7 +14,7 @@ namespace {
 constexpr Unit kMega{1e-6};
 constexpr std::int64_t kLastChannel = static_cast<std::int64_t>(drivers::quad08::kChannels) - 1;
 
-/// Keys that only make sense on the other transport are refused: they would be silently ignored.
+/// Keys that apply only to the other transport are refused instead of being ignored silently.
 void read_transport(Section& card, CounterCardConfig& out) {
   card.get_word<CardTransport>("transport", out.transport,
                                {{"usb", CardTransport::Usb}, {"usbip", CardTransport::Usbip}},
@@ -98,7 +98,7 @@ drivers::CounterAxis read_latched_axis(Section& section, const CounterCardConfig
     axis.scale = counted->scale;
     if (counted->offset != 0.0)
       section.fault(
-          "axis", fmt::format("has an offset in [counter_card], which the marks of {} are to give",
+          "axis", fmt::format("has an offset in [counter_card]; remove it, the marks of {} give it",
                               axis.name));
   }
 
@@ -144,7 +144,7 @@ void read_latched_axes(Section& section, const Config& config, ReferenceConfig& 
   }
 }
 
-/// The same card cannot count live and latch.
+/// One card cannot both count continuously and latch at marks.
 bool same_card(const CounterCardConfig& a, const CounterCardConfig& b) {
   if (a.transport != b.transport) return false;
   if (a.transport == CardTransport::Usb)
@@ -172,13 +172,13 @@ void read_reference(Section& root, Config& out) {
   section.get("tolerance_um", config.tolerance_m, kMicro, kPositive);
 
   if (!out.counter_card) {
-    section.fault("", "needs [counter_card]: the axes must be counted live, too");
+    section.fault("", "needs [counter_card], which counts the same axes continuously");
     static_cast<void>(section.has("axes"));
   } else {
     if (same_card(*out.counter_card, card))
       section.fault("",
-                    "is the card of [counter_card]: marks need a second one, told apart by its "
-                    "serial number");
+                    "is the card of [counter_card]: reference marks need a second card, selected "
+                    "by its serial_number");
     read_latched_axes(section, out, config);
     if (const auto possible = drivers::check(card.wiring); !possible)
       section.fault("", possible.error().text);
@@ -204,7 +204,7 @@ void read_counter_card(Section& root, Config& out) {
   put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, card, "axes", "channel",
                               config.wiring.axes);
 
-  // The driver knows what a wiring must be; its sentence names axis and channel.
+  // The driver checks the wiring; its error text names axis and channel.
   if (const auto possible = drivers::check(config.wiring); !possible)
     card.fault("", possible.error().text);
   for (const auto& axis : config.wiring.axes)

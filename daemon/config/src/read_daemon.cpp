@@ -26,8 +26,8 @@ void read_scheduling(Section& section, DaemonConfig& out) {
   if (out.hub_priority >= std::min(out.tracker_priority, out.encoder_priority))
     section.fault(
         "hub_priority",
-        fmt::format("{} must be below tracker_priority {} and encoder_priority {}: a busy hub must "
-                    "not keep the devices from their bytes",
+        fmt::format("{} must be below tracker_priority {} and encoder_priority {}: otherwise a "
+                    "busy hub delays the device threads",
                     out.hub_priority, out.tracker_priority, out.encoder_priority));
   read_cpu(section, "tracker_cpu", out.tracker_cpu);
   read_cpu(section, "encoder_cpu", out.encoder_cpu);
@@ -44,16 +44,16 @@ void read_daemon(Section& root, const std::filesystem::path& base, Config& out) 
   section.get("data_dir", daemon.data_dir, base);
   section.get("runtime_dir", daemon.runtime_dir, base);
 
-  // The hub says "alive" to abbe-dds every 100 ms, and is held for hung after a second without a
-  // turn.
+  // The hub sends a beat to abbe-dds every 100 ms, and counts as hung after a second without a
+  // cycle.
   section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
-  section.get("watermark_ms", daemon.watermark, kMilli,
-              {1.0, 5e3});  // half of what the assembler remembers
+  // Maximum: half of the time for which the assembler retains samples.
+  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});
   section.get("simulated", daemon.simulated);
   section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
   if (daemon.speed != 1.0 && !daemon.simulated)
     section.fault("speed",
-                  "may differ from 1 only with simulated = true: real devices keep real time");
+                  "may differ from 1 only with simulated = true: real devices run in real time");
   read_scheduling(section, daemon);
   section.close();
 }
@@ -84,18 +84,18 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   Section section = root.child("dds");
   auto& dds = out.dds;
   dds.socket = out.daemon.runtime_dir / "dds.sock";
-  section.get_integer("domain", dds.domain, 0,
-                      232);  // RTPS 2.2, 9.6.1.1: port numbers end at domain 232
+  // RTPS 2.2, 9.6.1.1: domain 232 is the last one with valid port numbers.
+  section.get_integer("domain", dds.domain, 0, 232);
 
-  // 0: every turn of the hub in which something new came. Its period and the devices' rates are the
-  // bound then.
+  // 0: with every hub cycle that has new data; the rate is then limited by the hub period and the
+  // rates of the devices.
   section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
   section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
   section.get_integer("priority", dds.priority, 0, 99);
   if (dds.priority >= out.daemon.hub_priority)
     section.fault("priority",
-                  fmt::format("must be below [daemon] hub_priority {}: a busy participant must not "
-                              "keep the hub from its beat",
+                  fmt::format("must be below [daemon] hub_priority {}: otherwise a busy DDS "
+                              "participant delays the hub",
                               out.daemon.hub_priority));
   section.get("validity_s", dds.validity, kPlain, {0.01, 3600.0});
   section.get_word<Supervise>(

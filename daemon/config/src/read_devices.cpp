@@ -38,22 +38,21 @@ void read_placement(Section& tracker, MachineConfig& machine) {
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
 }
 
-/// emScon measures every whole number of milliseconds: a rate in between would silently become
-/// another.
+/// The measurement period of emScon is a whole number of milliseconds. Other rates are refused,
+/// because the controller would change them silently.
 void read_point_rate(Section& tracker, TrackerConfig& out) {
-  constexpr double kRounded = 5e-3;  // 333 stands for 333.3
+  constexpr double kRounded = 5e-3;  // relative; accepts 333 for 333.3
   if (!tracker.get("point_rate_hz", out.point_rate_hz, kPlain, {1.0, 1000.0})) return;
   const double period_ms = std::round(1e3 / out.point_rate_hz);
   if (std::abs(out.point_rate_hz * period_ms / 1e3 - 1.0) > kRounded)
-    tracker.fault(
-        "point_rate_hz",
-        fmt::format("the tracker measures every whole ms: possible nearby are {:.4g} and {:.4g}",
-                    1e3 / std::ceil(1e3 / out.point_rate_hz),
-                    1e3 / std::floor(1e3 / out.point_rate_hz)));
+    tracker.fault("point_rate_hz",
+                  fmt::format("the period must be a whole number of ms: use {:.4g} or {:.4g}",
+                              1e3 / std::ceil(1e3 / out.point_rate_hz),
+                              1e3 / std::floor(1e3 / out.point_rate_hz)));
   out.point_rate_hz = 1e3 / period_ms;
 }
 
-/// What only the other mode knows is refused: it would be silently ignored.
+/// Keys that apply only to the other mode are refused instead of being ignored silently.
 void read_mode(Section& tracker, TrackerConfig& out) {
   constexpr int kLongest_ms = 60'000;  // emScon
   tracker.get_word<TrackerModeConfig>("mode", out.mode,
@@ -99,18 +98,18 @@ void read_search(Section& tracker, TrackerConfig& out) {
   misses("search_timeout_s", "search_radius_mm");
 }
 
-/// Which reflector the beam holds, and how it gets there.
+/// The reflector, and how the tracker finds it.
 void read_beam(Section& tracker, TrackerConfig& out) {
   tracker.get_maybe_empty("reflector", out.reflector);
   if (out.reflector.size() > drivers::kLongestReflectorName)
     tracker.fault("reflector",
-                  fmt::format("must be at most {} bytes long: no controller has a longer name",
+                  fmt::format("must be at most {} bytes long, the limit of the controllers",
                               drivers::kLongestReflectorName));
   tracker.get("home_after_initialize", out.home_after_initialize);
   read_search(tracker, out);
 }
 
-/// Keys that only make sense on the other transport are refused: they would be silently ignored.
+/// Keys that apply only to the other transport are refused instead of being ignored silently.
 void refuse(Section& encoder, std::initializer_list<std::string_view> keys,
             std::string_view transport) {
   for (const auto key : keys)
@@ -142,25 +141,27 @@ void read_transport(Section& encoder, EncoderConfig& out) {
     if (out.sync == SyncConfig::External && out.local_port == 0)
       encoder.fault(
           "local_port",
-          "missing: with sync = \"external\" abbed sends nothing the peer could answer to");
+          "missing: with sync = \"external\" abbed sends nothing, so the peer needs a fixed port");
     refuse(encoder, {"interface"}, "udp");
   }
 }
 
-/// Where a node is not asked how it is configured, the configuration must say it.
+/// Position of the reading in the TPDO. With sync = "external" abbed sends no SDO request to the
+/// node, so the configuration must give it.
 void read_mapping(Section& section, SyncConfig sync, EncoderNodeConfig& node) {
-  constexpr int kLastByte = 4;  // 8 bytes, 4 of them the position
+  constexpr int kLastByte = 4;  // a TPDO has 8 bytes, the position has 4
   section.get_integer("tpdo", node.tpdo, 1, 2);
   if (node.kind == AxisKind::Rotary)
     section.get_integer("wrap_counts", node.wrap_counts, 2, std::int64_t{1} << 32);
   if (sync != SyncConfig::External) {
     if (section.has("position_byte"))
-      section.fault("position_byte", "only with sync = \"external\": else the node is asked");
+      section.fault("position_byte",
+                    "only with sync = \"external\": otherwise it is read from the node");
     return;
   }
   section.get_integer("position_byte", node.position_byte, 0, kLastByte);
   if (node.kind == AxisKind::Rotary && node.wrap_counts == 0)
-    section.fault("wrap_counts", "missing: with sync = \"external\" the node is not asked for it");
+    section.fault("wrap_counts", "missing: with sync = \"external\" it is not read from the node");
 }
 
 EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, SyncConfig sync) {
@@ -183,7 +184,7 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
 }
 
 void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& out) {
-  constexpr std::size_t kMostNodes = 8;  // as many axes as a sample carries
+  constexpr std::size_t kMostNodes = 8;  // maximum number of axes in a sample
   std::set<std::string> axes;
   std::set<int> ids;
 
@@ -206,7 +207,7 @@ void read_nodes(Section& encoder, const MachineConfig& machine, EncoderConfig& o
 
 namespace {
 
-/// `air` is read after [tracker]; null: not there.
+/// `air`: the table [air], which is read after [tracker]; null if absent.
 double default_u_scale(WeatherConfig weather, const toml::node* air) {
   if (weather == WeatherConfig::Compute) return TrackerConfig::kControllersAir;
   const bool corrected =
@@ -247,13 +248,14 @@ void read_encoder(Section& root, Config& out) {
   get_bounded(encoder, "name", config.name, bound_of<v1::AxisSample>("device"));
   read_transport(encoder, config);
 
-  // Nodes count as silent after 350 ms, and the axes as unknown after 500 ms.
+  // Shorter than the 350 ms after which a node counts as silent, and the 500 ms after which an axis
+  // counts as unknown.
   encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 100e3});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);
   encoder.get("u_sampling_delay_us", config.u_sampling_delay, kMicro, kNotNegative);
   if (config.u_sampling_delay.count() == 0 && !out.daemon.simulated)
     encoder.fault("u_sampling_delay_us",
-                  "must be positive: no real node latches at a perfectly known instant");
+                  "must be positive: the latch time of a real node is never known exactly");
   encoder.get("axes_compensated", config.axes_compensated);
   read_nodes(encoder, out.machine, config);
   encoder.close();

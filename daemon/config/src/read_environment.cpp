@@ -20,7 +20,7 @@ using drivers::modbus::WordOrder;
 
 constexpr std::string_view kCustom = "custom";
 
-/// The channel of a named temperature; a new name takes the next one.
+/// Adds a temperature name and returns its channel. A fault if the name exists already.
 std::uint8_t channel_of(const std::string& name, Section& section, std::string_view key,
                         std::vector<std::string>& names) {
   const auto found = std::find(names.begin(), names.end(), name);
@@ -89,14 +89,14 @@ drivers::RegisterPlace read_place(Section& section, std::uint8_t unit) {
   return place;
 }
 
-/// What one of the unit is in SI, and where its zero lies.
+/// A unit of a register: SI value = scale * value + offset.
 struct RegisterUnit {
-  Quantity quantity;  // any temperature for a temperature
+  Quantity quantity;  // Temperature: also for AirTemperature
   double scale;
   double offset;
 };
 
-/// The unit must fit the quantity: a pressure in C is a map that cannot be meant.
+/// The unit must be a unit of the quantity: a pressure in C is a fault.
 void read_unit(Section& section, drivers::MeasuredRegister& out) {
   static const std::vector<std::pair<std::string_view, RegisterUnit>> kUnits{
       {"C", {Quantity::Temperature, 1.0, kZeroCelsius_K}},
@@ -165,7 +165,7 @@ void read_custom_map(Section& device, std::uint8_t unit, std::vector<std::string
   }
 }
 
-/// False: a fault was said.
+/// Returns false if it added a fault.
 bool read_known_map(Section& device, const std::string& name, std::uint8_t unit,
                     std::vector<std::string>& names, drivers::RegisterMap& map) {
   drivers::KnownMapOptions options;
@@ -205,16 +205,16 @@ void read_map(Section& device, std::vector<std::string>& names, drivers::Registe
     return;
   }
 
-  bool good = true;
+  bool valid_map = true;
   if (name == kCustom) {
     read_custom_map(device, unit, names, map);
   } else {
-    good = read_known_map(device, name, unit, names, map);
+    valid_map = read_known_map(device, name, unit, names, map);
   }
 
   device.get_integer("base_offset", map.base_offset, -1, 1);
-  if (!good) return;
-  if (const auto fine = drivers::check(map); !fine) device.fault("map", fine.error().text);
+  if (!valid_map) return;
+  if (const auto valid = drivers::check(map); !valid) device.fault("map", valid.error().text);
 }
 
 EnvironmentConfig read_device(Section& device, Config& out) {
@@ -229,7 +229,7 @@ EnvironmentConfig read_device(Section& device, Config& out) {
   return config;
 }
 
-/// Devices on one line are asked one after the other; a line has one baud rate.
+/// All devices on one serial line share its baud rate, parity and stop bits.
 void check_line(const EnvironmentConfig& config, const Config& out, Section& section) {
   for (const auto& other : out.environment) {
     if (!drivers::same_line(config.address, other.address) ||
@@ -246,12 +246,12 @@ void check_line(const EnvironmentConfig& config, const Config& out, Section& sec
   }
 }
 
-/// The names of Health's streams must differ: those of the devices, and the daemon's own.
+/// Health streams must have different names: the devices, and the parts of the daemon in kOwn.
 void take_name(const std::string& name, std::set<std::string>& names, Section& section) {
   static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
   if (name.empty()) return;
   if (kOwn.contains(name))
-    section.fault("name", fmt::format("\"{}\" is what the daemon calls a part of its own", name));
+    section.fault("name", fmt::format("\"{}\" is reserved for a part of the daemon", name));
   else if (!names.insert(name).second)
     section.fault("name", fmt::format("two devices are called \"{}\"", name));
 }
@@ -299,21 +299,24 @@ void read_thermal(Section& root, Config& out) {
       const AxisConfig* axis = out.machine.find_axis(config.axis);
       if (axis == nullptr || axis->kind != AxisKind::Linear)
         section.fault("axis", "no such linear axis in [axes]");
-      if (!axes.insert(config.axis).second) section.fault("axis", "is corrected twice");
+      if (!axes.insert(config.axis).second) section.fault("axis", "has two [[thermal]] tables");
       if (!connected.empty() &&
           std::find(connected.begin(), connected.end(), config.axis) == connected.end())
-        section.fault("axis", "is read by no [encoder] and no [counter_card]");
+        section.fault("axis", "is read by neither [encoder] nor [counter_card]");
     }
+
     if (section.get("temperature", temperature, Need::Required)) {
       const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
       if (found == out.temperatures.end())
-        section.fault("temperature", "no [[environment]] measures it");
+        section.fault("temperature", "no [[environment]] measures it: check the name");
       config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
     }
+
     section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
     section.get("u_alpha_um_per_m_K", config.u_alpha_per_K, kMicro, {0.0, 50.0}, Need::Required);
     section.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 50.0}, Need::Required);
     section.get("fixed_mm", config.fixed_m, kMilli, kAny, Need::Required);
+
     if (out.axes_compensated())
       section.fault("", "the control corrects these readings already (axes_compensated)");
     section.close();
@@ -323,7 +326,7 @@ void read_thermal(Section& root, Config& out) {
 
 namespace {
 
-bool all_of_the_air_is_measured(const Config& config) {
+bool air_is_fully_measured(const Config& config) {
   protocol::EnvironmentMask seen = 0;
   for (const auto& device : config.environment)
     for (const auto& measured : device.map.measured) seen |= drivers::mask_of(measured);
@@ -353,13 +356,10 @@ void read_air(Section& root, Config& out) {
     if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
       air.fault("assumed_index",
                 "the controller computes the index already (tracker.weather = \"compute\")");
-    if (out.tracker && out.tracker->weather == WeatherConfig::None &&
-        !all_of_the_air_is_measured(out))
+    if (out.tracker && out.tracker->weather == WeatherConfig::None && !air_is_fully_measured(out))
       air.fault("assumed_index",
                 "with tracker.weather = \"none\" an [[environment]] must measure temperature, "
-                "pressure and "
-                "humidity "
-                "of the air");
+                "pressure and humidity of the air");
   }
 
   air.close();

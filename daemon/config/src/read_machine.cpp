@@ -16,7 +16,7 @@ namespace abbe::daemon {
 namespace {
 
 constexpr double kDefaultNodeSpacing_m = 0.05;  // the spacing of [Sanders 2023]
-constexpr double kNodeTolerance_m = 1e-9;       // node and end of travel are meant to be equal
+constexpr double kNodeTolerance_m = 1e-9;       // largest difference of end node and end of travel
 
 void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& out) {
   AxisConfig config;
@@ -91,7 +91,8 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
     return;
   }
 
-  // a table nobody can identify; keeps a misprint from asking for gigabytes
+  // A larger table cannot be identified; the limit also prevents that a typing error allocates
+  // gigabytes.
   constexpr double kMaxNodes = 2000.0;
   if ((axis.max - axis.min) / spacing_m > kMaxNodes)
     model.fault("node_spacing_mm",
@@ -113,7 +114,7 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
   model.close();
 }
 
-/// A machine that is faulty anyway has no model to count.
+/// Checks the number of parameters. A machine with other faults is skipped.
 void check_model_size(Section& model, const MachineConfig& config) {
   const auto machine = otf_machine(config);
   if (!machine) return;

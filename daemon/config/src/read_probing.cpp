@@ -44,9 +44,9 @@ void read_probe(Section& root, Config& out) {
 
   if (!wired) {
     probe.fault("", "needs [counter_card] with a latch_channel or an edge_channel");
-  } else if (drivers::check(out.counter_card->wiring)) {  // else its own fault says enough
-    const auto possible = drivers::check(touch_options(config, *out.counter_card, out.machine));
-    if (!possible) probe.fault("", possible.error().text);
+  } else if (drivers::check(out.counter_card->wiring)) {  // else the wiring has a fault already
+    const auto valid = drivers::check(touch_options(config, *out.counter_card, out.machine));
+    if (!valid) probe.fault("", valid.error().text);
   }
 
   probe.close();
@@ -68,7 +68,7 @@ void read_cmm(Section& root, Config& out) {
   cmm.get("command_timeout_s", config.command_timeout, kPlain, kPositive);
   cmm.get("motion_timeout_s", config.motion_timeout, kPlain, kPositive);
 
-  if (out.probe) cmm.fault("", "touches come from [probe] already: one of them must go");
+  if (out.probe) cmm.fault("", "touches come from [probe] already: remove [probe] or [cmm]");
   cmm.close();
   out.cmm = std::move(config);
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// One reader per group of tables. Each fills what it can, adds a fault for what it cannot, and
-/// closes its sections.
+/// One reader per group of tables. Each reader sets the valid values, adds a fault for each invalid
+/// one, and closes its sections.
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"

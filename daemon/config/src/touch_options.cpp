@@ -25,12 +25,13 @@ drivers::TouchOptions touch_options(const ProbeConfig& probe, const CounterCardC
   wiring.use_latch = card.wiring.latch_channel.has_value();
   wiring.scan_period = nanoseconds_of(1.0 / drivers::scan_rate_hz(card.wiring));
 
-  // A debounce of microseconds filters noise; one longer than chatter is the confirmation itself.
+  // A debounce of microseconds only filters noise; one that is longer than the chatter time
+  // confirms the touch.
   const auto& debounce = card.wiring.edge_debounce;
-  const auto stands = nanoseconds_of(drivers::quad08::kDebounce_s[debounce.time_code]);
+  const auto debounce_time = nanoseconds_of(drivers::quad08::kDebounce_s[debounce.time_code]);
   const bool confirms =
       card.wiring.edge_channel && debounce.enabled && !debounce.trigger_before_stable;
-  if (confirms && stands > probe.switching.chatter) wiring.counter_debounce = stands;
+  if (confirms && debounce_time > probe.switching.chatter) wiring.counter_debounce = debounce_time;
   wiring.linear_axes = 0;
 
   for (std::size_t i = 0; i < card.wiring.axes.size(); ++i) {

@@ -11,7 +11,7 @@ calib::Air assumed_air() noexcept {
 }
 
 double u_of_unmeasured_air() noexcept {
-  // Constant air within the range of the equation: always a value.
+  // The air is constant and within the range of the equation, so there is always a value.
   static const double u =
       *calib::u_of_assumed_air(assumed_air(), calib::kHeliumNeon_m, calib::IndexEquation::Ciddor);
   return u;
@@ -31,14 +31,13 @@ std::optional<std::string> unmeasured_air_text(const Config& config, double u_sc
                          air.temperature_K - kZeroCelsius_K, air.pressure_Pa * 1e-2,
                          air.relative_humidity * 1e2)
            : std::string{
-                 "air measured, but the ranges are corrected with the index set in the controller "
-                 "last"};
+                 "air measured, but the ranges are corrected with the index that was last set in "
+                 "the controller"};
 
   return fmt::format(
-      "{} (tracker.weather = \"{}\"); their common scale counts as uncertain by {:.3g} um/m, a "
-      "shop floor "
-      "has {:.3g}; "
-      "weather = \"compute\" corrects for measured air",
+      "{} (tracker.weather = \"{}\"); the standard uncertainty of their common scale is set to "
+      "{:.3g} um/m, for a shop floor {:.3g} um/m is realistic; set weather = \"compute\" to "
+      "correct for measured air",
       corrected_for, none ? "none" : "read", u_scale * 1e6, u_of_unmeasured_air() * 1e6);
 }
 

@@ -1,5 +1,5 @@
-// abbe-dds: the DDS participant of abbe, a process of its own so that nothing a stranger sends can
-// stop abbed.
+// abbe-dds: the DDS participant of abbe. It is a separate process, so that no message from the
+// network can stop abbed.
 #include <linux/close_range.h>
 #include <signal.h>
 #include <unistd.h>
@@ -29,11 +29,9 @@ using abbe::daemon::ErrorCode;
 constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT or because the parent is gone, 2 usage, 3 the "
-    "configuration "
-    "or "
-    "the profile cannot be used,\n"
-    "4 no participant or writer can be created, 70 an unexpected exception.";
+    "Exit codes: 0 stopped by SIGTERM or SIGINT, or the parent process has ended; 2 usage;\n"
+    "3 the configuration or the profile cannot be used; 4 no participant or writer can be\n"
+    "created; 70 internal error.";
 
 volatile sig_atomic_t stop_requested = 0;
 
@@ -41,7 +39,7 @@ struct Options {
   std::string config;
   std::string socket;
   abbe::dds::ParticipantOptions participant;
-  pid_t parent = 0;  ///< 0: nobody's child
+  pid_t parent = 0;  ///< 0: not started by abbed
 };
 
 void stop_on_signals() {
@@ -67,15 +65,15 @@ bool parent_is_gone(const Options& options) {
   return options.parent != 0 && ::getppid() != options.parent;
 }
 
-void say_when_it_changes(const DdsBridge& bridge, bool& alive) {
+void log_source_change(const DdsBridge& bridge, bool& alive) {
   if (bridge.source_alive() == alive) return;
   alive = bridge.source_alive();
   std::fprintf(stderr, alive ? "abbe-dds: abbed is alive\n"
-                             : "abbe-dds: abbed is lost, published INVALID\n");
+                             : "abbe-dds: no data from abbed: ModelState INVALID is published\n");
 }
 
-/// As a service of its own it must do what abbed.toml says, and must not run beside a child of
-/// abbed's.
+/// For abbe-dds as a systemd service: reads the options from abbed.toml. Refused unless supervise
+/// is "systemd", because abbed would start a second abbe-dds.
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = abbe::daemon::load_config(options.config);
   if (!config) return tl::make_unexpected(config.error());
@@ -83,7 +81,7 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
     return abbe::daemon::fail(ErrorCode::BadInput,
                               options.config +
                                   ": [dds] supervise is not \"systemd\": abbed starts abbe-dds "
-                                  "itself, or nobody is to");
+                                  "itself, or abbe-dds is switched off");
   }
 
   options.socket = config->dds.socket;
@@ -94,8 +92,8 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
   return {};
 }
 
-/// As a service: systemd kills it when its loop stands still. The notification socket that a child
-/// has from abbed is abbed's.
+/// Notifies systemd when abbe-dds runs as a service: systemd kills it if its loop hangs. A child of
+/// abbed sends nothing, because the notification socket that it inherits is that of abbed.
 class ServiceManager {
  public:
   using Instant = std::chrono::steady_clock::time_point;
@@ -116,7 +114,8 @@ class ServiceManager {
   Instant next_{};
 };
 
-/// The exit code, or nothing where a new address calls for another participant.
+/// Publishes until it is stopped and returns the exit code. Returns nullopt if a new network
+/// address requires another participant.
 std::optional<int> publish(const Options& options) {
   using Clock = std::chrono::steady_clock;
   abbe::dds::InterfaceWatch interfaces(Clock::now());
@@ -126,16 +125,18 @@ std::optional<int> publish(const Options& options) {
   if (!writers) return refuse(writers.error());
   stop_on_signals();
 
+  // Readiness is reported only after participant and writers exist.
   ServiceManager manager(options);
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);
   abbe::dds::Announcer announcer(*participant, *writers);
   bool alive = false;
+
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.cycle();
     announcer.cycle(Clock::now());
     manager.cycle(Clock::now());
-    say_when_it_changes(bridge, alive);
+    log_source_change(bridge, alive);
     if (const auto added = interfaces.cycle(participant->allowed_addresses(), Clock::now())) {
       std::fprintf(stderr,
                    "abbe-dds: address %s came up: the participant is created again to use it\n",
@@ -143,12 +144,13 @@ std::optional<int> publish(const Options& options) {
       return std::nullopt;
     }
   }
+
   bridge.lost();
   writers->wait_for_state_acknowledged(std::chrono::seconds{1});
   return kDone;
 }
 
-/// Returns only if that fails.
+/// Replaces this process by a new one with the same arguments. Returns only if that fails.
 int start_again(char** argv) {
   ::close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
   ::execv("/proc/self/exe", argv);
@@ -160,14 +162,13 @@ int start_again(char** argv) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Publishes over DDS what abbed hands over its local socket, and tells the subscribers when "
-      "abbed is "
-      "lost."};
+      "Publishes over DDS the data that abbed sends over its local socket, and publishes "
+      "ModelState INVALID when abbed is lost."};
   app.footer(kExitCodes);
   Options options;
   options.participant.role = abbe::daemon::DdsRole::Daemon;
   auto* const socket = app.add_option("--socket", options.socket,
-                                      "Unix socket of abbed; waits for it if it is not there");
+                                      "Unix socket of abbed; waits until it exists");
   auto* const domain =
       app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
           ->capture_default_str();
@@ -176,16 +177,17 @@ int main(int argc, char** argv) {
       "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
   auto* const security = app.add_option(
       "--security", options.participant.security,
-      "keys from `abbe dds keys` (default: DDS Security is off, unless the profile has it)");
+      "folder of keys from `abbe dds keys` (default: DDS Security is off, unless the profile "
+      "switches it on)");
   app.add_option("-c,--config", options.config,
-                 "socket, domain, profile and security from this abbed.toml, which says supervise "
-                 "= \"systemd\"")
+                 "take socket, domain, profile and security from this abbed.toml; it must contain "
+                 "[dds] supervise = \"systemd\"")
       ->excludes(socket)
       ->excludes(domain)
       ->excludes(profile)
       ->excludes(security);
   app.add_option("--parent", options.parent,
-                 "leave when this process is no longer the parent (given by abbed)");
+                 "process id; exit when it is no longer the parent process (set by abbed)");
 
   try {
     app.parse(argc, argv);
@@ -194,7 +196,7 @@ int main(int argc, char** argv) {
   }
 
   if (options.config.empty() && options.socket.empty()) {
-    return refuse({ErrorCode::Usage, "--socket or --config is needed"});
+    return refuse({ErrorCode::Usage, "--socket or --config is required"});
   }
 
   try {
@@ -204,7 +206,7 @@ int main(int argc, char** argv) {
     if (const auto code = publish(options)) return *code;
     return start_again(argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "abbe-dds: %s\n", e.what());
+    std::fprintf(stderr, "abbe-dds: internal error: %s\n", e.what());
     return kInternal;
   }
 }

@@ -1,4 +1,5 @@
-// abbe-watch: a subscriber. Shows what abbe says about a machine, and what its correction is worth.
+// abbe-watch: a subscriber. Shows the data that abbe publishes about a machine, and compares a
+// received model with known errors.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -35,19 +36,19 @@ using WallClock = std::chrono::steady_clock;
 constexpr int kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
 
 constexpr const char* kExitCodes =
-    "Exit codes: 0 done, 1 no model that may be applied arrived in time (said why), 2 usage, 3 a "
-    "file or "
-    "profile cannot be\n"
-    "used, 4 no participant or output file can be created, 70 an unexpected exception.";
+    "Exit codes: 0 done; 1 no model that may be applied arrived in time (stderr has the reason);\n"
+    "2 usage; 3 a file or profile cannot be used; 4 no participant or output file can be created;\n"
+    "70 internal error.";
 
-/// ModelState is repeated every second, also if nothing changes.
+/// A publisher is not alive if its last ModelState is older. ModelState is repeated every second,
+/// even if nothing changes.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
 volatile sig_atomic_t stop_requested = 0;
 
 struct Options {
   dds::ParticipantOptions participant;
-  std::string machine;  ///< empty: every one
+  std::string machine;  ///< empty: all machines
   bool json = false;
   bool until_model = false;
   double timeout_s = std::numeric_limits<double>::infinity();
@@ -76,7 +77,7 @@ std::string micrometres(const std::array<double, 3>& v_m) {
   return fmt::format("{:+.2f} {:+.2f} {:+.2f} um", v_m[0] * 1e6, v_m[1] * 1e6, v_m[2] * 1e6);
 }
 
-/// A missing axis has no position: the last one is not where it is.
+/// A missing axis is shown as "-": its last position is out of date.
 std::string millimetres(const std::vector<double>& position_m, unsigned missing_mask) {
   std::string text;
   for (std::size_t axis = 0; axis < position_m.size(); ++axis) {
@@ -86,7 +87,7 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
   return text + " mm";
 }
 
-/// What is known of every machine, and what of it is worth a line.
+/// Keeps the received data of every machine, and prints what has changed.
 class Watch {
  public:
   Watch(const Options& options, const dds::Readers& readers,
@@ -106,13 +107,13 @@ class Watch {
     auto& publisher = machine.publisher(from);
     keep(arrival, publisher);
     if (verdict == Verdict::Waiting) return;
-    if (verdict == Verdict::Foreign) return report_foreign_sync(name, machine, from);
+    if (verdict == Verdict::Foreign) return report_foreign_publisher(name, machine, from);
     if (former && former != from) show_successor(name, from, *former);
     show(arrival, name, machine, publisher);
   }
 
-  /// Publishers that are no longer alive. What such a one said counts no longer, also when it comes
-  /// back: it repeats its state within a second.
+  /// Discards the ModelState of publishers that are not alive, and shows the change. If such a
+  /// publisher becomes alive again, it repeats its state within a second.
   void notice_losses() {
     for (auto& [name, machine] : machines_) {
       for (auto& [id, publisher] : machine.publishers)
@@ -121,7 +122,7 @@ class Watch {
     }
   }
 
-  /// A machine whose model may be applied, with everything the options need of it.
+  /// The first model that may be applied and is complete; nullptr if there is none.
   [[nodiscard]] const dds::ReceivedModel* applicable() const {
     for (const auto& [name, machine] : machines_) {
       const Publisher& publisher = machine.pinned();
@@ -143,26 +144,27 @@ class Watch {
   }
 
  private:
-  /// What one participant says about one machine. It lives and dies for itself.
+  /// The data that one participant published about one machine.
   struct Publisher {
     dds::ReceivedModel model;
-    std::optional<dds::WriterId> state_from;  ///< writer of the ModelState that counts
-    WallClock::time_point heard{};            ///< from it
+    std::optional<dds::WriterId> state_from;  ///< writer of the last valid ModelState
+    WallClock::time_point state_at{};         ///< when that ModelState arrived
     std::string position;
     dds::Delay delay;
-    std::optional<std::chrono::nanoseconds> waited;  ///< of the last vector
+    std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
   };
 
-  /// Several may be in a domain. Only what the pinned publisher says is used.
+  /// Several participants of a domain may publish data of the same machine. Only the data of the
+  /// pinned publisher is shown and used.
   struct Machine {
     dds::PublisherPin pin;
     std::map<dds::ParticipantId, Publisher> publishers;
     bool shown_alive = false;
     std::string shown_state, shown_model;
     WallClock::time_point last_live{};
-    std::optional<WallClock::time_point> foreign_sync_reported;
+    std::optional<WallClock::time_point> foreign_reported;
 
-    /// Something was heard of the machine.
+    /// Valid once a sample of the machine was received.
     [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
 
     Publisher& publisher(const dds::ParticipantId& id) {
@@ -174,7 +176,7 @@ class Watch {
   };
 
   [[nodiscard]] bool alive(const Publisher& publisher) const {
-    return publisher.state_from && WallClock::now() - publisher.heard < kLongestSilence &&
+    return publisher.state_from && WallClock::now() - publisher.state_at < kLongestSilence &&
            readers_.is_alive(*publisher.state_from);
   }
 
@@ -187,13 +189,13 @@ class Watch {
     }
   }
 
-  /// Also of a publisher that is not pinned: it may be the next one.
+  /// Called also for publishers that are not pinned, because one of them may be pinned next.
   void keep(const dds::Arrival& arrival, Publisher& publisher) {
     switch (arrival.topic) {
       case Topic::ModelState:
         return with<v1::ModelState>(arrival.payload, [&](auto& m) {
           publisher.state_from = arrival.writer;
-          publisher.heard = WallClock::now();
+          publisher.state_at = WallClock::now();
           publisher.model.state(m);
         });
       case Topic::ErrorModel:
@@ -206,15 +208,15 @@ class Watch {
         });
       case Topic::Compensation:
         return with<v1::Compensation>(arrival.payload, [&](auto& m) {
-          publisher.waited = publisher.delay.of(m, WallClock::now());
+          publisher.last_delay = publisher.delay.of(m, WallClock::now());
         });
       case Topic::Health:
       case Topic::CalibrationEvent:
-        return;  // only shown
+        return;  // shown when it arrives, not kept
     }
   }
 
-  /// A sample of the pinned publisher, which is kept.
+  /// Shows a sample of the pinned publisher, after keep().
   void show(const dds::Arrival& arrival, const std::string& name, Machine& machine,
             const Publisher& publisher) {
     const auto& payload = arrival.payload;
@@ -251,7 +253,7 @@ class Watch {
                       now ? "publisher is alive" : "publisher is not alive: do not apply"));
   }
 
-  /// As its announcement has it, which is as true as the participant is honest.
+  /// Participant id and announced addresses; the addresses are not verified.
   [[nodiscard]] std::string described(const dds::ParticipantId& id) const {
     const auto address = addresses_.of(id);
     return dds::text_of(id) + (address.empty() ? "" : ", announced at " + address);
@@ -264,24 +266,24 @@ class Watch {
                  dds::text_of(id), dds::text_of(former));
       std::fflush(stdout);
     }
-    print(fmt::format("{}  publisher is now {}: {} is silent", name, described(id),
+    print(fmt::format("{}  publisher is now {}: {} sends no more", name, described(id),
                       dds::text_of(former)));
   }
 
-  void report_foreign_sync(const std::string& name, Machine& machine,
-                           const dds::ParticipantId& id) {
+  void report_foreign_publisher(const std::string& name, Machine& machine,
+                                const dds::ParticipantId& id) {
     constexpr std::chrono::seconds kReportPeriod{10};
     const auto now = WallClock::now();
-    if (machine.foreign_sync_reported && now - *machine.foreign_sync_reported < kReportPeriod)
-      return;
-    machine.foreign_sync_reported = now;
+    if (machine.foreign_reported && now - *machine.foreign_reported < kReportPeriod) return;
+    machine.foreign_reported = now;
     if (options_.json) {
       fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name,
                  dds::text_of(id), addresses_.of(id));
       std::fflush(stdout);
     }
-    print(fmt::format("{}  rival publisher {}: ignored; stop it, or use keys (abbe dds keys)", name,
-                      described(id)));
+    print(fmt::format(
+        "{}  another publisher {}: ignored; stop it, or use DDS Security (abbe dds keys)", name,
+        described(id)));
   }
 
   void show_state(const std::string& name, Machine& machine, const Publisher& publisher) {
@@ -313,8 +315,8 @@ class Watch {
     if (std::exchange(calibration_[e.machine()], line) != line) print(line);
   }
 
-  /// The one line that is always true; on a terminal it stands still, elsewhere it comes once a
-  /// second.
+  /// The line with position, vector and decision. On a terminal it is updated in place, otherwise a
+  /// new line is printed once a second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c) {
     const auto now = WallClock::now();
     if (options_.json || now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100}
@@ -322,7 +324,7 @@ class Watch {
       return;
     machine.last_live = now;
     const auto decision =
-        dds::decide(c, publisher.waited, publisher.model.state(), alive(publisher));
+        dds::decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
     const std::string line =
         fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                     decision.apply ? "apply" : "do not apply: " + decision.reason);
@@ -418,7 +420,8 @@ int run(const Options& options) {
   auto participant = dds::Participant::create(options.participant);
   if (!participant) return exit_code_of(participant.error());
 
-  // The state first, so that nothing is judged by an older one.
+  // ModelState first: Readers::take() goes topic by topic, so every other sample is judged by the
+  // latest state.
   constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
                                Topic::Snapshot,        Topic::Health,     Topic::Compensation,
                                Topic::CalibrationEvent};
@@ -439,7 +442,8 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Shows what abbe publishes over DDS, and applies the rule of abbe_v1.idl: apply or not."};
+      "Shows the data that abbe publishes over DDS, and whether the correction may be applied by "
+      "the rule of abbe_v1.idl: apply or not."};
   app.footer(kExitCodes);
   Options options;
   app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
@@ -448,18 +452,20 @@ int main(int argc, char** argv) {
       "--profile", options.participant.profiles,
       "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
   app.add_option("--security", options.participant.security,
-                 "keys from `abbe dds keys`, as the publisher's (default: DDS Security is off)");
+                 "folder of keys from the same `abbe dds keys` as the publisher's (default: DDS "
+                 "Security is off)");
   app.add_option("--machine", options.machine, "only this machine (default: all)");
-  app.add_flag("--json", options.json, "one JSON object a line for every sample");
+  app.add_flag("--json", options.json, "print one line with a JSON object per sample");
   app.add_flag("--until-model", options.until_model,
-               "end with 0 as soon as a model arrived that may be applied");
+               "exit with code 0 as soon as a model that may be applied has arrived");
   app.add_option("--timeout", options.timeout_s,
-                 "end after this many seconds, with 1 if a model was waited for");
+                 "exit after this many seconds; exit code 1 if a model was awaited");
   app.add_option("--grid-csv", options.grid_csv,
-                 "wait for such a model and write its grid: x_mm,...,ex_um,...,ux_um,...");
+                 "wait for a model that may be applied and write its grid to this file: "
+                 "x_mm,...,ex_um,...,ux_um,...");
   app.add_option("--compare", options.known_errors,
-                 "wait for such a model and compare its grid with a CSV "
-                 "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um of known V");
+                 "wait for a model that may be applied and compare its grid with the known "
+                 "errors V in this CSV file: x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
 
   try {
     app.parse(argc, argv);
@@ -470,7 +476,7 @@ int main(int argc, char** argv) {
   try {
     return run(options);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "abbe-watch: %s\n", e.what());
+    std::fprintf(stderr, "abbe-watch: internal error: %s\n", e.what());
     return kInternal;
   }
 }

@@ -32,11 +32,13 @@ void Announcer::cycle(WallTime now) {
     interval_ = kFirst;
     next_round_ = std::min(next_round_, now + kFirst);
   }
+
   if (next_writer_ == 0 && now < next_round_) return;
   if (writers_.announced() == 0) return;
   writers_.announce(next_writer_);
   next_writer_ = (next_writer_ + 1) % writers_.announced();
   if (next_writer_ != 0) return;
+
   next_round_ = now + interval_;
   interval_ = std::min(2 * interval_, kPeriod);
 }

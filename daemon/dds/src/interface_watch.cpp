@@ -16,8 +16,8 @@
 namespace abbe::dds {
 namespace {
 
-/// Receives a message for every change of a link or of an IPv4 address; -1 where the system refuses
-/// it.
+/// Opens a socket that receives a message for every change of a link or of an IPv4 address; -1 if
+/// the system does not permit it.
 int open_netlink() {
   const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, NETLINK_ROUTE);
   if (fd < 0) return -1;
@@ -30,15 +30,16 @@ int open_netlink() {
   return -1;
 }
 
-/// Reads what waits. The content does not matter: the interfaces are asked then.
+/// Reads and discards the waiting messages; true if there were any. Their content is not needed,
+/// because the caller then reads the interfaces.
 bool has_messages(int netlink) {
   constexpr int kMostReads = 64;
   std::array<std::byte, 4096> message{};
   bool any = false;
   for (int i = 0; i < kMostReads; ++i) {
     const bool received = ::recv(netlink, message.data(), message.size(), 0) >= 0;
-    if (!received && errno != ENOBUFS && errno != EINTR)
-      break;  // ENOBUFS: more than the socket holds
+    // ENOBUFS: the socket buffer overflowed, so messages were there
+    if (!received && errno != ENOBUFS && errno != EINTR) break;
     any = true;
   }
   return any;
@@ -60,6 +61,7 @@ std::optional<std::string> InterfaceWatch::cycle(const std::vector<std::string>&
     last_change_ = now;
     if (!first_change_) first_change_ = now;
   }
+
   if (!first_change_ || now - begun_ < kShortestLife) return std::nullopt;
   if (now - *last_change_ < kSettles && now - *first_change_ < kLongestWait) return std::nullopt;
   first_change_.reset();

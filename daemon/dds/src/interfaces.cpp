@@ -58,8 +58,8 @@ daemon::Result<void> interface_of_profile_is_up(
   return daemon::fail(
       daemon::ErrorCode::Io,
       fmt::format(
-          "no interface of the profile is up (addresses {}): bring the network up, or change "
-          "interfaceWhiteList",
+          "no interface of the profile is up (addresses {}): bring the network up, or correct "
+          "interfaceWhiteList in the profile",
           fmt::join(named, ", ")));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The network interfaces a profile names and those that are up.
+/// The network interfaces that a profile names, and those that are up.
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <string>
@@ -11,17 +11,17 @@
 namespace abbe::dds {
 
 /// The IPv4 addresses that the profile allows (interfaceWhiteList: Fast DDS 2.9 compares it with
-/// addresses, not with names of interfaces); empty: all, or transports that are not UDP. Of QoS
-/// whose transports are not wrapped yet.
+/// addresses, not with names of interfaces). Empty: all are allowed, or a transport is not UDP.
+/// Call it before the transports are wrapped by with_message_filter().
 [[nodiscard]] std::vector<std::string> white_list(
     const eprosima::fastdds::dds::DomainParticipantQos& qos);
 
-/// Error Io: the profile names interfaces (interfaceWhiteList) and none of them is up with an IPv4
-/// address and a carrier. Fast DDS would create a participant that sends and receives nothing.
+/// Error Io: the profile names interfaces (interfaceWhiteList), but none of them is up with an IPv4
+/// address and a carrier. Fast DDS would create a participant that neither sends nor receives.
 [[nodiscard]] daemon::Result<void> interface_of_profile_is_up(
     const eprosima::fastdds::dds::DomainParticipantQos& qos);
 
-/// IPv4 addresses of the interfaces that are up with a carrier, sorted: those Fast DDS uses.
+/// IPv4 addresses of the interfaces that are up with a carrier, sorted. Fast DDS uses these.
 [[nodiscard]] std::vector<InterfaceAddress> running_addresses();
 
 }  // namespace abbe::dds

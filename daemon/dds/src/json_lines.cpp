@@ -114,7 +114,7 @@ daemon::Result<std::string> line(std::span<const std::byte> payload) {
   if (!value) return tl::make_unexpected(value.error());
   Json object{{"topic", daemon::topic_name<T>()}};
   object.update(fields(*value));
-  // A stranger's text need not be UTF-8.
+  // The text may come from any participant and need not be valid UTF-8.
   return object.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -18,14 +18,14 @@ constexpr std::size_t kHeaderBytes = 20, kSubmessageHeaderBytes = 4;
 constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09,
                        kStatistics = 0x80;
 constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08;
-constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from behind its own field
-/// Both entities and the sequence number lie in between. Fast DDS reads a signed number, and takes
-/// what is smaller for this.
+constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from the end of its own field
+/// Limits of octetsToInlineQos. Reader id, writer id and sequence number take 16 bytes; Fast DDS
+/// replaces a smaller value by 16. It reads a signed number, hence the upper limit.
 constexpr std::size_t kShortestToInlineQos = 16, kLongestToInlineQos = 0x7fff;
 
-/// Of the writers that announce writers and readers: entity kind c2, ids 0003 and 0004.
+/// Entity ids of the writers that announce writers and readers: kind c2, ids 0003 and 0004.
 constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter = 0x000004c2;
-/// What a type is announced with: TypeInformation, TypeObject, TypeIdentifier.
+/// Parameters that announce a type: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
 /// Vendor-specific and without the bit "must understand": a receiver that does not know it skips
@@ -52,17 +52,17 @@ class Reader {
   bool little_endian_;
 };
 
-/// Entity ids are four bytes, always in this order.
+/// An entity id is four bytes in big-endian order, whatever the byte order of the submessage.
 std::uint32_t entity_id(Bytes bytes, std::size_t at) {
   std::uint32_t id = 0;
   for (std::size_t i = 0; i < 4; ++i) id = id << 8 | bytes[at + i];
   return id;
 }
 
-/// Calls use(id, place of the id) for every parameter of the list that begins at `at`. Where the
-/// list ends, behind its sentinel; nothing where a length is not a multiple of four, as the
-/// standard has it [DDSI-RTPS 2.5, 9.4.2.11], or runs out of the list: receivers read such a list
-/// each in its own way.
+/// Calls use(id, offset of the id) for every parameter of the list that begins at `at`. Returns the
+/// offset behind the sentinel of the list. Returns nullopt if a length is not a multiple of four,
+/// as the standard requires [DDSI-RTPS 2.5, 9.4.2.11], or exceeds the list: DDS implementations
+/// interpret such a list differently.
 template <class Use>
 std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, Use use) {
   for (; at + 4 <= list.size();) {
@@ -76,16 +76,17 @@ std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, U
   return std::nullopt;
 }
 
-/// `body` of a DATA or DATA_FRAG submessage: behind its header.
+/// `body`: a DATA or DATA_FRAG submessage without its header.
 bool is_announcement(Bytes body) {
-  constexpr std::size_t kWriterAt = 8;  // behind extra flags, octetsToInlineQos and reader
+  constexpr std::size_t kWriterAt = 8;  // after extra flags, octetsToInlineQos and reader id
   if (body.size() < kWriterAt + 4) return false;
   const std::uint32_t writer = entity_id(body, kWriterAt);
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
 }
 
-/// False where it is not an announcement as the standard has it, of which receivers would take
-/// another part for the parameters: the message is not handed on then.
+/// Replaces the ids of the type parameters by an unused id. False if the announcement does not
+/// conform to the standard: Fast DDS could read its parameters at another offset, so the message
+/// must be dropped.
 bool blank_types(Bytes body, std::uint8_t flags) {
   const Reader header(body, (flags & kLittleEndian) != 0);
   const std::size_t to_inline_qos = header.u16(2);
@@ -103,15 +104,15 @@ bool blank_types(Bytes body, std::uint8_t flags) {
   const bool little_endian = (body[at + 1] & 1) != 0;  // PL_CDR_LE is 00 03, PL_CDR_BE is 00 02
   Reader list(body, little_endian);
 
-  const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t place) {
+  const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t offset) {
     if (std::ranges::find(kTypeParameters, id) != kTypeParameters.end())
-      list.put_u16(place, kUnusedParameterId);
+      list.put_u16(offset, kUnusedParameterId);
   });
 
   return end.has_value();
 }
 
-/// The low-level transport's bytes go to Fast DDS filtered.
+/// Passes the bytes of the low-level transport through the filter to Fast DDS.
 class MessageFilter final : public rtps::ChainingTransport {
  public:
   explicit MessageFilter(const rtps::ChainingTransportDescriptor& descriptor)
@@ -156,7 +157,9 @@ std::size_t filter_message(std::span<std::uint8_t> message) noexcept {
     const std::uint8_t kind = message[at], flags = message[at + 1];
     std::size_t length = Reader(message, (flags & kLittleEndian) != 0).u16(at + 2);
     at += kSubmessageHeaderBytes;
-    // A length of zero means: to the end of the message, where an empty submessage is not possible.
+
+    // A length of zero means "up to the end of the message", except for the two kinds of
+    // submessages that may be empty.
     if (length == 0 && kind != kPad && kind != kInfoTimestamp) length = message.size() - at;
     if (at + length > message.size()) return 0;
     const bool last = at + length == message.size();

@@ -23,8 +23,8 @@ namespace {
 namespace fast = eprosima::fastdds::dds;
 const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
-/// Standard output belongs to what a program prints; Fast DDS writes its errors there unless told
-/// otherwise.
+/// Directs the log of Fast DDS to stderr. By default its errors go to stdout, which is reserved for
+/// the output of the program.
 void log_to_stderr() {
   auto consumer = std::make_unique<fast::StdoutErrConsumer>();
   consumer->stderr_threshold(fast::Log::Kind::Info);
@@ -33,8 +33,7 @@ void log_to_stderr() {
 }
 
 Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& file) {
-  // Else a DEFAULT_FASTRTPS_PROFILES.xml that happens to lie in the working directory would change
-  // what we are.
+  // Without this a DEFAULT_FASTRTPS_PROFILES.xml in the working directory would change the profile.
   ::setenv("SKIP_DEFAULT_XML", "1", 1);
   auto* factory = fast::DomainParticipantFactory::get_instance();
   const std::string name = file.empty() ? std::string("built-in profile") : file.string();
@@ -60,7 +59,8 @@ bool has_property(const fast::DomainParticipantQos& qos, const char* name) {
          nullptr;
 }
 
-/// Without authentication Fast DDS switches security off, whatever access says.
+/// Without an authentication plugin Fast DDS switches security off, even if an access control
+/// plugin is set.
 bool has_security(const fast::DomainParticipantQos& qos) {
   return has_property(qos, "dds.sec.auth.plugin") && has_property(qos, "dds.sec.access.plugin");
 }
@@ -69,8 +69,9 @@ Result<void> add_security(const ParticipantOptions& options, fast::DomainPartici
   if (options.security.empty()) return {};
   if (has_property(qos, "dds.sec.auth.plugin") || has_property(qos, "dds.sec.access.plugin")) {
     return fail(ErrorCode::BadInput,
-                options.profiles.string() + ": has dds.sec properties of its own, and security = " +
-                    options.security.string() + " names keys, too: remove one");
+                options.profiles.string() +
+                    ": the profile has dds.sec properties, and security = " +
+                    options.security.string() + " names keys, too: remove one of the two");
   }
   const auto identity =
       daemon::find_dds_identity(options.security, options.role, std::chrono::system_clock::now());
@@ -101,10 +102,11 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   auto qos = read_profile(options.profiles);
   if (!qos) return tl::make_unexpected(qos.error());
 
-  // Without one Fast DDS makes a participant that sends nothing and reports no error.
+  // If no interface is up, Fast DDS creates a participant that sends nothing and reports no error.
   if (auto up = interface_of_profile_is_up(*qos); !up) return tl::make_unexpected(up.error());
   if (auto secured = add_security(options, *qos); !secured)
     return tl::make_unexpected(secured.error());
+
   auto allowed = white_list(*qos);
   for (auto& transport : qos->transport().user_transports)
     transport = with_message_filter(transport);
@@ -114,8 +116,8 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   if (participant == nullptr) {
     return fail(ErrorCode::Io,
                 "domain " + std::to_string(options.domain) +
-                    ": no participant can be created (ports or interfaces of the profile" +
-                    (has_security(*qos) ? ", or its keys and permissions)" : ")"));
+                    ": no participant can be created (check ports and interfaces of the profile" +
+                    (has_security(*qos) ? ", its keys and permissions)" : ")"));
   }
 
   return Participant(participant, std::move(allowed));
@@ -125,7 +127,7 @@ Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
   const auto& traits = daemon::traits(topic);
   fast::TypeSupport type(new PayloadType(topic));
 
-  // An announced TypeInformation keeps Cyclone DDS 0.10 from matching, an announced TypeObject
+  // An announced TypeInformation prevents Cyclone DDS 0.10 from matching; an announced TypeObject
   // crashes Fast DDS 2.9 participants that do not know the type.
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
@@ -134,7 +136,8 @@ Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
       type.register_type(participant_.get()) == kOk
           ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)
           : nullptr;
-  if (created == nullptr) return fail(ErrorCode::Io, "topic " + name + ": Fast DDS refuses it");
+  if (created == nullptr)
+    return fail(ErrorCode::Io, "topic " + name + ": Fast DDS cannot create it");
 
   return created;
 }

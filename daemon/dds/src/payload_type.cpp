@@ -80,10 +80,12 @@ bool PayloadType::getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t*
                          bool /*force_md5*/) {
   const auto key = daemon::payload_key(topic_, static_cast<const Payload*>(data)->bytes);
   if (!key) return false;
+
   std::string big_endian;
   append_big_endian(big_endian, key->machine);
   if (key->number) append_big_endian(big_endian, *key->number);
   if (key->text) append_big_endian(big_endian, *key->text);
+
   MD5 md5;
   md5.init();
   md5.update(big_endian.data(), static_cast<MD5::size_type>(big_endian.size()));

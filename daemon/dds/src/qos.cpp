@@ -6,13 +6,14 @@ namespace {
 using namespace eprosima::fastdds::dds;
 using eprosima::fastrtps::Duration_t;
 
-/// ModelState's writer asserts by itself, and only while abbed is alive.
+/// abbe-dds asserts the liveliness of the ModelState writer explicitly, and only while abbed is
+/// alive.
 const Duration_t kLivelinessLease(1, 0);
-/// A late joiner waits for the next heartbeat; the default of 3 s would be its delay.
+/// A late joiner waits for the next heartbeat; with the default period it would wait up to 3 s.
 const Duration_t kHeartbeatPeriod(0, 100'000'000);
 
-/// Fast DDS allows 10 instances unless told otherwise; slices of a grid and streams of a machine
-/// are more.
+/// The default limit of Fast DDS is 10 instances; a grid has more slices, and a machine may have
+/// more streams.
 constexpr int kMostInstances = 128;
 constexpr int kInstancesAtStart = 4;
 
@@ -20,7 +21,8 @@ bool is_durable(daemon::Topic topic) {
   return daemon::traits(topic).kind == daemon::TopicTraits::Kind::Durable;
 }
 
-/// Writer and reader agree on everything below; the rest differs only in where Fast DDS keeps it.
+/// Sets the policies that writer and reader have in common. Their other policies have the same
+/// values, but different places in the QoS types of Fast DDS.
 template <class Qos>
 void set_common(daemon::Topic topic, Qos& qos) {
   qos.reliability().kind =

@@ -34,8 +34,8 @@ WriterId writer_id(const eprosima::fastrtps::rtps::InstanceHandle_t& publication
   return id;
 }
 
-/// Which writers keep their lease. Fast DDS calls it for every change of one of them, from threads
-/// of its own; a status that is asked for later would name the last one only.
+/// The writers that keep their lease. Fast DDS calls the listener from its own threads for every
+/// change of a writer; a status that is read later contains only the last change.
 class AliveWriters final : public fast::DataReaderListener {
  public:
   [[nodiscard]] bool contains(const WriterId& writer) const {
@@ -43,10 +43,13 @@ class AliveWriters final : public fast::DataReaderListener {
     return alive_.contains(writer);
   }
 
-  fast::GuardCondition changed;  ///< reading a status resets its status condition
+  /// Triggered by every change. A status condition cannot be used: the listener's read of the
+  /// status resets it.
+  fast::GuardCondition changed;
 
-  /// Fast DDS may report two changes at once in the wrong order. What arrived before its writer was
-  /// lost, and lay in the reader until now, is no sign of life.
+  /// A sample of this writer was received at `arrived`. Needed because Fast DDS may report two
+  /// simultaneous changes in the wrong order. A sample that arrived before its writer was lost, and
+  /// was in the reader since then, does not make the writer alive.
   void heard(const WriterId& writer, const Time& arrived) {
     const std::lock_guard lock(mutex_);
     const auto lost = lost_at_.find(writer);
@@ -71,7 +74,7 @@ class AliveWriters final : public fast::DataReaderListener {
 
   mutable std::mutex mutex_;
   std::set<WriterId> alive_;
-  std::map<WriterId, Time> lost_at_;  ///< the last time
+  std::map<WriterId, Time> lost_at_;  ///< when the writer was last lost
 };
 
 }  // namespace
@@ -117,7 +120,7 @@ Readers::~Readers() = default;
 
 Result<Readers> Readers::create(Participant& participant, std::span<const daemon::Topic> topics) {
   auto* subscriber = participant.get().create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
-  if (subscriber == nullptr) return fail(ErrorCode::Io, "subscriber: Fast DDS refuses it");
+  if (subscriber == nullptr) return fail(ErrorCode::Io, "subscriber: Fast DDS cannot create it");
   auto state = std::make_unique<State>();
 
   for (const daemon::Topic t : topics) {
@@ -128,8 +131,8 @@ Result<Readers> Readers::create(Participant& participant, std::span<const daemon
         subscriber->create_datareader(*topic, reader_qos(t), is_state ? &state->alive : nullptr,
                                       fast::StatusMask::liveliness_changed());
     if (reader == nullptr) {
-      return fail(ErrorCode::Io,
-                  "reader of " + std::string(daemon::traits(t).name) + ": Fast DDS refuses it");
+      return fail(ErrorCode::Io, "reader of " + std::string(daemon::traits(t).name) +
+                                     ": Fast DDS cannot create it");
     }
     state->add(t, reader);
   }

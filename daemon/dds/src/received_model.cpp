@@ -37,7 +37,8 @@ void ReceivedModel::state(v1::ModelState state) {
 }
 
 void ReceivedModel::slice(v1::ErrorGrid slice) {
-  constexpr std::size_t kMostModels = 4;  // the state's, the next one, and what is left of others
+  // The model of the state, the next one, and remaining slices of old ones.
+  constexpr std::size_t kMostModels = 4;
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
     std::erase_if(slices_,
                   [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
@@ -65,31 +66,35 @@ Decision ReceivedModel::decide(bool publisher_alive) const {
   return decision;
 }
 
-Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanoseconds> waited,
+Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanoseconds> delay,
                 const std::optional<v1::ModelState>& state, bool publisher_alive) {
   Decision decision = decide_by_state(state, publisher_alive);
   if (!decision.apply) return decision;
+
   if (c.state() != v1::MODEL_ACTIVE) return refuse(std::string("vector is ") + name_of(c.state()));
   if (c.model_id() != state->model_id()) return refuse("vector is of another model");
-  if (!c.inside()) return refuse("outside the volume the data covered");
-  if (!c.tool_ok()) return refuse("the model does not hold for this tool");
-  if (!waited) return refuse("how quick the way can be is not known yet");
-  // A stranger may send any value: no sum of two of them.
-  if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - waited->count())
+  if (!c.inside()) return refuse("outside the volume that the calibration data covered");
+  if (!c.tool_ok()) return refuse("the model is not valid for this tool");
+  if (!delay) return refuse("the transit time is not known yet");
+
+  // The values may come from any participant: a sum of two of them could overflow.
+  if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - delay->count())
     return refuse("older than its validity");
   return decision;
 }
 
 std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector, Instant now) {
   constexpr std::chrono::nanoseconds kLongestStep = std::chrono::seconds{1};
-  // No abbe-dds sends more, and sums of larger values overflow.
+  // abbe-dds never sends more, and sums of larger values overflow.
   constexpr std::int64_t kLongest_ns = std::int64_t{1} << 60;
   for (const std::int64_t time : {vector.host_time_ns(), vector.age_ns()})
     if (time < 0 || time > kLongest_ns) return std::nullopt;
+
   const std::chrono::nanoseconds published{vector.host_time_ns() + vector.age_ns()};
   const std::chrono::nanoseconds offset = now.time_since_epoch() - published;
   const bool same_clock = least_ && std::chrono::abs(offset - *least_) <= kSameClock;
   if (std::exchange(inherited_, false) && !same_clock) *this = {};
+
   const auto drifted = least_ ? *least_ + std::min(now - last_, kLongestStep) / kDrift : offset;
   least_ = std::min(offset, drifted);
   last_ = now;

@@ -15,7 +15,8 @@ std::size_t index_of(daemon::Topic topic) {
   return static_cast<std::size_t>(topic);
 }
 
-/// Empty if the site's permissions do not allow it: then joining takes up to a second.
+/// The writer that is announced when DDS Security is on. Empty if the permissions of the site do
+/// not allow it; then a new subscriber may need up to a second to find the writers.
 std::vector<eprosima::fastdds::dds::DataWriter*> announcement_writer(
     Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
   namespace fast = eprosima::fastdds::dds;
@@ -35,7 +36,7 @@ Result<Writers> Writers::create(Participant& participant) {
   namespace fast = eprosima::fastdds::dds;
   Writers writers;
   auto* publisher = participant.get().create_publisher(fast::PUBLISHER_QOS_DEFAULT);
-  if (publisher == nullptr) return fail(ErrorCode::Io, "publisher: Fast DDS refuses it");
+  if (publisher == nullptr) return fail(ErrorCode::Io, "publisher: Fast DDS cannot create it");
 
   for (const auto& traits : daemon::all_topics()) {
     const auto topic = participant.topic(traits.topic);
@@ -43,7 +44,8 @@ Result<Writers> Writers::create(Participant& participant) {
     auto* writer = publisher->create_datawriter(*topic, writer_qos(traits.topic));
     if (writer == nullptr) {
       return fail(ErrorCode::Io,
-                  "writer of " + std::string(traits.name) + ": Fast DDS refuses it (permissions?)");
+                  "writer of " + std::string(traits.name) +
+                      ": Fast DDS cannot create it (check the permissions of the keys)");
     }
     writers.writers_[index_of(traits.topic)] = writer;
   }
@@ -63,7 +65,8 @@ bool Writers::write(daemon::Topic topic, std::span<const std::byte> payload) {
 
 void Writers::dispose(daemon::Topic topic, std::span<const std::byte> payload) {
   buffer_.bytes.assign(payload.begin(), payload.end());
-  // An instance that was never written is refused: then there is nothing to take back.
+  // Fast DDS returns an error for an instance that was never written; there is nothing to dispose
+  // of then.
   static_cast<void>(writers_[index_of(topic)]->dispose(
       &buffer_, eprosima::fastrtps::rtps::c_InstanceHandle_Unknown));
 }
@@ -73,14 +76,14 @@ void Writers::assert_liveliness() {
 }
 
 void Writers::announce(std::size_t index) {
-  // Fast DDS announces whenever the quality of service is set, also to what it was.
+  // Fast DDS announces a writer whenever its QoS is set, even if nothing changes.
   const auto unchanged = announced_[index]->get_qos();
   announced_[index]->set_qos(unchanged);
 }
 
 void Writers::wait_for_state_acknowledged(std::chrono::milliseconds at_most) {
-  const eprosima::fastrtps::Duration_t patience(static_cast<double>(at_most.count()) / 1e3);
-  writers_[index_of(daemon::Topic::ModelState)]->wait_for_acknowledgments(patience);
+  const eprosima::fastrtps::Duration_t timeout(static_cast<double>(at_most.count()) / 1e3);
+  writers_[index_of(daemon::Topic::ModelState)]->wait_for_acknowledgments(timeout);
 }
 
 }  // namespace abbe::dds

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxPaddingBytes = 3;
 
 template <class T>
-struct Names;  // one specialisation per topic, at the end
+struct Names;  // one specialisation per topic, at the end of the file
 
 template <class T>
 std::string broken_bound(const T& value) {
@@ -61,14 +61,14 @@ Result<void> encode(const T& value, std::vector<std::byte>& payload) {
 template <class T>
 Result<T> decode(std::span<const std::byte> payload) {
   if (payload.size() < kCdrHeaderBytes)
-    return refuse<T>("decode", std::to_string(payload.size()) + " bytes, no header");
+    return refuse<T>("decode", std::to_string(payload.size()) + " bytes, shorter than the header");
   if (payload[0] != std::byte{0} || payload[1] != std::byte{1}) {
     return refuse<T>("decode", "encapsulation is not CDR_LE (00 01)");
   }
 
   T value;
   try {
-    // Fast CDR only reads from a buffer it is to decode, but has no const interface.
+    // Fast CDR has no const interface, but does not write to a buffer that it decodes.
     auto* bytes = const_cast<char*>(reinterpret_cast<const char*>(payload.data()));
     eprosima::fastcdr::FastBuffer buffer(bytes, payload.size());
     auto cdr = little_endian_cdr(buffer);
@@ -76,7 +76,7 @@ Result<T> decode(std::span<const std::byte> payload) {
     value.deserialize(cdr);
     if (const std::size_t used = cdr.getSerializedDataLength();
         payload.size() - used > kMaxPaddingBytes) {
-      return refuse<T>("decode", std::to_string(payload.size() - used) + " bytes left over");
+      return refuse<T>("decode", std::to_string(payload.size() - used) + " bytes after the value");
     }
   } catch (const std::exception& e) {
     return refuse<T>("decode", e.what());

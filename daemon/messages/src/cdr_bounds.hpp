@@ -1,7 +1,7 @@
 #pragma once
-/// The bounds of abbe_v1.idl, checked. One overload of visit() per type names its bounded members
-/// in the order of the IDL; a test compares them with the text of the IDL. Fast CDR has neither
-/// reflection nor checks, hence by hand.
+/// Checks the bounds of abbe_v1.idl. One overload of visit() per type lists its bounded members in
+/// the order of the IDL. The lists are written by hand because Fast CDR has neither reflection nor
+/// bound checks; a test compares them with the text of the IDL.
 
 #include <algorithm>
 #include <array>
@@ -116,21 +116,22 @@ void visit(const v1::Health& m, V&& v) {
   v("fault", m.fault(), 256);
 }
 
-/// A struct of ours inside a sequence, whose own members are bounded too.
+/// A struct of abbe_v1.idl that is an element of a sequence; its own members are checked as well.
 template <class E>
 inline constexpr bool kIsNested =
     std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> ||
     std::is_same_v<E, v1::HullVertex> || std::is_same_v<E, v1::GridNode>;
 
-/// Visits one value; afterwards `broken` says what is wrong, empty if nothing.
+/// Visits one value. Afterwards `broken` describes the first violated bound; empty if there is
+/// none.
 class Checker {
  public:
   std::string broken;
 
   void operator()(std::string_view member, const std::string& text, std::size_t bound) {
     if (text.size() > bound) report(member, std::to_string(text.size()) + " bytes", bound);
-    // A CDR string ends at its first NUL: what follows would be lost silently.
-    if (text.find('\0') != std::string::npos) report(member, "has a NUL inside");
+    // A CDR string ends at its first NUL: the characters after it would be lost.
+    if (text.find('\0') != std::string::npos) report(member, "contains a NUL");
   }
 
   template <class E>

@@ -73,7 +73,7 @@ bool set_subject(X509* certificate, const std::string& common_name) {
                                     -1, 0) == 1;
 }
 
-/// The authority signs certificates and, by digitalSignature, the documents.
+/// The authority signs certificates (keyCertSign) and documents (digitalSignature).
 bool set_uses(X509* certificate, X509* issuer, bool is_authority) {
   return add_extension(certificate, issuer, NID_basic_constraints,
                        is_authority ? "critical,CA:TRUE" : "critical,CA:FALSE") &&
@@ -139,7 +139,7 @@ Result<ValidityPeriod> validity_of(std::string_view certificate_pem) {
   if (!certificate || ASN1_TIME_to_tm(X509_get0_notBefore(certificate.get()), &begin) != 1 ||
       ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) != 1) {
     ERR_clear_error();
-    return fail(ErrorCode::BadInput, "is not a certificate");
+    return fail(ErrorCode::BadInput, "not a certificate");
   }
   return ValidityPeriod{std::chrono::system_clock::from_time_t(::timegm(&begin)),
                         std::chrono::system_clock::from_time_t(::timegm(&end))};

@@ -32,17 +32,17 @@ struct ValidityPeriod {
   std::chrono::system_clock::time_point end;
 };
 
-/// Signed by `issuer`, or by itself if that is null: then it is a certificate authority. Error Io:
-/// OpenSSL.
+/// Makes a key and a certificate signed by `issuer`. If `issuer` is null, the certificate is
+/// self-signed and is a certificate authority. Error Io if OpenSSL fails.
 [[nodiscard]] Result<Credentials> make_credentials(const std::string& common_name,
                                                    ValidityPeriod period,
                                                    const Credentials* issuer);
 
-/// S/MIME with the text in clear, as DDS Security wants governance and permissions. Error Io:
-/// OpenSSL.
+/// S/MIME with the text in clear, as DDS Security requires for governance and permissions. Error Io
+/// if OpenSSL fails.
 [[nodiscard]] Result<std::string> sign_document(std::string_view text, const Credentials& signer);
 
-/// Of the first certificate in a PEM text. Error BadInput: there is none.
+/// Validity of the first certificate in a PEM text. Error BadInput if there is none.
 [[nodiscard]] Result<ValidityPeriod> validity_of(std::string_view certificate_pem);
 
 }  // namespace abbe::daemon

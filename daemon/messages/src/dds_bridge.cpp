@@ -22,8 +22,8 @@ bool is_durable(Topic topic) {
   return traits(topic).kind == TopicTraits::Kind::Durable;
 }
 
-/// The state `payload` as of a source that no longer talks; nothing if it already says so or is no
-/// ModelState.
+/// The ModelState in `payload`, changed to MODEL_INVALID with reason SOURCE_LOST. Empty if
+/// `payload` is not a ModelState or already has this reason.
 std::vector<std::byte> invalidated(std::span<const std::byte> payload) {
   auto state = decode<v1::ModelState>(payload);
   if (!state || state->reason() == kSourceLost) return {};
@@ -45,7 +45,7 @@ struct DdsBridge::State {
   WallTime last_beat{};
   WallTime last_assert{};
   RetainedPayloads<Written> durable;
-  /// Of each machine, by number: the head of their payloads, as far as the key.
+  /// The slices of ErrorGrid written so far, by machine and slice number: header and key of each.
   std::map<std::string, std::map<std::uint32_t, std::vector<std::byte>>> slices_written;
   std::uint64_t written = 0;
   std::uint64_t refused = 0;
@@ -58,8 +58,8 @@ struct DdsBridge::State {
     if (topic == Topic::ErrorGrid) follow_slices(payload);
   }
 
-  /// What was written stays with DDS for late joiners, also what another abbed said: beyond the
-  /// slices of this grid it is of another model.
+  /// DDS retains written slices for late joiners, including those of an earlier abbed. Slices with
+  /// a number beyond the newest grid belong to another model and are disposed.
   void follow_slices(std::span<const std::byte> payload) {
     const auto key = payload_key(Topic::ErrorGrid, payload);
     const auto slices = grid_slices(payload);
@@ -68,7 +68,7 @@ struct DdsBridge::State {
     for (auto beyond = known.lower_bound(*slices); beyond != known.end();
          beyond = known.erase(beyond))
       outlet.dispose(Topic::ErrorGrid, beyond->second);
-    // The key is all that disposing takes.
+    // Disposing needs only the key.
     const std::size_t head = kCdrHeaderBytes + key->bytes.size();
     known[*key->number].assign(payload.begin(),
                                payload.begin() + static_cast<std::ptrdiff_t>(head));
@@ -84,7 +84,7 @@ struct DdsBridge::State {
     }
   }
 
-  void write_what_is_due(WallTime now) {
+  void write_due_durable(WallTime now) {
     for (auto& entry : durable.entries()) {
       if (entry.extra.ever && now - entry.extra.at < traits(entry.topic).repeat) continue;
       write(entry.topic, entry.payload);
@@ -92,8 +92,8 @@ struct DdsBridge::State {
     }
   }
 
-  /// Afterwards the states are forgotten, everything else waits to be written again.
-  void tell_that_source_is_lost() {
+  /// Also discards the retained states and marks all other durable samples to be written again.
+  void report_source_lost() {
     alive = false;
     for (const auto& entry : durable.entries()) {
       if (entry.topic != Topic::ModelState) continue;
@@ -120,28 +120,28 @@ void DdsBridge::beat(WallTime at, WallTime now) {
 }
 
 void DdsBridge::publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now) {
-  // Behind an old beat there may stand newer ones: cycle() judges.
+  // Newer beats may follow an old one in the socket, so silence is reported by cycle() only.
   const bool alive = state_->alive && !state_->silent(now);
   const auto key = payload_key(topic, payload);
   if (!key) {
     ++state_->refused;
   } else if (is_durable(topic)) {
     state_->durable.keep(topic, key->bytes, payload);
-    if (alive) state_->write_what_is_due(now);
+    if (alive) state_->write_due_durable(now);
   } else if (alive) {
     state_->write_live(topic, payload, std::max(now - at, WallTime::duration::zero()));
   }
 }
 
 void DdsBridge::lost() {
-  if (state_->alive) state_->tell_that_source_is_lost();
+  if (state_->alive) state_->report_source_lost();
 }
 
 void DdsBridge::cycle(WallTime now) {
   State& s = *state_;
-  if (s.alive && s.silent(now)) s.tell_that_source_is_lost();
+  if (s.alive && s.silent(now)) s.report_source_lost();
   if (!s.alive) return;
-  s.write_what_is_due(now);
+  s.write_due_durable(now);
   if (now - s.last_assert < kAssertPeriod) return;
   s.outlet.assert_liveliness();
   s.last_assert = now;

@@ -31,14 +31,14 @@ struct DdsFeed::State {
     bridge.lost();
   }
 
-  /// All that waits: what abbed said last stands at the end of it.
+  /// Reads all waiting bytes: the latest state of abbed is at their end.
   void read() {
-    constexpr int kMostReads = 64;  // more than the kernel keeps for a socket
+    constexpr int kMostReads = 64;  // together more than the socket buffer holds
     for (int i = 0; i < kMostReads && read_once(); ++i) {
     }
   }
 
-  /// Whether there may be more.
+  /// True if more bytes may be waiting.
   bool read_once() {
     const auto room = frames.room();
     const ssize_t n = ::recv(peer.get(), room.data(), room.size(), MSG_DONTWAIT);
@@ -50,8 +50,8 @@ struct DdsFeed::State {
     return false;
   }
 
-  /// Shows abbed that this loop runs. An answer that does not fit is not needed: abbed does not
-  /// read.
+  /// Tells abbed that this loop runs. An answer may be lost if the socket is full: then abbed is
+  /// not reading.
   void answer() const {
     const std::byte alive{};
     static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
@@ -77,7 +77,7 @@ DdsFeed::~DdsFeed() = default;
 void DdsFeed::cycle() {
   State& s = *state_;
   if (!s.peer) s.connect();
-  // Without a connection this only waits; -1 is a descriptor poll() ignores.
+  // Without a connection the descriptor is -1: poll() ignores it and only waits.
   pollfd ready{s.peer.get(), POLLIN, 0};
   if (::poll(&ready, 1, static_cast<int>(kRetryPeriod.count())) > 0) s.read();
   s.bridge.cycle(std::chrono::steady_clock::now());

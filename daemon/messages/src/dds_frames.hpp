@@ -1,13 +1,15 @@
 #pragma once
-/// The frames on the local socket from abbed to abbe-dds: 16 bytes of header, then a payload. Back
-/// goes one byte, of any value, for each beat.
+/// The frames on the local socket from abbed to abbe-dds: a header of 16 bytes, then a payload.
+/// abbe-dds answers each beat with one byte of any value.
+///
 ///   bytes 0..3  length of the payload, little endian
 ///   byte  4     kind
 ///   byte  5     topic (kind Publish, else 0)
 ///   bytes 6..7  version of this format
-///   bytes 8..15 the instant it was said, ns of CLOCK_MONOTONIC, which both processes share; little endian
-/// A frame may wait in the socket for seconds: who reads it judges it by that instant, not by the reading.
-/// Sans-I/O; single-threaded.
+///   bytes 8..15 time of sending, ns of CLOCK_MONOTONIC (common to both processes), little endian
+///
+/// A frame may wait in the socket for seconds. The receiver therefore uses the time of sending, not
+/// the time of reading. Sans-I/O; single-threaded.
 
 #include <algorithm>
 #include <array>
@@ -25,7 +27,7 @@ namespace abbe::daemon {
 
 inline constexpr std::size_t kFrameHeaderBytes = 16;
 inline constexpr std::uint8_t kFrameVersion = 2;
-/// No topic comes near it: the largest, ErrorModel with 1024 parameters, is below 52 kB.
+/// The largest payload, ErrorModel with 1024 parameters, is below 52 kB.
 inline constexpr std::size_t kMaxPayloadBytes = std::size_t{64} * 1024;
 
 enum class FrameKind : std::uint8_t { Beat = 0, Publish = 1 };
@@ -39,7 +41,7 @@ struct Frame {
   std::span<const std::byte> payload;
 };
 
-/// Its payload may be changed in place before it goes on.
+/// The payload may be changed in place before it is forwarded.
 struct ReceivedFrame {
   FrameKind kind = FrameKind::Beat;
   Topic topic = Topic::Snapshot;
@@ -65,10 +67,11 @@ inline void append_frame(std::vector<std::byte>& out, const Frame& frame) {
   out.insert(out.end(), frame.payload.begin(), frame.payload.end());
 }
 
-/// Bytes in, frames out. After `broken()` the stream is lost and the connection is to be closed.
+/// Splits bytes into frames. If broken() is true, the stream is malformed and the caller must close
+/// the connection.
 class FrameReader {
  public:
-  /// Where to read the next bytes to; then tell how many came with filled().
+  /// The buffer for the next read. Afterwards pass the number of bytes read to filled().
   [[nodiscard]] std::span<std::byte> room() {
     if (end_ == buffer_.size() || begin_ == end_) {
       std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
@@ -79,7 +82,7 @@ class FrameReader {
   }
   void filled(std::size_t bytes) { end_ += bytes; }
 
-  /// The next whole frame; its payload is valid until the next call of room().
+  /// The next complete frame, or nullopt. Its payload is valid until the next call of room().
   [[nodiscard]] std::optional<ReceivedFrame> next() {
     const auto waiting = std::span<std::byte>(buffer_).subspan(begin_, end_ - begin_);
     if (broken_ || waiting.size() < kFrameHeaderBytes) return std::nullopt;

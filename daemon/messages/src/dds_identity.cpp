@@ -29,15 +29,15 @@ fs::path identity_in(const fs::path& folder, DdsRole role) {
   return fs::exists(own / kCertificate, error) ? own : folder;
 }
 
-/// As ssh does: a key that everybody can read proves nothing.
+/// A private key that others can read does not prove an identity; ssh refuses such keys as well.
 Result<void> check_key_mode(const fs::path& key) {
   struct stat file {};
   if (::stat(key.c_str(), &file) != 0 || (file.st_mode & S_IROTH) == 0) return {};
   return fail(
       ErrorCode::BadInput,
       fmt::format(
-          "{}: everybody on this computer can read this key: chmod 600 it, or make new keys with "
-          "`abbe dds keys` if others may have read it",
+          "{}: every user of this computer can read this key: set its mode to 600 (chmod 600), or "
+          "make new keys with `abbe dds keys` if another user may have copied it",
           key.string()));
 }
 
@@ -61,10 +61,8 @@ Result<void> check_validity(const fs::path& certificate, const std::string& pem,
 
 std::string dds_security_is_off(std::uint32_t domain) {
   return fmt::format(
-      "DDS Security is off: anyone on domain {} can publish as this machine; `abbe dds keys` makes "
-      "keys, "
-      "[dds] "
-      "security uses them",
+      "DDS Security is off: anyone on domain {} can publish as this machine; to switch it on, make "
+      "keys with `abbe dds keys` and enter their folder in [dds] security",
       domain);
 }
 
@@ -74,15 +72,16 @@ Result<DdsIdentity> find_dds_identity(const fs::path& folder, DdsRole role,
   for (const char* name : kFiles) {
     const auto text = read_text(identity / name);
     if (!text)
-      return fail(ErrorCode::BadInput, fmt::format("DDS Security: {}: is the folder one that `abbe "
-                                                   "dds keys` made, and may this user read it?",
-                                                   text.error().text));
+      return fail(ErrorCode::BadInput,
+                  fmt::format("DDS Security: {}: check that the folder was made by "
+                              "`abbe dds keys` and that this user may read it",
+                              text.error().text));
     if (name != kCertificate) continue;
     if (auto valid = check_validity(identity / name, *text, now); !valid)
       return tl::unexpected(valid.error());
   }
 
-  if (auto closed = check_key_mode(identity / kKey); !closed) return tl::unexpected(closed.error());
+  if (auto secret = check_key_mode(identity / kKey); !secret) return tl::unexpected(secret.error());
   return DdsIdentity{identity};
 }
 

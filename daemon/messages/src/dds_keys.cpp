@@ -18,14 +18,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr mode_t kOwnerOnly = 0600;
-constexpr mode_t kEverybodyReads = 0644;
-/// A subscriber whose clock is behind accepts keys made today.
+constexpr mode_t kWorldReadable = 0644;
+/// Keys are valid from one day before now: a subscriber whose clock is slow accepts new keys.
 constexpr auto kClockTolerance = std::chrono::hours{24};
 
-/// Of two participants the one whose subject has the smaller SHA-256 begins the handshake. Fast DDS
-/// 2.9 begins with a Diffie-Hellman key in a form that Cyclone DDS 0.10 cannot read (Fast-DDS issue
-/// 3802), so the daemon's subject has a hash above that of every subscriber: it begins with 18 one
-/// bits, the largest of the first thousand subscribers with 11.
+/// The participant whose subject has the smaller SHA-256 begins the handshake. When Fast DDS 2.9
+/// begins it, it sends a Diffie-Hellman key in a format that Cyclone DDS 0.10 cannot read (Fast-DDS
+/// issue 3802). Therefore this subject was chosen so that its hash is above that of every
+/// subscriber: its hash begins with 18 one bits, the largest of the first thousand subscribers
+/// with 11.
 constexpr const char* kDaemonSubject = "abbe-daemon-336310";
 
 Result<void> write_new(const fs::path& file, std::string_view text, mode_t mode) {
@@ -44,16 +45,16 @@ Result<void> make_new_folder(const fs::path& folder) {
   return {};
 }
 
-Result<void> refuse_what_is_there(const fs::path& folder) {
+Result<void> check_folder_is_empty(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(folder, error) || fs::is_empty(folder, error)) return {};
   return fail(ErrorCode::Refused,
-              fmt::format("{}: there is something already, nothing is overwritten: name a new "
-                          "folder with -o, or remove this one",
+              fmt::format("{}: the folder is not empty, nothing is overwritten: give a new folder "
+                          "with -o, or remove this one",
                           folder.string()));
 }
 
-/// What all identities of one folder have in common.
+/// Data common to all identities of one folder.
 struct Issuer {
   fs::path folder;
   ValidityPeriod period;
@@ -74,16 +75,16 @@ Result<void> make_identity(const Issuer& issuer, const std::string& name, DdsRol
   return make_new_folder(folder)
       .and_then([&] { return write_new(folder / "identity.key", identity->key_pem(), kOwnerOnly); })
       .and_then([&] {
-        return write_new(folder / "identity.crt", identity->certificate_pem(), kEverybodyReads);
+        return write_new(folder / "identity.crt", identity->certificate_pem(), kWorldReadable);
       })
       .and_then(
-          [&] { return write_new(folder / "identity_ca.crt", authority_pem, kEverybodyReads); })
+          [&] { return write_new(folder / "identity_ca.crt", authority_pem, kWorldReadable); })
       .and_then(
-          [&] { return write_new(folder / "permissions_ca.crt", authority_pem, kEverybodyReads); })
+          [&] { return write_new(folder / "permissions_ca.crt", authority_pem, kWorldReadable); })
       .and_then(
-          [&] { return write_new(folder / "governance.p7s", issuer.governance, kEverybodyReads); })
+          [&] { return write_new(folder / "governance.p7s", issuer.governance, kWorldReadable); })
       .and_then(
-          [&] { return write_new(folder / "permissions.p7s", *permissions, kEverybodyReads); });
+          [&] { return write_new(folder / "permissions.p7s", *permissions, kWorldReadable); });
 }
 
 Result<Issuer> make_issuer(const DdsKeysOptions& options,
@@ -115,7 +116,7 @@ Result<void> make_all(const Issuer& issuer, int subscribers) {
 
 Result<void> make_dds_keys(const DdsKeysOptions& options,
                            std::chrono::system_clock::time_point now) {
-  if (auto free = refuse_what_is_there(options.folder); !free) return free;
+  if (auto free = check_folder_is_empty(options.folder); !free) return free;
   const auto issuer = make_issuer(options, now);
   if (!issuer) return tl::unexpected(issuer.error());
   auto made = make_all(*issuer, options.subscribers);

@@ -15,28 +15,28 @@
 namespace abbe::daemon {
 namespace {
 
-/// The hub's cycle must not last as long as somebody connects.
-constexpr int kNewcomersInACycle = 4;
+/// Limits the duration of a hub cycle when processes connect again and again.
+constexpr int kAcceptsPerCycle = 4;
 
 struct Pending {
   bool to_send = true;
 };
 
-/// By the kernel: what the other end says of itself proves nothing.
+/// Checks the process id or user id that the kernel reports for the other end.
 bool may_connect(int fd, const DdsProcess* process) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
   if (process == nullptr) return credentials.uid == ::geteuid();
-  // 0: a process of another PID namespace, as which DdsProcess knows none.
+  // 0: a process of another PID namespace; pid() is 0 while no abbe-dds runs.
   return credentials.pid != 0 && credentials.pid == process->pid();
 }
 
-/// The beats of one connection that abbe-dds has not answered yet.
+/// Tracks the unanswered beats of one connection.
 class Beats {
  public:
   void ask(DdsLink::WallTime now) {
-    // After a pause of the hub, or of all of abbed, the silence begins anew.
+    // After a pause of the hub, or of all of abbed, the silence is counted from this beat.
     if (!unanswered_since_ || now - asked_ > DdsProcess::kPause) unanswered_since_ = now;
     asked_ = now;
   }
@@ -57,11 +57,12 @@ struct DdsLink::State {
   FileDescriptor listener;
   DdsProcess* process = nullptr;
   FileDescriptor peer;
-  std::vector<std::byte> out;  ///< what the kernel has not taken yet: at most the rest of one frame
+  std::vector<std::byte> out;  ///< not yet sent: at most the rest of one frame
   std::size_t out_begin = 0;
   RetainedPayloads<Pending> durable;
-  RetainedPayloads<WallTime>
-      live;  ///< empty unless the socket is full; with the instants their ages count to
+  /// Waiting live samples, with the times to which their ages refer. Empty unless the socket is
+  /// full.
+  RetainedPayloads<WallTime> live;
   WallTime last_beat{};
   Beats beats;
   DdsLinkCounters counters;
@@ -76,10 +77,10 @@ struct DdsLink::State {
   void send_or_keep(const Frame& frame, const PayloadKey& key);
 };
 
-/// A newer abbe-dds replaces the older one: the older one is hung or already replaced by whoever
-/// supervises it.
+/// A new connection of abbe-dds replaces the old one: the old process hangs, or the supervisor has
+/// replaced it.
 void DdsLink::State::accept_newest() {
-  for (int i = 0; i < kNewcomersInACycle; ++i) {
+  for (int i = 0; i < kAcceptsPerCycle; ++i) {
     FileDescriptor accepted(
         ::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
@@ -87,11 +88,12 @@ void DdsLink::State::accept_newest() {
       ++counters.strangers;
       continue;
     }
+
     disconnect();
     peer = std::move(accepted);
     ++counters.connections;
     beats = {};
-    last_beat = {};  // the newcomer is owed a beat at once
+    last_beat = {};  // the next beat is sent at once
     for (auto& entry : durable.entries()) entry.extra.to_send = true;
   }
 }
@@ -113,7 +115,7 @@ void DdsLink::State::disconnect() {
   live.entries().clear();
 }
 
-/// Whether the socket is free for the next frame.
+/// True if the next frame can be sent.
 bool DdsLink::State::send_waiting() {
   while (peer && out_begin < out.size()) {
     const ssize_t n = ::send(peer.get(), out.data() + out_begin, out.size() - out_begin,
@@ -134,7 +136,7 @@ bool DdsLink::State::send_waiting() {
   return static_cast<bool>(peer);
 }
 
-/// Whether it is on its way; never after a disconnection.
+/// True if the frame was accepted for sending; false if the socket is full or disconnected.
 bool DdsLink::State::send_now(const Frame& frame) {
   if (!send_waiting()) return false;
   append_frame(out, frame);
@@ -142,7 +144,7 @@ bool DdsLink::State::send_now(const Frame& frame) {
   return static_cast<bool>(peer);
 }
 
-/// Whether none waits any more.
+/// True if no durable sample waits.
 bool DdsLink::State::send_durable() {
   for (auto& entry : durable.entries()) {
     if (!entry.extra.to_send) continue;
@@ -162,7 +164,7 @@ void DdsLink::State::send_live() {
   if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
 }
 
-/// Of a live topic: what waits gives way to what is newer.
+/// For live topics: a newer sample replaces a waiting one.
 void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
   if (live.entries().empty() && send_now(frame)) return;
   if (!peer) {
@@ -213,8 +215,8 @@ void DdsLink::beat(WallTime now) {
   if (now - state_->last_beat < kBeatPeriod) return;
   state_->beats.ask(now);
   if (state_->process != nullptr) state_->process->asked(now);
-  // A beat that does not fit is not queued: abbe-dds has not read for a while and will judge for
-  // itself. Nor does it overtake a state: abbe-dds would repeat the one before.
+  // A beat is not queued when the socket is full: abbe-dds has not read for some time and detects
+  // the silence. A beat must not overtake a waiting state: abbe-dds would repeat the previous one.
   if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}}))
     state_->last_beat = now;
 }

@@ -15,7 +15,7 @@ constexpr std::int64_t kStatusMask = 0xffff;
 }  // namespace
 
 std::string DdsEnd::text() const {
-  // Not by gmtime_r(), which takes a lock for the time zone: the hub calls this.
+  // Called by the hub: gmtime_r() is not used because it takes a lock for the time zone.
   const auto day = std::chrono::floor<std::chrono::days>(when);
   const std::chrono::year_month_day date{day};
   const std::chrono::hh_mm_ss time{std::chrono::floor<std::chrono::seconds>(when - day)};
@@ -49,7 +49,8 @@ std::optional<DdsEnd> DdsProcess::last_end() const noexcept {
                 std::chrono::system_clock::from_time_t(packed >> kSecondsShift)};
 }
 
-/// A hub that stood still, or was stopped with all of abbed, has not read the answers either.
+/// If the hub was blocked, or abbed was suspended, the hub could not read answers during that
+/// pause.
 void DdsProcess::asked(WallTime now) noexcept {
   const WallTime before{std::chrono::nanoseconds{asked_ns_.load(std::memory_order_relaxed)}};
   if (now - before > kPause) store(asks_since_ns_, now);
@@ -57,11 +58,11 @@ void DdsProcess::asked(WallTime now) noexcept {
 }
 
 std::chrono::nanoseconds DdsProcess::silent_for() const noexcept {
-  const std::int64_t heard = std::max({started_ns_.load(std::memory_order_relaxed),
-                                       answered_ns_.load(std::memory_order_relaxed),
-                                       asks_since_ns_.load(std::memory_order_relaxed)});
+  const std::int64_t last_answer = std::max({started_ns_.load(std::memory_order_relaxed),
+                                             answered_ns_.load(std::memory_order_relaxed),
+                                             asks_since_ns_.load(std::memory_order_relaxed)});
   return std::chrono::nanoseconds{
-      std::max<std::int64_t>(0, asked_ns_.load(std::memory_order_relaxed) - heard)};
+      std::max<std::int64_t>(0, asked_ns_.load(std::memory_order_relaxed) - last_answer)};
 }
 
 bool DdsProcess::has_answered() const noexcept {

@@ -12,7 +12,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-/// The children of that name of all these elements.
+/// All children called `name` of the elements `of`.
 std::vector<const XMLElement*> children(const std::vector<const XMLElement*>& of,
                                         const char* name) {
   std::vector<const XMLElement*> found;
@@ -49,7 +49,8 @@ bool dds_is_secured(const std::filesystem::path& security, const std::filesystem
   auto participants = children(profiles_only ? root : children(root, "profiles"), "participant");
   std::erase_if(participants, [](const XMLElement* p) { return !is_abbe(p); });
 
-  // Without authentication Fast DDS switches security off, whatever access says.
+  // Without an authentication plugin Fast DDS switches security off, even if an access control
+  // plugin is configured.
   return !participants.empty() && std::ranges::all_of(participants, [](const XMLElement* p) {
     return has_property(p, "dds.sec.auth.plugin") && has_property(p, "dds.sec.access.plugin");
   });

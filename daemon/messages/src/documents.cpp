@@ -6,7 +6,7 @@
 namespace abbe::daemon {
 namespace {
 
-// Cyclone DDS refuses a document that names a domain above 230.
+// Cyclone DDS refuses a document with a domain above 230.
 constexpr const char* kDomains =
     "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
 

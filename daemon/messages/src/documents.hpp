@@ -8,12 +8,12 @@
 
 namespace abbe::daemon {
 
-/// Nobody joins without an identity; discovery, liveliness and whole submessages are encrypted,
-/// every message is signed. Submessages and not payloads, because Fast DDS 2.9 and Cyclone DDS 0.10
-/// agree on these only.
+/// A participant needs an identity to join. Discovery, liveliness and whole submessages are
+/// encrypted, every message is signed. Submessages are encrypted instead of payloads because Fast
+/// DDS 2.9 and Cyclone DDS 0.10 are interoperable only in this setting.
 [[nodiscard]] std::string governance_document();
 
-/// The daemon may publish abbe's topics, a subscriber may read them; nothing else.
+/// The daemon may publish abbe's topics, a subscriber may read them. Everything else is denied.
 [[nodiscard]] std::string permissions_document(const std::string& common_name, DdsRole role,
                                                ValidityPeriod period);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// The newest payload per topic and key, oldest publication first: what a durable topic reply_outstanding to
-/// whoever comes late. A model published before its state is therefore also sent again before it.
-/// Single-threaded; allocates.
+/// The newest payload per topic and key, as a durable topic sends it to late joiners. Ordered by
+/// time of publication, oldest first: a model that was published before its state is also sent
+/// again before it. Single-threaded; allocates.
 
 #include <algorithm>
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace abbe::daemon {
 
-/// Extra is what the owner needs to know per entry: still to send, or when last written.
+/// Extra is data of the owner per entry, for example "still to send" or the time of the last write.
 template <class Extra>
 class RetainedPayloads {
  public:
@@ -23,7 +23,7 @@ class RetainedPayloads {
     Extra extra{};
   };
 
-  /// The entry now at the end, holding this payload and a fresh Extra.
+  /// Stores the payload at the end of the list, with a default Extra, and returns its entry.
   Entry& keep(Topic topic, std::span<const std::byte> key, std::span<const std::byte> payload) {
     const auto same = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) {
       return e.topic == topic && std::ranges::equal(e.key, key);
@@ -46,7 +46,8 @@ class RetainedPayloads {
   [[nodiscard]] std::vector<Entry>& entries() noexcept { return entries_; }
 
  private:
-  /// A grid of fewer slices than the one before: what lies beyond belongs to the model before.
+  /// If the newest grid has fewer slices than the previous one, the surplus slices belong to the
+  /// previous model.
   void drop_surplus_slices(std::span<const std::byte> newest) {
     const auto machine = payload_key(Topic::ErrorGrid, newest);
     const auto slices = grid_slices(newest);

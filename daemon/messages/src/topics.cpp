@@ -24,7 +24,7 @@ constexpr std::array<TopicTraits, kTopicCount> kTopics{{
      Kind::Durable, Key::Machine, 10s},
 }};
 
-/// Reads CDR_LE from the end of the encapsulation header on, where alignment counts from.
+/// Reads CDR_LE. `body` begins after the encapsulation header; alignment is relative to this point.
 class KeyReader {
  public:
   explicit KeyReader(std::span<const std::byte> body) : body_(body) {}
@@ -40,7 +40,7 @@ class KeyReader {
   }
 
   std::optional<std::string_view> text() {
-    const auto length = number();  // counts the NUL
+    const auto length = number();  // includes the NUL
     if (!length || *length == 0 || *length > body_.size() - offset_) return std::nullopt;
     const auto* begin = reinterpret_cast<const char*>(body_.data() + offset_);
     if (std::memchr(begin, 0, *length) != begin + *length - 1) return std::nullopt;
@@ -48,7 +48,7 @@ class KeyReader {
     return std::string_view(begin, *length - 1);
   }
 
-  /// Past `bytes` that are aligned to `alignment`, whatever they hold.
+  /// Skips `bytes` bytes that begin at the next multiple of `alignment`.
   bool skip(std::size_t alignment, std::size_t bytes) {
     const std::size_t at = (offset_ + alignment - 1) / alignment * alignment;
     if (at > body_.size() || bytes > body_.size() - at) return false;
@@ -127,6 +127,7 @@ bool add_to_age(std::span<std::byte> compensation, std::chrono::nanoseconds more
                      && reader.skip(8, 8);                                         // age_ns
   const std::size_t end = reader.read_so_far().size();
   if (!whole || !reader.skip(8, 8) || reader.read_so_far().size() != body.size()) return false;
+
   const auto age = body.subspan(end - 8, 8);
   std::uint64_t ns = 0;
   for (std::size_t i = 0; i < 8; ++i) ns |= std::to_integer<std::uint64_t>(age[i]) << (8 * i);

@@ -11,8 +11,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// "d.ddde-05" with its point moved; plain where people can read it, with an exponent where it
-/// would be all zeros.
+/// Moves the decimal point of "d.ddde-05" by `shift`. Very small and very large numbers get an
+/// exponent, all others are written without one.
 std::string move_point(const std::string& scientific, int shift) {
   const auto e = scientific.find('e');
   const bool negative = scientific.front() == '-';
@@ -50,7 +50,7 @@ std::string to_decimal(double value, int shift) {
                        .ptr;
   auto shortest = move_point(std::string(buffer.data(), end), shift);
   if (from_decimal(std::strtold(shortest.c_str(), nullptr), shift) == value) return shortest;
-  return move_point(fmt::format("{:.16e}", value), shift);  // 17 digits always name one double
+  return move_point(fmt::format("{:.16e}", value), shift);  // 17 digits always determine a double
 }
 
 double from_decimal(long double written, int shift) {

@@ -1,15 +1,15 @@
 #pragma once
-/// Numbers in files stand in mm, um and urad, in memory in m and rad, and must come back to the
-/// same bits. Multiplying a double by 1e6 and dividing again does not: so the decimal point is
-/// moved in the text when writing, and the division when reading is done in long double, whose 64
-/// bits leave no doubt which double was meant.
+/// Conversion of numbers between SI in memory and mm, um and urad in files. A written and read
+/// number must be bit-identical; multiplying a double by 1e6 and dividing it again is not.
+/// Therefore writing moves the decimal point in the text, and reading divides in long double, whose
+/// 64-bit significand determines the double uniquely.
 
 #include <string>
 
 namespace abbe::daemon {
 
-/// `value * 10^shift`, the fewest digits (17 at most) that from_decimal() reads back to the same
-/// bits. Finite only.
+/// The text of `value * 10^shift` with the smallest number of digits (at most 17) that
+/// from_decimal() converts back to the same bits. `value` must be finite.
 [[nodiscard]] std::string to_decimal(double value, int shift);
 
 /// `written / 10^shift` as a double; shift 0, 3, 6 or 12.

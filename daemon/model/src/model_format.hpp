@@ -1,5 +1,5 @@
 #pragma once
-/// What writer and reader of model.json agree on.
+/// Constants common to the writer and the reader of model.json.
 
 #include <string_view>
 
@@ -9,9 +9,9 @@ namespace abbe::daemon {
 
 inline constexpr std::string_view kModelSchema = "abbe/model/1";
 inline constexpr std::string_view kVersion = ABBE_VERSION;
-inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a model in polynomials
+inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a polynomial model
 
-// How far the decimal point moves between SI and the file.
+// Shift of the decimal point between SI and the file.
 inline constexpr int kMm = 3;
 inline constexpr int kMicroUnit = 6;          // um, urad
 inline constexpr int kMicroUnitSquared = 12;  // their products

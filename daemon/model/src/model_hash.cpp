@@ -12,8 +12,9 @@ namespace abbe::daemon {
 
 namespace {
 
-/// Feeds labelled numbers to the hash as the little-endian bytes of IEEE 754 doubles, each list
-/// with its length in front, so that no two models share a stream. Minus zero counts as zero.
+/// Canonical byte stream of a model: numbers as little-endian bytes of IEEE 754 doubles, each list
+/// and text preceded by its length, so that different models have different streams. Minus zero is
+/// written as zero.
 class Canonical {
  public:
   void text(std::string_view value) {
@@ -75,7 +76,8 @@ void add_values(Canonical& out, const calib::VolumetricModel& model) {
     for (Eigen::Index j = i; j < covariance.cols(); ++j) out.number(covariance(i, j));
 }
 
-/// Last, and only where there is one: a model without has the hash it had before there were any.
+/// Added last and only if present: the hash of a model without an artefact temperature is that of
+/// earlier versions of abbe.
 void add_artefact(Canonical& out, const calib::Expansion& artefact) {
   out.text("artefact");
   for (const double value : {artefact.alpha_per_K, artefact.u_alpha_per_K, artefact.temperature_K,

@@ -20,7 +20,7 @@ fs::path state_path(const fs::path& folder) {
   return folder / "state.json";
 }
 
-/// A store nobody wrote to yet has no events.
+/// A new store has no state.json and no events.
 Result<StoreState> read_state(const fs::path& folder) {
   const auto file = state_path(folder);
   std::error_code seen;
@@ -54,8 +54,8 @@ Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
   return ids;
 }
 
-/// Nothing takes a model out of the store: one that was added and has no file is lost, and is to be
-/// seen.
+/// The ids on disk, and those of all Added events: models are never removed, so an added model
+/// without a file is lost and must be listed.
 Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
   auto ids = ids_on_disk(folder);
   if (!ids) return ids;
@@ -89,9 +89,8 @@ fs::path ModelStore::model_path(const std::string& id) const {
 Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
-  // First, and without the lock: the file of an id has one content, whoever writes it, and must not
-  // wait for whoever holds the lock. A damaged file of the same id is written again: what it should
-  // have held is in our hands.
+  // The model file is written first and without the lock: its content depends only on the id, so it
+  // need not wait for another process. A damaged file of the same id is replaced.
   if (!load(id))
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
       return tl::make_unexpected(written.error());
@@ -99,9 +98,10 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
+
   StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
 
-  // A change whose last step failed (fsync of the folder, or what follows it) is asked for again.
+  // The caller repeats a change whose last step failed, for example the fsync of the folder.
   if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
   if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
     return tl::make_unexpected(done.error());
@@ -118,12 +118,11 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
   const StoreEvent* added = state->last_added(id);
   const bool accepted = added != nullptr && added->accepted;
   if (!accepted && !force)
-    return fail(
-        ErrorCode::Refused,
-        added == nullptr
-            ? fmt::format("activate {}: the gate never judged it (force it to take it anyway)", id)
-            : fmt::format("activate {}: the gate refused it: {}", id,
-                          fmt::join(added->reasons, "; ")));
+    return fail(ErrorCode::Refused,
+                added == nullptr
+                    ? fmt::format("activate {}: it has no verdict of the gate (use force)", id)
+                    : fmt::format("activate {}: the gate refused it: {}", id,
+                                  fmt::join(added->reasons, "; ")));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
 
   return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
@@ -210,8 +209,9 @@ Result<ModelDocument> ModelStore::load(const std::string& id) const {
   if (!text) return tl::make_unexpected(text.error());
   auto document = parse_model(*text, file.string());
   if (document && model_id(*document) != id)
-    return fail(ErrorCode::BadInput,
-                fmt::format("{}: holds another model than its name says", model_path(id).string()));
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: the id of the model differs from the file name", model_path(id).string()));
   return document;
 }
 
@@ -233,7 +233,7 @@ Result<std::string> ModelStore::find(const std::string& prefix) const {
 
   if (found.size() == 1) return found.front();
   return fail(ErrorCode::Usage,
-              fmt::format("model \"{}\": {} in {} begin with that", prefix,
+              fmt::format("model \"{}\": {} of the ids in {} begin with it", prefix,
                           found.empty() ? "none" : std::to_string(found.size()), folder_.string()));
 }
 

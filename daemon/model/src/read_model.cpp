@@ -15,8 +15,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// n (n + 1) / 2 numbers of the covariance of n parameters are the largest array: n = 20,000 fits.
-/// to_json() nests five deep.
+/// The largest array is the covariance of n parameters, n (n + 1) / 2 numbers; n = 20,000 fits.
+/// to_json() writes five levels.
 constexpr JsonBounds kModelBounds{
     .bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
 
@@ -24,8 +24,8 @@ constexpr JsonBounds kModelBounds{
 using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, long double>;
 
-/// Reads values by path; the first faults of every part are kept, what cannot be read becomes a
-/// default.
+/// Reads values by path. A value that cannot be read adds a fault and becomes a default; the first
+/// 20 faults are kept.
 class Reader {
  public:
   Reader(const Json& root, std::string file) : root_(root), file_(std::move(file)) {}
@@ -36,7 +36,7 @@ class Reader {
   }
   [[nodiscard]] bool any() const noexcept { return !faults_.empty(); }
   [[nodiscard]] Error to_error() const {
-    return {ErrorCode::BadInput, fmt::format("{}: not a model abbe can use", file_), faults_};
+    return {ErrorCode::BadInput, fmt::format("{}: not a valid model", file_), faults_};
   }
 
   const Json* find(const Json& in, const std::string& path, const std::string& key) {
@@ -63,7 +63,7 @@ class Reader {
     const Json* value = find(in, path, key);
     return value == nullptr ? 0.0 : number(*value, path + "." + key, shift);
   }
-  /// `least` and `most` in SI.
+  /// Adds a fault if the value is not in `least` to `most`, both in SI.
   double number_within(const Json& in, const std::string& path, const std::string& key, int shift,
                        double least, double most) {
     const Json* value = find(in, path, key);
@@ -159,6 +159,7 @@ void read_parameters(Reader& in, calib::ModelDescription& out) {
     if (name != nullptr && name->is_string()) p.name = name->get<std::string>();
     if (entry.contains("position_mm"))
       p.position_m = in.number(entry.at("position_mm"), path + ".position_mm", kMm);
+
     p.value = in.number_of(entry, path, "value", kMicroUnit);
     p.u = in.number_of(entry, path, "u", kMicroUnit);
     const Json* unit = in.find(entry, path, "unit");
@@ -175,8 +176,7 @@ void read_covariance(Reader& in, calib::ModelDescription& out) {
   const auto values = in.numbers(*list, "covariance", kMicroUnitSquared);
 
   if (values.size() != static_cast<std::size_t>(n * (n + 1) / 2)) {
-    in.fault("covariance",
-             fmt::format("{} values where {} belong", values.size(), n * (n + 1) / 2));
+    in.fault("covariance", fmt::format("{} values, expected {}", values.size(), n * (n + 1) / 2));
     return;
   }
 
@@ -247,8 +247,9 @@ ModelStatistics read_statistics(Reader& in) {
   return s;
 }
 
-// Beyond what a sensor (-50 to 200 C), [evemu] and a calibrator's file (+-50 um/(m K)) may say.
-constexpr double kColdest_K = 173.15, kWarmest_K = 523.15;
+// Limits wider than those of a sensor (-50 to 200 C), of [evemu], and of a calibrator file
+// (+-50 um/(m K)).
+constexpr double kLowest_K = 173.15, kHighest_K = 523.15;
 constexpr double kMostAlpha_per_K = 100e-6;
 
 std::optional<calib::Expansion> read_artefact(Reader& in) {
@@ -261,11 +262,11 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
   return calib::Expansion{
       within("alpha_um_per_m_K", kMicroUnit, -kMostAlpha_per_K, kMostAlpha_per_K),
       within("u_alpha_um_per_m_K", kMicroUnit, 0.0, kMostAlpha_per_K),
-      within("temperature_K", 0, kColdest_K, kWarmest_K),
-      within("u_temperature_K", 0, 0.0, kWarmest_K - kColdest_K)};
+      within("temperature_K", 0, kLowest_K, kHighest_K),
+      within("u_temperature_K", 0, 0.0, kHighest_K - kLowest_K)};
 }
 
-/// Missing in models whose recording is whole, and in those of before.
+/// Absent in models with a complete recording and in models of earlier versions.
 std::string read_recording_gap(Reader& in) {
   const std::string key = "recording_gap";
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
@@ -287,15 +288,15 @@ std::vector<InputFile> read_inputs(Reader& in) {
 Result<ModelDocument> read_document(Reader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
-    // another schema would only give faults that mean nothing
+    // With another schema all further faults would be meaningless.
     return tl::make_unexpected(in.to_error());
   }
 
   const auto created = utc_from_text(in.text("created"));
   if (!created) in.fault("created", "must be a UTC time such as 2024-05-17T08:30:00.000000000Z");
   auto description = read_description(in);
-  if (const auto sound = calib::check_covariance(description.covariance); !sound && !in.any())
-    in.fault("covariance", sound.error().text);
+  if (const auto valid = calib::check_covariance(description.covariance); !valid && !in.any())
+    in.fault("covariance", valid.error().text);
   auto model = calib::VolumetricModel::from_description(std::move(description));
   if (!model && !in.any()) in.fault("parameters", model.error().text);
   const auto statistics = read_statistics(in);

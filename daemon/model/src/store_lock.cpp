@@ -22,12 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr auto kLockLook = std::chrono::milliseconds{10};
+constexpr auto kLockPollPeriod = std::chrono::milliseconds{10};
 constexpr int kLockFlags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
 
-/// 0600; 0660 where the group may write to the folder anyway. Also a file of before, when it was
-/// readable.
-void keep_from_strangers(int lock, const fs::path& folder) noexcept {
+/// Sets mode 0600, or 0660 if the group may write to the folder. Also corrects an existing lock
+/// file with another mode.
+void restrict_access(int lock, const fs::path& folder) noexcept {
   struct stat file {
   }, of_folder{};
   if (::fstat(lock, &file) != 0 || ::stat(folder.c_str(), &of_folder) != 0) return;
@@ -40,22 +40,22 @@ FileDescriptor open_lock(const fs::path& file) {
   FileDescriptor lock{::open(file.c_str(), kLockFlags)};
   if (!lock && errno == ENOENT) {
     lock = FileDescriptor{::open(file.c_str(), kLockFlags | O_CREAT | O_EXCL, 0600)};
-    // To its owner, so that whoever uses the store after root can lock it, too.
+    // Owner as the folder: if root creates the lock file, the daemon can still lock it.
     if (lock) take_after_folder(lock.get(), folder);
-    // Lost against another process: it is there now.
+    // Another process created it in the meantime.
     else if (errno == EEXIST)
       lock = FileDescriptor{::open(file.c_str(), kLockFlags)};
   }
-  if (lock) keep_from_strangers(lock.get(), folder);
+  if (lock) restrict_access(lock.get(), folder);
   return lock;
 }
 
-/// As /proc/locks names a file: "fe:01:4711".
+/// Name of a file in /proc/locks: "fe:01:4711".
 std::string name_in_proc(const struct stat& file) {
   return fmt::format("{:02x}:{:02x}:{}", major(file.st_dev), minor(file.st_dev), file.st_ino);
 }
 
-/// " (process 4711)"; empty where /proc/locks is not shown, or not for this file system.
+/// " (process 4711)"; empty if /proc/locks is not readable or does not list this file system.
 std::string holder_of(int lock) {
   struct stat file {};
   if (::fstat(lock, &file) != 0) return {};
@@ -72,22 +72,22 @@ std::string holder_of(int lock) {
 
 }  // namespace
 
-Result<FileDescriptor> lock_store(const fs::path& folder, std::chrono::nanoseconds patience) {
+Result<FileDescriptor> lock_store(const fs::path& folder, std::chrono::nanoseconds time_out) {
   const auto failure = [&folder](std::string_view seen) {
     return fail(ErrorCode::Io, fmt::format("lock the model store {}: {}", folder.string(), seen));
   };
 
   FileDescriptor lock = open_lock(folder / "lock");
   if (!lock) return failure(std::strerror(errno));
-  const auto until = std::chrono::steady_clock::now() + patience;
+  const auto until = std::chrono::steady_clock::now() + time_out;
 
   while (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK && errno != EINTR) return failure(std::strerror(errno));
     if (std::chrono::steady_clock::now() > until)
       return failure(fmt::format("another process{} has held it for {:.0f} s",
                                  holder_of(lock.get()),
-                                 std::chrono::duration<double>(patience).count()));
-    std::this_thread::sleep_for(kLockLook);
+                                 std::chrono::duration<double>(time_out).count()));
+    std::this_thread::sleep_for(kLockPollPeriod);
   }
 
   return lock;

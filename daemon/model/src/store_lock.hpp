@@ -1,5 +1,5 @@
 #pragma once
-/// The lock that orders the changes of several processes to one store.
+/// The lock that serialises changes of several processes to one store.
 
 #include <chrono>
 #include <filesystem>
@@ -9,10 +9,11 @@
 
 namespace abbe::daemon {
 
-/// Locks FOLDER/lock (flock) until the descriptor is closed or the process dies. The file can be
-/// opened only by who may write to the folder: anybody who can open it can hold it. Io after
-/// `patience`, naming the holder where the kernel shows it.
+/// Locks FOLDER/lock (flock) until the descriptor is closed or the process ends. Only processes
+/// that may write to the folder can open the file, because any process that can open it can hold
+/// the lock. Io after `time_out`; the text names the process that holds the lock if the kernel
+/// reports it.
 [[nodiscard]] Result<FileDescriptor> lock_store(const std::filesystem::path& folder,
-                                                std::chrono::nanoseconds patience);
+                                                std::chrono::nanoseconds time_out);
 
 }  // namespace abbe::daemon

@@ -31,7 +31,8 @@ json to_json(const StoreEvent& event) {
   return object;
 }
 
-/// Throws json::exception, or nothing and no value for a word that is not one of ours.
+/// nullopt for an unknown action or a malformed time. Throws json::exception if a member is missing
+/// or has the wrong type.
 std::optional<StoreEvent> event_from(const json& object) {
   const auto action =
       std::find(kActions.begin(), kActions.end(), object.at("action").get<std::string>());
@@ -58,7 +59,7 @@ std::vector<std::string> StoreState::activations() const {
     if (event.action == StoreAction::Added) continue;
     if (event.action == StoreAction::RolledBack)
       while (!stack.empty() && stack.back() != event.id) stack.pop_back();
-    // A model activated twice was active once: before it came the one before.
+    // A repeated activation of the active model does not count as a new activation.
     if (stack.empty() || stack.back() != event.id) stack.push_back(event.id);
   }
   return stack;
@@ -99,7 +100,7 @@ std::string to_text(const StoreState& state) {
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {
-  // An event of an hour for ever, and no deeper than abbe writes.
+  // Enough for one event per hour over the life of a machine; the depth is that of to_text().
   const auto parsed =
       parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
   if (!parsed) return tl::make_unexpected(parsed.error());

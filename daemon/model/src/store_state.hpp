@@ -1,5 +1,5 @@
 #pragma once
-/// state.json: the events of a store in order, and what follows from them.
+/// state.json: the events of a store in order, and the active model that results from them.
 
 #include <optional>
 #include <string>
@@ -13,12 +13,13 @@ namespace abbe::daemon {
 struct StoreState {
   std::vector<StoreEvent> events;
 
-  /// Every activation that a rollback has not taken back, oldest first; the last one is active.
+  /// The ids of all activations that were not rolled back, oldest first; the last one is active.
   [[nodiscard]] std::vector<std::string> activations() const;
   [[nodiscard]] std::optional<std::string> active() const;
-  /// The event that made it so, `accepted` as the gate said of the model when it was added.
+  /// The event that made the active model active; `accepted` is the verdict of the gate when the
+  /// model was added.
   [[nodiscard]] std::optional<StoreEvent> activation() const;
-  /// null if the gate never saw it
+  /// null if the model was never added
   [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;
 };
 

@@ -1,4 +1,4 @@
-/// What killed processes and damaged disks leave in a store.
+/// Repairs a store after killed processes and disk errors.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -26,12 +26,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kDamaged = "state.json.damaged-";
-constexpr std::string_view kFresh = ".new";
+constexpr std::string_view kTemporary = ".new";
 
-/// The process that wrote NAME.PID.new; nothing: that is no such name.
+/// The PID in a name NAME.PID.new; nullopt for other names.
 std::optional<pid_t> writer_of(std::string name) {
-  if (!name.ends_with(kFresh)) return std::nullopt;
-  name.resize(name.size() - kFresh.size());
+  if (!name.ends_with(kTemporary)) return std::nullopt;
+  name.resize(name.size() - kTemporary.size());
   const auto dot = name.rfind('.');
   pid_t process = 0;
   if (dot == std::string::npos) return std::nullopt;
@@ -41,12 +41,13 @@ std::optional<pid_t> writer_of(std::string name) {
                                                                   : std::nullopt;
 }
 
-/// Numbers are given again after a restart of the computer.
+/// True if the process does not exist. The own PID also counts: a file with it was written by an
+/// earlier process with the same PID.
 bool is_gone(pid_t process) noexcept {
   return process == ::getpid() || (::kill(process, 0) != 0 && errno == ESRCH);
 }
 
-/// "2024-05-17T08-30-00Z": a name that every file system takes.
+/// "2024-05-17T08-30-00Z": without colons, which some file systems do not allow.
 std::string date_for_name(protocol::UtcTime now) {
   constexpr std::size_t kSeconds = 19;
   std::string date = to_text(now).substr(0, kSeconds) + "Z";
@@ -81,12 +82,12 @@ Result<void> ModelStore::set_aside_damaged_state(protocol::UtcTime now) {
   if (!is_damaged(state_file_)) return {};
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
-  if (!is_damaged(state_file_)) return {};  // repaired meanwhile
-  const auto aside = folder_ / (std::string{kDamaged} + date_for_name(now));
-  if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0)
+  if (!is_damaged(state_file_)) return {};  // another process repaired it
+  const auto renamed = folder_ / (std::string{kDamaged} + date_for_name(now));
+  if (::renameat2(AT_FDCWD, state_file_.c_str(), AT_FDCWD, renamed.c_str(), RENAME_NOREPLACE) == 0)
     return {};
   return fail(ErrorCode::Io, fmt::format("rename {} to {}: {}", state_file_.string(),
-                                         aside.string(), std::strerror(errno)));
+                                         renamed.string(), std::strerror(errno)));
 }
 
 std::string ModelStore::damaged_state() const {

@@ -12,8 +12,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// JSON by hand: numbers keep the digits to_decimal() chose, one parameter stands on one line, and
-/// the same document gives the same bytes.
+/// Composes the JSON text directly, so that numbers keep the digits of to_decimal(), each parameter
+/// has one line, and the same document gives the same bytes.
 class JsonText {
  public:
   void raw(std::string_view text) { text_ += text; }
@@ -122,8 +122,7 @@ void write_artefact(JsonText& out, const calib::Expansion& artefact) {
   out.key("artefact");
   out.raw(fmt::format(
       "{{\"temperature_K\": {}, \"u_temperature_K\": {}, \"alpha_um_per_m_K\": {}, "
-      "\"u_alpha_um_per_m_K\": "
-      "{},\n"
+      "\"u_alpha_um_per_m_K\": {},\n"
       "    \"growth\": {}, \"u_growth\": {}}}",
       to_decimal(artefact.temperature_K, 0), to_decimal(artefact.u_temperature_K, 0),
       to_decimal(artefact.alpha_per_K, kMicroUnit), to_decimal(artefact.u_alpha_per_K, kMicroUnit),

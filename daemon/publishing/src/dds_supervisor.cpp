@@ -20,8 +20,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The child starts the same whatever thread of abbed starts it: no signal blocked or ignored,
-/// real-time only as asked. Its threads inherit that.
+/// Makes the attributes of the child independent of the starting thread: no signal is blocked or
+/// ignored, and the scheduling is that of `priority`. The threads of the child inherit them.
 class SpawnAttributes {
  public:
   explicit SpawnAttributes(int priority) {
@@ -47,9 +47,9 @@ class SpawnAttributes {
   posix_spawnattr_t attributes_{};
 };
 
-/// What abbed may do for real time (CAP_SYS_NICE, CAP_IPC_LOCK as ambient capabilities of its unit)
-/// is not for the process that strangers can talk to. Only what a program started from here
-/// inherits is cleared; this one keeps its own.
+/// Clears the ambient capabilities that abbed has for real time from its unit (CAP_SYS_NICE,
+/// CAP_IPC_LOCK): abbe-dds receives data from the network and must not have them. Only started
+/// programs are affected; this process keeps its capabilities.
 void keep_capabilities_from_children() {
   ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0UL, 0UL, 0UL);
 }
@@ -57,7 +57,7 @@ void keep_capabilities_from_children() {
 }  // namespace
 
 Result<DdsSupervisor> DdsSupervisor::start(Options options, WallTime now) {
-  // abbe-dds leaves by itself once this process is gone, after having said so to its subscribers.
+  // abbe-dds ends when this process has ended, after it has published the loss to its subscribers.
   options.arguments.insert(options.arguments.end(), {"--parent", std::to_string(::getpid())});
   DdsSupervisor supervisor(std::move(options));
   if (auto spawned = supervisor.spawn(now); !spawned) return tl::make_unexpected(spawned.error());
@@ -121,8 +121,8 @@ Result<void> DdsSupervisor::spawn(WallTime now) {
 void DdsSupervisor::kill_if_hung() noexcept {
   if (options_.process == nullptr || hung_) return;
   const DdsProcess& process = *options_.process;
-  const auto patience = process.has_answered() ? options_.hung_after : options_.hung_at_start;
-  if (process.silent_for() <= patience) return;
+  const auto limit = process.has_answered() ? options_.hung_after : options_.hung_at_start;
+  if (process.silent_for() <= limit) return;
   hung_ = true;
   ::kill(pid_, SIGKILL);
 }
@@ -133,10 +133,11 @@ bool DdsSupervisor::reap(WallTime now) {
   pid_ = 0;
   last_end_ = DdsEnd{status, hung_, std::chrono::system_clock::now()};
   if (options_.process != nullptr) options_.process->ended(*last_end_);
-  const bool died_at_start = now - started_ < options_.steady_after;
-  // What a signal ends may be well the next time; what exits has a reason that stays.
+  const bool ended_at_start = now - started_ < options_.steady_after;
+  // A crash by a signal may not recur, so the delay stays short. The cause of an exit usually
+  // persists.
   const auto longest = WIFSIGNALED(status) ? options_.first_delay : options_.longest_delay;
-  delay_ = died_at_start ? std::clamp(2 * delay_, options_.first_delay, longest) : 0ms;
+  delay_ = ended_at_start ? std::clamp(2 * delay_, options_.first_delay, longest) : 0ms;
   next_start_ = now + delay_;
   return true;
 }

@@ -13,7 +13,7 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::size_t kNodesPerSlice = 456;   // ErrorGrid::nodes in the IDL
-constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: what a late joiner is sent at once
+constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: the number a late joiner receives at once
 constexpr std::size_t kHullBound = 512;       // ErrorModel::validity_hull
 constexpr std::size_t kReasonBound = 256;     // ModelState::reason, Health::fault
 constexpr std::size_t kEventReasonBound = 512;
@@ -22,7 +22,7 @@ std::int64_t ns(protocol::HostTime t) {
   return t.time_since_epoch().count();
 }
 
-/// Between two characters of UTF-8.
+/// Truncates to at most `bound` bytes, between two UTF-8 characters.
 std::string cut(std::string_view text, std::size_t bound) {
   constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
   if (text.size() > bound)
@@ -40,7 +40,8 @@ std::array<double, 6> upper_triangle(const calib::Matrix3& c) {
   return {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)};
 }
 
-/// A hull of fewer vertices lies inside the true one: evenly spread, it loses little on every side.
+/// A hull of fewer vertices is inside the true one. With evenly spread vertices it is only slightly
+/// smaller on every side.
 std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   std::vector<v1::HullVertex> hull;
   for (const calib::Vector3& p : calib::spread_subset(validity.vertices_m(), kHullBound))
@@ -90,21 +91,21 @@ v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset u
   return m;
 }
 
-v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
-  const auto& layout = in_force.model.layout();
+v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
+  const auto& layout = active.model.layout();
   v1::ErrorModel m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
-  m.model_id(in_force.id);
-  m.method(in_force.method);
-  m.estimator(in_force.estimator);
-  m.gauge(std::string{calib::name(in_force.model.gauge())});
+  m.model_id(active.id);
+  m.method(active.method);
+  m.estimator(active.estimator);
+  m.gauge(std::string{calib::name(active.model.gauge())});
   m.chain(layout.chain().text());
-  m.basis(in_force.model.polynomials() == nullptr ? "linear" : "legendre");
+  m.basis(active.model.polynomials() == nullptr ? "linear" : "legendre");
   m.squareness("travel");
-  m.tool_offset_m(array(in_force.model.tool_offsets_m().front()));
+  m.tool_offset_m(array(active.model.tool_offsets_m().front()));
 
-  for (const auto& p : in_force.model.parameters()) {
+  for (const auto& p : active.model.parameters()) {
     v1::Parameter q;
     q.name(p.name);
     q.position_m(p.position_m.value_or(0.0));
@@ -122,22 +123,22 @@ v1::ErrorModel model_message(const ModelInForce& in_force, const Stamp& stamp) {
     m.validity().push_back(range);
   }
 
-  m.validity_hull(hull_of(in_force.model.validity()));
-  m.recording_sha256(in_force.recording_sha256);
-  m.created_utc_ns(in_force.created.time_since_epoch().count());
+  m.validity_hull(hull_of(active.model.validity()));
+  m.recording_sha256(active.recording_sha256);
+  m.created_utc_ns(active.created.time_since_epoch().count());
 
   return m;
 }
 
-std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Stamp& stamp) {
-  const auto grid = calib::interpolation_grid(in_force.model, kMostGridNodes);
-  const calib::Vector3 tool_m = in_force.model.tool_offsets_m().front();
+std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& active, const Stamp& stamp) {
+  const auto grid = calib::interpolation_grid(active.model, kMostGridNodes);
+  const calib::Vector3 tool_m = active.model.tool_offsets_m().front();
   std::vector<v1::GridNode> all;
 
   for (std::size_t x = 0; x < grid.axes_m[0].size(); ++x) {
     for (std::size_t y = 0; y < grid.axes_m[1].size(); ++y) {
       for (std::size_t z = 0; z < grid.axes_m[2].size(); ++z)
-        all.push_back(grid_node(in_force, grid, {x, y, z}, tool_m));
+        all.push_back(grid_node(active, grid, {x, y, z}, tool_m));
     }
   }
 
@@ -151,7 +152,7 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
     m.slice(static_cast<std::uint32_t>(slice));
     m.slices(static_cast<std::uint32_t>(slices));
     m.sequence_number(stamp.sequence_number);
-    m.model_id(in_force.id);
+    m.model_id(active.id);
     m.tool_offset_m(array(tool_m));
     m.every_node(grid.every_node);
     m.nodes(std::vector<v1::GridNode>(
@@ -163,23 +164,22 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& in_force, const Sta
 }
 
 v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
-                             const ModelInForce* in_force, nanoseconds validity,
-                             const Stamp& stamp) {
+                             const ModelInForce* active, nanoseconds validity, const Stamp& stamp) {
   v1::ModelState m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
   m.host_time_ns(ns(stamp.now));
   m.state(status);
   m.reason(cut(reason, kReasonBound));
-  if (in_force != nullptr) {
-    m.model_id(in_force->id);
-    m.age_ns((stamp.now - in_force->active_since).count());
+  if (active != nullptr) {
+    m.model_id(active->id);
+    m.age_ns((stamp.now - active->active_since).count());
   }
   m.validity_ns(validity.count());
   return m;
 }
 
-v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce* in_force,
+v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce* active,
                                       const protocol::Snapshot& s,
                                       const std::array<double, 3>& tool_offset_m,
                                       nanoseconds validity, const Stamp& stamp) {
@@ -194,16 +194,16 @@ v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
 
-  // Age of the position the vector belongs to: what a subscriber compares with validity_ns.
+  // Age of the position of this vector; subscribers compare it with validity_ns.
   m.age_ns((stamp.now - s.head.time).count());
   m.validity_ns(validity.count());
-  if (in_force == nullptr) return m;
-  m.model_id(in_force->id);
-  if (!known) return m;  // a vector of where the machine stood once looks as valid as any
-  const auto e = in_force->model.error_at({s.position[0], s.position[1], s.position[2]},
-                                          {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]});
+  if (active == nullptr) return m;
+  m.model_id(active->id);
+  if (!known) return m;  // a vector at an old position must not be published as valid
+  const auto e = active->model.error_at({s.position[0], s.position[1], s.position[2]},
+                                        {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]});
   m.tool_ok(e.tool_ok);
-  if (!e.tool_ok) return m;  // never a number that looks valid
+  if (!e.tool_ok) return m;  // the vector stays zero
   m.inside(e.inside);
   m.vector_m(array(e.V_m));
   m.cov_m2(upper_triangle(e.cov_V_m2));

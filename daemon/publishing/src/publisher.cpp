@@ -9,7 +9,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kStatePeriod = 1s;  // the IDL promises the state at least this often
+constexpr auto kStatePeriod = 1s;  // the IDL guarantees this period
 
 std::chrono::nanoseconds period(double rate_hz) {
   return rate_hz > 0.0 ? std::chrono::nanoseconds{static_cast<std::int64_t>(1e9 / rate_hz)} : 0ns;
@@ -17,10 +17,11 @@ std::chrono::nanoseconds period(double rate_hz) {
 
 }  // namespace
 
-/// The next time is a period after this one, not after the one that was due.
+/// The next sample is due one period after this one was sent, not after it was due.
 bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
-  const bool takes_back = view.head.time == pace.time && view.missing_mask != pace.missing_mask;
-  if (now < pace.next && !takes_back) return false;
+  const bool invalidates_previous =
+      view.head.time == pace.time && view.missing_mask != pace.missing_mask;
+  if (now < pace.next && !invalidates_previous) return false;
   pace = {now + period(rate_hz), view.head.time, view.missing_mask};
   return true;
 }
@@ -30,8 +31,8 @@ Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset
 
 template <class T>
 void Publisher::send(Topic topic, const T& message, WallTime at) {
-  // Outside the IDL's bounds: the configuration should have refused what led here. The link counts
-  // the empty payload.
+  // A value exceeds the IDL's bounds, although the configuration is checked. The link counts the
+  // empty payload as refused.
   if (auto encoded = encode(message, payload_); !encoded) {
     refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
   }

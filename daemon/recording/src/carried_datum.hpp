@@ -1,5 +1,6 @@
 #pragma once
-/// Which attachments a further file begins with, so that it stands for itself.
+/// Selects the attachments that a further file begins with, so that it can be replayed without the
+/// earlier files.
 
 #include <cstdint>
 #include <iterator>
@@ -17,8 +18,8 @@ struct TimedAttachment {
   std::uint64_t time_ns = 0;
 };
 
-/// Whether the next file needs it. `settled`: axes of which nothing found earlier is in force;
-/// walked from the newest back.
+/// Whether the next file needs the attachment. Call it from the newest attachment to the oldest.
+/// `settled`: mask of the axes whose earlier datums are not valid any more; updated by the call.
 inline bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state,
                           std::uint32_t& settled) {
   if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName ||
@@ -28,13 +29,13 @@ inline bool is_carried_on(const RecordingAttachment& attachment, const DatumStat
   const auto datum = datum_from_attachment(attachment);
   if (!datum || datum->from >= state.at) return true;
   const std::uint32_t axis = 1u << datum->axis;
-  const bool in_force = (settled & axis) == 0;
+  const bool valid = (settled & axis) == 0;
   settled |= axis;
-  return in_force;
+  return valid;
 }
 
-/// Leaves what is in force of every axis and what was found since, and adds which axes nobody
-/// knows.
+/// Keeps the valid datum of every axis and the datums found since `state`, and adds `state`, which
+/// lists the axes that are not referenced.
 inline void carry_datum_on(std::vector<TimedAttachment>& attachments, const DatumState& state,
                            std::uint64_t state_time_ns) {
   std::uint32_t settled = state.unknown;

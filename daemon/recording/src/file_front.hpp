@@ -1,7 +1,7 @@
 #pragma once
-/// What stands at the front of every recording, before the first chunk: who recorded what with
-/// which configuration, the schemas and channels of all streams (so that no chunk depends on
-/// another one), and attachments.
+/// The front of every recording, before the first chunk: metadata with machine, configuration and
+/// versions, the schemas and channels of all streams (so that no chunk depends on another one), and
+/// attachments.
 
 #include <span>
 
@@ -11,17 +11,17 @@
 namespace abbe::daemon::recording {
 
 struct PartOf {
-  std::uint32_t part = 1;  ///< 1, 2, ... of this recorder's files
-  std::string follows;     ///< name of the previous one, empty for the first
+  std::uint32_t part = 1;  ///< number of the file within this recorder: 1, 2, ...
+  std::string follows;     ///< name of the previous file, empty for the first
 };
 
-/// Appends magic to channels, and tells `summary`. `out` must be empty: offsets count from its
-/// front.
+/// Appends everything from the magic to the channels to `out`, and adds it to `summary`. `out` must
+/// be empty: offsets count from its beginning.
 void append_front(const RecordingInfo& info, const PartOf& part,
                   protocol::mcap::SummaryBuilder& summary, protocol::mcap::Buffer& out);
 
-/// Appends an attachment that will stand at `offset` of the file. The returned entry of the summary
-/// views `attachment`.
+/// Appends an attachment that will be at `offset` in the file. The returned summary entry refers to
+/// the strings of `attachment`.
 [[nodiscard]] protocol::mcap::AttachmentIndex append_attachment(
     const RecordingAttachment& attachment, std::uint64_t time_ns, std::uint64_t offset,
     protocol::mcap::Buffer& out);

@@ -21,9 +21,9 @@ namespace mcap = protocol::mcap;
 
 namespace {
 
-/// More than any record that abbed writes in one piece: a chunk of 64 MiB and its indexes.
+/// Larger than any piece that abbed writes at once: a chunk of 64 MiB and its indexes.
 constexpr std::uint64_t kLargestPiece = std::uint64_t{128} << 20;
-/// Opcode to records_size of a chunk without compression.
+/// Length of the fields of an uncompressed chunk record before its messages.
 constexpr std::uint64_t kChunkHeadBytes = 8 + 8 + 8 + 4 + 4 + 8;
 
 std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
@@ -32,9 +32,9 @@ std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
   return number;
 }
 
-/// What stands behind a torn record is its own rest. A whole chunk there: the record is no torn
-/// end, its length is damaged.
-bool holds_a_whole_chunk(mcap::Bytes tail) {
+/// True if a whole chunk is in `tail`. A truncated record is followed by nothing else; if a whole
+/// chunk follows a record that seems truncated, the length of that record is damaged.
+bool contains_whole_chunk(mcap::Bytes tail) {
   constexpr std::byte kChunk{static_cast<std::uint8_t>(mcap::Opcode::Chunk)};
   constexpr std::size_t kRecordsSizeAt = mcap::kRecordHeadSize + kChunkHeadBytes - 8;
   constexpr std::size_t kLeast = mcap::kRecordHeadSize + kChunkHeadBytes;
@@ -89,13 +89,14 @@ Result<std::vector<std::byte>> LeftFile::bytes(std::uint64_t offset, std::uint64
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return tl::unexpected(io_error("read"));
     if (got == 0)
-      return fail(ErrorCode::Io, fmt::format("read {}: it became shorter", part_.string()));
+      return fail(ErrorCode::Io, fmt::format("read {}: the file became shorter while it was read",
+                                             part_.string()));
     have += static_cast<std::size_t>(got);
   }
   return out;
 }
 
-/// Nothing: there is no whole record.
+/// nullopt: there is no whole record at `offset`.
 Result<std::optional<LeftFile::Head>> LeftFile::head_at(std::uint64_t offset) const {
   if (size_ - offset < mcap::kRecordHeadSize) return std::nullopt;
   const auto head = bytes(offset, mcap::kRecordHeadSize);
@@ -112,12 +113,15 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
   if (!magic) return tl::unexpected(magic.error());
   if (!std::ranges::equal(*magic, Bytes{mcap::kMagic}.first(magic->size())))
     return fail(ErrorCode::BadInput,
-                fmt::format("{}: does not begin like a recording", part_.string()));
+                fmt::format("{}: is not a recording: it does not begin with the MCAP magic",
+                            part_.string()));
   whole_until_ = magic->size();
 
   while (!complete_ && whole_until_ < size_) {
     if (stop)
-      return fail(ErrorCode::Io, fmt::format("{}: stopped while it was read", part_.string()));
+      return fail(ErrorCode::Io,
+                  fmt::format("{}: not closed: abbed was stopped while it read the file",
+                              part_.string()));
     const auto record = head_at(whole_until_);
     if (!record) return tl::unexpected(record.error());
     if (!*record) break;
@@ -125,7 +129,7 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
       const auto last = bytes(size_ - mcap::kMagic.size(), mcap::kMagic.size());
       if (!last) return tl::unexpected(last.error());
       complete_ = std::ranges::equal(*last, mcap::kMagic);
-      break;  // else its end is torn, and written again
+      break;  // if not complete_, the end is truncated and will be written again
     }
     if (auto taken = take(**record); !taken) return taken;
     whole_until_ = (*record)->end();
@@ -165,7 +169,7 @@ Result<void> LeftFile::take_chunk(const Head& record) {
   chunk_->offset = record.offset;
   chunk_->length = record.end() - record.offset;
   if (chunk) chunk_->head = chunk->head;
-  chunk_->head.compression = {};  // a view of bytes that are gone
+  chunk_->head.compression = {};  // the bytes that it refers to are freed
   return {};
 }
 
@@ -177,7 +181,7 @@ void LeftFile::take_index(const Head& record, Bytes content) {
   chunk_->indexed += index->entries.size();
 }
 
-/// What cannot be decoded is in the index all the same: so a reader reports it.
+/// Metadata that cannot be decoded are indexed, too, so that a reader reports them.
 void LeftFile::take_metadata(const Head& record, Bytes content) {
   const auto metadata = mcap::decode<mcap::Metadata>(content);
   summary_.add(mcap::MetadataIndex{record.offset, record.end() - record.offset,
@@ -217,14 +221,17 @@ void LeftFile::end_chunk() {
   chunk_.reset();
 }
 
-/// What stands behind the last whole record: a torn chunk, of which the whole messages are kept;
-/// another torn piece; or what a power cut leaves of a file that had grown already, zeros.
+/// Evaluates the bytes behind the last whole record:
+/// - a truncated chunk: its whole messages are kept;
+/// - another truncated record: it is discarded;
+/// - zeros, which a power cut leaves if the file had its new size already: they are discarded;
+/// - anything else: the file is damaged.
 Result<void> LeftFile::judge_tail() {
   if (whole_until_ == size_) return {};
   const auto damaged = [this] {
     return fail(ErrorCode::BadInput,
-                fmt::format("{}: damaged at byte {}, with {} bytes behind it; `abbe replay` "
-                            "reads what stands before",
+                fmt::format("{}: damaged at byte {}, {} bytes before its end; `abbe replay` can "
+                            "read the data before the damage",
                             part_.string(), whole_until_, size_ - whole_until_));
   };
 
@@ -232,9 +239,10 @@ Result<void> LeftFile::judge_tail() {
   if (!zeros) return tl::unexpected(zeros.error());
   if (*zeros) return {};
   if (size_ - whole_until_ > kLargestPiece) return damaged();
+
   const auto tail = bytes(whole_until_, size_ - whole_until_);
   if (!tail) return tl::unexpected(tail.error());
-  if (tail->front() == std::byte{0} || holds_a_whole_chunk(Bytes{*tail}.subspan(1)))
+  if (tail->front() == std::byte{0} || contains_whole_chunk(Bytes{*tail}.subspan(1)))
     return damaged();
   if (tail->front() != std::byte{static_cast<std::uint8_t>(mcap::Opcode::Chunk)} ||
       tail->size() <= mcap::kRecordHeadSize)
@@ -258,13 +266,15 @@ Result<bool> LeftFile::is_zero_from(std::uint64_t offset) const {
   return true;
 }
 
-/// Whole, but perhaps without some of its indexes, which are written with it.
+/// The last chunk is whole, but some of its indexes may be missing: then chunk and indexes are
+/// written again.
 Result<void> LeftFile::judge_last_chunk() {
   if (!chunk_) return {};
   if (chunk_->length > kLargestPiece) return end_chunk(), Result<void>{};
   const auto content =
       bytes(chunk_->offset + mcap::kRecordHeadSize, chunk_->length - mcap::kRecordHeadSize);
   if (!content) return tl::unexpected(content.error());
+
   const auto chunk = mcap::decode<mcap::Chunk>(*content);
   const bool sound = chunk && chunk->head.compression.empty() &&
                      chunk->head.uncompressed_crc == mcap::crc32(chunk->records);
@@ -272,6 +282,7 @@ Result<void> LeftFile::judge_last_chunk() {
   if (sound)
     for (mcap::MessageReader all{chunk->records}; all.next();) ++messages;
   if (!sound || messages == chunk_->indexed) return end_chunk(), Result<void>{};
+
   const auto offset = std::exchange(chunk_, std::nullopt)->offset;
   rebuild(offset, chunk->records);
 
@@ -304,7 +315,7 @@ Result<void> LeftFile::write(std::uint64_t offset, Bytes piece) {
 
 Result<void> LeftFile::write_end() {
   if (!complete_) {
-    // In this order a kill or a full disk leaves a file that the next start can close.
+    // With this order the next start can close the file even after a kill or a full disk.
     if (auto done = write(rebuilt_at_, rebuilt_); !done) return done;
     if (::ftruncate(fd_.get(), static_cast<off_t>(whole_until_)) != 0)
       return tl::unexpected(io_error("truncate"));

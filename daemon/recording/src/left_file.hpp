@@ -1,6 +1,7 @@
 #pragma once
-/// One recording that a killed recorder left open: what is in it, and its end written. Read piece
-/// by piece, not mapped: the memory of abbed is locked, and a recording may be larger than it.
+/// A recording that a killed recorder left open: reads its records and writes its end. The file is
+/// read piece by piece, not mapped, because the memory of abbed is locked and a recording may be
+/// larger than the memory.
 
 #include <atomic>
 #include <cstdint>
@@ -17,18 +18,19 @@ namespace abbe::daemon::recording {
 
 class LeftFile {
  public:
-  /// Nothing: it is gone, or another process still writes it.
+  /// nullopt: the file does not exist any more, or another process still writes it.
   [[nodiscard]] static Result<std::optional<LeftFile>> open(const std::filesystem::path& part);
 
-  /// Finds all whole records. BadInput: damaged before its end, or stopped.
+  /// Finds all whole records. BadInput: damaged before its end. Io: `stop` was set, or the file
+  /// cannot be read.
   [[nodiscard]] Result<void> read(const std::atomic<bool>& stop);
-  /// Nothing of a run is in it.
+  /// True if the file has neither messages nor attachments.
   [[nodiscard]] bool holds_nothing() const {
     return summary_.message_count() == 0 && !has_attachments_;
   }
   [[nodiscard]] std::uint64_t messages() const { return summary_.message_count(); }
 
-  /// Writes what is missing, to the disk; the file keeps its date.
+  /// Writes the missing end and syncs the file; the file keeps its date.
   [[nodiscard]] Result<void> write_end();
 
  private:
@@ -38,11 +40,11 @@ class LeftFile {
     std::uint64_t offset = 0, length = 0;
     [[nodiscard]] std::uint64_t end() const;
   };
-  /// A chunk whose indexes may still follow.
+  /// The last chunk read; more of its indexes may follow.
   struct OpenChunk {
     std::uint64_t offset = 0, length = 0;
     protocol::mcap::ChunkHead head;
-    std::uint64_t indexed = 0;  ///< messages
+    std::uint64_t indexed = 0;  ///< number of messages in its indexes
     std::vector<protocol::mcap::ChannelShare> shares;
   };
 
@@ -70,10 +72,10 @@ class LeftFile {
   struct timespec written_;
   protocol::mcap::SummaryBuilder summary_;
   bool has_attachments_ = false;
-  bool complete_ = false;  ///< with its end; only the name is missing
+  bool complete_ = false;  ///< the end is written already; only the file name is unfinished
   std::uint64_t whole_until_ = 0;
   std::optional<OpenChunk> chunk_;
-  protocol::mcap::Buffer rebuilt_;  ///< goes to whole_until_
+  protocol::mcap::Buffer rebuilt_;  ///< the last chunk, rebuilt; to be written at rebuilt_at_
   std::uint64_t rebuilt_at_ = 0;
 };
 

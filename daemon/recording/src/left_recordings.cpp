@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPart = ".mcap.part";
 
-/// NAME.mcap.part, NAME-2.mcap.part ... of this run.
+/// True for NAME.mcap.part, NAME-2.mcap.part ... of this run.
 bool is_written_by(const std::string& file, const std::string& running) {
   return !running.empty() && file.starts_with(running) &&
          (file[running.size()] == '.' || file[running.size()] == '-');
@@ -39,7 +39,7 @@ Result<std::vector<fs::path>> parts_in(const fs::path& directory, const std::str
   return parts;
 }
 
-/// Durable, as the recorder does it.
+/// Renames NAME.mcap.part to NAME.mcap and syncs the directory, as the recorder does.
 Result<fs::path> take_finished_name(const fs::path& part) {
   auto finished = part;
   finished.replace_extension();
@@ -52,7 +52,7 @@ Result<fs::path> take_finished_name(const fs::path& part) {
   return finished;
 }
 
-/// Nothing: another process writes it.
+/// nullopt: another process writes the file.
 Result<std::optional<LeftRecording>> close_one(const fs::path& part,
                                                const std::atomic<bool>& stop) {
   auto file = recording::LeftFile::open(part);

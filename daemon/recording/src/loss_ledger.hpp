@@ -1,6 +1,6 @@
 #pragma once
-/// How many messages of each stream and device there were since the last one that lies in the
-/// recording. A handful of entries; one thread.
+/// Counts messages by stream and device, for example those lost since the last recorded one. Has
+/// only a few entries; for one thread.
 
 #include <algorithm>
 #include <string>
@@ -24,7 +24,7 @@ class LossLedger {
   void add(const LossLedger& other) {
     for (const Entry& e : other.entries_) add(e.stream, e.device, e.messages);
   }
-  /// And forgets them.
+  /// Returns the count and resets it to 0.
   [[nodiscard]] std::uint32_t take(Stream stream, std::string_view device) {
     const auto at = find(stream, device);
     return at == entries_.end() ? 0 : std::exchange(at->messages, 0);

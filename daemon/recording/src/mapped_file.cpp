@@ -20,7 +20,7 @@ tl::unexpected<Error> io_error(const char* verb, const std::filesystem::path& fi
 }  // namespace
 
 Result<MappedFile> MappedFile::open(const std::filesystem::path& file) {
-  // waits for no pipe
+  // O_NONBLOCK: opening a pipe does not block
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (fd < 0) return io_error("open", file, errno);
   struct stat status {};
@@ -39,7 +39,7 @@ Result<MappedFile> MappedFile::open(const std::filesystem::path& file) {
 
   void* data = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, fd, 0);
   const int error = errno;
-  ::close(fd);  // the mapping stays
+  ::close(fd);  // the mapping stays valid
   if (data == MAP_FAILED) return io_error("map", file, error);
   ::madvise(data, size, MADV_SEQUENTIAL);
 

@@ -1,5 +1,5 @@
 #pragma once
-/// A file mapped for reading, whole.
+/// A whole file mapped into memory for reading.
 
 #include <cstddef>
 #include <filesystem>

@@ -25,7 +25,7 @@ Checked check(const std::map<std::string, MetadataEntries>& metadata, std::strin
                                                                       : Checked::Wrong;
 }
 
-/// Recordings of before have the hash of the text alone.
+/// For recordings of older versions, which only have the hash of the text.
 MetadataCheck check_text(const MetadataEntries& configuration) {
   const auto text = configuration.find("text"), hash = configuration.find("sha256");
   if (text == configuration.end() || hash == configuration.end()) return MetadataCheck::Unchecked;
@@ -50,7 +50,8 @@ std::string metadata_sha256(std::string_view record, const MetadataEntries& entr
 }
 
 MetadataJudgement judge_metadata(const std::map<std::string, MetadataEntries>& metadata) {
-  // A damaged bit can hide one checksum or one record, not all three.
+  // The recording has checksums if any record has one: a single damaged bit can hide one checksum
+  // or one record, but not all three.
   const bool checked = std::ranges::any_of(kRecords, [&](std::string_view record) {
     const Checked found = check(metadata, record);
     return found == Checked::Right || found == Checked::Wrong;

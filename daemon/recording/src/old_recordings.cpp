@@ -13,14 +13,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Models name "NAME.mcap", or "NAME.mcap.part (4711 bytes)" while it still grew: NAME, of all of
-/// them.
+/// The names of all recordings that models name among their inputs, without extension. A model
+/// names "NAME.mcap", or "NAME.mcap.part (4711 bytes)" if the recording was still open.
 Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   std::set<std::string> names;
-  // Opening it would create it: what is not there (a disk that is not mounted) is no empty store.
+  // ModelStore::open() would create a missing store; a store on a disk that is not mounted must not
+  // count as empty.
   std::error_code error;
   if (!fs::is_directory(folder / "models", error))
-    return fail(ErrorCode::Io, fmt::format("list {}: no model store is there", folder.string()));
+    return fail(ErrorCode::Io, fmt::format("list {}: there is no model store", folder.string()));
   const auto store = ModelStore::open(folder);
   if (!store) return tl::unexpected(store.error());
   const auto entries = store->list();
@@ -36,17 +37,18 @@ Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   return names;
 }
 
-bool is_ours(const std::string& name) {
+bool is_recording(const std::string& name) {
   return name.starts_with("abbe-") && (name.ends_with(".mcap") || name.ends_with(".mcap.part"));
 }
 
-/// NAME.mcap, NAME-2.mcap ...
+/// True for NAME.mcap, NAME-2.mcap ...
 bool is_of_run(const std::string& file, const std::string& name) {
   return !name.empty() && file.starts_with(name) &&
          (file[name.size()] == '.' || file[name.size()] == '-');
 }
 
-/// Nothing was recorded before: the real-time clock had lost its battery.
+/// Files with an earlier date were written with a wrong clock (empty battery of the real-time
+/// clock): abbe did not exist then.
 fs::file_time_type earliest_date() {
   using namespace std::chrono;
   return file_clock::from_sys(sys_seconds{sys_days{year{2026} / January / 1}});
@@ -61,7 +63,7 @@ struct Recordings {
   std::vector<Dated> former, own;
 };
 
-/// All but the one that is being written.
+/// All recordings except the one that is being written.
 Result<Recordings> recordings_in(const fs::path& directory, const std::string& running) {
   Recordings found;
   std::error_code error;
@@ -71,7 +73,7 @@ Result<Recordings> recordings_in(const fs::path& directory, const std::string& r
     const std::string name = entry->path().filename();
     const bool regular = entry->symlink_status(unknown).type() == fs::file_type::regular;
     const bool own = is_of_run(name, running);
-    if (!regular || !is_ours(name) || (own && name.ends_with(".part"))) continue;
+    if (!regular || !is_recording(name) || (own && name.ends_with(".part"))) continue;
     const auto written = entry->last_write_time(unknown);
     if (!unknown) (own ? found.own : found.former).push_back({entry->path(), written});
   }
@@ -81,7 +83,7 @@ Result<Recordings> recordings_in(const fs::path& directory, const std::string& r
   return found;
 }
 
-/// In order of name.
+/// The files older than the rule permits, in order of name.
 std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rule) {
   std::vector<fs::path> old;
   const auto add = [&old](const std::vector<Dated>& some, fs::file_time_type until) {
@@ -90,7 +92,7 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
   };
 
   add(recordings.own, rule.now - rule.keep);
-  if (rule.lasted > rule.keep) {  // the clock has told the truth for as long as that
+  if (rule.lasted > rule.keep) {  // the clock was not set during that time: it is trusted
     add(recordings.former, rule.now - rule.keep);
   } else if (!recordings.former.empty()) {
     const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;
@@ -111,7 +113,9 @@ Result<std::vector<fs::path>> remove_old_recordings(const fs::path& directory,
   if (old.empty()) return old;
   const auto named = named_by_models(store);
   if (!named)
-    return fail(named.error().code, fmt::format("keep all recordings: {}", named.error().text));
+    return fail(named.error().code,
+                fmt::format("keep all recordings, although some are older than keep_days: {}",
+                            named.error().text));
 
   std::erase_if(old, [&named](const fs::path& file) {
     const std::string name = file.filename();

@@ -56,8 +56,8 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Some devices speak only when something changes. Published again when the file begins; measured
-/// when it was.
+/// Repeats the last environment sample of each device, because some devices send only changes. The
+/// message is dated at the beginning of the file; its content keeps the time of measurement.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;
@@ -84,7 +84,7 @@ void Recorder::State::account(Stream stream, std::string_view device, std::uint3
   (added ? in_chunk : lost).add(stream, device, lost_before + 1);
 }
 
-// --- the public face
+// --- public functions
 
 Result<Recorder> Recorder::open(RecorderOptions options, RecordingInfo info, WallTime now) {
   auto state = std::make_unique<State>(std::move(options), std::move(info));
@@ -99,7 +99,7 @@ Result<Recorder> Recorder::open(RecorderOptions options, RecordingInfo info, Wal
 Recorder::Recorder(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Recorder::Recorder(Recorder&&) noexcept = default;
 Recorder& Recorder::operator=(Recorder&& other) noexcept {
-  std::swap(state_, other.state_);  // what was here is closed with `other`
+  std::swap(state_, other.state_);  // the former recording is closed by the destructor of `other`
   return *this;
 }
 Recorder::~Recorder() {
@@ -144,7 +144,7 @@ void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample
   auto latest = latest_environment.find(device);
   if (latest == latest_environment.end()) latest = latest_environment.emplace(device, sample).first;
   latest->second = sample;
-  latest->second.head.lost_before = 0;  // that is said where it was lost
+  latest->second.head.lost_before = 0;  // the original message has reported the loss
   latest->second.head.flags &= ~static_cast<protocol::SampleFlags>(protocol::SampleFlag::GapBefore);
 }
 
@@ -180,7 +180,8 @@ void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   if (s.status.state == RecorderStatus::State::Recording) s.end_cycle();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});
 
-  if (s.status.state != RecorderStatus::State::Recording) return;  // the next file begins with it
+  // Without an open file the attachment is written at the beginning of the next one.
+  if (s.status.state != RecorderStatus::State::Recording) return;
   mcap::Buffer bytes;
   const TimedAttachment& kept = s.attachments.back();
   const auto index =
@@ -219,7 +220,8 @@ RecordingDigest Recorder::digest() const {
 Result<RecordingDigest> Recorder::close() {
   State& s = *state_;
   if (s.status.state == RecorderStatus::State::Closed)
-    return daemon::fail(ErrorCode::Usage, "close recording: it is closed");
+    return daemon::fail(ErrorCode::Usage, "close recording: it is already closed");
+
   flush();
   const bool was_recording = s.status.state == RecorderStatus::State::Recording;
   const std::string fault = s.status.fault, gap = s.gap_of_run();

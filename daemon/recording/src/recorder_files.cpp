@@ -16,8 +16,8 @@ using IoResult = tl::expected<void, IoFault>;
 
 namespace {
 
-/// Room that must have come back beyond min_free_bytes before a new file is begun: else a disk that
-/// hovers at the limit would fill a directory with stumps.
+/// Free space needed in addition to min_free_bytes before a new file is begun, in chunks: otherwise
+/// a disk near the limit would fill the directory with very short files.
 constexpr std::uint64_t kResumeMarginChunks = 16;
 
 }  // namespace
@@ -40,7 +40,8 @@ IoResult Recorder::State::write_front(RecordingFile& fresh,
   return fresh.sync();
 }
 
-/// A calibration that is over is not asked for again; the newest request may be running.
+/// Requests of ended calibrations are not repeated in the next file; the newest request is kept
+/// while its calibration is running.
 void Recorder::State::forget_finished_requests() {
   bool keep_newest = calibrating;
   std::vector<TimedAttachment> kept;
@@ -51,7 +52,8 @@ void Recorder::State::forget_finished_requests() {
 }
 
 IoResult Recorder::State::begin_file() {
-  std::error_code made;  // the disk may have been read-only until now
+  // Here and not in open(), because the disk may have been read-only until now.
+  std::error_code made;
   std::filesystem::create_directories(options.directory, made);
   if (made) return tl::unexpected(recording::io_fault("create", options.directory, made.value()));
 
@@ -64,6 +66,7 @@ IoResult Recorder::State::begin_file() {
   if (std::filesystem::exists(finished, error))
     return tl::unexpected(recording::io_fault("create", finished, EEXIST));
   if (error) return tl::unexpected(recording::io_fault("look for", finished, error.value()));
+
   forget_finished_requests();
   if (part > 0 && axes_known)
     recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
@@ -89,7 +92,7 @@ IoResult Recorder::State::begin_file() {
   status.file = file->path();
   if (!status.fault.empty())
     status.last_fault =
-        fmt::format("{}; over: recording goes on in {}", std::exchange(status.fault, {}),
+        fmt::format("{}; over: recording continues in {}", std::exchange(status.fault, {}),
                     status.file.filename().string());
   status.bytes = file->size();
   ++status.files;
@@ -124,6 +127,7 @@ void Recorder::State::write_chunk() {
   const std::uint64_t offset = file->size();
   const auto written = file->append(closed.bytes);
   if (!written) return enter_fault(written.error());
+
   summary.add(closed, offset);
   chunk.clear();
   carried_in_chunk = 0;
@@ -145,13 +149,13 @@ bool Recorder::State::is_full() const {
          options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating;
 }
 
-/// Between two turns of the hub, so that a file begins with a whole one.
+/// Called between two cycles of the hub, so that a file begins with a whole cycle.
 void Recorder::State::end_cycle() {
   write_chunk();
-  if (is_full()) go_on_in_next_file();
+  if (is_full()) continue_in_next_file();
 }
 
-void Recorder::State::go_on_in_next_file() {
+void Recorder::State::continue_in_next_file() {
   if (const auto ended = end_file(); !ended) return enter_fault(ended.error());
   previous_file = file->path().filename().string();
   file.reset();
@@ -183,7 +187,7 @@ void Recorder::State::enter_fault(const IoFault& fault) {
   if (!file) return;
 
   if (messages_in_file == 0 && part > 1) {
-    file->discard();  // a stump: the next attempt takes its name
+    file->discard();  // it has no messages; the next attempt uses its name again
     --part;
     --status.files;
     file.reset();

@@ -1,6 +1,7 @@
 #pragma once
-/// What a Recorder is made of. recorder.cpp makes messages of samples and collects them in chunks;
-/// recorder_files.cpp keeps the files: begun, written, synced, ended, and begun anew after a fault.
+/// The state of a Recorder. recorder.cpp converts samples to messages and collects them in chunks;
+/// recorder_files.cpp creates, writes, syncs and ends the files, and begins a new one after a
+/// fault.
 
 #include <algorithm>
 #include <array>
@@ -54,7 +55,7 @@ struct Recorder::State {
   [[nodiscard]] std::string gap_of_run() const;
   [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
   void put(Stream stream, Dates dates, std::span<const std::byte> payload);
-  /// Marks `message` with what is missing before it, and adds it.
+  /// Marks in `message` how many messages are missing before it, and adds it.
   template <class Message>
   void add_marked(Stream stream, Dates dates, std::string_view device, Message& message);
   void add_carried_environment(protocol::HostTime begin);
@@ -68,7 +69,7 @@ struct Recorder::State {
   void enter_fault(const IoFault& fault);
   void report_fault(const IoFault& fault);
   void note_fault(const IoFault& fault);
-  void go_on_in_next_file();
+  void continue_in_next_file();
   void retry();
   [[nodiscard]] bool has_room_again() const;
 
@@ -80,8 +81,8 @@ struct Recorder::State {
   std::uint64_t messages_in_file = 0;
   bool end_written = false;
   std::string previous_file;
-  bool calibrating = false;  ///< the run that was asked for belongs into one file
-  /// As it was when the last calibration was asked for.
+  bool calibrating = false;  ///< no new file is begun, so that the run is in one file
+  /// The values when the last calibration was requested.
   struct AtRequest {
     std::uint32_t part = 0;
     std::uint64_t not_recorded = 0;
@@ -91,22 +92,24 @@ struct Recorder::State {
   protocol::mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
   std::map<std::string, protocol::EnvironmentSample, std::less<>>
-      latest_environment;                ///< by device
-  bool environment_carried = true;       ///< the present file begins with it
-  std::uint64_t carried_in_chunk = 0;    ///< messages of it: they are in a former file, too
-  std::optional<DatumState> axes_known;  ///< as the last axis sample said
+      latest_environment;           ///< by device
+  bool environment_carried = true;  ///< false: the present file must begin with latest_environment
+  /// repeated environment messages in the open chunk: they are in an earlier file, too
+  std::uint64_t carried_in_chunk = 0;
+  std::optional<DatumState> axes_known;  ///< from the last axis sample
   RecorderStatus status;
-  recording::LossLedger lost;  ///< not yet said by a later message
-  recording::LossLedger
-      in_chunk;  ///< with what they say was lost before them: gone if the chunk cannot be written
+  recording::LossLedger lost;  ///< messages lost, not yet reported in a later message
+  /// messages of the open chunk, plus the losses they report: all are lost if the chunk cannot be
+  /// written
+  recording::LossLedger in_chunk;
 
   WallTime now{};
-  WallTime chunk_since{};  ///< no message of the open chunk was recorded before this
+  WallTime chunk_since{};  ///< no message of the open chunk was recorded before this time
   WallTime synced{};
   bool unsynced = false;
   WallTime retry_at{};
 
-  // Reused, so that recording a sample allocates nothing once they have grown.
+  // Reused: their capacity is kept, so that recording a sample allocates only at first.
   std::vector<std::byte> payload;
   std::array<std::byte, protocol::kMaxRawBytesCdrSize> raw_payload{};
   v1::TrackerPoint tracker_point;

@@ -15,21 +15,21 @@
 namespace abbe::daemon {
 namespace {
 
-// How long a sample may wait in memory before it is encoded; a tenth of the shortest chunk.
+// Longest time that a sample waits in memory before it is encoded; a tenth of the shortest chunk.
 constexpr std::chrono::milliseconds kCycle{20};
-// How long the recorder waits when the hub is just adding to what waits.
+// How long the recorder waits if the hub is adding samples at that moment.
 constexpr std::chrono::microseconds kHubAdds{50};
-// What waits is kept in parts: a vector that grows is copied, and the hub does that.
+// The waiting samples are kept in parts of this size: a growing vector is copied, by the hub.
 constexpr std::size_t kMostInOnePart = 1 << 20;
 
-/// With the turn of the hub in which it came.
+/// A sample with the time of the hub cycle in which it came.
 template <class T>
 struct OfCycle {
   protocol::HostTime taken;
   T what;
 };
 
-/// Several devices measure the environment.
+/// An environment sample with its device, because several devices measure the environment.
 struct EnvironmentOf {
   std::string_view device;
   protocol::EnvironmentSample sample;
@@ -39,7 +39,7 @@ template <class T>
 std::size_t size_of(const std::vector<OfCycle<T>>& waiting) noexcept {
   return waiting.size() * sizeof(OfCycle<T>);
 }
-/// What append() will need for these.
+/// The memory that append() will use for these samples.
 template <class As, class T>
 std::size_t size_as(const std::vector<T>& samples) noexcept {
   return samples.size() * sizeof(OfCycle<As>);
@@ -63,14 +63,14 @@ struct Attachment {
   protocol::HostTime time{};
 };
 
-struct WantedDigest {
+struct DigestRequest {
   std::promise<RecordingDigest> promise;
-  /// messages that never came this far since a calibration was asked for
+  /// messages dropped since the last calibration was requested
   std::uint64_t dropped = 0;
 };
 
-/// What waits for the recorder; of each topic in the order of the hub's turns, which its messages
-/// keep.
+/// The data that wait for the recorder; within a topic in the order of the hub's cycles, which the
+/// recorded messages keep.
 struct Waiting {
   std::vector<OfCycle<protocol::TrackerPoint>> points;
   std::vector<OfCycle<protocol::AxisSample>> axes;
@@ -80,8 +80,9 @@ struct Waiting {
   WaitingBlocks raw;
   std::vector<OfCycle<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
-  std::vector<WantedDigest> digests;
-  /// what comes until the recorder has taken this is dropped: one hole, not many
+  std::vector<DigestRequest> digests;
+  /// Further batches are dropped until the recorder has taken this object, so that there is one gap
+  /// and not many.
   bool full = false;
   std::unique_ptr<Waiting> earlier;  ///< the parts before this one
   std::size_t bytes_earlier = 0;
@@ -91,7 +92,7 @@ struct Waiting {
            size_of(touch_scans) + raw.bytes();
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_earlier + bytes_here(); }
-  /// Keeps the room for an ordinary turn, gives that of a stalled disk back.
+  /// Keeps the memory that normal cycles need; frees the larger memory used during a disk stall.
   void clear() {
     if (bytes() > kMostInOnePart) {
       *this = {};
@@ -111,7 +112,7 @@ struct Waiting {
   }
 };
 
-/// Messages of each stream that were dropped since the last one that was not.
+/// Number of messages of each stream that were dropped since the last accepted one.
 struct Dropped {
   std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
   std::vector<std::uint32_t> measured;  // of each device of the environment
@@ -119,7 +120,7 @@ struct Dropped {
 };
 
 template <class T>
-T& place(std::vector<T>& of_devices, std::size_t device) {
+T& entry_of(std::vector<T>& of_devices, std::size_t device) {
   if (device >= of_devices.size()) of_devices.resize(device + 1);
   return of_devices[device];
 }
@@ -146,18 +147,18 @@ void append(std::vector<OfCycle<EnvironmentOf>>& to, protocol::HostTime taken,
 
 }  // namespace
 
-/// The hub and the recorder share one pointer: to the Waiting that is being filled, null while the
-/// hub adds to it. The hub always finds it there, because the recorder leaves an empty one for the
-/// one it takes; the recorder tries again when the hub is adding.
+/// The hub and the recorder share one pointer, `waiting`: to the Waiting that is being filled, or
+/// null while the hub adds to it. For the hub the pointer is never null, because the recorder
+/// replaces the Waiting that it takes by an empty one. If the recorder finds null, it tries again.
 struct RecorderThread::State {
   RecorderThreadOptions options;
   Recorder recorder;
   std::atomic<Waiting*> waiting{new Waiting};
-  std::atomic<RecorderStatus*> news{nullptr};  // put here by the recorder, taken by status()
-  RecorderStatus known;                        // the thread's that asks for status()
-  Dropped unsaid;                              // the hub's
-  std::uint64_t dropped_before_run = 0;        // the hub's
-  std::string defect;                          // the recorder's: not yet handed to the recorder
+  std::atomic<RecorderStatus*> new_status{nullptr};  // set by the recorder, taken by status()
+  RecorderStatus known;                              // used by the thread that calls status()
+  Dropped unreported;                                // used by the hub
+  std::uint64_t dropped_before_run = 0;              // used by the hub
+  std::string internal_error;  // used by the recorder thread: not yet passed to Recorder::fail()
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
   WakeUp wake_up;
@@ -168,10 +169,10 @@ struct RecorderThread::State {
   State& operator=(const State&) = delete;
   ~State() {
     delete waiting.load(std::memory_order_relaxed);
-    delete news.load(std::memory_order_relaxed);
+    delete new_status.load(std::memory_order_relaxed);
   }
 
-  /// While the hub adds: the recorder finds nothing to take.
+  /// Exists while the hub adds data: the recorder then finds a null pointer.
   struct Adding {
     explicit Adding(State& s)
         : state(s), to(s.waiting.exchange(nullptr, std::memory_order_acquire)) {}
@@ -198,96 +199,96 @@ struct RecorderThread::State {
   }
 
   void serve() {
-    auto turn = std::make_unique<Waiting>();
+    auto taken = std::make_unique<Waiting>();
     for (bool last = false; !last;) {
       (void)wake_up.wait_for(kCycle);
       // pairs with the release in ~RecorderThread()
       last = stopping.load(std::memory_order_acquire);
-      turn = take_waiting(std::move(turn));
-      write_all(*turn);
-      turn->clear();  // whoever waits for a digest that was not made learns of it
+      taken = take_waiting(std::move(taken));
+      write_all(*taken);
+      taken->clear();  // also breaks the promises of digests that were not made
       report();
     }
   }
 
   void report() {
     auto status = std::make_unique<RecorderStatus>(recorder.status());
-    // release: pairs with the acquire in status(); the one nobody has asked for is replaced
-    delete news.exchange(status.release(), std::memory_order_acq_rel);
+    // release: pairs with the acquire in status(); a report that was not taken is deleted
+    delete new_status.exchange(status.release(), std::memory_order_acq_rel);
   }
 
-  /// Only a defect or a lack of memory throws: the recorder begins a new file then, as after a disk
-  /// fault.
-  void write_all(Waiting& turn) {
+  /// An exception means an internal error or a lack of memory: the recorder then begins a new file,
+  /// as after a disk fault.
+  void write_all(Waiting& data) {
     try {
-      if (!defect.empty()) recorder.fail(std::exchange(defect, {}));
-      write(turn);
+      if (!internal_error.empty()) recorder.fail(std::exchange(internal_error, {}));
+      write(data);
       return;
     } catch (const std::exception& e) {
-      defect = std::string{"recorder: "} + e.what();
+      internal_error = std::string{"recorder: "} + e.what();
     }
     try {
-      recorder.fail(defect);
-      defect.clear();
-    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): tried again in the next turn
+      recorder.fail(internal_error);
+      internal_error.clear();
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): retried in the next cycle
     }
   }
 
   void drop(const Batch& batch) {
-    const auto lose = [this](std::uint32_t& unsaid_of, std::size_t messages) {
-      unsaid_of += static_cast<std::uint32_t>(messages);
-      dropped.fetch_add(messages, std::memory_order_relaxed);  // a count orders nothing
+    const auto lose = [this](std::uint32_t& unreported_of, std::size_t messages) {
+      unreported_of += static_cast<std::uint32_t>(messages);
+      dropped.fetch_add(messages, std::memory_order_relaxed);  // only a counter: no ordering needed
     };
 
-    lose(unsaid.points, batch.points.size());
-    lose(unsaid.axes, batch.axes.size());
-    lose(unsaid.environment, batch.environment.size());
+    lose(unreported.points, batch.points.size());
+    lose(unreported.axes, batch.axes.size());
+    lose(unreported.environment, batch.environment.size());
 
     for (const auto& sample : batch.measured_environment)
-      lose(place(unsaid.measured, sample.device), 1);
-    lose(unsaid.touches, batch.touches.size());
-    lose(unsaid.touch_scans, batch.touch_scans.size());
+      lose(entry_of(unreported.measured, sample.device), 1);
+    lose(unreported.touches, batch.touches.size());
+    lose(unreported.touch_scans, batch.touch_scans.size());
     if (!options.raw) return;
-    for (const auto& raw : batch.raw) lose(place(unsaid.raw, raw.device), 1);
+    for (const auto& raw : batch.raw) lose(entry_of(unreported.raw, raw.device), 1);
   }
 
-  void write(Waiting& turn) {
+  void write(Waiting& data) {
     std::vector<std::unique_ptr<Waiting>> earlier;  // the latest first
-    for (auto part = std::move(turn.earlier); part != nullptr;) {
+    for (auto part = std::move(data.earlier); part != nullptr;) {
       auto before = std::move(part->earlier);
       earlier.push_back(std::move(part));
       part = std::move(before);
     }
     for (; !earlier.empty(); earlier.pop_back()) write_part(*earlier.back());
-    write_part(turn);
+    write_part(data);
     recorder.tick(Recorder::WallTime::clock::now());
   }
 
-  void write_part(Waiting& turn) {
-    for (auto& a : turn.attachments) recorder.attach(std::move(a.what), a.time);
-    // First: a further file begins with the environment of before, which must not come after that
-    // of now.
-    for (const auto& [taken, e] : turn.environment) recorder.record(e.sample, e.device, taken);
-    for (const auto& [taken, s] : turn.axes) recorder.record(s, options.encoder, taken);
-    for (const auto& [taken, s] : turn.points) recorder.record(s, options.tracker, taken);
-    for (const auto& [taken, t] : turn.touches) recorder.record(t, options.probe, taken);
-    for (const auto& [taken, s] : turn.touch_scans) recorder.record(s, options.probe, taken);
+  void write_part(Waiting& data) {
+    for (auto& a : data.attachments) recorder.attach(std::move(a.what), a.time);
+    // Environment first: a further file begins with the repeated environment samples, which must
+    // not come after the new ones.
+    for (const auto& [taken, e] : data.environment) recorder.record(e.sample, e.device, taken);
+    for (const auto& [taken, s] : data.axes) recorder.record(s, options.encoder, taken);
+    for (const auto& [taken, s] : data.points) recorder.record(s, options.tracker, taken);
+    for (const auto& [taken, t] : data.touches) recorder.record(t, options.probe, taken);
+    for (const auto& [taken, s] : data.touch_scans) recorder.record(s, options.probe, taken);
 
-    turn.raw.for_each([this](const protocol::RawBytes& bytes, protocol::HostTime taken) {
+    data.raw.for_each([this](const protocol::RawBytes& bytes, protocol::HostTime taken) {
       recorder.record(bytes, taken);
     });
 
-    for (const auto& [taken, e] : turn.events) recorder.record(e, taken);
-    if (!turn.digests.empty()) recorder.flush();
-    for (auto& wanted : turn.digests) {
+    for (const auto& [taken, e] : data.events) recorder.record(e, taken);
+    if (!data.digests.empty()) recorder.flush();
+    for (auto& request : data.digests) {
       RecordingDigest digest = recorder.digest();
-      if (digest.gap.empty() && wanted.dropped > 0)
-        digest.gap = fmt::format("{} messages of the run are missing", wanted.dropped);
-      wanted.promise.set_value(std::move(digest));
+      if (digest.gap.empty() && request.dropped > 0)
+        digest.gap = fmt::format("{} messages of the run are missing", request.dropped);
+      request.promise.set_value(std::move(digest));
     }
   }
 
-  /// Begins a further part when this one is so large that to let it grow would take long.
+  /// Begins a further part when this one is so large that growing its vectors would take long.
   static void make_room(Adding& waiting) {
     if (waiting->bytes_here() < kMostInOnePart) return;
     auto next = std::make_unique<Waiting>();
@@ -313,15 +314,13 @@ RecorderThread::RecorderThread(std::unique_ptr<State> state) : state_(std::move(
 }
 
 RecorderThread::~RecorderThread() {
-  state_->stopping.store(true,
-                         std::memory_order_release);  // release: pairs with the acquire in serve()
+  // release: pairs with the acquire in serve()
+  state_->stopping.store(true, std::memory_order_release);
   state_->wake_up.signal();
   state_->thread.join();
   try {
-    (void)state_->recorder.close();  // what could not be finished stays readable as .part
-  } catch (
-      const std::
-          exception&) {  // NOLINT(bugprone-empty-catch): so does what a lack of memory left behind
+    (void)state_->recorder.close();  // a file that cannot be finished stays readable as .part
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): the same, lack of memory
   }
 }
 
@@ -331,7 +330,7 @@ void RecorderThread::on_samples(const Batch& batch) {
 
 void RecorderThread::hand_over(const Batch& batch) {
   State::Adding adding{*state_};
-  Dropped& unsaid = state_->unsaid;
+  Dropped& unreported = state_->unreported;
   adding->full =
       adding->full || adding->bytes() + bytes_of(batch) > state_->options.most_waiting_bytes;
 
@@ -340,18 +339,19 @@ void RecorderThread::hand_over(const Batch& batch) {
   Waiting& waiting = *adding.to;
   const auto& names = state_->options;
   const auto taken = batch.taken;
-  append(waiting.points, taken, batch.points, unsaid.points);
-  append(waiting.axes, taken, batch.axes, unsaid.axes);
+
+  append(waiting.points, taken, batch.points, unreported.points);
+  append(waiting.axes, taken, batch.axes, unreported.axes);
   for (const auto& sample : batch.environment)
-    append(waiting.environment, taken, {names.tracker, sample}, unsaid.environment);
+    append(waiting.environment, taken, {names.tracker, sample}, unreported.environment);
   for (const auto& [device, sample] : batch.measured_environment)
     append(waiting.environment, taken, {names.environment.at(device), sample},
-           place(unsaid.measured, device));
-  append(waiting.touches, taken, batch.touches, unsaid.touches);
-  append(waiting.touch_scans, taken, batch.touch_scans, unsaid.touch_scans);
+           entry_of(unreported.measured, device));
+  append(waiting.touches, taken, batch.touches, unreported.touches);
+  append(waiting.touch_scans, taken, batch.touch_scans, unreported.touch_scans);
   if (!names.raw) return;
   for (const auto& [device, block] : batch.raw)
-    waiting.raw.append(taken, names.devices.at(device), block, place(unsaid.raw, device));
+    waiting.raw.append(taken, names.devices.at(device), block, entry_of(unreported.raw, device));
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {
@@ -378,9 +378,9 @@ std::future<RecordingDigest> RecorderThread::digest() {
 
 const RecorderStatus& RecorderThread::status() const {
   // acquire: pairs with the release in report()
-  const std::unique_ptr<RecorderStatus> news{
-      state_->news.exchange(nullptr, std::memory_order_acq_rel)};
-  if (news) state_->known = std::move(*news);
+  const std::unique_ptr<RecorderStatus> latest{
+      state_->new_status.exchange(nullptr, std::memory_order_acq_rel)};
+  if (latest) state_->known = std::move(*latest);
   return state_->known;
 }
 

@@ -16,11 +16,11 @@ std::map<std::string, std::string> owned(mcap::StringMap entries) {
   return map;
 }
 
-/// Collects what is met, in file order, whichever way it is found.
+/// Collects the contents in file order, whether found by the summary or by reading all records.
 class Collector {
  public:
   Contents contents;
-  bool cut_is_damage = false;
+  bool cut_is_damage = false;  ///< a truncated chunk is damage within the recording
 
   void lost(std::uint64_t offset, std::uint64_t bytes, std::string what, bool inside = true) {
     contents.losses.push_back({offset, bytes, std::move(what), inside});
@@ -57,12 +57,12 @@ class Collector {
         return damaged(fmt::format("cut off by the end of the file after {} whole messages",
                                    read(chunk.chunk.records)));
       case ChunkState::BadCrc:
-        return damaged("its checksum is wrong, passed over");
+        return damaged("its checksum is wrong, skipped");
       case ChunkState::Compressed:
         return damaged(
             fmt::format("compressed ({}), which is not supported", chunk.chunk.head.compression));
       case ChunkState::Malformed:
-        return damaged("malformed, passed over");
+        return damaged("malformed, skipped");
     }
   }
 
@@ -124,14 +124,15 @@ void collect(const mcap::LinearScan::Item& item, Collector& collector) {
     collector.add(*channel);
 }
 
-/// What a killed recorder or a power cut leaves behind the last whole record: a torn one, or zeros.
-bool is_torn(mcap::Bytes rest) {
+/// True if `rest`, the bytes behind the last whole record, is what a killed recorder or a power cut
+/// leaves: a truncated record, or zeros.
+bool is_truncated_end(mcap::Bytes rest) {
   return rest.front() != std::byte{0} ||
          std::ranges::all_of(rest, [](std::byte b) { return b == std::byte{0}; });
 }
 
 void collect_by_scan(mcap::Bytes file, Collector& collector) {
-  // It was closed: what does not go on to its end is no torn end.
+  // The recording was closed: records that do not continue to its end are damaged, not truncated.
   collector.cut_is_damage = mcap::ends_with_magic(file);
   mcap::LinearScan scan{file};
   bool cut_chunk = false;
@@ -145,10 +146,12 @@ void collect_by_scan(mcap::Bytes file, Collector& collector) {
   collector.contents.closed_cleanly = scan.complete();
   if (scan.complete()) {
     collector.lost(end, file.size() - end,
-                   fmt::format("the indexes at byte {} are damaged: walked instead", end), false);
+                   fmt::format("the indexes at byte {} are damaged: all records were read instead",
+                               end),
+                   false);
   } else if (end < file.size() && !cut_chunk) {
     collector.lost(end, file.size() - end, fmt::format("cut off or damaged from byte {} on", end),
-                   collector.cut_is_damage || !is_torn(file.subspan(end)));
+                   collector.cut_is_damage || !is_truncated_end(file.subspan(end)));
   }
 }
 

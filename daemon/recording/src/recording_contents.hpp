@@ -1,6 +1,6 @@
 #pragma once
-/// What is in a recording's bytes, whole or broken: found by its summary, else by walking it from
-/// the front.
+/// The contents of a recording, complete or damaged: found by its summary, or without a summary by
+/// reading all records from the front.
 
 #include <map>
 #include <optional>
@@ -12,8 +12,8 @@
 
 namespace abbe::daemon::recording {
 
-/// A chunk whose messages can be read; its times are those of its messages, not those its head
-/// claims.
+/// A chunk whose messages can be read. The times are computed from its messages, not read from its
+/// head.
 struct ReadableChunk {
   protocol::mcap::Bytes records;
   std::uint64_t earliest_ns = 0;  ///< of this chunk and all after it
@@ -31,7 +31,7 @@ struct Contents {
   bool closed_cleanly = false;
 };
 
-/// Total. Precondition: the bytes start with the MCAP magic.
+/// Accepts any bytes after the MCAP magic. Precondition: the bytes start with the magic.
 [[nodiscard]] Contents contents_of(protocol::mcap::Bytes file);
 
 }  // namespace abbe::daemon::recording

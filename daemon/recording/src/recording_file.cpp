@@ -29,7 +29,7 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
   if (fd < 0) return unexpected(io_fault("open", directory, errno));
   const int error = ::fsync(fd) == 0 ? 0 : errno;
   ::close(fd);
-  // EINVAL: this file system has no such thing.
+  // EINVAL: this file system cannot sync a directory.
   if (error != 0 && error != EINVAL) return unexpected(io_fault("fsync", directory, error));
   return {};
 }
@@ -37,8 +37,8 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
 int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
-  // A file system without RENAME_NOREPLACE: that `to` did not exist was seen when the recording
-  // began.
+  // The file system has no RENAME_NOREPLACE. The recorder checked that `to` did not exist when the
+  // recording began.
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
@@ -62,7 +62,7 @@ tl::expected<RecordingFile, IoFault> RecordingFile::create(const std::filesystem
   const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
   if (fd < 0) return unexpected(io_fault("create", part, errno));
   RecordingFile file{fd, part};
-  // For whoever closes what a killed recorder left: this one is still being written.
+  // The lock shows close_left_recordings() that this file is still being written.
   (void)::flock(fd, LOCK_EX | LOCK_NB);
   if (const auto synced = sync_directory_of(part); !synced) {
     file.discard();
@@ -111,8 +111,8 @@ tl::expected<void, IoFault> RecordingFile::append(std::span<const std::byte> pie
       done += static_cast<std::size_t>(n);
     } else if (n == 0 || errno != EINTR) {
       const int error = n == 0 ? ENOSPC : errno;
-      // If this fails too, a torn chunk stays at the end, which every reader copes with.
-      if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0) { /* said above */
+      // If this fails too, a truncated chunk remains at the end; readers skip it.
+      if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0) { /* see above */
       }
       return unexpected(io_fault("write", path_, error));
     }
@@ -147,9 +147,10 @@ void RecordingFile::mark_damaged() {
 
 tl::expected<void, IoFault> RecordingFile::finish() {
   if (!is_open()) return {};
-  // Nothing may stand behind the last magic, should cutting back a torn piece have failed earlier.
+  // Nothing may follow the last magic: removes a truncated piece that append() could not cut back.
   if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0)
     return unexpected(io_fault("truncate", path_, errno));
+
   std::optional<IoFault> unproven;
   if (::fsync(fd_) != 0 && !std::exchange(damaged_, true))
     unproven = io_fault("fsync", path_, errno);

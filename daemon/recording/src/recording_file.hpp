@@ -1,5 +1,6 @@
 #pragma once
-/// The file a Recorder writes: it grows by whole pieces only, and knows the hash of what is in it.
+/// The file that a Recorder writes: whole pieces are appended, and the hash of its contents is
+/// kept.
 
 #include <cstdint>
 #include <filesystem>
@@ -11,14 +12,14 @@
 
 namespace abbe::daemon::recording {
 
-/// What the operating system said: errno, and what was tried.
+/// An error of the operating system: errno and the attempted operation.
 struct IoFault {
   int error = 0;
   std::string what;  ///< "write rec.mcap.part: No space left on device"
 };
 [[nodiscard]] IoFault io_fault(const char* verb, const std::filesystem::path& file, int error);
 
-/// No room: the disk, a quota or the process's file size limit.
+/// True for errors about missing space: disk full, quota, or the file size limit of the process.
 [[nodiscard]] bool is_disk_full(int error) noexcept;
 
 class RecordingFile {
@@ -31,26 +32,26 @@ class RecordingFile {
   RecordingFile& operator=(RecordingFile&&) noexcept;
   ~RecordingFile();
 
-  /// All of `piece` with one pwrite if the system takes it at once, or nothing: after a failure the
-  /// file is cut back to what it was.
+  /// Appends all of `piece`, with one pwrite if the system accepts it at once. After a failure the
+  /// file is cut back to its former size.
   [[nodiscard]] tl::expected<void, IoFault> append(std::span<const std::byte> piece);
-  /// After a failure the file is damaged() for good: Linux reports an error of write-back once, so
-  /// a later success proves nothing.
+  /// fdatasync. After a failure the file stays damaged(): Linux reports a write-back error only
+  /// once, so a later success proves nothing.
   [[nodiscard]] tl::expected<void, IoFault> sync();
   /// fsync, rename to NAME.mcap or NAME.damaged.mcap (which must not exist), fsync of the
-  /// directory. The file is closed, also where fsync failed and it became damaged().
+  /// directory. The file is closed even if fsync failed and the file became damaged().
   [[nodiscard]] tl::expected<void, IoFault> finish();
-  /// Removes it again: nothing worth keeping was written.
+  /// Removes the file, for one that contains no message.
   void discard() noexcept;
 
-  /// The disk reported an error while it was written; its name says so, too:
+  /// True if the disk reported an error while the file was written. Its name then is
   /// NAME.damaged.mcap(.part).
   [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] bool is_open() const noexcept { return fd_ >= 0; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   [[nodiscard]] std::string sha256() const { return hash_->hex_so_far(); }
-  /// Of the file system it lies on, for an unprivileged process.
+  /// Free space of its file system for an unprivileged process.
   [[nodiscard]] std::uint64_t free_bytes() const noexcept;
 
  private:

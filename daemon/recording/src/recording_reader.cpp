@@ -28,7 +28,7 @@ bool parse(std::string_view text, T& value) {
   return error == std::errc{} && end == text.data() + text.size();
 }
 
-/// Nothing if these are not the metadata of a recording of ours.
+/// nullopt if these are not the metadata of a recording of abbe.
 std::optional<RecordingInfo> info_of(const Contents& contents) {
   const auto text = [&](std::string_view record, std::string_view key) -> std::string {
     const auto entries = contents.metadata.find(std::string(record));
@@ -54,7 +54,7 @@ std::optional<RecordingInfo> info_of(const Contents& contents) {
   return info;
 }
 
-/// Wraps around for dates no clock shows, so that damaged bytes stay harmless.
+/// Wraps around for impossible dates, so that damaged bytes cause no undefined behaviour.
 protocol::HostTime host_time(std::uint64_t utc_ns, protocol::UtcOffset offset) {
   const std::uint64_t host_ns = utc_ns - static_cast<std::uint64_t>(offset.value.count());
   return protocol::HostTime{std::chrono::nanoseconds{static_cast<std::int64_t>(host_ns)}};
@@ -111,19 +111,18 @@ bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
 }
 
 // --- the file
-// ------------------------------------------------------------------------------------------------------
 
 struct RecordingReader::State {
   recording::MappedFile file;
   Contents contents;
   RecordingInfo info;
   MetadataCheck configuration;
-  bool says_turns;  ///< else log_time is when it was published
+  bool log_time_is_cycle;  ///< false: log_time is the instant described
 };
 
 namespace {
 
-bool says_turns(const Contents& contents) {
+bool log_time_is_cycle(const Contents& contents) {
   const auto entries = contents.metadata.find(std::string(recording::kRecordingMetadata));
   return entries != contents.metadata.end() && entries->second.contains(recording::kLogTime);
 }
@@ -135,7 +134,8 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   if (!file) return tl::unexpected(file.error());
   if (!mcap::starts_with_magic(file->bytes())) {
     return fail(ErrorCode::BadInput,
-                fmt::format("read {}: does not begin like an MCAP file", path.string()));
+                fmt::format("read {}: is not an MCAP file: it does not begin with the MCAP magic",
+                            path.string()));
   }
 
   Contents contents = recording::contents_of(file->bytes());
@@ -143,16 +143,16 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   if (!info) {
     return fail(
         ErrorCode::BadInput,
-        fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or cut at its front",
+        fmt::format("read {}: no metadata \"{}\": not recorded by abbe, or truncated at its front",
                     path.string(), recording::kRecordingMetadata));
   }
 
-  const bool turns = says_turns(contents);
+  const bool cycles = log_time_is_cycle(contents);
   const auto metadata = recording::judge_metadata(contents.metadata);
   if (!metadata.damage.empty()) contents.losses.push_back({0, 0, metadata.damage});
 
   return RecordingReader{std::make_unique<State>(
-      State{std::move(*file), std::move(contents), *info, metadata.configuration, turns})};
+      State{std::move(*file), std::move(contents), *info, metadata.configuration, cycles})};
 }
 
 RecordingReader::RecordingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -220,16 +220,14 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 }
 
 // --- messages by time
-// ----------------------------------------------------------------------------------------------
 
-/// Chunks overlap in time, because the recorder empties one stream after the other. They are opened
-/// in file order; a message is given once no chunk still closed can hold an earlier one.
+/// Chunks overlap in time, because the recorder writes one stream after the other. The cursor opens
+/// them in file order and delivers a message once no unopened chunk can contain an earlier one.
 struct RecordingReader::Cursor::State {
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;
-  std::vector<mcap::Message>
-      open;  ///< messages of opened chunks, by time; those before `given` are done with
-  std::size_t given = 0;
+  std::vector<mcap::Message> open;  ///< messages of opened chunks, by time
+  std::size_t given = 0;            ///< the first `given` messages of `open` are delivered
   std::uint64_t given_in_all = 0;
   std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< by channel
 
@@ -242,7 +240,7 @@ struct RecordingReader::Cursor::State {
 };
 
 void RecordingReader::Cursor::State::open_chunk() {
-  // Of equal times, the one recorded first, which is the one that lies in front.
+  // At equal times the message recorded first, which is the one at the lower address.
   const auto earlier = [](const mcap::Message& a, const mcap::Message& b) {
     return a.log_time_ns != b.log_time_ns ? a.log_time_ns < b.log_time_ns
                                           : std::less<>{}(a.data.data(), b.data.data());
@@ -254,7 +252,7 @@ void RecordingReader::Cursor::State::open_chunk() {
   mcap::MessageReader messages{recording->contents.chunks[next_chunk++].records};
 
   while (auto message = messages.next()) {
-    if (!recording->says_turns) message->publish_time_ns = message->log_time_ns;
+    if (!recording->log_time_is_cycle) message->publish_time_ns = message->log_time_ns;
     std::uint64_t& latest = latest_ns[message->channel_id];
     latest = message->log_time_ns = std::max(message->log_time_ns, latest);
     open.push_back(*message);

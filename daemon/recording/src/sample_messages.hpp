@@ -1,5 +1,5 @@
 #pragma once
-/// Samples as the IDL types and back: copying, nothing else.
+/// Converts samples to the IDL types and back, field by field.
 
 #include <string_view>
 
@@ -8,7 +8,7 @@
 
 namespace abbe::daemon::recording {
 
-/// Fill an existing message, so that its strings and sequences keep their memory.
+/// Fill an existing message, so that the memory of its strings and sequences is reused.
 void fill(v1::TrackerPoint& message, const protocol::TrackerPoint& point, std::string_view device);
 void fill(v1::AxisSample& message, const protocol::AxisSample& sample, std::string_view device);
 void fill(v1::ProbeTrigger& message, const protocol::ProbeTrigger& touch, std::string_view device);
@@ -22,7 +22,7 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
 [[nodiscard]] protocol::TouchScan sample_of(const v1::TouchScan& message);
 [[nodiscard]] protocol::EnvironmentSample sample_of(const v1::EnvironmentSample& message);
 
-/// Says in a message that `lost` of its stream are missing before it.
+/// Marks in a message that `lost` messages of its stream are missing before it.
 template <class Message>
 void mark_gap(Message& message, std::uint32_t lost) {
   message.flags(message.flags() | protocol::SampleFlag::GapBefore);

@@ -38,13 +38,13 @@ struct StreamNames {
 [[nodiscard]] constexpr std::size_t index(Stream stream) noexcept {
   return static_cast<std::size_t>(stream);
 }
-/// Also the id of its schema; 0 is not a valid one.
+/// The channel id, which is also the id of the schema; 0 is not a valid id.
 [[nodiscard]] constexpr std::uint16_t channel_id(Stream stream) noexcept {
   return static_cast<std::uint16_t>(index(stream) + 1);
 }
 
 inline constexpr std::string_view kRecordingMetadata = "abbe.recording";
-/// Of kRecordingMetadata. Files without it were recorded when log_time still was the instant
+/// Entry of kRecordingMetadata. In files without it (of older versions) log_time is the instant
 /// described.
 inline constexpr const char* kLogTime = "log_time";
 inline constexpr std::string_view kConfigurationMetadata = "abbe.configuration";

@@ -1,6 +1,7 @@
 #pragma once
-/// Raw blocks of all devices that wait for the recorder, each with its own length: most are a
-/// twentieth of the room a RawBlock has. The names of the devices outlive this.
+/// Raw blocks of all devices that wait for the recorder. Each takes only the memory of its own
+/// length: most use a twentieth of a RawBlock's capacity. The device names must outlive this
+/// object.
 
 #include <span>
 #include <string_view>
@@ -13,11 +14,12 @@ namespace abbe::daemon {
 
 class WaitingBlocks {
  public:
-  /// What append() will need for these.
+  /// The memory that append() will use for the block.
   [[nodiscard]] static std::size_t bytes_of(const protocol::RawBlock& block) noexcept {
     return sizeof(Head) + block.length;
   }
-  /// `dropped` blocks before these never came this far: the first one says so.
+  /// `dropped`: number of blocks of the device dropped before this one. It is added to lost_before
+  /// and reset to 0.
   void append(protocol::HostTime taken, std::string_view device, const protocol::RawBlock& block,
               std::uint32_t& dropped) {
     const auto from = protocol::to_raw_bytes(block, {}).bytes;
@@ -29,7 +31,7 @@ class WaitingBlocks {
     return heads_.size() * sizeof(Head) + bytes_.size();
   }
 
-  /// sink(const protocol::RawBytes&, taken), in the order in which they came.
+  /// Calls sink(const protocol::RawBytes&, taken) for each block, in the order of append().
   template <class Sink>
   void for_each(Sink&& sink) const {
     auto rest = std::span{bytes_};

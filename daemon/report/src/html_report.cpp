@@ -24,7 +24,7 @@ constexpr std::string_view kStyle =
     ".charts{display:flex;flex-wrap:wrap;gap:1rem}.charts div{width:33rem;height:19rem}"
     "@media print{.charts div{break-inside:avoid}}";
 
-/// Told apart by people who do not see red and green alike [Okabe, Ito 2008].
+/// Colours that people with colour vision deficiency can distinguish [Okabe, Ito 2008].
 constexpr std::array<std::string_view, 6> kColours{"#0072b2", "#d55e00", "#009e73",
                                                    "#cc79a7", "#e69f00", "#56b4e9"};
 
@@ -49,7 +49,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// JSON inside a script element: "</" would end the element.
+/// JSON for a script element; "</" is escaped because it would end the element.
 std::string for_script(const json& value) {
   std::string text = value.dump();
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
@@ -67,7 +67,7 @@ json points(const std::vector<double>& x, const std::vector<double>& y) {
   return list;
 }
 
-/// The edge of a curve's band, `factor` standard uncertainties away.
+/// One edge of the uncertainty band: the curve plus `factor` standard uncertainties.
 json edge(const Curve& curve, double factor, std::size_t number) {
   std::vector<double> y = curve.y;
   for (std::size_t i = 0; i < y.size(); ++i) y[i] += factor * curve.u[i];
@@ -195,7 +195,7 @@ void HtmlReport::chart(const Histogram& histogram) {
 }
 
 void HtmlReport::chart(const VectorChart& chart) {
-  // One line with a gap behind every arrow; only beginnings have a dot.
+  // All vectors are one line with a gap after each; only the origins have a dot.
   const json gap{{"x", nullptr}, {"y", nullptr}};
   json line = json::array(), dots = json::array();
   for (const auto& a : chart.arrows) {
@@ -216,7 +216,7 @@ void HtmlReport::chart(const VectorChart& chart) {
 }
 
 void HtmlReport::canvas(std::string_view configuration) {
-  // Neighbouring charts share a row.
+  // Consecutive charts share a row.
   constexpr std::string_view kEnd = "</div>\n<!-- charts -->\n";
   if (body_.ends_with(kEnd)) {
     body_.resize(body_.size() - kEnd.size());
@@ -230,7 +230,7 @@ void HtmlReport::canvas(std::string_view configuration) {
 }
 
 std::string HtmlReport::text() const {
-  // Band edges have no name and no place in the legend.
+  // Band edges have no name; the filter removes them from the legend.
   constexpr std::string_view kShow =
       "function show(id,c){c.options.plugins.legend={labels:{filter:l=>l.text!==''}};"
       "new Chart(document.getElementById(id),c)}";

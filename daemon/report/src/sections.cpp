@@ -8,7 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// Files with their hashes; nothing without files.
+/// A table of the files and their hashes; no table if there are no files.
 void add_inputs(HtmlReport& page, const std::vector<InputFile>& inputs) {
   if (inputs.empty()) return;
   std::vector<std::vector<std::string>> rows;
@@ -39,14 +39,14 @@ void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_vi
   for (const auto& note : verdict.notes) page.paragraph(note);
   const auto& figures = verdict.held_out;
   std::vector<std::pair<std::string, std::string>> facts{
-      {fmt::format("left at {} the fit did not see, without compensation", held_out),
+      {fmt::format("error at {} excluded from the fit, without compensation", held_out),
        um_text(figures.no_compensation_rms_m, decimals) + " rms"},
       {"with the model", um_text(figures.candidate_rms_m, decimals) + " rms"},
-      {"the same in standard deviations of the measurement (1: noise alone)",
+      {"the same in standard deviations of the measurement (1: noise only)",
        fmt::format("{:.2f} without, {:.2f} with the model", figures.no_compensation,
                    figures.candidate)}};
   if (figures.active_rms_m)
-    facts.emplace_back("with the model active until now, where it holds",
+    facts.emplace_back("with the model active so far, within its validity volume",
                        um_text(*figures.active_rms_m, decimals) + " rms");
   facts.emplace_back("largest error in the volume", um_text(verdict.max_error_m, decimals));
   page.facts(facts);

@@ -19,17 +19,18 @@ namespace abbe::daemon {
 
 namespace {
 
-// of positions and features: far above any procedure, far below overflow
+// Limit of position and feature numbers: far above any procedure, far below overflow.
 constexpr int kMostNumber = 1000;
 
-/// A whole number from 1; a fault otherwise.
+/// The cell as a whole number of at least 1. Adds a fault and returns 1 if it is none.
 int number_at(const NumberTable& table, std::size_t row, std::size_t column, std::string_view name,
               Faults& faults) {
   const double value = table.at(row, column);
-  const bool fine = value >= 1.0 && value <= kMostNumber && value == std::floor(value);
-  if (!fine && table.sound(row))
-    faults.add(table.line(row), 1, name, fmt::format("{}: must be a whole number from 1", value));
-  return fine ? static_cast<int>(value) : 1;
+  const bool valid = value >= 1.0 && value <= kMostNumber && value == std::floor(value);
+  if (!valid && table.sound(row))
+    faults.add(table.line(row), 1, name,
+               fmt::format("{}: must be a whole number, 1 to {}", value, kMostNumber));
+  return valid ? static_cast<int>(value) : 1;
 }
 
 calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first,
@@ -63,7 +64,7 @@ void read_face(Section& block, std::optional<BlockFace>& out) {
   known += block.get("z_mm", face.centre_m.z(), kMilli, kAny) ? 1 : 0;
   block.get("half_size_mm", face.half_size_m, kMilli, kPositive);
   if (known == 3) out = face;
-  if (known == 1 || known == 2) block.fault("x_mm", "needs y_mm and z_mm, too");
+  if (known == 1 || known == 2) block.fault("x_mm", "needs x_mm, y_mm and z_mm together");
 }
 
 void read_blocks(Section& root, calib::evemu::Calibrator& out,
@@ -94,9 +95,9 @@ void read_expansivity(Section& head, std::optional<calib::evemu::Calibrator::Exp
   const bool u_alpha = head.get("u_alpha_um_per_m_K", given.u_alpha_per_K, kMicro, {0.0, 50.0});
   if (alpha && u_alpha) out = given;
   if (alpha && !head.has("u_alpha_um_per_m_K"))
-    head.fault("alpha_um_per_m_K", "needs u_alpha_um_per_m_K, too");
+    head.fault("alpha_um_per_m_K", "also needs u_alpha_um_per_m_K");
   if (u_alpha && !head.has("alpha_um_per_m_K"))
-    head.fault("u_alpha_um_per_m_K", "needs alpha_um_per_m_K, too");
+    head.fault("u_alpha_um_per_m_K", "also needs alpha_um_per_m_K");
 }
 
 calib::evemu::Calibrator read_calibrator(Section& root,
@@ -168,8 +169,8 @@ Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   std::array<std::optional<BlockFace>, 2> faces;
   auto calibrator = read_calibrator(root, faces);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
-  if (const auto sound = calib::evemu::check(calibrator); !sound)
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), sound.error().text));
+  if (const auto valid = calib::evemu::check(calibrator); !valid)
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), valid.error().text));
 
   return CalibratorFile{
       {file.filename().string(), sha256_hex(*text)}, std::move(calibrator), faces};
@@ -178,7 +179,7 @@ Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
 std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
                             const std::array<std::optional<BlockFace>, 2>& faces,
                             std::string_view comment) {
-  const auto place = [](const calib::Vector3& p_m) {
+  const auto position = [](const calib::Vector3& p_m) {
     return fmt::format("x_mm = {:.17g}\ny_mm = {:.17g}\nz_mm = {:.17g}\n", kMmPerM * p_m.x(),
                        kMmPerM * p_m.y(), kMmPerM * p_m.z());
   };
@@ -186,14 +187,14 @@ std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
   std::string out{comment};
   out += fmt::format("[calibrator]\nname = {}\ntip_radius_mm = {:.17g}\n",
                      nlohmann::json(calibrator.name).dump(), kMmPerM * calibrator.tip_radius_m);
-  if (const auto& grows = calibrator.expansivity)
+  if (const auto& expansivity = calibrator.expansivity)
     out += fmt::format("alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
-                       kUmPerM * grows->alpha_per_K, kUmPerM * grows->u_alpha_per_K);
+                       kUmPerM * expansivity->alpha_per_K, kUmPerM * expansivity->u_alpha_per_K);
 
   for (const auto& ball : calibrator.balls) {
     out +=
         fmt::format("\n[[ball]]\nnumber = {}\n{}radius_mm = {:.17g}\nu_um = {:.3g}\n", ball.number,
-                    place(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);
+                    position(ball.centre_m), kMmPerM * ball.radius_m, kUmPerM * ball.u_m);
   }
 
   for (const auto& block : calibrator.blocks) {
@@ -202,7 +203,7 @@ std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
         "\n[[block]]\nnumber = {}\nnormal = [{:.17g}, {:.17g}, {:.17g}]\nu_urad = {:.3g}\n",
         block.number, n.x(), n.y(), n.z(), 1e6 * block.u_rad);
     if (const auto& face = faces[block.number == 2 ? 1 : 0])
-      out += fmt::format("{}half_size_mm = {:.17g}\n", place(face->centre_m),
+      out += fmt::format("{}half_size_mm = {:.17g}\n", position(face->centre_m),
                          kMmPerM * face->half_size_m);
   }
 

@@ -20,7 +20,7 @@ AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t f
           table.at(row, first + 2) / kMmPerM};
 }
 
-// Rows with a fault are left out of the checks below: they would only repeat it.
+// The checks below skip rows that already have a fault.
 
 void check_time_ascends(ParsedTable& parsed) {
   const auto& table = parsed.table;
@@ -41,13 +41,13 @@ void check_path(ParsedTable& parsed) {
     if (!table.sound(row)) continue;
     if (row > 0 && table.sound(row - 1) &&
         position_m(table, row, 0) == position_m(table, row - 1, 0))
-      parsed.faults.add(table.line(row), 1, "", "the same vertex as before");
+      parsed.faults.add(table.line(row), 1, "", "the same vertex as in the row before");
     if (table.has(3) && table.at(row, 3) <= 0.0)
       parsed.faults.add(table.line(row), 1, "feed_mm_per_min", "must be positive");
   }
 }
 
-constexpr std::size_t kSpherical = 0;  // index of the form
+constexpr std::size_t kSpherical = 0;  // index of this variant of the file format
 
 void check_spherical(ParsedTable& parsed) {
   const auto& table = parsed.table;
@@ -57,14 +57,16 @@ void check_spherical(ParsedTable& parsed) {
     if (table.at(row, 1) <= 0.0)
       parsed.faults.add(table.line(row), 1, "range_mm", "must be positive");
     if (std::abs(table.at(row, 2)) > 2.0 * std::numbers::pi)
-      parsed.faults.add(table.line(row), 1, "azimuth_rad", "beyond a full turn (degrees?)");
+      parsed.faults.add(table.line(row), 1, "azimuth_rad",
+                        "more than one revolution (is the unit degrees?)");
     if (std::abs(table.at(row, 3)) > std::numbers::pi / 2.0)
-      parsed.faults.add(table.line(row), 1, "elevation_rad", "beyond the vertical (degrees?)");
+      parsed.faults.add(table.line(row), 1, "elevation_rad",
+                        "beyond the vertical (is the unit degrees?)");
   }
 }
 
 calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
-  // the highest status that still is a good point: emScon, point status
+  // emScon point status: the highest one of a valid point
   constexpr double kSpeedWarning = 1.0;
   calib::otf::TrackerObservation point;
   point.time_s = table.at(row, 0);

@@ -175,8 +175,8 @@ class StrangersWithoutSecurity : public Strangers {
   }
   void expect_foreign_sync_reported() {
     for (Process* subscriber : {&fast, &cyclone})
-      EXPECT_TRUE(subscriber->wait_for("vmc-3: rival publisher ")) << subscriber->transcript();
-    const auto line = watcher.wait_for("vmc-3  rival publisher ");
+      EXPECT_TRUE(subscriber->wait_for("vmc-3: another publisher ")) << subscriber->transcript();
+    const auto line = watcher.wait_for("vmc-3  another publisher ");
     ASSERT_TRUE(line) << watcher.transcript();
     EXPECT_NE(line->text.find(", announced at 127.0.0.1"), std::string::npos) << line->text;
   }
@@ -268,7 +268,7 @@ TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
   Process watcher(watch({"--grid-csv", csv, "--timeout", "30"}));
   ASSERT_TRUE(watcher.wait_for("vmc-3  publisher is alive")) << watcher.transcript();
   Process fake(stranger("fake"));
-  ASSERT_TRUE(watcher.wait_for("vmc-3  rival publisher ")) << watcher.transcript();
+  ASSERT_TRUE(watcher.wait_for("vmc-3  another publisher ")) << watcher.transcript();
   EXPECT_FALSE(watcher.wait_for("nothing", Clock::now(), 2s));  // time for its grid
   EXPECT_FALSE(std::filesystem::exists(csv)) << "the stranger's state was believed";
 

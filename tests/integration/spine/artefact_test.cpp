@@ -172,7 +172,7 @@ TEST_F(ArtefactRun, SaysThatTheMachineWentAway) {
   simulator_->stop();
   EXPECT_EQ(running.wait_for_end(), 1);
   EXPECT_THAT(running.err(), HasSubstr("was not made"));
-  EXPECT_THAT(running.err(), HasSubstr("touches until then"));
+  EXPECT_THAT(running.err(), HasSubstr("touches were made before"));
   const auto away = calibrate();
   EXPECT_EQ(away.code, 5) << away.err;
   EXPECT_THAT(away.err, HasSubstr("not ready"));

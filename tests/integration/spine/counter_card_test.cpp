@@ -17,7 +17,7 @@ TEST_F(CounterCardRun, StreamsRecordsAndSaysWhatItTakesForGranted) {
   EXPECT_EQ(stream("counter_card")["state"], "streaming");
   EXPECT_TRUE(goes_on("counter_card"));
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
-  EXPECT_THAT(abbed_->err(), HasSubstr("not yet seen on hardware"));
+  EXPECT_THAT(abbed_->err(), HasSubstr("not yet verified on hardware"));
   ASSERT_EQ(recordings().size(), 1u);
   EXPECT_EQ(recordings().front().extension(), ".mcap");
 }

@@ -95,7 +95,8 @@ TEST_F(CountingRun, ACardThatWasWithoutPowerIsNotReferenced) {
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   ASSERT_NO_FATAL_FAILURE(wait_for_samples());
   EXPECT_EQ(status()["axes_without_zero"], json::array({"X", "Y", "Z"}));
-  EXPECT_THAT(stream("counter_card")["last_fault"].get<std::string>(), HasSubstr("did not go on"));
+  EXPECT_THAT(stream("counter_card")["last_fault"].get<std::string>(),
+              HasSubstr("did not continue"));
 }
 
 TEST_F(CountingRun, AfterAnotherBootNothingIsReferenced) {

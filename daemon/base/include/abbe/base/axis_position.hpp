@@ -1,11 +1,11 @@
 #pragma once
-/// Where a machine of three axes stands. Pure data.
+/// Position of a machine with three linear axes. Pure data.
 
 #include <array>
 
 namespace abbe::daemon {
 
-/// Of X, Y and Z, in m: scale readings unless a name says otherwise.
+/// X, Y and Z in m; scale readings unless the name of the variable states otherwise.
 using AxisPosition = std::array<double, 3>;
 
 }  // namespace abbe::daemon

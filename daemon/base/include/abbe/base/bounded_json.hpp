@@ -1,7 +1,7 @@
 #pragma once
-/// JSON from a file or another process. A parser that recurses, and every copy and destruction of
-/// what it made, needs stack for each level and memory for each value, so both are counted before
-/// anything is parsed.
+/// JSON from a file or another process. A recursive parser needs stack for each nesting level and
+/// memory for each value; so do copying and destroying the parsed value. Therefore levels and
+/// values are counted, and limited, before the text is parsed.
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -13,17 +13,19 @@ namespace abbe::daemon {
 
 struct JsonBounds {
   std::size_t bytes = 4u << 20;
-  std::size_t depth = 32;  ///< nested arrays and objects; nothing abbe writes is deeper than 8
-  std::size_t values = 1'000'000;  ///< of arrays and objects, all levels together
+  std::size_t depth = 32;  ///< nested arrays and objects; JSON written by abbe has 8 levels at most
+  std::size_t values = 1'000'000;  ///< elements of arrays and objects, all levels together
 };
 
-/// Whether `text` is within `bounds`, whatever parses it then. Errors as of parse_json(). Pure; no
-/// recursion.
+/// Checks that `text` is within `bounds`, for any parser that reads it afterwards. Same errors as
+/// parse_json(). Pure; no recursion.
 [[nodiscard]] Result<void> check_json(std::string_view text, std::string_view what,
                                       const JsonBounds& bounds);
 
-/// Else BadInput: "WHAT: nested deeper than 32 at byte 33", "WHAT: not JSON at byte 17: unexpected
-/// ...". Pure; allocates; never throws but for lack of memory.
+/// The parsed value, or BadInput with one of the texts
+///   "WHAT: nested deeper than 32 at byte 33"
+///   "WHAT: not JSON at byte 17: unexpected ..."
+/// Pure; allocates; throws only std::bad_alloc.
 [[nodiscard]] Result<nlohmann::json> parse_json(std::string_view text, std::string_view what,
                                                 const JsonBounds& bounds = {});
 

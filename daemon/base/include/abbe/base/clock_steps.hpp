@@ -1,7 +1,7 @@
 #pragma once
-/// Whether somebody set the wall clock while abbed ran (a time server after a dead battery of the
-/// real-time clock, or a bad server). Dates of files are not compared with such a clock. Ordinary
-/// world; one thread.
+/// Detects that the wall clock was set while abbed ran, for example by a time server after the
+/// battery of the real-time clock failed. Dates of files must not be compared with such a clock.
+/// Not for real-time threads; one thread.
 
 #include <chrono>
 
@@ -9,7 +9,7 @@ namespace abbe::daemon {
 
 struct ClockReading {
   std::chrono::nanoseconds utc{};         ///< since 1970
-  std::chrono::nanoseconds since_boot{};  ///< with the time the computer slept; nobody sets it
+  std::chrono::nanoseconds since_boot{};  ///< CLOCK_BOOTTIME: includes suspend; cannot be set
 };
 [[nodiscard]] ClockReading read_clocks();
 
@@ -17,7 +17,8 @@ class ClockSteps {
  public:
   explicit ClockSteps(const ClockReading& start) : start_(start.utc - start.since_boot) {}
 
-  /// Set by more than five minutes at any look until now. Stays true: files were dated in between.
+  /// True if the wall clock was off by more than five minutes at this call or an earlier one. Stays
+  /// true when the clock is corrected, because files got wrong dates in between.
   [[nodiscard]] bool look(const ClockReading& now);
 
  private:

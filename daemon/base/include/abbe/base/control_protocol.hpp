@@ -1,11 +1,16 @@
 #pragma once
-/// The control API: one JSON object a line, request then answer, over a Unix stream socket that
-/// only the daemon's user and group may open. A request is {"do": NAME, ...}; an answer {"ok":
-/// true, ...} or {"ok": false, "code": WORD, "error": TEXT}, WORD one of data_insufficient, usage,
-/// bad_input, io, refused: the exit code of whoever asked follows it. The server puts the user the
-/// kernel knows the client to be (SO_PEERCRED) into every request as "user". A connection that is
-/// closed for a newer one, or because it is idle, gets a last line with "ok": false. Ordinary
-/// world.
+/// The control API: one JSON object per line, request then answer, over a Unix stream socket that
+/// only the daemon's user and group may open.
+///
+///   request:  {"do": NAME, ...}
+///   answer:   {"ok": true, ...}
+///         or  {"ok": false, "code": WORD, "error": TEXT}
+///
+/// WORD is one of data_insufficient, usage, bad_input, io, refused; it determines the exit code of
+/// the client program. The server adds the name of the client's user, taken from the kernel
+/// (SO_PEERCRED), to every request as "user". A connection that the server closes because it is
+/// idle or to make place for a newer one gets a last line with "ok": false. Not for real-time
+/// threads.
 
 #include <sys/types.h>
 
@@ -22,43 +27,45 @@
 
 namespace abbe::daemon {
 
-/// Of a request: a path of 10^5 vertices fits; the places on the way to a touch are five levels
-/// deep.
+/// Limits of a request. A path of 10^5 vertices fits; the deepest request has five levels (the
+/// positions on the way to a touch).
 inline constexpr JsonBounds kRequestBounds{.bytes = 4u << 20, .depth = 16};
 
 /// The process at the other end of a connection, as the kernel knew it when it connected.
 struct ControlPeer {
-  std::string user = "somebody";
-  uid_t uid = static_cast<uid_t>(-1);  ///< of nobody
-  std::vector<gid_t> groups = {};      ///< its own and the supplementary ones
+  std::string user = "unknown";
+  uid_t uid = static_cast<uid_t>(-1);  ///< the default is not a user
+  std::vector<gid_t> groups = {};      ///< primary group and supplementary groups
 };
 
-/// Connections beyond these take the place of the one that has been idle for longest: of the same
-/// user if that user has too many, else of the user who has most.
+/// When a limit is exceeded, the server closes the connection that has been idle longest: one of
+/// the same user if that user reached `of_one_user`, else one of the user with the most
+/// connections.
 struct ControlLimits {
   std::size_t connections = 32;
   std::size_t of_one_user = 16;
-  std::chrono::milliseconds idle = std::chrono::minutes{1};  ///< without a byte in or out: closed
+  /// A connection without traffic for this time is closed.
+  std::chrono::milliseconds idle = std::chrono::minutes{1};
 };
 
-/// Serves the socket on a thread of its own. The handler runs on that thread; it must not block for
+/// Serves the socket on its own thread. The handler runs on that thread and must not block for
 /// long.
 class ControlServer {
  public:
   using Handler =
       std::function<nlohmann::json(const nlohmann::json& request, const ControlPeer& peer)>;
 
-  /// Refuses when a live server already answers at `socket_path`; a file left behind by a dead one
+  /// An Error if another process already listens at `socket_path`. A socket file without a listener
   /// is replaced.
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> open(
       const std::filesystem::path& socket_path, Handler handler, const ControlLimits& limits = {});
   virtual ~ControlServer() = default;
 };
 
-/// The answer that an Error becomes on the socket.
+/// The answer on the socket that reports `error`.
 [[nodiscard]] nlohmann::json refusal(const Error& error);
 
-/// One request and its answer. An answer with "ok": false becomes the Error it was made of.
+/// Sends one request and returns its answer. An answer with "ok": false is returned as an Error.
 [[nodiscard]] Result<nlohmann::json> ask_daemon(
     const std::filesystem::path& socket_path, const nlohmann::json& request,
     std::chrono::milliseconds time_out = std::chrono::seconds{5});

@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-/// Serves a socket that listens at `path` already (listen_unix()): nothing is refused any more.
+/// Serves a socket that listens at `path` already, see listen_unix(). Cannot fail.
 [[nodiscard]] std::unique_ptr<ControlServer> serve_control(FileDescriptor listener,
                                                            const std::filesystem::path& path,
                                                            ControlServer::Handler handler,

@@ -1,6 +1,6 @@
 #pragma once
-/// The daemon's errors: a code a program can act on and a sentence a person can, "what was tried:
-/// what was seen".
+/// The daemon's errors: a code for programs and a sentence for people, in the form
+/// "what was tried: what was seen".
 
 #include <string>
 #include <tl/expected.hpp>
@@ -12,15 +12,15 @@ namespace abbe::daemon {
 enum class ErrorCode {
   DataInsufficient,  ///< the data do not allow an answer (rank, alignment, too few points)
   Usage,             ///< a command was called wrongly
-  BadInput,          ///< a file, message or configuration is not what it should be
-  Io,                ///< the operating system refused: file, socket, process
-  Refused,           ///< the gate, or the present state, does not allow it
+  BadInput,          ///< a file, message or configuration is invalid
+  Io,                ///< a call to the operating system failed: file, socket, process
+  Refused,           ///< the model checks, or the present state, do not allow it
 };
 
 struct Error {
   ErrorCode code = ErrorCode::BadInput;
   std::string text;
-  /// one line each, when one sentence is not enough: every fault of a file
+  /// further lines, for example one for each fault of a file
   std::vector<std::string> details = {};
 };
 

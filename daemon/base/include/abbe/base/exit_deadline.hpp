@@ -1,7 +1,7 @@
 #pragma once
-/// An orderly end waits for every thread, and a thread that hangs never ends. Unless this is
-/// destroyed within `patience`, the process writes `message` to stderr and ends with `exit_code`,
-/// without destructors.
+/// Ends the process if its orderly shutdown hangs, for example because a thread does not return.
+/// If an ExitDeadline is not destroyed within `time_limit`, the process writes `message` to stderr
+/// and exits with `exit_code` without running destructors.
 
 #include <chrono>
 #include <string>
@@ -13,7 +13,7 @@ namespace abbe::daemon {
 
 class ExitDeadline {
  public:
-  ExitDeadline(std::chrono::nanoseconds patience, int exit_code, std::string message);
+  ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, std::string message);
   ExitDeadline(const ExitDeadline&) = delete;
   ExitDeadline& operator=(const ExitDeadline&) = delete;
   ~ExitDeadline();

@@ -1,6 +1,6 @@
 #pragma once
-/// The faults of one input file, gathered so that a person can mend them all at once. Shared by the
-/// TOML and CSV readers.
+/// The faults of one input file, collected so that the user can correct all of them at once. Used
+/// by the TOML and CSV readers.
 
 #include <cstddef>
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace abbe::daemon {
 
-/// Collects "file:line:column: key: what is wrong", keeps the 20 nearest to the top of the file and
-/// counts the rest.
+/// Collects lines of the form "file:line:column: key: what is wrong". Keeps the 20 that come first
+/// in the file and counts the others.
 class Faults {
  public:
   static constexpr std::size_t kShown = 20;
@@ -33,12 +33,12 @@ class Faults {
   std::size_t count_ = 0;
 };
 
-/// The one of `known` that `word` was probably meant to be, or empty: a few letters apart, or the
-/// same but for its unit.
+/// The entry of `known` that is most similar to the misspelt `word`: it differs by a few letters or
+/// only in the unit suffix. Empty if no entry is similar.
 [[nodiscard]] std::string_view nearest(std::string_view word,
                                        const std::vector<std::string_view>& known);
 
-/// ` (did you mean "x"?)`, or nothing.
+/// The text ` (did you mean "x"?)`, or an empty string.
 [[nodiscard]] std::string suggestion(std::string_view word,
                                      const std::vector<std::string_view>& known);
 

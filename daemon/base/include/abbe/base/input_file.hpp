@@ -1,12 +1,12 @@
 #pragma once
-/// What every reader of a file gives beside the content.
+/// What every file reader returns or reports beside the content.
 
 #include <functional>
 #include <string>
 
 namespace abbe::daemon {
 
-/// A file as it was read: its name without folder, and the SHA-256 of exactly the bytes that were
+/// Identifies a file that was read: its name without folder and the SHA-256 of the bytes that were
 /// parsed.
 struct InputFile {
   std::string name;
@@ -14,7 +14,7 @@ struct InputFile {
   friend bool operator==(const InputFile&, const InputFile&) = default;
 };
 
-/// Called with 0 <= fraction <= 1, ascending; may be empty.
+/// Called while a file is read, with ascending 0 <= fraction <= 1. May be empty.
 using ReadProgress = std::function<void(double fraction)>;
 
 }  // namespace abbe::daemon

@@ -1,6 +1,6 @@
 #pragma once
 /// Structured log lines. Under systemd they go to the journal in its native protocol, with their
-/// fields; elsewhere to stderr, as text with the same content. Ordinary threads only.
+/// fields; elsewhere to stderr, as text with the same content. Not for real-time threads.
 
 #include <filesystem>
 #include <memory>
@@ -33,16 +33,18 @@ class JournalSink {
   virtual void write(const JournalEntry& entry) = 0;
 };
 
-/// systemd's JOURNAL_NATIVE_PROTOCOL: one datagram an entry. What the journal does not take in
-/// 50 ms is lost, and counted in the next entry. An Error if nobody listens at `socket`.
+/// Writes systemd's JOURNAL_NATIVE_PROTOCOL: one datagram per entry. An entry that the journal does
+/// not accept within 50 ms is lost; the next entry states how many were lost. An Error if no
+/// process listens at `socket`.
 [[nodiscard]] Result<std::unique_ptr<JournalSink>> native_journal(
     const std::filesystem::path& socket = "/run/systemd/journal/socket");
 
-/// "abbed: MESSAGE [ABBE_DEVICE=tracker ...]"; control characters, which a device may have sent, as
-/// '?'.
+/// Writes lines "abbed: MESSAGE [ABBE_DEVICE=tracker ...]". A control character, which a device may
+/// have sent, is written as '?'.
 [[nodiscard]] std::unique_ptr<JournalSink> text_journal(int fd);
 
-/// The journal if it reads this process's stderr (JOURNAL_STREAM of systemd.exec(5)), else stderr.
+/// The journal if this process's stderr is connected to it (JOURNAL_STREAM, systemd.exec(5)), else
+/// stderr.
 [[nodiscard]] std::unique_ptr<JournalSink> open_journal();
 
 }  // namespace abbe::daemon

@@ -1,5 +1,6 @@
 #pragma once
-/// Errors known at points, to compare a received model with. A function, safe from any thread.
+/// Reads known errors at given points, with which a received model is compared. Callable from any
+/// thread.
 
 #include <array>
 #include <filesystem>
@@ -11,12 +12,14 @@
 
 namespace abbe::daemon {
 
-/// errors.csv: `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]` as `abbe model eval`
-/// writes it, V = true - reading at scale readings, at least one; u and inside are not used.
+/// errors.csv, as `abbe model eval` writes it:
+///   x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]
+/// The error is true position - scale reading, given at scale readings x, y, z. At least one row.
+/// The columns u and inside are not used.
 struct KnownErrorsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;
-  std::vector<std::array<double, 3>> errors_m;  ///< as long as points_m
+  std::vector<std::array<double, 3>> errors_m;  ///< one per entry of points_m
 };
 [[nodiscard]] Result<KnownErrorsFile> read_known_errors_csv(const std::filesystem::path& file);
 

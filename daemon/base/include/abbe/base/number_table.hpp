@@ -1,8 +1,8 @@
 #pragma once
-/// A CSV file of numbers, checked cell by cell. Written here because the libraries at hand
-/// (fast-cpp-csv-parser, libcsv) stop at the first fault, do not know the column of a character,
-/// and leave numbers to routines that are slow (strtod) or not correctly rounded; std::from_chars
-/// is exact and reads some 10 million numbers a second.
+/// A CSV file of numbers, checked cell by cell. Own implementation: the available libraries
+/// (fast-cpp-csv-parser, libcsv) stop at the first fault, do not report the column of a character,
+/// and convert numbers with routines that are slow (strtod) or do not round correctly.
+/// std::from_chars rounds correctly and reads about 10 million numbers per second.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,33 +19,32 @@ namespace abbe::daemon {
 struct ColumnRule {
   std::string_view name;
   bool required = true;
-  /// not a number but one of these; the value is its index
+  /// if not empty: the cell holds one of these words, and the value is the index of the word
   std::vector<std::string_view> words = {};
 };
 
-/// The columns of one form of a file. A file may have several forms; the header decides.
+/// The columns of one variant of a file format. The header decides which variant a file has.
 using TableForm = std::vector<ColumnRule>;
 
-/// Rows of finite numbers in the order of the form's columns; an absent optional column holds 0.
+/// Rows of finite numbers, in the column order of the form. An absent optional column holds 0.
 class NumberTable {
  public:
   NumberTable(std::size_t form, std::vector<bool> present)
       : form_(form), present_(std::move(present)) {}
 
-  [[nodiscard]] std::size_t form() const noexcept { return form_; }  ///< which of the forms
+  [[nodiscard]] std::size_t form() const noexcept { return form_; }  ///< index in the list of forms
   [[nodiscard]] bool has(std::size_t column) const { return present_[column]; }
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
   [[nodiscard]] double at(std::size_t row, std::size_t column) const {
     return values_[row * width() + column];
   }
   [[nodiscard]] std::size_t line(std::size_t row) const { return lines_[row]; }
-  [[nodiscard]] bool sound(std::size_t row) const {
-    return sound_[row];
-  }  ///< every cell was a number
+  /// True if the row had no fault: all cells present and valid.
+  [[nodiscard]] bool sound(std::size_t row) const { return sound_[row]; }
   [[nodiscard]] std::size_t width() const noexcept { return present_.size(); }
 
-  [[nodiscard]] double* append(std::size_t line);  ///< a row of zeros to fill
-  void mark_unsound() { sound_.back() = false; }   ///< the row appended last
+  [[nodiscard]] double* append(std::size_t line);  ///< appends a row of zeros
+  void mark_unsound() { sound_.back() = false; }   ///< applies to the last row
   void reserve(std::size_t rows);
 
  private:
@@ -56,7 +55,7 @@ class NumberTable {
   std::vector<bool> sound_;
 };
 
-/// Adds a fault for everything wrong; the table is empty if the header cannot be understood.
+/// Adds one fault to `faults` for each error in the text. nullopt if the header is invalid.
 [[nodiscard]] std::optional<NumberTable> parse_numbers(std::string_view text,
                                                        const std::vector<TableForm>& forms,
                                                        Faults& faults,

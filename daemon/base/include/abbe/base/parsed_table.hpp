@@ -1,6 +1,6 @@
 #pragma once
-/// A file of numbers read, hashed and parsed; what its meaning forbids is added to `faults` by who
-/// reads it.
+/// Reads, hashes and parses a file of numbers. The caller then checks the values and adds what is
+/// invalid to `faults`.
 
 #include <filesystem>
 #include <string_view>
@@ -18,12 +18,12 @@ struct ParsedTable {
   Faults faults;
 };
 
-/// BadInput with all faults of the text.
+/// Io if the file cannot be read; BadInput with all faults if its header is invalid.
 [[nodiscard]] Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                               const std::vector<TableForm>& forms,
                                               const ReadProgress& progress = {});
 
-/// A fault where there are fewer than `least` rows ("vertices").
+/// Adds a fault if there are fewer than `least` rows. `what` names them in the message: "vertices".
 void check_rows(ParsedTable& parsed, std::size_t least, std::string_view what);
 
 }  // namespace abbe::daemon

@@ -1,14 +1,14 @@
 #pragma once
-/// An Error as the answer on the control socket, and back.
+/// Converts between Error and the answer on the control socket.
 
 #include "abbe/base/control_protocol.hpp"
 
 namespace abbe::daemon {
 
-/// `answer`: with "ok": false. A code nobody knows, of a newer daemon, is Refused.
+/// `answer` has "ok": false. An unknown code (from a newer daemon) becomes ErrorCode::Refused.
 [[nodiscard]] Error error_of_refusal(const nlohmann::json& answer);
 
-/// "data_insufficient", "io" ...: what a program acts on.
+/// "data_insufficient", "io" ...: the value of "code" in an answer.
 [[nodiscard]] std::string_view word_of(ErrorCode code) noexcept;
 
 }  // namespace abbe::daemon

@@ -1,6 +1,6 @@
 #pragma once
-/// What systemd wants to hear from a service of Type=notify, and how often. Without systemd nothing
-/// happens.
+/// Notifications to systemd from a service of Type=notify. Without systemd these functions do
+/// nothing.
 
 #include <chrono>
 #include <optional>
@@ -10,8 +10,8 @@ namespace abbe::daemon {
 
 void tell_ready(std::string_view status);
 void tell_stopping();
-void tell_alive();  ///< feeds the watchdog
-/// How often the watchdog wants to be fed: half of WatchdogSec; nothing if there is none.
+void tell_alive();  ///< resets the watchdog timer
+/// Period for tell_alive(): half of WatchdogSec. nullopt if the service has no watchdog.
 [[nodiscard]] std::optional<std::chrono::microseconds> watchdog_period();
 
 }  // namespace abbe::daemon

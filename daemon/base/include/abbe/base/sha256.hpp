@@ -1,5 +1,5 @@
 #pragma once
-/// SHA-256 [FIPS 180-4] by OpenSSL, as the hexadecimal text that stands in models and records.
+/// SHA-256 [FIPS 180-4] by OpenSSL, as the hexadecimal text used in models and recordings.
 
 #include <cstddef>
 #include <filesystem>
@@ -28,7 +28,7 @@ class Sha256 {
   requires std::is_trivially_copyable_v<T>
   void update_bytes_of(const T& value) { update(std::as_bytes(std::span{&value, 1})); }
   [[nodiscard]] std::string hex();  ///< 64 lower-case digits; the hash is finished afterwards
-  [[nodiscard]] std::string hex_so_far() const;  ///< of what was added until now; more may be added
+  [[nodiscard]] std::string hex_so_far() const;  ///< of the bytes added so far; more may follow
 
  private:
   struct State;

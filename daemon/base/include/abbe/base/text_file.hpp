@@ -1,5 +1,5 @@
 #pragma once
-/// Whole files in and out.
+/// Reads and writes whole files.
 
 #include <filesystem>
 #include <string>
@@ -9,25 +9,26 @@
 
 namespace abbe::daemon {
 
-/// The bytes of a file. One read, not a mapping: a file that shrinks under a mapping kills the
-/// process.
+/// The bytes of a file. Reads, does not map: a mapped file that shrinks kills the process with
+/// SIGBUS.
 [[nodiscard]] Result<std::string> read_text(const std::filesystem::path& file);
 
-/// The same of what must be a regular file of at most 1 GiB: a pipe or device in its place is
-/// BadInput and is not waited for.
+/// As read_text(), but the file must be a regular file of at most 1 GiB. A pipe or a device is
+/// BadInput; the call does not wait for it.
 [[nodiscard]] Result<std::string> read_regular_file(const std::filesystem::path& file);
 
-/// Writes a new file beside the old one, forces it to the disk and renames it: after a power cut
-/// either the old or the new content is there. Owner and mode stay those of the file; a new file
-/// gets those of its folder (never writable by others), whoever writes it: what root writes for the
-/// daemon, the daemon can read.
+/// Writes a temporary file in the same folder, syncs it to the disk and renames it: after a power
+/// failure the file has either its old or its new content. An existing file keeps its owner and
+/// mode. A new file gets owner and mode of its folder, but is never writable by others: the daemon
+/// can read what root writes there.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
 
-/// With all folders above; each new one gets owner and mode of the one it is in.
+/// Creates `folder` and its missing parents. If root calls it, each new folder gets owner and mode
+/// of its parent.
 [[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder);
 
-/// Owner and mode of an open file that was created just now, from the folder it is in. Best effort:
-/// only root may give files away.
+/// Gives the newly created file `fd` the owner and mode of the folder that contains it. Best
+/// effort: only root may change the owner.
 void take_after_folder(int fd, const std::filesystem::path& folder) noexcept;
 
 }  // namespace abbe::daemon

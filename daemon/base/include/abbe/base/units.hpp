@@ -4,7 +4,7 @@
 
 namespace abbe::daemon {
 
-// Files, reports and messages are in millimetres, micrometres and microradians.
+// Files, reports and messages use mm, um and urad; the program computes in m and rad.
 inline constexpr double kMmPerM = 1e3;
 inline constexpr double kUmPerM = 1e6;
 inline constexpr double kUradPerRad = 1e6;

@@ -1,5 +1,5 @@
 #pragma once
-/// Unix sockets. Ordinary world.
+/// Unix sockets. Not for real-time threads.
 
 #include <chrono>
 #include <filesystem>
@@ -9,22 +9,23 @@
 
 namespace abbe::daemon {
 
-/// A listening socket at `path`, mode 0660. A socket file nobody answers at is replaced; one in use
-/// is an Error.
+/// A listening socket at `path`, mode 0660. A socket file without a listener is replaced; a socket
+/// in use is an Error.
 [[nodiscard]] Result<FileDescriptor> listen_unix(const std::filesystem::path& path);
 
-/// A listener that accepts nobody is an Error after `time_out`.
+/// Connects to the stream socket at `path`. An Error if the listener does not accept the connection
+/// within `time_out`.
 [[nodiscard]] Result<FileDescriptor> connect_unix(
     const std::filesystem::path& path,
     std::chrono::milliseconds time_out = std::chrono::seconds{2});
 
-/// For datagrams; fails at once where nobody listens.
+/// Connects to the datagram socket at `path`; fails at once if no process listens there.
 [[nodiscard]] Result<FileDescriptor> connect_unix_datagrams(const std::filesystem::path& path);
 
-/// Whether a process listens at `path`, even one that accepts nobody. Does not wait for it.
+/// True if a process listens at `path`, even if it accepts no connection. Does not block.
 [[nodiscard]] bool is_listened_at(const std::filesystem::path& path);
 
-/// A send on `fd` that makes no progress for so long fails with EAGAIN; 0: it waits for ever.
+/// A send on `fd` that makes no progress for `time_out` fails with EAGAIN; 0: it waits forever.
 void set_send_time_out(int fd, std::chrono::milliseconds time_out) noexcept;
 
 }  // namespace abbe::daemon

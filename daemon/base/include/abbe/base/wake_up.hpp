@@ -1,6 +1,6 @@
 #pragma once
-/// Wakes one waiting thread. signal() takes no lock and never waits: a real-time thread may wake an
-/// ordinary one with it.
+/// Wakes one waiting thread. signal() takes no lock and never blocks, so that a real-time thread
+/// may wake a thread without real-time priority.
 
 #include <semaphore.h>
 
@@ -18,17 +18,17 @@ class WakeUp {
   WakeUp& operator=(const WakeUp&) = delete;
   ~WakeUp() { ::sem_destroy(&semaphore_); }
 
-  /// Any thread. Counts: as many waits return as there were signals.
+  /// Any thread. Signals are counted: each signal lets one wait return.
   void signal() noexcept {
     signals_.fetch_add(1, std::memory_order_release);
     ::sem_post(&semaphore_);
   }
   void wait() noexcept {
-    while (::sem_wait(&semaphore_) != 0) {  // only a signal handler interrupts it
+    while (::sem_wait(&semaphore_) != 0) {  // EINTR: wait again
     }
     order_memory();
   }
-  /// Whether there was a signal within that time.
+  /// True if a signal came within `at_most`.
   bool wait_for(std::chrono::nanoseconds at_most) noexcept {
     const auto until = (std::chrono::steady_clock::now() + at_most).time_since_epoch();
     const auto seconds = std::chrono::floor<std::chrono::seconds>(until);
@@ -42,7 +42,8 @@ class WakeUp {
   }
 
  private:
-  /// The semaphore orders memory, too; ThreadSanitizer of GCC 12 does not know sem_clockwait.
+  /// Acquire: pairs with the release in signal(). The semaphore orders memory as well, but
+  /// ThreadSanitizer of GCC 12 does not support sem_clockwait.
   void order_memory() const noexcept { (void)signals_.load(std::memory_order_acquire); }
 
   std::atomic<unsigned> signals_{0};

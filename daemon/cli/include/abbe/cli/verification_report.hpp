@@ -1,7 +1,7 @@
 #pragma once
-/// What a metrologist looks at after an independent measurement of the compensated volume: what is
-/// left, how it compares with what was there (R_resmag of [Li OMM] section 5.4), and the vectors in
-/// three planes. Pure.
+/// The report on an independent measurement of the compensated volume, for a metrologist: the
+/// residual errors, their ratio to the errors without compensation (R_resmag of [Li OMM] section
+/// 5.4), and the vectors in three planes. Pure.
 
 #include <optional>
 #include <string>
@@ -17,17 +17,18 @@ struct Verification {
   calib::verify::Observations observations;
   calib::verify::Comparison comparison;
   std::vector<InputFile> inputs;
-  std::vector<std::size_t> lines;  ///< of the points in their file; may be empty
-  std::string cut_short{};  ///< why some of the points are missing or may be wrong; empty: none is
-  /// Where the planes of vectors lie, one coordinate for each axis; default: the middle of the
-  /// grid.
+  std::vector<std::size_t> lines;  ///< line numbers of the points in their file; may be empty
+  /// why some points are missing or may be wrong; empty: all are complete
+  std::string cut_short{};
+  /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
+  /// middle of the grid.
   std::optional<calib::Vector3> planes_m;
 };
 
-/// "better with the model: 0.090 um rms left, 41.300 um without it; 340 of 343 points gained".
+/// "better with the model: 0.090 um rms left, 41.300 um without it; 340 of 343 points improved".
 [[nodiscard]] std::string verdict_text(const calib::verify::Comparison&);
 
-/// Why R_resmag is not given. None: it is.
+/// The reason why R_resmag is not given; nullopt if it is given.
 [[nodiscard]] std::optional<std::string> why_no_ratio(const calib::verify::Comparison&);
 
 /// report.html, self-contained. Begins with the verdict.

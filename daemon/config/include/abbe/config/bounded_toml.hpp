@@ -1,6 +1,6 @@
 #pragma once
-/// TOML with bounds on size and depth, checked before the parser sees the text: its tables are
-/// copied and destroyed recursively, and a dotted key nests as deep as it has parts.
+/// TOML with limits on size and nesting depth, checked before the text is parsed: parsed tables are
+/// copied and destroyed recursively, and each part of a dotted key adds one level.
 
 #include <toml++/toml.h>
 #include <cstddef>
@@ -14,8 +14,8 @@ namespace abbe::daemon {
 
 using protocol::TomlBounds;
 
-/// Else BadInput with one fault, "FILE:LINE:COLUMN: ...": after a fault of syntax the parser only
-/// guesses.
+/// The parsed table, or BadInput with one fault, "FILE:LINE:COLUMN: ...": faults after the first
+/// syntax error would not be reliable.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlBounds& bounds = {});
 

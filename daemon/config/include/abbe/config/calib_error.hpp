@@ -1,12 +1,12 @@
 #pragma once
-/// Errors of the mathematics. Pure.
+/// Errors of the module calib. Pure.
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/error.hpp"
 
 namespace abbe::daemon {
 
-/// An error of the mathematics in the daemon's words and exit codes.
+/// Converts an error of calib to an error of the daemon, with its exit code.
 [[nodiscard]] Error error_of(const calib::Error& error);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// The configured machine as the input type of the mathematics. Pure.
+/// Converts the configured machine to the input type of calib. Pure.
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/otf/run.hpp"
@@ -7,11 +7,11 @@
 
 namespace abbe::daemon {
 
-/// BadInput if the chain or the nodes are not those of a machine of three linear axes.
+/// BadInput if the chain or the nodes do not describe a machine with three linear axes.
 [[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
 
-/// BadInput where [target] offset_mm is missing: every calibration needs it, and zeros would pass
-/// for it.
+/// BadInput if [target] offset_mm is missing. Every calibration needs it; without this check the
+/// default zeros would be used as the offset.
 [[nodiscard]] Result<void> require_target(const MachineConfig& machine);
 
 }  // namespace abbe::daemon

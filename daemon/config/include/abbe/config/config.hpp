@@ -1,10 +1,10 @@
 #pragma once
-/// The one configuration file, read once into plain structs. In the file lengths are mm, small
-/// errors um and urad, times ms or us, and the unit stands in the key; here everything is SI or
-/// std::chrono. A relative path is meant from the folder of the file. `machine.toml` (only
-/// [machine], [axes], [target], [model] and the noise figures of [tracker]) and `abbed.toml`
-/// (everything) are the same format: each reader takes from either file what it needs. Pure data;
-/// safe to copy between threads.
+/// The configuration file, read once into plain structs. In the file lengths are in mm, small
+/// errors in um and urad, times in ms or us, and the key contains the unit; in the structs all
+/// values are SI or std::chrono. A relative path is relative to the folder of the file.
+/// `machine.toml` (only [machine], [axes], [target], [model] and the noise of [tracker]) and
+/// `abbed.toml` (everything) have the same format: a reader uses the tables that it needs from
+/// either file. Pure data; safe to copy between threads.
 
 #include <array>
 #include <chrono>
@@ -28,8 +28,8 @@ namespace abbe::daemon {
 
 enum class AxisKind { Linear, Rotary };
 
-/// [axes.NAME]. `reference` is where positioning and angle tables are zero: 0 if inside the range,
-/// else the minimum.
+/// [axes.NAME]. At `reference` the tables of positioning and angular errors are zero. Default: 0 if
+/// it is within the range, else the minimum.
 struct AxisConfig {
   std::string name;
   AxisKind kind = AxisKind::Linear;
@@ -44,91 +44,91 @@ enum class BasisConfig { Linear };
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
-/// [machine], [axes.*], [target], [model], and the noise figures of [tracker]: what identification
-/// needs to know.
+/// [machine], [axes.*], [target], [model], and the noise of [tracker]: the input of an
+/// identification.
 struct MachineConfig {
   std::string name;
   std::string chain;             ///< ISO 10791-6 style, "[w X' b Y Z (C1) t]"
-  std::vector<AxisConfig> axes;  ///< X, Y, Z, then further linear ones, then rotary ones by name
-  std::array<double, 3>
-      target_offset_m{};  ///< reflector centre relative to the tool reference point, machine axes
-  /// [target] offset_mm is there; else the zeros above are no offset: require_target()
+  std::vector<AxisConfig> axes;  ///< X, Y, Z, then other linear, then rotary axes by name
+  /// Reflector centre relative to the tool reference point, along the machine axes.
+  std::array<double, 3> target_offset_m{};
+  /// [target] offset_mm is present. If false, target_offset_m is not valid; see require_target().
   bool target_given = false;
   BasisConfig basis = BasisConfig::Linear;
-  std::map<std::string, std::vector<double>>
-      nodes_m;                  ///< of every linear axis, ascending, both ends of travel included
+  /// Nodes of every linear axis, ascending, from one end of travel to the other.
+  std::map<std::string, std::vector<double>> nodes_m;
   double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
-  double sigma_angle_rad =
-      3e-6;  ///< standard deviation of one tracker direction, perpendicular to the beam
-  /// Of the offset all ranges have in common. 10 um as limit of error of home position and
-  /// reflector: 10 um / sqrt(3).
+  /// Standard deviation of one tracker direction, perpendicular to the beam.
+  double sigma_angle_rad = 3e-6;
+  /// Standard uncertainty of the offset common to all ranges. From a limit of error of 10 um for
+  /// home position and reflector: 10 um / sqrt(3).
   double u_range_offset_m = 6e-6;
-  std::optional<TrackerVertical> tracker_vertical;          ///< none: the tracker is not levelled
-  std::optional<std::array<double, 3>> tracker_position_m;  ///< machine coordinates, to 0.5 m
+  std::optional<TrackerVertical> tracker_vertical;          ///< nullopt: not levelled
+  std::optional<std::array<double, 3>> tracker_position_m;  ///< machine axes, to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
 };
 
-enum class WeatherConfig {
-  None,
-  Read,
-  Compute
-};  ///< none: environment is not read; compute: the controller corrects n
+/// None: the controller's environment is not read. Read: it is read. Compute: the controller
+/// computes the refractive index and corrects the distances.
+enum class WeatherConfig { None, Read, Compute };
 
-/// Continuous: for runs on the fly. Stationary: one mean after the other, for verification at
-/// standstills; no run on the fly is possible then.
+/// Continuous: for on-the-fly runs. Stationary: one mean value after another, for verification at
+/// standstills; on-the-fly runs are then not possible.
 enum class TrackerModeConfig { Continuous, Stationary };
 
-/// emScon sets both together.
+/// Search of the tracker for its reflector. emScon sets both values with one command.
 struct TrackerSearchConfig {
   double radius_m = 0.0;
   std::chrono::nanoseconds timeout{};  ///< whole ms
 };
 
-/// [tracker]: the instrument on the wire.
+/// [tracker]: the connected laser tracker.
 struct TrackerConfig {
   std::string name = "tracker";
   std::string host;
   std::uint16_t port = 700;
   TrackerModeConfig mode = TrackerModeConfig::Continuous;
-  double point_rate_hz = 500.0;                                              ///< continuous
-  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< a mean's; whole ms
+  double point_rate_hz = 500.0;                                              ///< mode Continuous
+  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< per mean; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
-  /// Relative standard uncertainty that all its distances have in common. Unless given: with
-  /// "compute" what the controller's own sensors leave of the air (0.2 K and 30 Pa: 2e-7); with
-  /// [air] assumed_index 0, that of [air] is added; else nobody corrects for measured air:
-  /// u_of_unmeasured_air().
+  /// Relative standard uncertainty common to all distances. Default:
+  /// - weather = "compute": from the controller's own sensors, 0.2 K and 30 Pa: 2e-7;
+  /// - with [air] assumed_index: 0; the uncertainty from [air] is added later;
+  /// - else no correction for measured air is made: u_of_unmeasured_air().
   double u_scale = kControllersAir;
   static constexpr double kControllersAir = 0.2 / 1e6;
-  std::chrono::nanoseconds max_constant_delay{
-      std::chrono::milliseconds{2}};  ///< bound of the unobservable part of the delay
+  /// Upper bound of the constant, unobservable part of the delay.
+  std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{2}};
   std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
-  std::chrono::nanoseconds silence_timeout{
-      std::chrono::milliseconds{1500}};  ///< no data while streaming: a fault
-  std::string reflector;  ///< name or id in the controller's list; empty: the one that is set
-  bool home_after_initialize = false;  ///< the beam to the bird bath after Initialize
-  std::optional<TrackerSearchConfig>
-      search;  ///< around where the beam points; none: as set in the controller
+  /// A longer time without data during a measurement is a fault.
+  std::chrono::nanoseconds silence_timeout{std::chrono::milliseconds{1500}};
+  std::string reflector;  ///< name or id in the controller's list; empty: the current one
+  /// The tracker moves its beam to the home position (bird bath) after Initialize.
+  bool home_after_initialize = false;
+  /// Search around the direction of the beam. nullopt: the controller's settings are not changed.
+  std::optional<TrackerSearchConfig> search;
 };
 
 enum class EncoderTransport { Udp, SocketCan };
-/// Who sends the SYNC: the device thread, CAN_BCM on its timer, or the machine (then abbed sends
-/// nothing at all).
+/// The SYNC producer. Daemon: the device thread. Kernel: CAN_BCM with its timer. External: the
+/// machine; abbed then sends nothing on the bus.
 enum class SyncConfig { Daemon, Kernel, External };
 
-/// One element of [encoder] nodes. reading = offset + count * step, the step negative when
-/// `invert = true`.
+/// One element of [encoder] nodes. The step is negative with `invert = true`:
+///
+///   reading = offset + count * step
 struct EncoderNodeConfig {
   std::string axis;
   std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
   double step = 1e-9;     ///< m or rad per count, signed
-  double offset = 0.0;    ///< m or rad: the reading at count 0
+  double offset = 0.0;    ///< reading at count 0, m or rad
   AxisKind kind = AxisKind::Linear;
-  int tpdo = 1;           ///< 1 or 2: which one carries the position
-  int position_byte = 0;  ///< where in it; External only, else the node is asked
-  /// rotary: counts after which it begins anew; 0: the node is asked
+  int tpdo = 1;           ///< 1 or 2: the TPDO with the position
+  int position_byte = 0;  ///< in the TPDO; External only, else read from the node
+  /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
   std::int64_t wrap_counts = 0;
 };
 
@@ -142,61 +142,67 @@ struct EncoderConfig {
   std::uint16_t peer_port = 0;   ///< UDP only
   SyncConfig sync = SyncConfig::Daemon;
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  std::chrono::nanoseconds
-      sampling_delay{};  ///< from the SYNC (its echo; UDP: its send) to the node's latch
-  std::chrono::nanoseconds u_sampling_delay =
-      std::chrono::microseconds{50};  ///< its standard uncertainty; 0 only with simulated devices
-  /// True: the control already corrects these readings. No model is ACTIVE then, and none can be
-  /// identified: it would be applied, or measured, on top of the control's own.
+  /// From the SYNC (its echo; with UDP: its sending) to the latching of the position in the node.
+  std::chrono::nanoseconds sampling_delay{};
+  /// Standard uncertainty of sampling_delay; 0 only with simulated devices.
+  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
+  /// True: the control already corrects these readings. Then no model becomes ACTIVE and none can
+  /// be identified, because it would add to the correction of the control.
   bool axes_compensated = false;
-  std::vector<EncoderNodeConfig>
-      nodes;  ///< in the order of MachineConfig::axes; X, Y and Z are there
+  /// In the order of MachineConfig::axes; contains X, Y and Z.
+  std::vector<EncoderNodeConfig> nodes;
 };
 
 enum class CardTransport { Usb, Usbip };
 
-/// [counter_card]: a USB-QUAD08 whose counters are the axes, instead of [encoder].
-/// reading = offset + count * step, count 0 being where the axis stood when the card was set up.
-/// `step_nm` is that of one count, four counts a signal period.
+/// [counter_card]: a USB-QUAD08 whose counters read the axes, instead of [encoder]. Count 0 is the
+/// position of the axis when the card was configured:
+///
+///   reading = offset + count * step
+///
+/// `step_nm` is the step of one count; a signal period has four counts.
 struct CounterCardConfig {
   std::string name = "counter_card";
   CardTransport transport = CardTransport::Usb;
   std::string host = "127.0.0.1";  ///< USB/IP only
   std::uint16_t port = 3240;       ///< USB/IP only
   std::string bus_id = "1-1";      ///< USB/IP only
-  std::string serial_number;       ///< empty: the only card there is
+  std::string serial_number;       ///< empty: the only connected card
   drivers::CounterCardWiring wiring;
-  std::uint32_t sample_every = 1;  ///< one axis sample for so many scans
-  std::chrono::nanoseconds max_constant_delay{
-      std::chrono::milliseconds{1}};  ///< bound of the unobservable part of the delay
-  bool axes_compensated = false;      ///< true: the control already corrects these readings
-  /// Axes without marks read their offset where they stand when the card is set up for the first
-  /// time. Else, and always when it began anew in the middle, they are not known until
-  /// `abbe reference --here`.
+  std::uint32_t sample_every = 1;  ///< one axis sample per this number of scans
+  /// Upper bound of the constant, unobservable part of the delay.
+  std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{1}};
+  bool axes_compensated = false;  ///< true: the control already corrects these readings
+  /// True: an axis without reference marks is referenced where it is when the card is configured
+  /// for the first time; it then reads its offset. If false, and always after the card restarted
+  /// during operation, the axis is not referenced until `abbe reference --here`.
   bool zero_is_here = false;
 };
 
-/// One element of [reference] axes: the distance-coded marks of the scale. Reading at a
-/// mark = zero_mark + (reversed: -) its place on the scale.
+/// One element of [reference] axes: the distance-coded reference marks of the scale.
+///
+///   reading at a mark = zero_mark + position of the mark on the scale
+///   reversed:           zero_mark - position of the mark on the scale
 struct ReferenceAxisConfig {
   std::string axis;
   drivers::DistanceCode code;
   double signal_period = 20e-6;  ///< of the scale, m or rad
-  double zero_mark = 0.0;        ///< m or rad: the reading at the scale's zero mark
-  bool reversed = false;         ///< the scale's places rise as the reading falls
+  double zero_mark = 0.0;        ///< reading at the zero mark of the scale, m or rad
+  bool reversed = false;         ///< position on the scale ascends while the reading descends
 };
 
-/// [reference]: a second card that latches axes of [counter_card] on their marks. These axes are
-/// not known until `abbe reference` has found where their counters began.
+/// [reference]: a second card that latches the counts of [counter_card]'s axes at their reference
+/// marks. These axes are not referenced until `abbe reference` has found the positions at which
+/// their counters started.
 struct ReferenceConfig {
   CounterCardConfig card;                 ///< its axes are in the order of `axes`
   std::vector<ReferenceAxisConfig> axes;  ///< each is an axis of [counter_card]
-  std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{
-      1}};                    ///< how well the two cards' scans lie beside each other in time
-  double tolerance_m = 1e-6;  ///< how well the two cards' counts must be brought together, m or rad
+  /// Standard uncertainty of the time offset between the scans of the two cards.
+  std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{1}};
+  double tolerance_m = 1e-6;  ///< limit of the difference of the two cards' counts, m or rad
 };
 
-/// One [[environment]]: a Modbus device that measures air, scales or parts.
+/// One [[environment]]: a Modbus device that measures air, or temperatures of scales and parts.
 struct EnvironmentConfig {
   std::string name;
   drivers::ModbusAddress address;
@@ -205,18 +211,17 @@ struct EnvironmentConfig {
   std::chrono::nanoseconds answer_timeout{std::chrono::milliseconds{500}};
 };
 
-/// One [[thermal]]: the readings of an axis are corrected to what the machine really does, by the
-/// temperature of its scale.
+/// One [[thermal]]: the readings of an axis are corrected for the thermal expansion of its scale.
 struct ThermalConfig {
   std::string axis;
   std::uint8_t temperature = 0;  ///< index into Config::temperatures
-  double alpha_per_K = 0.0;      ///< of the scale
+  double alpha_per_K = 0.0;      ///< expansion coefficient of the scale
   double u_alpha_per_K = 0.0;
   double u_temperature_K = 0.0;
-  double fixed_m = 0.0;  ///< the reading where the scale is fixed to the machine
+  double fixed_m = 0.0;  ///< reading where the scale is fixed to the machine
 };
 
-/// [air]: the refractive index of the air that is measured.
+/// [air]: the refractive index of air, computed from measured values.
 struct AirConfig {
   calib::IndexEquation equation = calib::IndexEquation::Ciddor;
   double wavelength_m = calib::kHeliumNeon_m;
@@ -224,17 +229,16 @@ struct AirConfig {
   double u_temperature_K = 0.2;
   double u_pressure_Pa = 30.0;
   double u_relative_humidity = 0.03;
-  /// people and burners add 50 to 1000 ppm to the 430 outside; nobody measures it
+  /// CO2 is not measured; people and burners add 50 to 1000 ppm to the 430 ppm outdoors
   double u_co2_ppm = 200.0;
-  std::chrono::nanoseconds max_age{
-      std::chrono::seconds{60}};  ///< an older value is not available any more
-  /// The tracker's distances are raw: computed with this index. Then they are corrected to the air
-  /// measured.
+  std::chrono::nanoseconds max_age{std::chrono::seconds{60}};  ///< an older value is not used
+  /// The refractive index with which the tracker computed its distances. If given, abbe corrects
+  /// the distances for the measured air.
   std::optional<double> assumed_index;
 };
 
-/// [probe]: the touch probe on the latch and edge channels of [counter_card]. Delay and jitter are
-/// those that `abbe calibrate probe` finds for this probe; the wiring comes from the card.
+/// [probe]: the touch probe on the latch and edge channels of [counter_card]. `abbe calibrate
+/// probe` determines delay and jitter of this probe; the wiring comes from the card.
 struct ProbeConfig {
   std::string name = "probe";
   drivers::ProbeDelay delay;
@@ -244,17 +248,17 @@ struct ProbeConfig {
   std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
 };
 
-/// [cmm]: a measuring machine behind an I++ DME server. Its touches are the daemon's; its positions
-/// are the axes where no other device gives them.
+/// [cmm]: a measuring machine with an I++ DME server. The daemon takes its touches, and its
+/// positions as axis readings if no other device reads the axes.
 struct CmmConfig {
   std::string name = "cmm";
   std::string host;
   std::uint16_t port = 1294;
-  std::string tool;            ///< set before measuring; empty: the one that is set
-  bool home = false;           ///< may send the machine home if it is not
-  std::uint32_t probe = 1;     ///< number of its probe in the touches
-  double u_position_m = 1e-6;  ///< of a reported position
-  /// A measuring machine reports positions it has corrected itself, unless told otherwise.
+  std::string tool;            ///< selected before measuring; empty: the current one
+  bool home = false;           ///< abbe may home the machine if it is not homed
+  std::uint32_t probe = 1;     ///< probe number in the recorded touches
+  double u_position_m = 1e-6;  ///< standard uncertainty of a reported position
+  /// True (default): the measuring machine corrects the positions that it reports.
   bool axes_compensated = true;
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
@@ -268,32 +272,33 @@ struct DaemonConfig {
   [[nodiscard]] std::filesystem::path models_dir() const { return data_dir / "models"; }
   std::filesystem::path runtime_dir = "/run/abbe";
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
-  std::chrono::nanoseconds watermark{
-      std::chrono::milliseconds{600}};  ///< how long the hub waits for a late stream
+  /// The longest time for which the hub waits for a late stream.
+  std::chrono::nanoseconds watermark{std::chrono::milliseconds{600}};
   bool simulated = false;  ///< the devices are simulated: only then may `speed` differ from 1
   double speed = 1.0;      ///< host time = speed x CLOCK_MONOTONIC
   RealTimeMode realtime = RealTimeMode::Ignore;
   int tracker_priority = 40;  ///< SCHED_FIFO, 1 to 99
   int encoder_priority = 50;
   int hub_priority = 30;
-  std::optional<int> tracker_cpu;  ///< the core the thread is bound to
+  std::optional<int> tracker_cpu;  ///< the CPU core to which the thread is bound
   std::optional<int> encoder_cpu;
   std::optional<int> hub_cpu;
-  std::optional<std::chrono::microseconds>
-      cpu_latency;  ///< bound on a processor's waking; none: not asked for
+  /// Limit of the wake-up latency of the CPU (/dev/cpu_dma_latency). nullopt: not requested.
+  std::optional<std::chrono::microseconds> cpu_latency;
 };
 
 /// [recording]
 struct RecordingConfig {
   std::filesystem::path dir;  ///< default: data_dir/recordings
   std::uint32_t chunk_bytes = 256 * 1024;
-  std::chrono::nanoseconds chunk_period{
-      std::chrono::seconds{1}};  ///< a chunk is closed at the latest after this
-  bool raw = true;               ///< also record the device bytes
-  /// recording stops, acquisition goes on, below this
+  /// A chunk is closed after this time at the latest.
+  std::chrono::nanoseconds chunk_period{std::chrono::seconds{1}};
+  bool raw = true;  ///< also record the raw bytes of the devices
+  /// With less free disk space recording stops; acquisition continues.
   std::uint64_t min_free_bytes = 256ull * 1024 * 1024;
-  std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: never
-  std::chrono::hours keep{0};  ///< recordings no model names are removed after this; 0: never
+  std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: no limit
+  /// Recordings that are older than this and not used by a model are removed; 0: never.
+  std::chrono::hours keep{0};
 };
 
 enum class Supervise { Child, Systemd, Off };
@@ -301,42 +306,43 @@ enum class Supervise { Child, Systemd, Off };
 /// [dds]
 struct DdsConfig {
   std::uint32_t domain = 0;
-  double snapshot_hz = 50.0;       ///< at most; 0: whenever something new came
-  double compensation_hz = 100.0;  ///< at most; 0: whenever something new came
-  std::chrono::nanoseconds validity{
-      std::chrono::milliseconds{500}};  ///< a subscriber must not apply older vectors
+  double snapshot_hz = 50.0;       ///< maximum rate; 0: with every hub cycle that has new data
+  double compensation_hz = 100.0;  ///< maximum rate; 0: with every hub cycle that has new data
+  /// A subscriber must not apply a compensation vector older than this.
+  std::chrono::nanoseconds validity{std::chrono::milliseconds{500}};
   Supervise supervise = Supervise::Child;
-  int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: an ordinary process
+  int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: not SCHED_FIFO
   std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
-  std::filesystem::path
-      security;  ///< keys as `abbe dds keys` makes them; empty: none, what the profile says
+  /// Folder of keys made by `abbe dds keys`; empty: the profile decides.
+  std::filesystem::path security;
   std::filesystem::path socket;  ///< default: runtime_dir/dds.sock
 };
 
-/// [gate]: what a model must satisfy before it may become active.
+/// [gate]: the conditions that a model must satisfy before it may become active.
 struct GateConfig {
   double max_error_m = 1e-3;   ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;  ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  /// By which the scales may read something else at a vertex of an on-the-fly path, beside their
-  /// uncertainty.
+  /// Allowed difference between the scale readings and a vertex of the commanded on-the-fly path,
+  /// in addition to their uncertainty.
   double path_tolerance_m = 20e-6;
-  /// Share of the legs of an on-the-fly run that a fit does not see while it is judged by them.
-  /// Models of a ball array are judged by positions held out, one after the other.
+  /// Fraction of the legs of an on-the-fly run that are excluded from a fit and used to check it.
+  /// For a ball array, one position after another is excluded and used to check the fit.
   double holdout_fraction = 0.2;
-  /// What this shop takes as it is, by name: "evemu-shape-only", a ball array's model whose
-  /// rotation about Ball1 nobody has referenced; "smaller-volume", a model in place of one that
-  /// holds in more of the machine; "scale-change", one whose scale is another; "path-orientation",
-  /// a path file that may be turned (calib/otf/orientation).
+  /// Conditions that the user accepts, by name:
+  /// - "evemu-shape-only": a model from a ball array whose rotation about Ball1 is not referenced;
+  /// - "smaller-volume": a model whose validity volume is smaller than that of the active model;
+  /// - "scale-change": a model whose scale differs from that of the active model;
+  /// - "path-orientation": a path file that may be rotated (calib/otf/orientation).
   std::vector<std::string> accept;
 
   [[nodiscard]] bool accepts(std::string_view name) const;
 };
 
-/// [evemu] artefact_sensor or artefact_C: how warm the ball array is while it is touched.
+/// [evemu] artefact_sensor or artefact_C: temperature of the ball array while it is touched.
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
   double fixed_K = 293.15;             ///< without a sensor
-  double u_temperature_K = 0.0;        ///< standard: of the sensor, and of the array against it
+  double u_temperature_K = 0.0;        ///< standard uncertainty: sensor, and array relative to it
 };
 
 /// [evemu]: calibration with a ball array.
@@ -344,21 +350,23 @@ struct EvemuConfig {
   std::string estimator = "bayes-pose";  ///< one of calib::evemu::estimator()
   std::string folds = "position";        ///< one of calib::evemu::folds_by(): for lasso, mcp, scad
   int order = 3;                         ///< of the polynomials
-  std::vector<int> positions{4, 8, 3, 7,
-                             2, 6, 1, 5};  ///< of the array, in the order they are touched
+  /// Positions of the array, in the order in which they are touched.
+  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
-  std::chrono::nanoseconds longest_pause{
-      std::chrono::hours{1}};                         ///< without a touch: the session ends
-  std::optional<ArtefactTemperatureConfig> artefact;  ///< none: the array counts as at 20 C
+  /// The session ends after this time without a touch.
+  std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};
+  std::optional<ArtefactTemperatureConfig> artefact;  ///< nullopt: 20 C is assumed
 };
 
-/// [control]. Root and the daemon's own user may ask for everything; see control_roles.hpp.
+/// [control]. Root and the daemon's user may send every request; see control_roles.hpp.
 struct ControlConfig {
-  std::filesystem::path socket;              ///< default: runtime_dir/control.sock
-  std::string look_group;                    ///< empty: everybody who may open the socket
-  std::string change_group = "abbe-change";  ///< may change what is in force; empty: nobody else
-  std::string move_group = "abbe-move";      ///< may move a machine; empty: nobody else
+  std::filesystem::path socket;  ///< default: runtime_dir/control.sock
+  /// May read, and stop a machine; empty: all who may open the socket.
+  std::string look_group;
+  /// May change models and calibrate; empty: only root and the daemon's user.
+  std::string change_group = "abbe-change";
+  std::string move_group = "abbe-move";  ///< may move a machine; empty: as change_group
 };
 
 /// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean
@@ -369,8 +377,8 @@ struct Config {
   std::optional<EncoderConfig> encoder;
   std::optional<CounterCardConfig> counter_card;
   std::vector<EnvironmentConfig> environment;
-  std::vector<std::string>
-      temperatures;  ///< names of EnvironmentSample::temperature_K, as they are configured
+  /// Names of the elements of EnvironmentSample::temperature_K, in order of configuration.
+  std::vector<std::string> temperatures;
   std::vector<ThermalConfig> thermal;
   AirConfig air;
   std::optional<ReferenceConfig> reference;
@@ -383,31 +391,33 @@ struct Config {
   EvemuConfig evemu;
   ControlConfig control;
 
-  /// What a sample of [encoder] or [counter_card] holds, in its order; empty: there is none.
+  /// The axes in a sample of [encoder] or [counter_card], in order; empty: neither is configured.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
-  /// The control already corrects what the axes read, whichever device reads them.
+  /// True if the control already corrects the axis readings, for any device that reads them.
   [[nodiscard]] bool axes_compensated() const noexcept {
     return (encoder && encoder->axes_compensated) ||
            (counter_card && counter_card->axes_compensated) ||
            (cmm_reads_axes() && cmm->axes_compensated);
   }
-  /// No other device reads the axes: they are what the measuring machine reports.
+  /// True if the axis readings are the positions of the measuring machine, because no other device
+  /// reads the axes.
   [[nodiscard]] bool cmm_reads_axes() const noexcept { return cmm && !encoder && !counter_card; }
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in
-/// Error::details, at most 20, each "file:line:column: key: what is wrong". Nothing is used of a
-/// file that has a fault.
+/// Error::details, at most 20, each "file:line:column: key: what is wrong". A file with a fault
+/// is not used at all.
 [[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
 
-/// The same for the text of a file; `file` names it in the errors and anchors relative paths.
+/// Same as load_config() for the text of a file. `file` is used in error messages and is the base
+/// of relative paths.
 [[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
 
-/// SHA-256 in hex over what a model depends on: the machine (identity, chain, axes, target, basis,
-/// nodes) and what a scale reading is (which node is which axis, its step and offset, whether the
-/// control corrects it already). A stored model is ACTIVE only where this agrees. Noise figures,
-/// and how the bytes travel, do not enter.
+/// SHA-256 in hex over the configuration that a model depends on: the machine (name, chain, axes,
+/// target, basis, nodes) and the meaning of a scale reading (node and axis, step, offset,
+/// correction by the control). A stored model is ACTIVE only if its hash is equal to this one.
+/// Noise values and transport settings are not included.
 [[nodiscard]] std::string machine_hash(const Config& config);
 
 }  // namespace abbe::daemon

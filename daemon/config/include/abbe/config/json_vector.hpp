@@ -1,5 +1,5 @@
 #pragma once
-/// A place or direction in JSON: [x, y, z].
+/// A position or direction in JSON: [x, y, z].
 
 #include <array>
 #include <nlohmann/json.hpp>
@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-/// Throws what nlohmann::json throws.
+/// Throws nlohmann::json exceptions if `list` is not an array of three numbers.
 [[nodiscard]] inline calib::Vector3 vector_of(const nlohmann::json& list) {
   const auto v = list.get<std::array<double, 3>>();
   return {v[0], v[1], v[2]};

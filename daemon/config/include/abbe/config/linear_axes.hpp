@@ -5,10 +5,10 @@
 
 namespace abbe::daemon {
 
-// X, Y and Z come first in a machine description, and so in every sample.
+// X, Y and Z are the first axes of a machine description and of every sample.
 inline constexpr std::size_t kLinearAxes = 3;
 
-/// `sample`: whatever has axis_count and missing_mask.
+/// True if the sample has X, Y and Z. Sample: any type with axis_count and missing_mask.
 template <class Sample>
 [[nodiscard]] bool has_linear_axes(const Sample& sample) noexcept {
   constexpr std::uint8_t kXyz = (1u << kLinearAxes) - 1u;

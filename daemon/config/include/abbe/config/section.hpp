@@ -1,7 +1,7 @@
 #pragma once
-/// One table of a TOML file while it is being read: every get() names the key, its unit and its
-/// bounds; a fault goes to the list instead of stopping, and close() refuses every key nobody asked
-/// for. A Section of a table that is not there gives the defaults, so a reader has no branches.
+/// Reads one table of a TOML file. Every get() names the key, its unit and its bounds. A fault is
+/// added to the list and reading continues. close() adds a fault for every key that was not read. A
+/// Section of an absent table leaves all defaults, so that readers need no special case.
 
 #include <toml++/toml.h>
 #include <chrono>
@@ -17,7 +17,11 @@
 
 namespace abbe::daemon {
 
-/// How a number in the file becomes SI: value / per_si, so that 300 mm is exactly the double 0.3 m.
+/// Conversion of a number in the file to SI:
+///
+///   SI value = number / per_si
+///
+/// The division makes 300 mm exactly the double 0.3 m.
 struct Unit {
   double per_si = 1.0;
 };
@@ -45,7 +49,7 @@ class Section {
   [[nodiscard]] bool present() const noexcept { return table_ != nullptr; }
   [[nodiscard]] bool has(std::string_view key) const;  ///< also marks the key as known
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
-  /// null if absent; for keys of several types
+  /// The value of a key that may have several types; null if absent.
   [[nodiscard]] const toml::node* node(std::string_view key) const;
   [[nodiscard]] std::vector<std::string> keys() const;
   [[nodiscard]] Section child(std::string_view key, Need need = Need::Optional);
@@ -62,16 +66,17 @@ class Section {
   template <class Integer>
   bool get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max,
                    Need need = Need::Optional);
-  /// One of the given words; out receives its enumerator.
+  /// The value must be one of `words`; sets `out` to its enumerator.
   template <class Enum>
   bool get_word(std::string_view key, Enum& out,
                 std::vector<std::pair<std::string_view, Enum>> words, Need need = Need::Optional);
-  /// A path; a relative one is meant from `base`.
+  /// A path; a relative path is relative to `base`.
   bool get(std::string_view key, std::filesystem::path& out, const std::filesystem::path& base);
 
-  void fault(std::string_view key,
-             std::string_view what);  ///< at the key, or at the table if it has none
-  void close();                       ///< refuses the keys nobody asked for; call when all is read
+  /// Adds a fault at the position of the key, or of the table if the key is absent.
+  void fault(std::string_view key, std::string_view what);
+  /// Adds a fault for every key that was not read. Call it last.
+  void close();
 
  private:
   [[nodiscard]] const toml::node* find(std::string_view key, Need need);

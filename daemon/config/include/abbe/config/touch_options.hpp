@@ -1,12 +1,12 @@
 #pragma once
-/// [probe] and [counter_card] as the options of the drivers' touch detector. Pure.
+/// Converts [probe] and [counter_card] to the options of the touch detector in drivers. Pure.
 
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/sampling/probe_options.hpp"
 
 namespace abbe::daemon {
 
-/// The probe on the card's channels; `machine` says which axes are linear.
+/// `machine` gives the kind of each axis, linear or rotary.
 [[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe,
                                                   const CounterCardConfig& card,
                                                   const MachineConfig& machine);

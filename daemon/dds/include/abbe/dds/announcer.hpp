@@ -1,11 +1,15 @@
 #pragma once
-/// Announces the writers again: soon after another participant is discovered, and every 2 s.
-/// - Cyclone DDS misses the first heartbeat of Fast DDS's discovery, and the next would come 1 s later; an
-///   announcement comes with a heartbeat.
-/// - One side may forget the other while the other does not, after an outage longer than one lease and
-///   shorter than the other, or after this process was stopped. Fast DDS takes what it announced for known
-///   then, and the subscriber would never find the writers again.
-/// Used by the thread that writes, between its writes; the participant's threads only report discoveries.
+/// Repeats the discovery announcements of the writers: soon after another participant is
+/// discovered, then every 2 s. There are two reasons:
+/// - Cyclone DDS misses the first heartbeat of Fast DDS's discovery; the next one would come 1 s
+///   later. Every announcement is sent with a heartbeat.
+/// - After an outage longer than the lease of one participant and shorter than that of the other,
+///   or after this process was suspended, only one of the two has dropped the other. Fast DDS then
+///   regards its announcements as acknowledged and does not repeat them, so that the subscriber
+///   would never find the writers again.
+///
+/// Used by the thread that writes, between its writes; the participant's threads only report
+/// discoveries.
 
 #include <atomic>
 #include <chrono>
@@ -20,18 +24,18 @@ namespace abbe::dds {
 class Announcer final : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
-  static constexpr std::chrono::milliseconds kFirst{
-      20};  ///< after a discovery; then twice as long each time
-  static constexpr std::chrono::milliseconds kPeriod{2000};  ///< at most
+  /// Interval after a discovery; every further interval is twice as long, up to kPeriod.
+  static constexpr std::chrono::milliseconds kFirst{20};
+  static constexpr std::chrono::milliseconds kPeriod{2000};
 
-  /// Both must outlive this.
+  /// Both arguments must outlive this object.
   Announcer(Participant& participant, Writers& writers);
   ~Announcer() override;
   Announcer(const Announcer&) = delete;
   Announcer& operator=(const Announcer&) = delete;
 
-  /// Announces at most one writer: what is to be written does not wait for all. Call it in every
-  /// cycle.
+  /// Announces at most one writer, so that samples to be written do not wait until all writers are
+  /// announced. Call it in every cycle.
   void cycle(WallTime now);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// The nodes of a received ErrorGrid as a lattice to ask and as a file to look at.
+/// Converts the nodes of a received ErrorGrid to a lattice for interpolation and to a CSV file.
 
 #include <filesystem>
 #include <span>
@@ -10,10 +10,11 @@
 
 namespace abbe::dds {
 
-/// Error BadInput as calib::ErrorLattice::create().
+/// Error BadInput under the conditions of calib::ErrorLattice::create().
 [[nodiscard]] daemon::Result<calib::ErrorLattice> lattice_of(std::span<const v1::GridNode> nodes);
 
-/// `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um,ux_um,uy_um,uz_um`, u standard uncertainties. Error Io.
+/// Writes the columns `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um,ux_um,uy_um,uz_um`; u: standard
+/// uncertainty. Error Io: the file cannot be written.
 [[nodiscard]] daemon::Result<void> write_grid_csv(const std::filesystem::path& file,
                                                   std::span<const v1::GridNode> nodes);
 

@@ -6,8 +6,8 @@
 
 namespace abbe::dds {
 
-/// With the index of its interface: multicast memberships end with the interface, and one that is
-/// made again with the same address has another index.
+/// The interface index is part of the comparison: an interface that is deleted and created again
+/// with the same address has another index, and the multicast memberships of the old one are lost.
 struct InterfaceAddress {
   unsigned interface = 0;
   std::string address;

@@ -1,9 +1,9 @@
 #pragma once
-/// Addresses that a network interface gets while a participant runs: a cable plugged in, DHCP, a
-/// boot that was quicker than the network. Fast DDS 2.9 does not take them up, not even when its
-/// QoS is set again: its writers and readers keep the addresses of their creation. The participant
-/// has to be created again, in a new process image, because Fast DDS never gives a participant id
-/// (and with it the port) twice to one process.
+/// Detects addresses that a network interface gets while a participant runs: a cable is plugged
+/// in, DHCP assigns an address, or the program started before the network was up. Fast DDS 2.9 does
+/// not use such addresses, not even when its QoS is set again: its writers and readers keep the
+/// addresses of their creation. The participant has to be created again, in a new process image,
+/// because Fast DDS never gives a participant id (and with it the port) twice to one process.
 
 #include <chrono>
 #include <optional>
@@ -14,34 +14,39 @@
 
 namespace abbe::dds {
 
-/// One thread. Without rtnetlink(7), as where a sandbox forbids it, it sees nothing.
+/// For one thread. Where rtnetlink(7) is not available, for example in a sandbox, it detects
+/// nothing.
 class InterfaceWatch {
  public:
   using Clock = std::chrono::steady_clock;
-  /// An interface that comes up gets its addresses one after the other, and a cable bounces.
+  /// A change is evaluated after this time without a further one: an interface that comes up gets
+  /// its addresses one after the other, and the link may drop a few times while a cable is plugged
+  /// in.
   static constexpr std::chrono::milliseconds kSettles{500};
-  /// Interfaces that never rest, as containers that come and go, delay it no longer than that.
+  /// A change is evaluated after this time even if further ones follow, for example because
+  /// containers start and stop all the time.
   static constexpr std::chrono::seconds kLongestWait{5};
-  /// A participant lives for so long at least: interfaces that come and go must not keep abbe-dds
-  /// from publishing.
+  /// No address is reported before the watch has run this long: abbe-dds must publish for a while
+  /// even if interfaces change all the time.
   static constexpr std::chrono::seconds kShortestLife{5};
 
-  /// Before the participant is created, so that no address comes in between unseen.
+  /// Create it before the participant, so that no address is missed in between.
   explicit InterfaceWatch(Clock::time_point now);
   ~InterfaceWatch();
   InterfaceWatch(const InterfaceWatch&) = delete;
   InterfaceWatch& operator=(const InterfaceWatch&) = delete;
 
-  /// An address that calls for another participant: running, of those that the profile allows
-  /// (`allowed`; empty: all), and not known when the watch began nor since. Never waits.
+  /// Returns a new address for which the participant has to be created again: its interface is
+  /// running, the profile allows it (`allowed`; empty: all), and no earlier call and not the
+  /// constructor has seen it. Never blocks.
   [[nodiscard]] std::optional<std::string> cycle(const std::vector<std::string>& allowed,
                                                  Clock::time_point now);
 
  private:
   int netlink_ = -1;
   Clock::time_point begun_;
-  std::optional<Clock::time_point> first_change_,
-      last_change_;                      ///< since the interfaces were last read
+  /// since the interfaces were last read
+  std::optional<Clock::time_point> first_change_, last_change_;
   std::vector<InterfaceAddress> known_;  ///< sorted
 };
 

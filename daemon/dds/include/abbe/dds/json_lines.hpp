@@ -1,6 +1,6 @@
 #pragma once
-/// Samples as one JSON object a line, for programs that read abbe-watch: "topic" and every field of
-/// the IDL by its name. NaN becomes null. Pure, thread-safe.
+/// Formats a sample as one line with a JSON object, for programs that read the output of
+/// abbe-watch: "topic" and every field of the IDL by its name. NaN becomes null. Pure, thread-safe.
 
 #include <cstddef>
 #include <span>

@@ -1,15 +1,20 @@
 #pragma once
-/// Keeps from Fast DDS what would end it. Two things that anyone can send, with and without DDS
-/// Security, end every process with Debian's Fast DDS 2.9.1:
-/// - an announced TypeObject with a sequence of structs that it does not know (Fast-DDS issue 3296). abbe's
-///   topics need no types: in endpoint announcements their parameters get an identifier without meaning,
-///   which every implementation skips.
-/// - a statistics submessage (80h, of Fast DDS alone) whose length is not the one it asserts. One at the end
-///   is cut off, as Fast DDS does itself; elsewhere there is no honest one.
-/// Besides, lengths that lie: only messages pass whose submessages follow each other as the standard has
-/// them, and whose endpoint announcements hold their parameters where the standard has them, so that the
-/// filter and Fast DDS see the same ones. The filter stands between the socket and Fast DDS. Pure, but for the
-/// transport; one thread a receive channel.
+/// Removes from received RTPS messages what would crash Fast DDS. Any computer of the network can
+/// send two things, with and without DDS Security, that end every process with Debian's Fast DDS
+/// 2.9.1:
+/// - An announced TypeObject with a sequence of structs that Fast DDS does not know (Fast-DDS issue
+///   3296). The topics of abbe need no type parameters: in endpoint announcements the filter
+///   replaces their parameter ids by an unused one, which every implementation skips.
+/// - A statistics submessage (80h, specific to Fast DDS) with a length other than the one that Fast
+///   DDS asserts. The filter cuts it off at the end of a message, as Fast DDS does itself; anywhere
+///   else no valid sender puts one, and the message is dropped.
+///
+/// Besides, the filter drops messages with wrong lengths: a message passes only if its submessages
+/// follow each other as the standard requires, and its endpoint announcements have their parameters
+/// where the standard puts them. So the filter and Fast DDS read the same parameters.
+///
+/// The filter is between the socket and Fast DDS. Pure, except for the transport; one thread per
+/// receive channel.
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
 
@@ -20,11 +25,11 @@
 
 namespace abbe::dds {
 
-/// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. How many of its
-/// bytes may be handed on; 0: none. Never reads beyond it.
+/// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
+/// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
 [[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message) noexcept;
 
-/// The same transport with the filter in front.
+/// The same transport with the filter between it and Fast DDS.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>
 with_message_filter(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level);

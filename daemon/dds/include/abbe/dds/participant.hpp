@@ -1,6 +1,6 @@
 #pragma once
-/// The one DDS participant of a process, made from an XML profile that the site may replace.
-/// Thread-safe as far as Fast DDS is; create and destroy it from one thread.
+/// The only DDS participant of a process, created from an XML profile that the site may replace.
+/// As thread-safe as Fast DDS; create and destroy it from one thread.
 
 #include <cstdint>
 #include <filesystem>
@@ -24,35 +24,38 @@ using daemon::Error;
 using daemon::ErrorCode;
 using daemon::Result;
 
-/// Highest domain whose ports, by the default rule 7400 + 250 x domain, are UDP ports
-/// [DDSI-RTPS 2.5, 9.6.2.3].
+/// Highest domain whose port numbers, by the default rule 7400 + 250 x domain, are valid UDP port
+/// numbers [DDSI-RTPS 2.5, 9.6.2.3].
 inline constexpr std::uint32_t kHighestDomain = 232;
 
 struct ParticipantOptions {
   std::uint32_t domain = 0;
-  std::filesystem::path
-      profiles;  ///< XML file with a participant profile "abbe"; empty: the built-in abbe-dds.xml
-  std::filesystem::path
-      security;  ///< keys as `abbe dds keys` makes them; empty: what the profile says
+  /// XML file with a participant profile "abbe"; empty: the built-in abbe-dds.xml
+  std::filesystem::path profiles;
+  /// folder of keys from `abbe dds keys`; empty: the security settings of the profile apply
+  std::filesystem::path security;
   daemon::DdsRole role = daemon::DdsRole::Subscriber;
 };
 
 class Participant {
  public:
-  /// Error: Usage for a domain above kHighestDomain, BadInput for a profile that cannot be read or
-  /// has no participant "abbe", and for keys that cannot be used, Io if no participant can be
-  /// created (no port), or no interface of the profile is up.
+  /// Errors:
+  /// - Usage: the domain is above kHighestDomain.
+  /// - BadInput: the profile cannot be read or has no participant "abbe", or the keys cannot be
+  ///   used.
+  /// - Io: no participant can be created (no port), or no interface of the profile is up.
   [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
 
-  /// The topic with its payload type, registered without TypeObject and TypeInformation. Error Io:
-  /// Fast DDS refuses.
+  /// Creates the topic with its payload type, registered without TypeObject and TypeInformation.
+  /// Error Io: Fast DDS does not create it.
   [[nodiscard]] Result<eprosima::fastdds::dds::Topic*> topic(daemon::Topic topic);
 
   [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept {
     return *participant_;
   }
 
-  /// Keys of `security` or of the profile keep strangers out.
+  /// True if DDS Security is on, with the keys of `security` or of the profile: participants
+  /// without keys can neither publish nor read.
   [[nodiscard]] bool is_secure() const;
 
   /// IPv4 addresses that the profile allows (interfaceWhiteList); empty: all.

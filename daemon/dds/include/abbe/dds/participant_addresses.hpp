@@ -1,6 +1,6 @@
 #pragma once
-/// Where the participants of a domain announce that they can be reached, for messages that name
-/// one. A participant may announce what it likes. Thread-safe.
+/// The network addresses that the participants of a domain announce, for messages about a
+/// participant. The addresses are not checked: a participant may announce any. Thread-safe.
 
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <map>
@@ -14,13 +14,13 @@ namespace abbe::dds {
 
 class ParticipantAddresses final : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  /// Takes the participant's listener. `participant` must outlive this.
+  /// Replaces the listener of the participant. `participant` must outlive this object.
   explicit ParticipantAddresses(Participant& participant);
   ~ParticipantAddresses() override;
   ParticipantAddresses(const ParticipantAddresses&) = delete;
   ParticipantAddresses& operator=(const ParticipantAddresses&) = delete;
 
-  /// For instance "192.168.10.7", several separated by commas; empty: not known.
+  /// For example "192.168.10.7"; several addresses are separated by commas. Empty: not known.
   [[nodiscard]] std::string of(const ParticipantId& id) const;
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
-/// The types of the topics as Fast DDS sees them here: payloads that are already CDR. What abbed
-/// encoded goes on the wire byte for byte, and what arrives is decoded by the total daemon::decode,
-/// not by generated code that lets a stranger's bytes throw. On the wire nothing tells it from the
-/// generated types. Used by Fast DDS from any thread.
+/// The data type of a topic for Fast DDS: a payload that is CDR already. Fast DDS sends the bytes
+/// that abbed encoded unchanged. Received bytes are decoded by daemon::decode, which returns an
+/// error for malformed input where generated code would throw. On the wire the type is identical to
+/// the generated one. Used by Fast DDS from any thread.
 
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
@@ -13,7 +13,7 @@
 
 namespace abbe::dds {
 
-/// What a PayloadType reads and writes: the encapsulation header and the CDR bytes.
+/// The data that a PayloadType serializes: the encapsulation header and the CDR bytes.
 struct Payload {
   std::vector<std::byte> bytes;
 };
@@ -25,8 +25,8 @@ class PayloadType final : public eprosima::fastdds::dds::TopicDataType {
   bool serialize(void* data, eprosima::fastrtps::rtps::SerializedPayload_t* payload) override;
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override;
   std::function<uint32_t()> getSerializedSizeProvider(void* data) override;
-  /// MD5 of the key as big-endian CDR [DDSI-RTPS 2.5, 9.6.3.8]: every key of ours may exceed 16
-  /// bytes.
+  /// MD5 of the key as big-endian CDR [DDSI-RTPS 2.5, 9.6.3.8]. Always MD5, because the key of
+  /// every abbe topic may be longer than 16 bytes.
   bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
               bool force_md5) override;
   void* createData() override { return new Payload; }

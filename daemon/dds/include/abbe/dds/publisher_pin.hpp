@@ -1,8 +1,11 @@
 #pragma once
-/// Which of several DDS participants that publish as one machine a subscriber follows: the one it
-/// heard first, until that one is silent. Standard library only, for subscribers to copy; the
-/// Cyclone DDS example has the same rule in C. It keeps out a participant that comes later, not one
-/// that is there first, one that takes over after a silence, or one that forges the GUID:
+/// Decides which participant a subscriber uses when several DDS participants publish data of the
+/// same machine: the first one it receives from is pinned until it stops sending. The header uses
+/// the standard library only, so that subscribers can copy it; the Cyclone DDS example implements
+/// the same rule in C.
+///
+/// The rule protects against a participant that starts later. It does not protect against one that
+/// starts first, one that takes over after the pinned one has stopped, or one that forges the GUID:
 /// daemon/docs/dds.md, "Strangers". Pure; used by one thread.
 
 #include <algorithm>
@@ -17,11 +20,11 @@
 
 namespace abbe::dds {
 
-/// A DDS participant by the prefix of its GUID, which all of its writers share
+/// Identifies a DDS participant: the GUID prefix that all of its writers share
 /// [DDSI-RTPS 2.5, 8.2.4.2].
 using ParticipantId = std::array<std::uint8_t, 12>;
 
-/// As Fast DDS and Cyclone DDS print it, for instance "010f4e2a.8c1f0100.00000000".
+/// In the format of Fast DDS and Cyclone DDS, for example "010f4e2a.8c1f0100.00000000".
 [[nodiscard]] inline std::string text_of(const ParticipantId& id) {
   std::string text;
   for (std::size_t i = 0; i < id.size(); ++i) {
@@ -33,34 +36,36 @@ using ParticipantId = std::array<std::uint8_t, 12>;
   return text;
 }
 
-/// One for every machine.
+/// Create one object per machine.
 class PublisherPin {
  public:
   using Instant = std::chrono::steady_clock::time_point;
 
-  /// The pinned participant sent nothing for so long: another one may be the next. abbe sends at 50
-  /// to 100 Hz.
+  /// Another participant can be pinned once the pinned one has sent nothing for this time. abbe
+  /// sends at 50 to 100 Hz.
   static constexpr std::chrono::milliseconds kSilence{300};
-  /// The next one has sent alone for so long. Pauses between its samples count up to kLongestPause,
-  /// so that a subscriber that stood still itself hears the pinned one before it takes another.
+  /// The next participant must have sent for kAlone while the pinned one sent nothing. A pause
+  /// between two of its samples counts as at most kLongestPause, so that a subscriber that was
+  /// suspended itself receives from the pinned participant before it pins another.
   static constexpr std::chrono::milliseconds kAlone{30}, kLongestPause{10};
-  /// Two participants that both sent within so long: the other one is a foreign. A restarted
-  /// publisher never is, because the one before has ended.
+  /// A participant is foreign if the pinned one still sends this long after its first sample. A
+  /// restarted publisher never is, because its predecessor has ended.
   static constexpr std::chrono::milliseconds kOverlap{100};
-  /// A foreign is accepted after this silence of the pinned one, and not before.
+  /// A foreign participant is pinned only after the pinned one has sent nothing for this time.
   static constexpr std::chrono::seconds kSilenceForRival{10};
-  /// So many are remembered; the one heard longest ago is forgotten.
+  /// At most this many other participants are remembered; the one with the oldest last sample is
+  /// dropped.
   static constexpr std::size_t kMostOthers = 7;
 
   enum class Verdict {
     Pinned,  ///< use the sample
-    /// use the sample, and what this participant sent before; nothing of the one before
+    /// use the sample and earlier ones of this participant; discard those of the previous one
     NewlyPinned,
-    Waiting,  ///< keep what it sent, do not use it
-    Foreign,  ///< the same, and report it
+    Waiting,  ///< keep the sample, do not use it
+    Foreign,  ///< keep the sample, do not use it, and report the participant
   };
 
-  /// A sample of this machine, on any topic, came from `from`.
+  /// Call it for every sample of this machine, on any topic; `from` is its sender.
   Verdict heard(const ParticipantId& from, Instant now) {
     if (pinned_ == from) {
       pinned_heard_ = now;
@@ -83,7 +88,7 @@ class PublisherPin {
 
   [[nodiscard]] const std::optional<ParticipantId>& pinned() const noexcept { return pinned_; }
 
-  /// Of others nothing needs to be kept.
+  /// False: the samples of this participant need not be kept.
   [[nodiscard]] bool remembers(const ParticipantId& id) const {
     return pinned_ == id || std::ranges::find(others_, id, &Other::id) != others_.end();
   }

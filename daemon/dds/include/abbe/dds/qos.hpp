@@ -1,6 +1,6 @@
 #pragma once
-/// The quality of service of every topic: the contract with subscribers, hence in code and not in
-/// the site's profile. Pure.
+/// The quality of service of every topic. It is the contract with the subscribers and therefore
+/// fixed in code, not in the profile of the site. Pure.
 
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
@@ -11,8 +11,8 @@ namespace abbe::dds {
 
 [[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(daemon::Topic topic);
 
-/// What a subscriber should ask for. Its lease on ModelState is what makes a dead or hung abbe-dds
-/// visible.
+/// The QoS that a subscriber should request. The lease on ModelState lets it detect an abbe-dds
+/// that has ended or hangs.
 [[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(daemon::Topic topic);
 
 }  // namespace abbe::dds

@@ -1,6 +1,6 @@
 #pragma once
-/// Readers of topics of abbe, for programs that subscribe: payloads as they arrive, by whom, and
-/// whether a publisher of ModelState is alive. Used by one thread.
+/// Readers of the abbe topics, for subscribers: the received payloads, their writers, and whether
+/// a writer of ModelState is alive. Used by one thread.
 
 #include <array>
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace abbe::dds {
 
-/// The GUID of a DDS writer. Every machine has a publisher with writers of its own.
+/// The GUID of a DDS writer. Every machine has its own publisher with its own writers.
 using WriterId = std::array<std::uint8_t, 16>;
 
 [[nodiscard]] ParticipantId participant_of(const WriterId& writer) noexcept;
@@ -30,22 +30,23 @@ class Readers {
  public:
   using OnArrival = std::function<void(const Arrival&)>;
 
-  /// `participant` must outlive the readers. Error Io: Fast DDS refuses one.
+  /// `participant` must outlive the readers. Error Io: Fast DDS does not create a reader.
   [[nodiscard]] static Result<Readers> create(Participant& participant,
                                               std::span<const daemon::Topic> topics);
   ~Readers();
   Readers(Readers&&) noexcept;
   Readers& operator=(Readers&&) noexcept;
 
-  /// Returns when something arrived, the liveliness of ModelState's writer changed, or the time is
-  /// over.
+  /// Returns when a sample has arrived, the liveliness of a ModelState writer has changed, or
+  /// `at_most` is over.
   void wait(std::chrono::milliseconds at_most);
 
-  /// Everything that has arrived, topic by topic in the order given to create(). Bytes are a
-  /// stranger's: decode them.
+  /// Calls `on_arrival` for every sample that has arrived, topic by topic in the order given to
+  /// create(). The payload is not validated and may come from any participant: use daemon::decode.
   void take(const OnArrival& on_arrival);
 
-  /// Whether this writer of ModelState keeps its lease; false also if ModelState was not asked for.
+  /// True while this writer of ModelState keeps its lease; false also if `topics` of create() did
+  /// not contain ModelState.
   [[nodiscard]] bool is_alive(const WriterId& writer) const;
 
  private:

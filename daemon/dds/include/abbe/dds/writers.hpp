@@ -1,5 +1,5 @@
 #pragma once
-/// One writer per topic of the table, in one participant. Used by one thread.
+/// One writer per abbe topic, in one participant. Used by one thread.
 
 #include <array>
 #include <chrono>
@@ -19,26 +19,26 @@ namespace abbe::dds {
 
 class Writers final : public daemon::DdsOutlet {
  public:
-  /// `participant` must outlive the writers. Error Io: Fast DDS refuses one (security permissions,
-  /// resources).
+  /// `participant` must outlive the writers. Error Io: Fast DDS does not create a writer (security
+  /// permissions, resources).
   [[nodiscard]] static Result<Writers> create(Participant& participant);
 
-  /// False if Fast DDS did not take it. A payload is written as it is.
+  /// Writes the payload unchanged. False if Fast DDS did not accept it.
   bool write(daemon::Topic topic, std::span<const std::byte> payload) override;
 
   void dispose(daemon::Topic topic, std::span<const std::byte> payload) override;
 
-  /// Says to the readers of ModelState: somebody answers for it.
+  /// Asserts the liveliness of the ModelState writer.
   void assert_liveliness() override;
 
-  /// Sends the announcement of a writer once more, to every participant that is known, with a
-  /// heartbeat of discovery. `index` < announced(). With DDS Security that is one more writer,
-  /// which has no readers: with every announcement Fast DDS sends a writer's keys to all of its
-  /// readers again, and Cyclone DDS 0.10 does not survive that (daemon/docs/dds.md, "Found again").
+  /// Repeats the announcement of a writer to every discovered participant, with a heartbeat of the
+  /// discovery protocol. `index` < announced(). With DDS Security only an additional writer without
+  /// readers is announced: with every announcement Fast DDS sends the keys of a writer to all of
+  /// its readers again, and that crashes Cyclone DDS 0.10 (daemon/docs/dds.md, "Found again").
   void announce(std::size_t index);
   [[nodiscard]] std::size_t announced() const noexcept { return announced_.size(); }
 
-  /// Waits until every reader has acknowledged ModelState, or the time is over.
+  /// Waits until every reader has acknowledged ModelState, at most `at_most`.
   void wait_for_state_acknowledged(std::chrono::milliseconds at_most);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// The JSON that an attachment of a recording holds. A request's path of 10^5 vertices is 7 MB.
+/// Parses the JSON of an attachment of a recording. A requested path of 10^5 vertices is 7 MB.
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/messages/recording_info.hpp"

@@ -1,17 +1,21 @@
 #pragma once
-/// The rules of abbe-dds, without DDS: what abbed hands over goes to an outlet, and abbed's silence
-/// is told to everybody.
-/// - alive: a beat sent within kSilence, however late it is read. Only then is anything but INVALID written,
-/// and liveliness asserted.
-/// - silent, or the socket closed: every ModelState known goes out once more as MODEL_INVALID, reason
-/// SOURCE_LOST; then
-///   nothing, so that the lease of ModelState's writer ends too.
-/// - back: durable topics go out again. The state only once abbed says it anew, so that no old ACTIVE comes
-/// to life.
-/// - durable topics are repeated as their traits say.
-/// - a vector's age counts what it waited on its way here; live samples that waited longer than kLongestWait
-/// are discarded.
-/// - slices of ErrorGrid beyond those of the newest grid are disposed. Used by one thread; time is handed in.
+/// The rules of abbe-dds, without DDS: forwards payloads from abbed to an outlet, and reports to
+/// the subscribers when abbed is silent. abbed proves that it runs by sending beats.
+///
+/// - Source alive: abbed sent the last beat within kSilence; the time of sending counts, not the
+///   time of reading. Only then samples other than MODEL_INVALID are written and liveliness is
+///   asserted.
+/// - Source silent, or socket closed: every known ModelState is written once more as MODEL_INVALID
+///   with reason SOURCE_LOST. After that nothing is written, so that the liveliness lease of the
+///   ModelState writer expires.
+/// - Source alive again: durable topics are written again, but ModelState only after abbed has sent
+///   it again. A stale ACTIVE is never republished.
+/// - Durable topics are repeated with the period of their traits.
+/// - The age of a compensation vector includes its delay on the way here. Live samples delayed by
+///   more than kLongestWait are discarded.
+/// - Slices of ErrorGrid with a number beyond those of the newest grid are disposed.
+///
+/// Used by one thread. The caller passes the time.
 
 #include <chrono>
 #include <cstddef>
@@ -25,12 +29,13 @@
 
 namespace abbe::daemon {
 
-/// Where the bridge writes to: DDS writers, or a list in a test.
+/// The output of the bridge: DDS writers, or a list in a test.
 class DdsOutlet {
  public:
   virtual ~DdsOutlet() = default;
-  virtual bool write(Topic topic, std::span<const std::byte> payload) = 0;  ///< false: refused
-  /// The instance this payload was written to is gone: nobody who comes late is to see it.
+  /// Returns false if the writer refused the payload.
+  virtual bool write(Topic topic, std::span<const std::byte> payload) = 0;
+  /// Disposes the instance that `payload` belongs to, so that late joiners do not receive it.
   virtual void dispose(Topic topic, std::span<const std::byte> payload) = 0;
   virtual void assert_liveliness() = 0;
 };
@@ -40,8 +45,8 @@ class DdsBridge {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kSilence{500};
   static constexpr std::chrono::milliseconds kAssertPeriod{200};
-  static constexpr std::chrono::milliseconds kLongestWait{
-      100};  ///< an older vector is of no use to a control
+  /// A machine control cannot use an older compensation vector.
+  static constexpr std::chrono::milliseconds kLongestWait{100};
 
   /// `outlet` must outlive the bridge.
   explicit DdsBridge(DdsOutlet& outlet);
@@ -49,25 +54,29 @@ class DdsBridge {
   DdsBridge(const DdsBridge&) = delete;
   DdsBridge& operator=(const DdsBridge&) = delete;
 
-  void
-  connected();  ///< a new abbed, which will say everything durable again: what the old one said is forgotten
-  /// `at`: when abbed said it. The age in the payload of a vector is changed in place.
+  /// A new connection to abbed. abbed sends all durable samples again, so the retained ones are
+  /// discarded.
+  void connected();
+  /// `at`: when abbed sent it. publish() changes the age in a Compensation payload in place.
   void beat(WallTime at, WallTime now);
   void publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now);
-  void lost();               ///< the socket closed, or abbe-dds is leaving
-  void cycle(WallTime now);  ///< silence, liveliness, repetition: call at least every 50 ms
+  void lost();  ///< the socket closed, or abbe-dds shuts down
+  /// Checks for silence, asserts liveliness, repeats durable topics. Call at least every 50 ms.
+  void cycle(WallTime now);
 
   [[nodiscard]] bool source_alive() const noexcept;
   [[nodiscard]] std::uint64_t written() const noexcept;
-  [[nodiscard]] std::uint64_t refused() const noexcept;   ///< by the outlet
-  [[nodiscard]] std::uint64_t outdated() const noexcept;  ///< live samples that had waited too long
+  [[nodiscard]] std::uint64_t refused() const noexcept;  ///< by the outlet, or malformed
+  /// Live samples discarded because they were delayed too long.
+  [[nodiscard]] std::uint64_t outdated() const noexcept;
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
-/// abbe-dds's end of the local socket: connects to abbed, again and again, and feeds the bridge.
+/// abbe-dds's end of the local socket: connects to abbed, reconnects after a loss, and passes the
+/// frames to the bridge.
 class DdsFeed {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
@@ -78,7 +87,8 @@ class DdsFeed {
   DdsFeed(const DdsFeed&) = delete;
   DdsFeed& operator=(const DdsFeed&) = delete;
 
-  /// One turn: waits at most kRetryPeriod for bytes, feeds every whole frame, then bridge.cycle().
+  /// Waits at most kRetryPeriod for bytes, passes every complete frame to the bridge, then calls
+  /// bridge.cycle().
   void cycle();
 
   [[nodiscard]] bool connected() const noexcept;

@@ -1,12 +1,15 @@
 #pragma once
-/// abbed's end of the local socket to abbe-dds. abbed listens, abbe-dds connects, so abbe-dds may
-/// die and come back. Nothing here ever blocks: what the socket does not take at once waits, newest
-/// per key, until it does; older live samples are dropped and counted, durable topics are all sent
-/// again to every new abbe-dds. A beat says that nothing durable waits any more. Used by one
-/// thread, the one that assembles snapshots, so that a hung abbed stops beating. The real-time
-/// threads never come here: it makes system calls and allocates. ModelState is to be published at
-/// least once a second: its age changes, and abbe-dds forgets it when abbed was silent, so that a
-/// stale ACTIVE is never published again.
+/// abbed's end of the local socket to abbe-dds. abbed listens and abbe-dds connects, so that
+/// abbe-dds can be restarted at any time.
+///
+/// - No call blocks. While the socket is full, the newest sample per key waits; older live samples
+///   are dropped and counted.
+/// - After each new connection all durable samples are sent again.
+/// - A beat is sent only when no durable sample waits.
+/// - One thread uses the link: the thread that assembles snapshots. If it hangs, the beats stop.
+/// - Not for real-time threads: makes system calls and allocates.
+/// - The caller must publish ModelState at least once a second: its age changes, and abbe-dds
+///   discards the state when abbed was silent, so that a stale ACTIVE is never republished.
 
 #include <chrono>
 #include <cstddef>
@@ -26,54 +29,59 @@ namespace abbe::daemon {
 
 struct DdsLinkCounters {
   std::uint64_t sent = 0;  ///< frames handed to the kernel completely, beats included
-  std::uint64_t dropped_live =
-      0;                      ///< live samples dropped: nobody connected, or a newer one came first
-  std::uint64_t refused = 0;  ///< payloads that are no CDR payload of their topic or too long
-  std::uint64_t connections = 0;  ///< how often an abbe-dds came
+  /// live samples dropped: not connected, or replaced by a newer one while waiting
+  std::uint64_t dropped_live = 0;
+  std::uint64_t refused = 0;      ///< payloads that are too long or not CDR of their topic
+  std::uint64_t connections = 0;  ///< accepted connections of abbe-dds
   std::uint64_t strangers = 0;    ///< connections of other processes or users, closed at once
 };
 
-/// Who may connect: the process that is supervised, else any process of the user abbed runs as.
+/// Which process may connect: the supervised abbe-dds; without supervision, any process of the user
+/// that abbed runs as.
 struct DdsLinkPeer {
-  DdsProcess* process = nullptr;  ///< outlives the link; also learns when it was asked and answered
+  /// Must outlive the link. The link also records the times of beats and answers in it.
+  DdsProcess* process = nullptr;
 };
 
 class DdsLink {
  public:
-  /// Wall time even with simulated devices: abbe-dds measures the beats with its own
-  /// CLOCK_MONOTONIC.
+  /// CLOCK_MONOTONIC, even with simulated devices: abbe-dds compares the beats with the same
+  /// clock.
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kBeatPeriod{100};
 
-  /// Creates the socket file (mode 0660) and listens. A file left by a dead abbed is replaced;
-  /// Error (Io) if a living one answers there, the path is too long for a socket (107 bytes), or
-  /// the directory is missing.
+  /// Creates the socket file (mode 0660) and listens. A socket file without a listener is
+  /// replaced. Error Io if another process listens there or the folder is missing; Error Usage if
+  /// the path is longer than a socket address allows (107 bytes).
   [[nodiscard]] static Result<DdsLink> listen(const std::filesystem::path& socket,
                                               DdsLinkPeer peer = {});
-  ~DdsLink();  ///< closes the connection (abbe-dds publishes INVALID) and removes the socket file
+  ~DdsLink();  ///< closes the connection (abbe-dds then publishes INVALID), removes the file
   DdsLink(DdsLink&&) noexcept;
   DdsLink& operator=(DdsLink&&) noexcept;
 
-  /// Hands over one payload as encode() made it. The key is read from the payload. `at`: the
-  /// instant the age in a live sample counts to; abbe-dds adds what the sample waits from then on.
+  /// Sends one payload made by encode(). The key is read from the payload. `at`: the time to which
+  /// the age in a live sample refers; abbe-dds adds the delay after that time.
   void publish(Topic topic, std::span<const std::byte> payload,
                WallTime at = WallTime::clock::now());
 
-  /// Says "I am alive". Call it every turn of the loop; it sends at most every kBeatPeriod.
+  /// Sends a beat, at most one per kBeatPeriod. Call every cycle.
   void beat(WallTime now);
 
-  /// Accepts an abbe-dds (a newer one replaces the older one), closes what others connect, takes
-  /// the answers to the beats, notices that abbe-dds left, sends what waits. Call every cycle.
+  /// Accepts connections of abbe-dds (a new one replaces the old one), closes connections of other
+  /// processes, reads the answers to the beats, detects that abbe-dds disconnected, and sends
+  /// waiting samples. Call every cycle.
   void poll();
 
   [[nodiscard]] bool connected() const noexcept;
-  /// Connected, and no beat is without an answer for longer than kUnanswered: else abbe-dds hangs.
+  /// True if connected and no beat is unanswered for longer than kUnanswered. Otherwise abbe-dds
+  /// hangs or is not connected.
   [[nodiscard]] bool answers() const noexcept;
   static constexpr std::chrono::seconds kUnanswered{1};
-  /// A literal: "connected", "does not answer", "waiting".
+  /// One of the literals "connected", "does not answer", "waiting" (not connected).
   [[nodiscard]] const char* state() const noexcept;
   [[nodiscard]] const DdsLinkCounters& counters() const noexcept;
-  [[nodiscard]] const DdsProcess* process() const noexcept;  ///< null: abbed does not supervise it
+  /// null: abbed does not supervise abbe-dds.
+  [[nodiscard]] const DdsProcess* process() const noexcept;
 
  private:
   struct State;

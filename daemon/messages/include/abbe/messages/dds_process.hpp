@@ -1,8 +1,8 @@
 #pragma once
-/// What is known of the process abbe-dds, shared without a lock by the two threads that deal with
-/// it: the supervisor's (main) writes how it started and ended, the hub's writes when it asked and
-/// was answered. Everybody reads. Two members may belong to two moments: they are for a report and
-/// for patience of seconds.
+/// State of the process abbe-dds, shared without a lock between two threads: the supervisor's
+/// thread (main) writes when it started and how it ended, the hub's thread writes the times of
+/// beats and answers. Any thread may read. Values read together may come from different times; they
+/// are used only for reports and for time limits of seconds.
 
 #include <sys/types.h>
 
@@ -17,11 +17,11 @@ namespace abbe::daemon {
 /// How abbe-dds ended.
 struct DdsEnd {
   int wait_status = 0;  ///< of waitpid()
-  bool hung = false;    ///< it was ended because it did not answer
+  bool hung = false;    ///< abbed stopped it because it did not answer
   std::chrono::system_clock::time_point when{};
 
-  [[nodiscard]] std::string text()
-      const;  ///< "signal 11 (Segmentation fault) at 2026-11-22T16:58:22Z"
+  /// "signal 11 (Segmentation fault) at 2026-11-22T16:58:22Z"
+  [[nodiscard]] std::string text() const;
 };
 
 class DdsProcess {
@@ -29,42 +29,41 @@ class DdsProcess {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kPause{500};
 
-  // The supervisor's thread.
+  // Called by the supervisor's thread.
   void started(pid_t pid, WallTime now) noexcept;
   void ended(const DdsEnd& end) noexcept;
   void restarted() noexcept { restarts_.fetch_add(1, std::memory_order_relaxed); }
 
-  // The hub's thread.
+  // Called by the hub's thread.
   void asked(WallTime now) noexcept;                                  ///< a beat was due
-  void answered(WallTime now) noexcept { store(answered_ns_, now); }  ///< abbe-dds has read one
+  void answered(WallTime now) noexcept { store(answered_ns_, now); }  ///< abbe-dds answered a beat
 
-  [[nodiscard]] pid_t pid() const noexcept {
-    return pid_.load(std::memory_order_relaxed);
-  }  ///< 0: none
+  /// 0: not running.
+  [[nodiscard]] pid_t pid() const noexcept { return pid_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t restarts() const noexcept {
     return restarts_.load(std::memory_order_relaxed);
   }
   [[nodiscard]] std::optional<DdsEnd> last_end() const noexcept;
 
-  /// How long abbe-dds has left the hub without an answer. It counts from its start until it has
-  /// answered once, and never while the hub itself does not ask: after a pause of kPause it begins
-  /// anew.
+  /// Time from the last answer of abbe-dds to the last beat of the hub. Before the first answer it
+  /// counts from the start of abbe-dds. If the hub sent no beat for longer than kPause, it counts
+  /// from the first beat after that pause.
   [[nodiscard]] std::chrono::nanoseconds silent_for() const noexcept;
-  [[nodiscard]] bool has_answered() const noexcept;  ///< since it was started
+  [[nodiscard]] bool has_answered() const noexcept;  ///< since its last start
 
  private:
   static void store(std::atomic<std::int64_t>& out, WallTime t) noexcept {
     out.store(t.time_since_epoch().count(), std::memory_order_relaxed);
   }
 
-  // relaxed: each value stands for itself, nothing else is published with it
+  // relaxed: each value is independent; no other data are published with it
   std::atomic<pid_t> pid_{0};
   std::atomic<std::uint64_t> restarts_{0};
-  std::atomic<std::int64_t> last_end_{
-      0};  // seconds UTC << 24 | hung << 16 | wait status; 0: none yet
+  // seconds UTC << 24 | hung << 16 | wait status; 0: it has not ended yet
+  std::atomic<std::int64_t> last_end_{0};
   std::atomic<std::int64_t> started_ns_{0};
   std::atomic<std::int64_t> asked_ns_{0};
-  std::atomic<std::int64_t> asks_since_ns_{0};  // without a pause
+  std::atomic<std::int64_t> asks_since_ns_{0};  // first beat after the last pause
   std::atomic<std::int64_t> answered_ns_{0};
 };
 

@@ -1,13 +1,14 @@
 #pragma once
-/// DDS Security with abbe's own keys: `abbe dds keys` makes a folder, `[dds] security` and the
-/// subscribers' `--security` name it. Without it anyone on the domain can publish as this machine.
-/// Ordinary world.
+/// DDS Security with keys made by abbe: `abbe dds keys` creates a folder of keys; `[dds] security`
+/// and the option `--security` of the subscribers give its path. Without DDS Security any
+/// participant of the domain can publish as this machine. Not for real-time threads.
 ///
-///   DIR/ca.key               key of the certificate authority, 0600: keep it away from the machine
-///   DIR/daemon/              identity of abbe-dds: may publish every topic of abbe
-///   DIR/subscriber-1/ ...    identity of one subscriber: may read every topic of abbe
-/// Each identity is complete, and can be copied to another computer by itself:
-///   identity_ca.crt, permissions_ca.crt, governance.p7s, identity.crt, identity.key (0600), permissions.p7s
+///   DIR/ca.key               key of the certificate authority, mode 0600: store it elsewhere
+///   DIR/daemon/              identity of abbe-dds: may publish all topics of abbe
+///   DIR/subscriber-1/ ...    identity of one subscriber: may read all topics of abbe
+/// Each identity is complete and can be copied to another computer on its own:
+///   identity_ca.crt, permissions_ca.crt, governance.p7s, identity.crt, permissions.p7s,
+///   identity.key (mode 0600)
 
 #include <chrono>
 #include <cstdint>
@@ -20,14 +21,16 @@
 
 namespace abbe::daemon {
 
-/// What it means that there are no keys, and what to do; for the log, `abbe status` and Health.
+/// The warning that DDS Security is off: what it means and what to do. For the log, `abbe status`
+/// and Health.
 [[nodiscard]] std::string dds_security_is_off(std::uint32_t domain);
 
-/// The participant profile that abbe's programs use, whatever else a site's file holds.
+/// The participant profile that abbe's programs use from the XML file of the site.
 inline constexpr const char* kDdsProfileName = "abbe";
 
-/// Keys are named, or that profile in the file of the site has dds.sec properties of its own:
-/// plugins for authentication and access. A file that is no XML is not.
+/// True if `security` is not empty, or if the profile kDdsProfileName in the XML file `profile` has
+/// the dds.sec properties for the authentication and access control plugins. False for a file that
+/// is not XML.
 [[nodiscard]] bool dds_is_secured(const std::filesystem::path& security,
                                   const std::filesystem::path& profile);
 
@@ -37,27 +40,27 @@ struct DdsKeysOptions {
   std::chrono::days validity{3650};
 };
 
-/// Makes the folder above: EC P-256, governance and permissions signed by a new certificate
-/// authority. Error: Refused if the folder has anything in it, Io if it cannot be written or
-/// OpenSSL fails; then nothing stays.
+/// Creates the folder described above: keys on EC P-256, governance and permissions signed by a new
+/// certificate authority. Error Refused if the folder is not empty. Error Io if it cannot be
+/// written or OpenSSL fails; the folder is then removed.
 [[nodiscard]] Result<void> make_dds_keys(const DdsKeysOptions& options,
                                          std::chrono::system_clock::time_point now);
 
 enum class DdsRole { Daemon, Subscriber };
 
-/// The files of one identity; all of them are there.
+/// The folder of one identity; all its files exist.
 struct DdsIdentity {
   std::filesystem::path folder;
 };
 
-/// `folder` is an identity, or what make_dds_keys() made: then daemon/ or subscriber-1/ in it.
-/// Error BadInput with what to do: a file is missing or cannot be read, the key is readable by
-/// everybody, or the certificate is not valid at `now`.
+/// `folder` is the folder of one identity, or a folder made by make_dds_keys(): then daemon/ or
+/// subscriber-1/ in it is used, depending on `role`. Error BadInput, with what to do, if a file is
+/// missing or unreadable, the key is readable by others, or the certificate is not valid at `now`.
 [[nodiscard]] Result<DdsIdentity> find_dds_identity(const std::filesystem::path& folder,
                                                     DdsRole role,
                                                     std::chrono::system_clock::time_point now);
 
-/// The properties of a participant, by the names Fast DDS gives them.
+/// The security properties of a participant: names as in Fast DDS, and values.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> dds_security_properties(
     const DdsIdentity& identity);
 

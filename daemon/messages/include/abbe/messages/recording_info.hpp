@@ -1,6 +1,6 @@
 #pragma once
-/// What a recording says about itself, written by the Recorder at the front of every file and given
-/// back by the RecordingReader. Pure data; safe to copy between threads.
+/// Description of a recording. The Recorder writes it at the start of every file, the
+/// RecordingReader returns it. Pure data; safe to copy between threads.
 
 #include <cstddef>
 #include <string>
@@ -13,26 +13,26 @@
 namespace abbe::daemon {
 
 /// MCAP metadata records "abbe.recording" (machine, utc_offset_ns, speed, part, follows),
-/// "abbe.configuration" (text, sha256) and "abbe.versions", each with entries_sha256 over all its
-/// other entries.
+/// "abbe.configuration" (text, sha256) and "abbe.versions". Each record has an entry entries_sha256
+/// over its other entries.
 struct RecordingInfo {
   std::string machine;
-  protocol::UtcOffset utc_offset;  ///< dates in the file = host time + this
-  double speed = 1.0;  ///< host time = speed x CLOCK_MONOTONIC; not 1 only with simulated devices
-  std::string configuration;  ///< the text of abbed.toml as it was read
-  std::vector<std::pair<std::string, std::string>>
-      versions;  ///< "abbe", "fastcdr", a device's firmware ...
+  protocol::UtcOffset utc_offset;  ///< UTC in the file = host time + utc_offset
+  double speed = 1.0;  ///< host time = speed x CLOCK_MONOTONIC; differs from 1 only in simulation
+  std::string configuration;  ///< the text of abbed.toml
+  /// name and version: "abbe", "fastcdr", firmware of a device ...
+  std::vector<std::pair<std::string, std::string>> versions;
 };
 
-/// A file kept inside a recording, so that it explains itself: the commanded path of a calibration,
-/// for example.
+/// A file stored inside a recording so that the recording is complete, for example the commanded
+/// path of a calibration.
 struct RecordingAttachment {
   std::string name;        ///< "path.csv"
   std::string media_type;  ///< "text/csv"
   std::string content;
 };
 
-/// Of the attachment that holds what a calibration was asked for: "calibration-otf.json",
+/// The name of the attachment with the request of a calibration: "calibration-otf.json",
 /// "calibration-evemu.json".
 inline constexpr std::string_view kRequestNamePrefix = "calibration-", kRequestNameSuffix = ".json";
 [[nodiscard]] constexpr bool is_calibration_request(std::string_view attachment_name) noexcept {

@@ -1,7 +1,7 @@
 #pragma once
-/// The topics abbe publishes over DDS, as abbed and abbe-dds both see them: number on the local
-/// socket, names, how long a sample counts, and where the key stands in a payload. The QoS that
-/// follows from it lives in abbe-dds. Pure, thread-safe, no allocation.
+/// The topics that abbe publishes over DDS, as abbed and abbe-dds use them: number on the local
+/// socket, names, lifetime of a sample, and position of the key in a payload. abbe-dds derives the
+/// QoS from these traits. Pure, thread-safe, no allocation.
 
 #include <array>
 #include <chrono>
@@ -13,7 +13,7 @@
 
 namespace abbe::daemon {
 
-/// The values cross the local socket: append only.
+/// The values are sent over the local socket: append only.
 enum class Topic : std::uint8_t {
   Snapshot = 0,
   Compensation = 1,
@@ -25,14 +25,14 @@ enum class Topic : std::uint8_t {
 };
 inline constexpr std::size_t kTopicCount = 7;
 
-/// before the payload: representation and options
+/// Encapsulation header of a payload: representation identifier and options.
 inline constexpr std::size_t kCdrHeaderBytes = 4;
 
 struct TopicTraits {
-  /// Live: only the newest sample counts, best effort, dropped rather than queued.
-  /// Durable: the newest per key is kept, sent again to whoever comes late, and repeated.
+  /// Live: only the newest sample is of use; best effort; a sample is dropped, not queued.
+  /// Durable: the newest sample per key is retained, sent to late joiners, and repeated.
   enum class Kind : std::uint8_t { Live, Durable };
-  /// Which leading members are the key of the IDL type.
+  /// The leading members of the IDL type that form its key.
   enum class Key : std::uint8_t { Machine, MachineAndNumber, MachineAndText };
 
   Topic topic;
@@ -40,19 +40,19 @@ struct TopicTraits {
   std::string_view type_name;  ///< "abbe::v1::Snapshot"
   Kind kind;
   Key key;
-  std::chrono::milliseconds
-      repeat{};  ///< durable: published at least this often, so that a missed late joiner heals
+  /// Period with which a durable topic is repeated, for a late joiner that missed a sample.
+  std::chrono::milliseconds repeat{};
 };
 
 [[nodiscard]] const TopicTraits& traits(Topic topic) noexcept;
 [[nodiscard]] std::span<const TopicTraits> all_topics() noexcept;
 [[nodiscard]] std::optional<Topic> topic_from(std::uint8_t value) noexcept;
 
-/// The key of a payload (CDR_LE with its 4-byte header): the leading members, exactly as they stand
-/// in the payload. Nothing if the bytes are not a payload or end within the key.
+/// The key of a payload (CDR_LE with its 4-byte header): the bytes of the leading members in the
+/// payload. nullopt if the bytes are not a payload or end within the key.
 struct PayloadKey {
-  std::span<const std::byte>
-      bytes;  ///< after the header up to the end of the key; equal bytes = same instance
+  /// From after the header to the end of the key. Equal bytes mean the same instance.
+  std::span<const std::byte> bytes;
   std::string_view machine;              ///< without its NUL
   std::optional<std::string_view> text;  ///< MachineAndText: the second text
   std::optional<std::uint32_t> number;   ///< MachineAndNumber: the number
@@ -60,16 +60,17 @@ struct PayloadKey {
 [[nodiscard]] std::optional<PayloadKey> payload_key(Topic topic,
                                                     std::span<const std::byte> payload) noexcept;
 
-/// How many slices the grid has that this payload of ErrorGrid is a part of. Nothing if it is none.
+/// Number of slices of the grid that this ErrorGrid payload belongs to. nullopt if `payload` is not
+/// an ErrorGrid.
 [[nodiscard]] std::optional<std::uint32_t> grid_slices(std::span<const std::byte> payload) noexcept;
 
-/// Writes sequence_number of a payload of ErrorModel or ErrorGrid, in place. False, and nothing
-/// changed, if it is none.
+/// Sets sequence_number in a payload of ErrorModel or ErrorGrid, in place. Returns false and
+/// changes nothing if `payload` is neither of them.
 [[nodiscard]] bool set_sequence_number(Topic topic, std::span<std::byte> payload,
                                        std::uint64_t number) noexcept;
 
-/// Adds to age_ns of a payload of Compensation, in place. False, and nothing changed, if it is
-/// none.
+/// Adds `more` to age_ns in a payload of Compensation, in place. Returns false and changes nothing
+/// if `compensation` is not such a payload.
 [[nodiscard]] bool add_to_age(std::span<std::byte> compensation,
                               std::chrono::nanoseconds more) noexcept;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A model as it is written, kept and exchanged: model.json. Lengths in the file are mm, errors um
-/// and urad, covariance in products of those; here everything is SI. What is written reads back to
-/// the same bits.
+/// The file model.json, in which a model is stored and exchanged. In the file lengths are in mm,
+/// errors in um and urad, covariances in products of these; in the structs all values are SI.
+/// Reading a written file gives bit-identical values.
 
 #include <cstddef>
 #include <filesystem>
@@ -25,7 +25,7 @@ struct ResidualFigures {
   friend bool operator==(const ResidualFigures&, const ResidualFigures&) = default;
 };
 
-/// How the model came about, in the terms every method shares.
+/// Statistics of the identification that all methods have in common.
 struct ModelStatistics {
   std::size_t samples = 0, lost_samples = 0;
   std::size_t observations = 0, unknowns = 0, rank = 0;
@@ -39,7 +39,7 @@ struct ModelStatistics {
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
 
-/// A model and where it came from.
+/// A model and its origin.
 struct ModelDocument {
   calib::VolumetricModel model;
   std::string method = "otf";
@@ -49,41 +49,43 @@ struct ModelDocument {
   protocol::UtcTime created{};
   ModelStatistics statistics;
   std::vector<InputFile> inputs;
-  std::optional<calib::Expansion> artefact{};  ///< of a ball array that counts as warm
-  /// What the recording of the run lacks; empty: nothing, or nothing was recorded on purpose. Such
-  /// a model is as sure as the data it was identified from, but no replay can check it.
+  /// Thermal expansion of the ball array, if it was corrected.
+  std::optional<calib::Expansion> artefact{};
+  /// What is missing in the recording of the run. Empty if the recording is complete, or if
+  /// recording was switched off. A gap does not affect the uncertainty of the model, but no replay
+  /// can check such a model.
   std::string recording_gap{};
 };
-/// For the verdict of a model whose recording has this gap.
+/// Text for the verdict of a model with this recording gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
-/// SHA-256 in hex over what the model *says* (method, chain, basis, nodes, gauge, tools,
-/// parameters, covariance, validity, and what warmth of a ball array was taken out of it), not over
-/// dates, inputs or statistics: the live model's hash equals the replay's.
+/// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
+/// parameters, covariance, validity, and the corrected thermal expansion of the ball array. Dates,
+/// inputs and statistics are not included, so that the live model and its replay have equal hashes.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 
-/// How people and the store call a model: 16 digits of a hash over model_hash() and the machine
-/// configuration it was made for. The same model found again under another configuration is another
-/// document: one is STALE where the other is ACTIVE.
+/// The name of a model in commands and in the store: 16 digits of a hash over model_hash() and the
+/// machine configuration of the model. An equal model for another machine configuration has another
+/// id: for a given configuration one of them is STALE when the other is ACTIVE.
 [[nodiscard]] std::string model_id(const ModelDocument& document);
 
 /// The text of model.json; the same document gives the same bytes.
 [[nodiscard]] std::string to_json(const ModelDocument& document);
 
-/// BadInput with every fault in Error::details. `file` only names the text in errors. A text whose
-/// recorded hash is not the hash of its content is refused.
+/// BadInput with the faults in Error::details. `file` is used only in error messages. A text whose
+/// stored hash differs from the hash of its content is refused.
 [[nodiscard]] Result<ModelDocument> parse_model(std::string_view text, const std::string& file);
 [[nodiscard]] Result<ModelDocument> read_model(const std::filesystem::path& file);
 
-/// `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad, of a model in
-/// polynomials.
+/// CSV with the columns `name,value,u,unit`: the coefficients of [Li OMM] Table 3 in mm and rad,
+/// for a polynomial model.
 [[nodiscard]] std::string to_coefficients_csv(const calib::evemu::EvemuModel& model);
 
-/// `name,position_mm,value,u,unit`
+/// CSV with the columns `name,position_mm,value,u,unit`.
 [[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model);
 
-/// Said where a candidate is not compared with the active model.
+/// Note in the verdict if a candidate is not compared with the active model.
 inline constexpr std::string_view kOfAnotherMachine =
-    "not compared with the active model: that one was made for another machine configuration";
+    "not compared with the active model: that model belongs to another machine configuration";
 
 }  // namespace abbe::daemon

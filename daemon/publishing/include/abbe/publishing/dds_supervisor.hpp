@@ -1,9 +1,13 @@
 #pragma once
-/// Starts abbe-dds as a child of abbed and starts it again when it ends: at once if it had been up
-/// for a while, after `first_delay` if a signal ends it at start, with a growing delay if it exits
-/// at start (bad profile, port in use). A child that does not answer the hub is killed and so
-/// started again. Knows its child by pid only; the child inherits none of abbed's capabilities.
-/// Used by one thread that is not real-time; never blocks but in the destructor.
+/// Starts abbe-dds as a child process of abbed and restarts it when it ends:
+/// - at once, if it ran for `steady_after` or longer;
+/// - after `first_delay`, if a signal ended it earlier;
+/// - after a delay that doubles from `first_delay` to `longest_delay`, if it exited earlier
+///   (invalid profile, port in use).
+///
+/// A child that does not answer the hub is killed and therefore restarted. The child is identified
+/// by its pid only and inherits no capabilities of abbed. Used by one thread, not a real-time one.
+/// Only the destructor blocks.
 
 #include <sys/types.h>
 
@@ -26,17 +30,17 @@ class DdsSupervisor {
   struct Options {
     std::filesystem::path program;       ///< abbe-dds
     std::vector<std::string> arguments;  ///< without argv[0]
-    int priority = 0;                    ///< SCHED_FIFO; 0, or not permitted: an ordinary process
-    std::chrono::milliseconds steady_after{
-        2000};  ///< alive this long: the next death is answered at once
-    std::chrono::milliseconds first_delay{100};  ///< after a death at start; doubles
+    int priority = 0;                    ///< SCHED_FIFO; 0, or not permitted: SCHED_OTHER
+    /// If the child ran for this time, it is restarted without delay.
+    std::chrono::milliseconds steady_after{2000};
+    std::chrono::milliseconds first_delay{100};
     std::chrono::milliseconds longest_delay{5000};
-    std::chrono::milliseconds stop_patience{
-        3000};  ///< destructor: SIGTERM, then this long, then SIGKILL
-    /// Outlives the supervisor; null: nobody asks the child whether it hangs.
+    /// Destructor: time from SIGTERM to SIGKILL.
+    std::chrono::milliseconds stop_patience{3000};
+    /// Must outlive the supervisor. null: a hanging child is not detected.
     DdsProcess* process = nullptr;
-    std::chrono::milliseconds hung_after{2000};       ///< no answer for this long
-    std::chrono::milliseconds hung_at_start{10'000};  ///< not one answer since its start
+    std::chrono::milliseconds hung_after{2000};       ///< time without an answer
+    std::chrono::milliseconds hung_at_start{10'000};  ///< before the first answer
   };
 
   /// Error (Io) if the program cannot be started at all (missing, not executable).
@@ -45,22 +49,22 @@ class DdsSupervisor {
   DdsSupervisor(DdsSupervisor&&) noexcept;
   DdsSupervisor& operator=(DdsSupervisor&&) noexcept;
 
-  /// Notices an end or a hang and starts again when it is time. Call every cycle, at least every
-  /// 50 ms.
+  /// Detects that the child ended or hangs, and restarts it when the delay is over. Call every
+  /// cycle, at least every 50 ms.
   void poll(WallTime now);
 
-  [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0 while there is none
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }  ///< 0: not running
   [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
-  /// How the last child ended; none: none has.
+  /// How the last child ended; nullopt: none has ended yet.
   [[nodiscard]] const std::optional<DdsEnd>& last_end() const noexcept { return last_end_; }
-  /// Why the next child cannot be started, which is tried again; empty: it can.
+  /// Why the last start failed; it is repeated. Empty: the last start succeeded.
   [[nodiscard]] const std::string& start_fault() const noexcept { return start_fault_; }
 
  private:
   explicit DdsSupervisor(Options options) : options_(std::move(options)) {}
   Result<void> spawn(WallTime now);
   void kill_if_hung() noexcept;
-  [[nodiscard]] bool reap(WallTime now);  ///< whether there is no child any more
+  [[nodiscard]] bool reap(WallTime now);  ///< true if the child has ended
   void stop() noexcept;
 
   Options options_;

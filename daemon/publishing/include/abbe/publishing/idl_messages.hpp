@@ -1,6 +1,6 @@
 #pragma once
-/// What the daemon knows, as the types of abbe_v1.idl. Copying and naming only: no mathematics
-/// beyond asking the model. Pure, thread-safe; allocates.
+/// Converts the daemon's data to the types of abbe_v1.idl. Only copies values and evaluates the
+/// model; no other mathematics. Pure, thread-safe; allocates.
 
 #include <cstdint>
 #include <string>
@@ -15,19 +15,19 @@
 
 namespace abbe::daemon {
 
-/// The model in force with what subscribers must know of it.
+/// The active model, with the data that subscribers need.
 struct ModelInForce {
   std::string id;
   std::string method;
   std::string estimator;
-  std::string
-      recording_sha256;  ///< of what was recorded when it was identified; empty: not recorded
+  /// SHA-256 of the recording of its identification; empty: not recorded.
+  std::string recording_sha256;
   protocol::UtcTime created{};
   protocol::HostTime active_since{};
   calib::VolumetricModel model;
 };
 
-/// How a publication is stamped.
+/// Machine, sequence number and time of a message.
 struct Stamp {
   std::string_view machine;
   std::uint64_t sequence_number = 0;
@@ -37,15 +37,15 @@ struct Stamp {
 [[nodiscard]] v1::Snapshot snapshot_message(const protocol::Snapshot&, protocol::UtcOffset,
                                             const Stamp&);
 [[nodiscard]] v1::ErrorModel model_message(const ModelInForce&, const Stamp&);
-/// V on calib::interpolation_grid() of 4096 nodes, in slices of the IDL's bound. cov_m2 includes
-/// what linear interpolation misses where every_node is false.
+/// V on calib::interpolation_grid() of at most 4096 nodes, in slices with the IDL's bound. If
+/// every_node is false, cov_m2 includes the error of the linear interpolation.
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const ModelInForce&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
                                            const ModelInForce*, std::chrono::nanoseconds validity,
                                            const Stamp&);
-/// V at the axis position of the live view, for the given tool; all zero and not inside without a
-/// model, for a tool it does not hold for, and where the axes are not known: ACTIVE becomes STALE
-/// then, in this very message.
+/// V at the axis position of the live view, for the given tool. The vector is zero and `inside`
+/// false if there is no model, if the model is not valid for this tool, or if the axis positions
+/// are not known. If they are not known, this message also has STALE instead of ACTIVE.
 [[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const ModelInForce*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,

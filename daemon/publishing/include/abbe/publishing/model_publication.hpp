@@ -1,7 +1,7 @@
 #pragma once
-/// A model as it is published: the payloads of ErrorModel and ErrorGrid, encoded where the model
-/// was read, because that takes long (4096 nodes with covariance). Who publishes them only fills in
-/// the sequence numbers. Pure, thread-safe; allocates.
+/// The payloads of ErrorModel and ErrorGrid of a model. Encoding takes long (4096 nodes with
+/// covariance), so it is done by the thread that reads the model. The publisher only sets the
+/// sequence numbers. Pure, thread-safe; allocates.
 
 #include <cstddef>
 #include <string_view>
@@ -12,13 +12,13 @@
 
 namespace abbe::daemon {
 
-/// The sequence numbers are 0.
+/// Encoded payloads with sequence number 0.
 struct ModelPublication {
   std::vector<std::byte> model;                ///< ErrorModel
   std::vector<std::vector<std::byte>> slices;  ///< ErrorGrid
 };
 
-/// Refused for a model that does not fit into the bounds of the IDL.
+/// Error Refused if the model exceeds the bounds of the IDL.
 [[nodiscard]] Result<ModelPublication> encode_model(const ModelInForce& model,
                                                     std::string_view machine);
 

@@ -1,8 +1,12 @@
 #pragma once
-/// Hands what the daemon knows to abbe-dds, each topic in its own rhythm: live vectors at their
-/// rates, model and grid when they change, state when it changes and every second (its age moves),
-/// health every second and when it changes. abbe-dds repeats durable topics for late joiners by
-/// itself. Rhythms run in wall time, also with simulated devices. Used by the hub's thread only.
+/// Sends the daemon's data to abbe-dds, each topic with its own timing:
+/// - live topics at their configured rates;
+/// - model and grid when they change;
+/// - state when it changes and every second, because its age changes;
+/// - health every second and when it changes.
+///
+/// abbe-dds repeats durable topics for late joiners. Periods are CLOCK_MONOTONIC time, also with
+/// simulated devices. Used by the hub's thread only.
 
 #include <array>
 #include <chrono>
@@ -23,20 +27,20 @@ namespace abbe::daemon {
 struct PublisherOptions {
   std::string machine;
   std::array<double, 3> tool_offset_m{};
-  double snapshot_hz = 50.0;       ///< 0: whenever something new came
-  double compensation_hz = 100.0;  ///< 0: whenever something new came
-  /// of a live vector, host time
+  double snapshot_hz = 50.0;       ///< 0: with every hub cycle that has new data
+  double compensation_hz = 100.0;  ///< 0: with every hub cycle that has new data
+  /// Validity of a compensation vector, in host time.
   std::chrono::nanoseconds validity = std::chrono::milliseconds{500};
-  std::string security_warning;  ///< what to report of DDS Security; empty: it is on
+  std::string security_warning;  ///< warning that DDS Security is off; empty: it is on
 };
 
-/// What may be said of the model in force at this moment.
+/// The present state of the active model.
 struct ModelStanding {
   v1::ModelStatus status = v1::ModelStatus::MODEL_NONE;
   std::string reason;
   const ModelInForce* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< of `model`
-  std::uint64_t revision = 0;  ///< changes whenever another model comes into force
+  std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
 };
 
 class Publisher {
@@ -45,19 +49,19 @@ class Publisher {
 
   Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc);
 
-  /// Every turn, behind what subscribers wait for: says the daemon is alive and lets the link
-  /// breathe.
+  /// Polls the link and sends a beat. Call every cycle, after the live topics, because subscribers
+  /// wait for those.
   void beat(WallTime wall);
-  /// Every turn in which something new came; the snapshot first, subscribers wait for it.
+  /// Call snapshot(), then compensation(), in every cycle that has new data.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
   void compensation(const protocol::Snapshot& view, const ModelStanding& standing,
                     protocol::HostTime now, WallTime wall);
-  /// Every turn.
+  /// Call every cycle. Sends the model if it is another one, and the state if it changed or is due.
   void model(const ModelStanding& standing, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);
 
-  /// Why the last message that could not be encoded was not sent; empty: all could.
+  /// Why the last message that was not sent could not be encoded; empty: all were encoded.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
   [[nodiscard]] const std::string& security_warning() const noexcept {
@@ -75,10 +79,11 @@ class Publisher {
   DdsLink link_;
   PublisherOptions options_;
   protocol::UtcOffset utc_;
-  std::vector<std::byte> payload_;  // reused
+  std::vector<std::byte> payload_;  // reused; keeps its capacity
   std::string refusal_;
   std::uint64_t sequence_number_ = 0;
-  /// How often a live vector may go; one that takes back what went before it goes at once.
+  /// Limits the rate of a live topic. A sample that marks axes of the previous sample as missing is
+  /// sent at once.
   struct Pace {
     WallTime next{};
     protocol::HostTime time{};

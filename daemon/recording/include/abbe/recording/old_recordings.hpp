@@ -1,6 +1,6 @@
 #pragma once
-/// What [recording] keep_days takes away. Reads the models, so it is not for the hub or the
-/// recorder. Ordinary world.
+/// Removes recordings older than [recording] keep_days. Reads all models, so do not call it from
+/// the threads of the hub or the recorder. Not real-time.
 
 #include <chrono>
 #include <filesystem>
@@ -15,17 +15,24 @@ struct KeepRule {
   std::filesystem::file_time_type now;
   std::chrono::hours keep{};  ///< [recording] keep_days
   std::string running;        ///< RecorderOptions::name of this run
-  /// How long this run has lasted without its clock being set.
+  /// Duration of this run since its start or since its clock was last set.
   std::chrono::nanoseconds lasted{};
 };
 
-/// Removes what abbed recorded in `directory` (abbe-*.mcap, abbe-*.mcap.part) and last wrote longer
-/// than `keep` ago. Ago: before now for what this run wrote, and for all once this run has lasted
-/// longer than `keep`; until then, for what former runs wrote, before the newest of their
-/// recordings, too: a clock that runs ahead does not make them old. What this run is writing
-/// (.part) stays. Kept is what any model in the store names among its inputs, and what is dated
-/// before there was an abbe: its clock was wrong. Returns what was removed. Nothing is removed if
-/// the store is not there or a model cannot be read: it might be the one that names a file.
+/// Removes recordings of abbed in `directory` (abbe-*.mcap, abbe-*.mcap.part) that were last
+/// written more than `keep` ago. Returns the removed files.
+///
+/// The age counts from `now` for files of this run, and for all files once this run has lasted
+/// longer than `keep`. Before that, the age of files of former runs counts from the newest of them,
+/// if that is earlier than `now`: so a clock that is wrongly ahead does not make them old.
+///
+/// These files are kept:
+/// - the file that this run is writing (.part);
+/// - every file that a model in the store names among its inputs;
+/// - files dated before the first version of abbe, because the clock was wrong then.
+///
+/// Nothing is removed if the store does not exist or a model cannot be read, because that model
+/// might name one of the files.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> remove_old_recordings(
     const std::filesystem::path& directory, const std::filesystem::path& store,
     const KeepRule& rule);

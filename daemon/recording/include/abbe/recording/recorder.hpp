@@ -1,33 +1,36 @@
 #pragma once
-/// Writes what was acquired into an MCAP file, so that a power cut, a kill or a full disk costs at
-/// most the chunk that was open. NAME.mcap.part while it grows, NAME.mcap once closed cleanly; both
+/// Writes acquired data to an MCAP file. A power cut, a kill or a full disk loses at most the open
+/// chunk. The file is NAME.mcap.part while it is written and NAME.mcap after a clean close; both
 /// are readable.
 ///
 /// Samples are XCDR1 messages of the IDL types (topics abbe/v1/TrackerPoint ..., schema encoding
-/// omgidl), dated in UTC = host time + UtcOffset; raw device bytes lie beside them. publish_time is
-/// the instant that a message describes, log_time when the hub took it: messages of one log_time
-/// are one turn of the hub, which a replay gives again as one. A chunk is closed at chunk_bytes or
-/// after chunk_period, written with its indexes by one pwrite and made durable (fdatasync) every
-/// sync_period.
+/// omgidl), dated in UTC = host time + UtcOffset. The raw device bytes are recorded in the same
+/// file. publish_time is the instant that a message describes, log_time the time at which the hub
+/// took it: messages with the same log_time belong to one cycle of the hub, and a replay delivers
+/// them in one cycle. A chunk is closed at chunk_bytes or after chunk_period, written with its
+/// indexes by one pwrite and made durable (fdatasync) every sync_period.
 ///
 /// A full or failing disk never stops the caller: record() and tick() cannot fail. The file is cut
-/// back to its last whole chunk and closed if there is room for that, messages are counted as lost,
-/// status() says why, and when there is room again recording goes on in NAME-2.mcap, NAME-3.mcap
-/// ... There the first message of every stream and device says in lost_before how many are missing.
-/// Where the disk reported an error (fdatasync, fsync), the file counts as damaged and is called
-/// NAME.damaged.mcap: Linux reports an error of write-back once, so a later success proves nothing.
-/// The last fault stays in status().last_fault.
+/// back to its last whole chunk, and closed if there is space for its end. Messages are counted as
+/// lost, and status() gives the reason. When there is space again, recording continues in
+/// NAME-2.mcap, NAME-3.mcap ... There lost_before of the first message of every stream and device
+/// is the number of missing messages.
+///
+/// After a disk error (fdatasync, fsync) the file counts as damaged and is renamed to
+/// NAME.damaged.mcap: Linux reports a write-back error only once, so a later success proves
+/// nothing. The last fault stays in status().last_fault.
 ///
 /// A file that has reached max_file_bytes is closed by the next tick(), flush() or attach(), and
-/// recording goes on in the next, too, but never while a calibration is running: its run lies in
-/// one file. Nothing is missing in between; calibrations that are over are not asked for again in
-/// the next file, nor searches for reference marks.
+/// recording continues in the next file, but never while a calibration is running: a run is always
+/// in one file. No message is lost in between. Requests for calibrations that have ended, and for
+/// searches for reference marks, are not repeated in the next file.
 ///
-/// Every further file stands for itself: its first messages repeat the last EnvironmentSample of
-/// each device (log_time and publish_time: when the file began, content: when it was measured), and
-/// its attachments are the datums still in force and which axes were not known (DatumState).
+/// Every further file can be replayed without the earlier ones: its first messages repeat the last
+/// EnvironmentSample of each device (log_time and publish_time: when the file began, content: when
+/// it was measured), and its attachments are the valid datums and the list of axes that are not
+/// referenced (DatumState).
 ///
-/// One thread uses it, in the ordinary world: it allocates and makes blocking system calls.
+/// Used by one thread. Not real-time: it allocates and makes blocking system calls.
 
 #include <chrono>
 #include <cstdint>
@@ -48,63 +51,66 @@ namespace abbe::daemon {
 struct RecorderOptions {
   std::filesystem::path directory;
   std::string name;  ///< without extension; neither NAME.mcap nor NAME.mcap.part may exist
-  /// at most this much is lost with a chunk, and
+  /// A chunk is closed at this size or age; a failure loses at most one chunk.
   std::size_t chunk_bytes = std::size_t{1024} * 1024;
-  std::chrono::nanoseconds chunk_period = std::chrono::milliseconds{500};  ///< at most this long
+  std::chrono::nanoseconds chunk_period = std::chrono::milliseconds{500};
   std::chrono::nanoseconds sync_period = std::chrono::seconds{1};
   std::chrono::nanoseconds retry_period =
       std::chrono::seconds{5};       ///< after the disk was full or failed
-  std::uint64_t min_free_bytes = 0;  ///< the disk counts as full when less than this is free
-  std::uint64_t max_file_bytes = 0;  ///< about; 0: one file, however large
+  std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
+  std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
 };
 
 struct RecorderStatus {
   enum class State : std::uint8_t {
     Recording,
-    DiskFull,  ///< messages are lost; tried again every retry_period
-    Failed,    ///< another I/O error; tried again likewise
+    DiskFull,  ///< messages are lost; retried every retry_period
+    Failed,    ///< another I/O error; messages are lost; retried every retry_period
     Closed,
   };
   State state = State::Closed;
   std::string fault;  ///< empty while Recording: "write rec.mcap.part: No space left on device"
-  std::string last_fault;      ///< stays when recording goes on, and says in which file that was
-  std::uint32_t faults = 0;    ///< how often recording was interrupted
+  /// kept after recording has resumed; then also names the file in which it resumed
+  std::string last_fault;
+  std::uint32_t faults = 0;    ///< number of interruptions of the recording
   std::filesystem::path file;  ///< the present (or last) file
-  std::uint32_t files = 0;     ///< how many were begun
+  std::uint32_t files = 0;     ///< number of files begun
   std::uint64_t bytes = 0;     ///< written to the present file in whole chunks
   std::uint64_t chunks = 0;    ///< written to all files
   std::uint64_t messages = 0;  ///< in those chunks
-  std::uint64_t lost = 0;      ///< messages that were to be recorded and are in no file
-  /// messages outside the bounds of the IDL (a device name > 32 characters)
+  std::uint64_t lost = 0;      ///< messages passed to record() that are in no file
+  /// messages not recorded because they exceed the bounds of the IDL (a device name > 32
+  /// characters)
   std::uint64_t refused = 0;
 };
 /// "recording", "disk full" ...
 [[nodiscard]] std::string_view name(RecorderStatus::State state) noexcept;
 
-/// The first `bytes` bytes of `file` have this hash: `head -c BYTES FILE | sha256sum`.
+/// The hash of the first `bytes` bytes of `file`: `head -c BYTES FILE | sha256sum`.
 struct RecordingDigest {
   std::string sha256;  ///< hex
   std::uint64_t bytes = 0;
   std::filesystem::path file;
-  /// What the recording lacks of the run asked for last: "12 messages of the run are missing".
+  /// What is missing of the calibration requested last: "12 messages of the run are missing".
   /// Empty: nothing.
   std::string gap;
 };
 
 class Recorder {
  public:
-  /// Wall time even with simulated devices: what a power cut costs does not run at simulated speed.
+  /// Wall time even with simulated devices: the data lost by a power cut depend on real time, not
+  /// on simulated time.
   using WallTime = std::chrono::steady_clock::time_point;
 
   /// Creates the file, and the directory if needed. Error (Io): a file of that name exists. A disk
-  /// that is full, read-only or failing is not an error: recording begins when it can be written.
+  /// that is full, read-only or failing is not an error: recording begins once it is writable.
   [[nodiscard]] static Result<Recorder> open(RecorderOptions options, RecordingInfo info,
                                              WallTime now);
   ~Recorder();  ///< closes cleanly if close() was not called
   Recorder(Recorder&&) noexcept;
   Recorder& operator=(Recorder&&) noexcept;
 
-  /// `taken`: when the hub had it; none: the instant it describes.
+  /// `taken`: when the hub took the sample; nullopt: the instant that the sample describes.
   using Taken = std::optional<protocol::HostTime>;
   void record(const protocol::TrackerPoint& point, std::string_view device, Taken taken = {});
   void record(const protocol::AxisSample& sample, std::string_view device, Taken taken = {});
@@ -114,28 +120,28 @@ class Recorder {
   void record(protocol::RawBytes bytes, Taken taken = {});
   void record(const v1::CalibrationEvent& event, Taken taken = {});
 
-  /// Written at once, and again into every later file of this recorder, except what was over by
-  /// then.
+  /// Writes the attachment at once, and again into every later file of this recorder, except
+  /// requests of calibrations and searches that have ended.
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// Call between two turns of the hub, at least every 100 ms: closes the chunk, syncs and retries
-  /// when it is time to.
+  /// Call between two cycles of the hub, at least every 100 ms: closes the chunk, syncs the file
+  /// and retries after a fault when these are due.
   void tick(WallTime now);
 
-  /// Between two turns of the hub: ends the open chunk now, so that everything recorded so far is
-  /// in the file and in digest().
+  /// Call between two cycles of the hub: closes the open chunk now, so that everything recorded so
+  /// far is in the file and in digest().
   void flush();
 
-  /// Something went wrong that only a defect or a lack of memory explains: the open chunk is lost,
-  /// the file is closed, and recording goes on in the next one after retry_period.
+  /// Reports an internal error or a lack of memory: the open chunk is lost, the file is closed, and
+  /// recording continues in the next file after retry_period.
   void fail(const std::string& what);
 
-  /// The hash of everything written to the present file until now.
+  /// The hash of everything written to the present file so far.
   [[nodiscard]] RecordingDigest digest() const;
 
-  /// Ends the file: chunk, indexes, footer, fsync, rename, fsync of the directory. The digest is
-  /// that of the finished file. Error (Io): it could not be finished and stays NAME.mcap.part,
-  /// readable up to its last whole chunk. A file that holds nothing is removed; its digest is
+  /// Ends the file: chunk, indexes, footer, fsync, rename, fsync of the directory. Returns the
+  /// digest of the finished file. Error (Io): the file could not be finished; it remains
+  /// NAME.mcap.part, readable up to its last whole chunk. An empty file is removed; its digest is
   /// empty.
   Result<RecordingDigest> close();
 

@@ -1,9 +1,10 @@
 #pragma once
-/// The recorder on a thread of its own, so that a slow disk never holds up the hub. What the hub
-/// hands over waits in memory; when more than `most_waiting_bytes` would wait, further batches are
-/// dropped and counted until the recorder has taken what waits, and the next message of every
-/// stream says in lost_before how many it were. All functions are for one thread, the hub's: it
-/// hands over without a lock and never waits for the recorder. Only dropped() is for any thread.
+/// Runs the recorder on its own thread, so that a slow disk never delays the hub. Batches from the
+/// hub wait in memory. If more than `most_waiting_bytes` would wait, further batches are dropped
+/// and counted until the recorder has taken the waiting ones; lost_before of the next message of
+/// every stream is the number dropped. All functions are for one thread, that of the hub, which
+/// hands over without a lock and never waits for the recorder. Only dropped() may be called from
+/// any thread.
 
 #include <cstdint>
 #include <future>
@@ -23,10 +24,10 @@ struct RecorderThreadOptions {
   std::string encoder = "encoder";
   std::string probe = "probe";           ///< the touch probe, or the measuring machine
   std::vector<std::string> environment;  ///< in the order of Config::environment
-  std::vector<std::string> devices;      ///< Batch::raw counts them
+  std::vector<std::string> devices;      ///< Batch::raw refers to them by index
   bool raw = true;                       ///< record the device bytes, too
-  /// Two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. The memory may be
-  /// locked.
+  /// Enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. Limited,
+  /// because the memory may be locked.
   std::size_t most_waiting_bytes = 64 << 20;
 };
 
@@ -45,14 +46,14 @@ class RecorderThread : public PipelineObserver {
   void hand_over(v1::CalibrationEvent event, protocol::HostTime taken);
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// Everything handed over before this call is on its way to the disk when the future is ready. A
-  /// broken promise if the recorder failed at it.
+  /// When the future is ready, everything handed over before this call has been written to the file
+  /// (not necessarily synced). The future reports a broken promise if the recorder failed.
   [[nodiscard]] std::future<RecordingDigest> digest();
-  /// As the recorder reported it last, at most two of its turns (40 ms) ago. Valid until the next
+  /// The last report of the recorder, at most two of its cycles (40 ms) old. Valid until the next
   /// call.
   [[nodiscard]] const RecorderStatus& status() const;
-  [[nodiscard]] std::uint64_t dropped()
-      const noexcept;  ///< messages handed over for which there was no room
+  /// Number of messages that were dropped because too much was waiting.
+  [[nodiscard]] std::uint64_t dropped() const noexcept;
 
  private:
   struct State;

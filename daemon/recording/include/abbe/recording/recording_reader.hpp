@@ -1,13 +1,13 @@
 #pragma once
-/// Opens a recording, complete or broken, and gives its messages in the order in which the hub took
-/// them, those of a topic in the order in which they were recorded: what `abbe replay` stands on.
-/// Whatever is damaged is passed over and said in losses(); whole chunks are always given, of a
-/// chunk cut off by the end of the file every whole message.
+/// Opens a recording, complete or damaged, and delivers its messages in the order in which the hub
+/// took them, and those of a topic in the order in which they were recorded. Used by `abbe replay`.
+/// Damaged parts are skipped and listed in losses(). All messages of undamaged chunks are
+/// delivered, and all whole messages of a chunk that is truncated by the end of the file.
 ///
-/// The file is mapped: views stay valid as long as the reader, and the file must not be shortened
-/// meanwhile (a Recorder shortens its own file only after a failed write). Checksums are checked
-/// when the file is opened. Const functions may be used by several threads, each with its own
-/// cursor.
+/// The file is mapped into memory: views stay valid as long as the reader exists, and the file must
+/// not be shortened during that time (a Recorder shortens its own file only after a failed write).
+/// Checksums are checked when the file is opened. Const functions may be used by several threads,
+/// each with its own cursor.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,34 +27,35 @@
 
 namespace abbe::daemon {
 
-/// What a checksum says of the recorded configuration.
+/// Result of the checksum test of the recorded configuration.
 enum class MetadataCheck : std::uint8_t {
   Right,
-  Unchecked,  ///< recorded before configurations had a checksum
+  Unchecked,  ///< the recording has no checksum: it is of an older version of abbe
   Damaged,
 };
 
-/// One damage: "cut off at byte 4711, inside a chunk: 12 of its messages could be read".
+/// A damaged part: "cut off at byte 4711, inside a chunk: 12 of its messages could be read".
 struct RecordingLoss {
-  std::uint64_t offset = 0;  ///< where in the file it begins
-  std::uint64_t bytes = 0;   ///< how many bytes of the file are affected
+  std::uint64_t offset = 0;  ///< of the damaged part in the file
+  std::uint64_t bytes = 0;   ///< its length
   std::string what;
-  /// Something inside is missing or wrong. Not so where only the end is missing, as after a kill or
-  /// a power cut, or only an index: what stands there is whole.
+  /// True if data within the recording are missing or wrong. False if only its end is missing, as
+  /// after a kill or a power cut, or only an index: all other data are undamaged.
   bool inside = true;
 };
 
-/// One message as it lies in the file.
+/// One message of the file.
 struct RecordedMessage {
   std::string_view topic;  ///< "abbe/v1/TrackerPoint"
-  // Host times: the file's UTC dates less the recorded offset.
-  protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a turn
-  /// The instant described; of what a former file handed on: when this one began.
+  // Host times: the UTC dates of the file minus the recorded offset.
+  protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a cycle
+  /// The instant that the message describes; for a message repeated from the previous file, the
+  /// beginning of this file.
   protocol::HostTime published;
   std::span<const std::byte> payload;  ///< CDR with its encapsulation header
 };
 
-/// Who wants what of a recording. What is left empty is not even decoded.
+/// Callbacks for the messages of a recording, by type. Messages without a callback are not decoded.
 struct RecordingSink {
   std::function<void(const protocol::TrackerPoint&, std::string_view device)> tracker_point;
   std::function<void(const protocol::AxisSample&, std::string_view device)> axis_sample;
@@ -65,15 +66,16 @@ struct RecordingSink {
   std::function<void(const v1::CalibrationEvent&)> calibration_event;
 };
 
-/// Decodes one message for whoever wants it. False: it is of a wanted topic, but cannot be decoded.
+/// Decodes a message and calls the callback of its type. False: the callback exists, but the
+/// message cannot be decoded.
 [[nodiscard]] bool deliver(const RecordedMessage& message, const RecordingSink& sink);
 
 class RecordingReader {
  public:
   class Cursor;
 
-  /// Error (Io): cannot be read. Error (BadInput): not a recording of this program (no MCAP magic,
-  /// or cut before the end of its metadata).
+  /// Error (Io): the file cannot be read. Error (BadInput): it is not a recording of abbe (no MCAP
+  /// magic, or truncated before the end of its metadata).
   [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file);
   ~RecordingReader();
   RecordingReader(RecordingReader&&) noexcept;
@@ -81,33 +83,35 @@ class RecordingReader {
 
   [[nodiscard]] const RecordingInfo& info() const noexcept;
   [[nodiscard]] const std::vector<RecordingAttachment>& attachments() const noexcept;
-  /// All metadata records by name, for people.
+  /// All metadata records by name, for display.
   [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata()
       const noexcept;
 
-  /// Closed by its recorder (whatever happened to it afterwards).
+  /// True if the recorder closed the file, even if it was damaged later.
   [[nodiscard]] bool closed_cleanly() const noexcept;
-  /// What is missing or was passed over; empty for a whole recording, also for one still open at a
-  /// chunk's end.
+  /// The missing and the skipped parts. Empty for a complete recording, and for one that is still
+  /// open and ends with a whole chunk.
   [[nodiscard]] std::span<const RecordingLoss> losses() const noexcept;
-  /// In one sentence what is damaged inside: "the recording is damaged: chunk 3 ... (and 2 more
-  /// places)". A model identified from it may be off by more than its uncertainty. Empty: nothing.
+  /// The damage within the recording in one sentence: "the recording is damaged: chunk 3 ... (and 2
+  /// more places)". A model identified from such a recording may be wrong by more than its
+  /// uncertainty. Empty: there is no such damage.
   [[nodiscard]] std::string damage() const;
   [[nodiscard]] MetadataCheck configuration_check() const noexcept;
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
   [[nodiscard]] std::uint64_t size_bytes() const noexcept;
-  /// When the first and the last message were taken; nothing if there are none.
+  /// When the hub took the first and the last message; nullopt if there are no messages.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
       const noexcept;
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
-  /// All messages by `taken`, those of equal time as they were recorded. None comes before the one
-  /// recorded before it in its topic, even if its log_time says so: once that was the instant
-  /// described.
+  /// All messages in the order of `taken`; those of equal time in the order of recording. Messages
+  /// of a topic always keep the order of recording, whatever their log_time: in recordings of older
+  /// versions log_time is the instant described.
   [[nodiscard]] Cursor messages() const;
-  /// All messages to the sink. Returns how many wanted ones could not be decoded.
+  /// Delivers all messages to the sink. Returns the number of messages that have a callback and
+  /// could not be decoded.
   std::uint64_t read(const RecordingSink& sink) const;
 
  private:
@@ -116,12 +120,12 @@ class RecordingReader {
   std::unique_ptr<State> state_;
 };
 
-/// Walks the messages once. Must not outlive its reader. Holds the message heads of the chunks
-/// around the present time.
+/// Iterates over the messages once. Must not outlive its reader. Keeps the message heads of the
+/// chunks near the current time.
 class RecordingReader::Cursor {
  public:
   [[nodiscard]] std::optional<RecordedMessage> next();
-  /// Share of the messages already given, 0 to 1.
+  /// Fraction of the messages already delivered, 0 to 1.
   [[nodiscard]] double progress() const noexcept;
   ~Cursor();
   Cursor(Cursor&&) noexcept;

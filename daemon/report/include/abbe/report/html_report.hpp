@@ -1,6 +1,6 @@
 #pragma once
-/// A page that explains a result: text, tables and charts in one file that needs no network, now or
-/// in ten years (Chart.js is inside). Builder; one thread.
+/// Builds an HTML page that explains a result: text, tables and charts. The page is one file and
+/// needs no network, because it contains Chart.js. One thread.
 
 #include <cstddef>
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace abbe::daemon {
 
-/// Points joined by lines. `u`, where given, is the standard uncertainty of y: drawn as a band of
-/// two either side.
+/// Points connected by lines. `u`, if not empty, is the standard uncertainty of y and is drawn as a
+/// band from y - 2 u to y + 2 u.
 struct Curve {
   std::string name;
   std::vector<double> x, y, u;
@@ -21,7 +21,7 @@ struct LineChart {
   std::vector<Curve> curves;
 };
 
-/// How often values occur, in `bins` equal steps from the smallest to the largest of all series.
+/// Counts of values in `bins` equal intervals from the smallest to the largest value of all series.
 struct Histogram {
   struct Series {
     std::string name;
@@ -32,11 +32,12 @@ struct Histogram {
   std::size_t bins = 40;
 };
 
-/// Arrows in a plane: each begins at its dot and is drawn `magnification` times as long as it is.
+/// Vectors in a plane: each is a line that begins at a dot and has `magnification` times the length
+/// of the vector.
 struct VectorChart {
   struct Arrow {
-    double x = 0.0, y = 0.0;    ///< where it begins, in the units of the axes
-    double dx = 0.0, dy = 0.0;  ///< the same units
+    double x = 0.0, y = 0.0;    ///< origin, in the units of the axes
+    double dx = 0.0, dy = 0.0;  ///< vector, in the same units
   };
   std::string title, x_label, y_label, name;
   std::vector<Arrow> arrows;
@@ -49,7 +50,7 @@ class HtmlReport {
 
   void heading(std::string_view);
   void paragraph(std::string_view);
-  /// Two columns: what, value.
+  /// A table of two columns: name, value.
   void facts(const std::vector<std::pair<std::string, std::string>>&);
   void table(const std::vector<std::string>& columns,
              const std::vector<std::vector<std::string>>& rows);
@@ -57,7 +58,7 @@ class HtmlReport {
   void chart(const Histogram&);
   void chart(const VectorChart&);
 
-  /// The whole page.
+  /// The complete page.
   [[nodiscard]] std::string text() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// What the reports of several methods have in common.
+/// Sections that the reports of several methods have in common.
 
 #include <string>
 #include <string_view>
@@ -17,13 +17,12 @@ namespace abbe::daemon {
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
 [[nodiscard]] std::vector<double> in_um(const std::vector<double>& lengths_m);
 
-/// The gate's verdict and what it stands on. `held_out`: "legs", "positions": what the fit did not
-/// see.
+/// The verdict of the gate and the values on which it is based. `held_out`: the observations that
+/// were excluded from the fit, "legs" or "positions".
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
                  int decimals = 2);
 
-/// Where a model comes from, what `more` there is to say of it, and the files this report was made
-/// from.
+/// The origin of a model, the additional rows `more`, and the input files of this report.
 void add_model_origin(HtmlReport& page, const ModelDocument& document,
                       const std::vector<InputFile>& inputs,
                       const std::vector<std::pair<std::string, std::string>>& more = {});

@@ -1,9 +1,10 @@
 #pragma once
-/// The CSV files people hand to abbe, read into SI. Every reader gives all faults of a file at once
-/// (at most 20, each "file:line:column: column name: what is wrong") and nothing of a file that has
-/// one: NaN and infinity, a missing or unknown column, a row too short or too long, time that does
-/// not ascend, a last line that does not end. Comma, one header row, lines that begin with # are
-/// comments, decimal point. Functions, safe from any thread.
+/// Reads the CSV files of the user and converts to SI. A reader reports all faults of a file at
+/// once (at most 20, each "file:line:column: column name: what is wrong"); a file with a fault is
+/// not used at all. Faults are NaN and infinity, a missing or unknown column, a row with too few or
+/// too many values, times that do not ascend, and a last line without newline. Format: comma as
+/// separator, decimal point, one header row; lines that begin with # are comments. The functions
+/// may be called from any thread.
 
 #include <cstddef>
 #include <filesystem>
@@ -21,19 +22,20 @@
 
 namespace abbe::daemon {
 
-/// path.csv: `x_mm,y_mm,z_mm[,feed_mm_per_min]`, at least two vertices, no two neighbours equal.
+/// path.csv: `x_mm,y_mm,z_mm[,feed_mm_per_min]`, at least two vertices; consecutive vertices
+/// differ.
 struct PathFile {
   InputFile source;
   std::vector<AxisPosition> vertices_m;
-  std::vector<double>
-      feed_m_per_s;  ///< as long as vertices_m, or empty if the file has no such column
-  std::vector<std::size_t> lines;  ///< of the vertices in the file
+  /// One per vertex; empty if the file has no such column.
+  std::vector<double> feed_m_per_s;
+  std::vector<std::size_t> lines;  ///< line in the file, one per vertex
 };
 [[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
 
 /// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or
-/// `time_s,x_mm,y_mm,z_mm[,status]`. Status is the device's: 0 good, 1 speed warning (still good),
-/// others mark a point that holds its place but is not used.
+/// `time_s,x_mm,y_mm,z_mm[,status]`. Status of the device: 0 valid, 1 speed warning (valid); a
+/// point with another status remains in the sequence but is not used.
 struct TrackerFile {
   InputFile source;
   std::vector<calib::otf::TrackerObservation> points;
@@ -60,12 +62,12 @@ struct PointsFile {
 };
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 
-/// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading and
-/// independent measurement there, each in its own frame; at least one.
+/// verification.csv: `x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm`: scale reading, and
+/// the independent measurement of the same point in the frame of the tracker; at least one.
 struct VerificationFile {
   InputFile source;
   std::vector<calib::verify::MeasuredPoint> points;
-  std::vector<std::size_t> lines;  ///< where each stands in the file; empty for points out of none
+  std::vector<std::size_t> lines;  ///< line of each point; empty if not read from a file
 };
 [[nodiscard]] Result<VerificationFile> read_verification_csv(const std::filesystem::path& file);
 [[nodiscard]] std::string to_verification_csv(std::span<const calib::verify::MeasuredPoint> points);

@@ -7,8 +7,8 @@
 
 namespace abbe::daemon {
 
-/// ":42", the line where the touches of the first position begin in which the calibrator is not
-/// seen; empty: it is seen in each.
+/// Finds the first position whose touches do not determine the pose of the calibrator, and returns
+/// the first line of that position as ":42". Empty if all positions are valid.
 [[nodiscard]] std::string line_not_seen(const TouchesFile& file,
                                         const calib::evemu::Calibrator& calibrator,
                                         const calib::evemu::ObserveOptions& options);

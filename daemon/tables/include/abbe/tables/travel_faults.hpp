@@ -1,5 +1,5 @@
 #pragma once
-/// Positions of a file against the travel of [axes].
+/// Checks that the positions of a file are within the travel of [axes].
 
 #include <filesystem>
 #include <span>
@@ -11,9 +11,9 @@
 
 namespace abbe::daemon {
 
-/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel, and the
-/// mistake (an axis reversed, two swapped, another unit) that would put all of them inside.
-/// `lines`: of the positions.
+/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel. The text
+/// also names a likely mistake in the file (an axis reversed, two axes swapped, another unit) if
+/// correcting it would put all positions inside. `lines`: line of each position.
 [[nodiscard]] Result<void> check_travel(const std::filesystem::path& file,
                                         std::span<const calib::Vector3> positions_m,
                                         std::span<const std::size_t> lines,

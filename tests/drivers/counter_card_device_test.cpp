@@ -135,7 +135,7 @@ TEST(CounterCardDevice, LatchesTheProbeToOneClockPeriodWithItsOwnTimer) {
 
 TEST(CounterCardDevice, SaysThatTheLatchIsAnAssumption) {
   CardBench bench;
-  EXPECT_THAT(bench.device->assumption(), HasSubstr("not yet seen on hardware"));
+  EXPECT_THAT(bench.device->assumption(), HasSubstr("not yet verified on hardware"));
 }
 
 TEST(CounterCardDevice, GivesTheCountAtTheIndexPulseAndNoLivePosition) {
@@ -264,7 +264,7 @@ TEST(CounterCardDevice, ReportsAClockThatRunsTooFast) {
   bench.cycles_for(12s);
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("the clock of channel 5 runs "));
   EXPECT_THAT(bench.device->status().last_fault,
-              HasSubstr(" ppm fast, a sound one at most 200 ppm"));
+              HasSubstr(" ppm fast, the limit is 200 ppm"));
   EXPECT_EQ(bench.device->status().faults, 1u);
   EXPECT_EQ(bench.device->status().state, "streaming");
   EXPECT_TRUE(has(bench.take_samples().back().head.flags, SampleFlag::ClockUnsettled));

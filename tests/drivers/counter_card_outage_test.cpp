@@ -123,7 +123,7 @@ TEST(CounterCardOutage, CountsBeginAnewAfterTheCardWasWithoutPower) {
       samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
   ASSERT_NE(first, samples.end());
   EXPECT_LT(first->position[0], 2e-3) << "from where it was set up, 50 ms before the first scan";
-  EXPECT_THAT(bench.device->status().last_fault, HasSubstr("did not go on"));
+  EXPECT_THAT(bench.device->status().last_fault, HasSubstr("did not continue"));
 }
 
 TEST(CounterCardOutage, AClockThatStandsElsewhereThanItMustIsAnotherSessionOfTheCard) {

@@ -48,7 +48,8 @@ TEST_F(LibusbLinkTest, OpensAnotherCardOnceAndNotAgainWhileItStaysPluggedIn) {
 TEST_F(LibusbLinkTest, TwoCardsAndNoSerialNumberAreSaidWithoutOpeningThemAgain) {
   fake_bus.devices = {&ours_, &other_};
   drivers::LibusbLink link{card(""), time_};
-  for (int i = 0; i < 10; ++i) EXPECT_THAT(opened(link), HasSubstr("2 are there (A, B)"));
+  for (int i = 0; i < 10; ++i)
+    EXPECT_THAT(opened(link), HasSubstr("2 such devices are connected (A, B)"));
   EXPECT_EQ(ours_.opened + other_.opened, 2);
 }
 

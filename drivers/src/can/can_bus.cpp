@@ -3,8 +3,9 @@
 namespace abbe::drivers {
 
 Result<void> CanBus::start_sync(std::chrono::nanoseconds) {
-  return tl::unexpected(Error{ErrorCode::BadConfiguration,
-                              "CAN " + name() + ": only SocketCAN sends the SYNC by itself"});
+  return tl::unexpected(
+      Error{ErrorCode::BadConfiguration,
+            "CAN " + name() + ": cyclic transmission of the SYNC needs SocketCAN"});
 }
 
 }  // namespace abbe::drivers

@@ -40,16 +40,17 @@ void EmergencyReports::on_emergency(Node& node, const can::Emergency& emergency,
   node.code = emergency.code;
   if (emergency.code == 0) return;
   node.latest = emergency;
-  node.unwell = now;
-  if (other || !node.told || now - *node.told >= kReportAgainAfter) ++node.to_tell;
+  node.disturbed_at = now;
+  if (other || !node.reported_at || now - *node.reported_at >= kReportAgainAfter) ++node.unreported;
 }
 
 std::optional<std::string> EmergencyReports::take_fault(HostTime now) {
   for (auto& node : nodes_) {
-    if (node.to_tell == 0 || !node.latest || (node.told && now - *node.told < kReportAgainAfter))
+    if (node.unreported == 0 || !node.latest ||
+        (node.reported_at && now - *node.reported_at < kReportAgainAfter))
       continue;
-    node.told = now;
-    const auto others = std::exchange(node.to_tell, 0u) - 1;
+    node.reported_at = now;
+    const auto others = std::exchange(node.unreported, 0u) - 1;
     auto text = fmt::format("encoder {} (node {}): {}", node.axis, node.id, text_of(*node.latest));
     if (others > 0) text += fmt::format(" and {} others", others);
     return text;
@@ -63,10 +64,10 @@ std::string EmergencyReports::condition(std::uint8_t absent_mask, HostTime now) 
     auto& node = nodes_[i];
     const bool absent = ((absent_mask >> i) & 1u) != 0;
     if (!absent && node.code == 0) {
-      if (node.to_tell == 0 && now - node.unwell >= kSettledAfter) node.latest.reset();
+      if (node.unreported == 0 && now - node.disturbed_at >= kSettledAfter) node.latest.reset();
       continue;
     }
-    node.unwell = now;
+    node.disturbed_at = now;
     text += fmt::format("{}{}{} (node {})", text.empty() ? "" : "; ", node.axis,
                         absent ? " missing" : "", node.id);
     if (node.latest) text += ": " + text_of(*node.latest);

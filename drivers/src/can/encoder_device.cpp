@@ -30,7 +30,7 @@ Result<std::unique_ptr<EncoderDevice>> EncoderDevice::create(const EncoderDevice
   if (options.sync == SyncSource::Kernel && !bus->has_sync()) {
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration,
-              fmt::format("CAN {}: the kernel sends a SYNC only on SocketCAN", bus->name())});
+              fmt::format("CAN {}: sync = \"kernel\" needs SocketCAN", bus->name())});
   }
   return std::unique_ptr<EncoderDevice>(new EncoderDevice(options, std::move(bus), time));
 }
@@ -61,15 +61,15 @@ void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
   if (!ensure_open(at_most)) return;
   follow_bus_off(cycle_end_);
 
-  // A thread that was held up reads what came meanwhile before it sends the next SYNC: the
-  // heartbeats among it are not late.
+  // After a delay of this thread, read the frames that have arrived before the next SYNC is sent:
+  // heartbeats among them are not late.
   const bool behind = is_behind(cycle_end_);
   if (sending_ && !behind) send_sync();
   if (sending_ && !bus_off()) send_configuration();
   if (open_) read_batch(time_.now(), behind ? std::chrono::nanoseconds{0} : at_most);
   if (behind) caught_up_ = all_read_;
 
-  if (open_) judge(cycle_end_);
+  if (open_) check_timeouts(cycle_end_);
   account(cycle_end_);
   show_state(cycle_end_);
 }
@@ -78,8 +78,8 @@ bool EncoderDevice::is_behind(HostTime now) const {
   return !caught_up_ && next_sync_ && now >= *next_sync_ + options_.receiver.sync_period;
 }
 
-/// What is due at `now`, by all that came before.
-void EncoderDevice::judge(HostTime now) {
+/// Checks all time-outs at `now`, after the frames that arrived before.
+void EncoderDevice::check_timeouts(HostTime now) {
   if (external()) return follow_external_sync(now);
   follow_foreign_sync(now);
   if (!sending_ || !all_read_ || bus_off()) return;
@@ -88,12 +88,12 @@ void EncoderDevice::judge(HostTime now) {
 }
 
 void EncoderDevice::follow_foreign_sync(HostTime now) {
-  if (bus_off()) return;                // its quiet says nothing about other producers
-  if (!all_read_ && !sending_) return;  // a SYNC may be among the rest
+  if (bus_off()) return;                // no SYNC can be received: silence proves nothing
+  if (!all_read_ && !sending_) return;  // unread frames may contain a SYNC
   const bool may_send = foreign_.may_send(now);
 
   if (may_send && !sending_) {
-    foreign_told_ = false;
+    foreign_reported_ = false;
     sending_ = true;
     supervisor_.start(now);
   } else if (!may_send && sending_) {
@@ -101,11 +101,11 @@ void EncoderDevice::follow_foreign_sync(HostTime now) {
   }
 
   const bool measured = foreign_.period() || now - foreign_.last() >= ForeignSync::kListenFor;
-  if (!foreign_.present() || !measured || std::exchange(foreign_told_, true)) return;
+  if (!foreign_.present() || !measured || std::exchange(foreign_reported_, true)) return;
   board_.fault(
       now, fmt::format(
                "CAN {}: another SYNC producer is on this bus{}: nothing is sent. To use its SYNC "
-               "set sync = \"external\"; else switch that producer off",
+               "set sync = \"external\"; otherwise switch that producer off",
                bus_->name(), every(foreign_.period())));
 }
 
@@ -114,20 +114,21 @@ void EncoderDevice::follow_external_sync(HostTime now) {
   const auto patience = std::max(ForeignSync::kListenFor, 3 * period);
   const bool missing = now - std::max(opened_at_, foreign_.last()) >= patience;
 
-  if (missing && all_read_ && !std::exchange(no_sync_told_, true))
+  if (missing && all_read_ && !std::exchange(no_sync_reported_, true))
     board_.fault(
         now,
-        fmt::format("CAN {}: no SYNC (080h) for {} ms: sync = \"external\" needs the machine's own",
-                    bus_->name(), patience / std::chrono::milliseconds{1}));
-  if (!missing) no_sync_told_ = false;
-  const auto heard = foreign_.period();
-  if (!heard || now - opened_at_ < ForeignSync::kListenFor) return;
-  const bool other = *heard < period * 9 / 10 || *heard > period * 11 / 10;
-  if (other && !period_told_)
+        fmt::format(
+            "CAN {}: no SYNC (080h) for {} ms: sync = \"external\" needs the SYNC of the machine",
+            bus_->name(), patience / std::chrono::milliseconds{1}));
+  if (!missing) no_sync_reported_ = false;
+  const auto measured = foreign_.period();
+  if (!measured || now - opened_at_ < ForeignSync::kListenFor) return;
+  const bool differs = *measured < period * 9 / 10 || *measured > period * 11 / 10;
+  if (differs && !period_reported_)
     board_.fault(
         now, fmt::format("CAN {}: the machine's SYNC comes{}, configured is sync_period_us = {}",
-                         bus_->name(), every(heard), period / std::chrono::microseconds{1}));
-  period_told_ = other;
+                         bus_->name(), every(measured), period / std::chrono::microseconds{1}));
+  period_reported_ = differs;
 }
 
 void EncoderDevice::stop_sending() {
@@ -151,7 +152,7 @@ bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
   auto ids = supervisor_.ids();
   ids.push_back(can::cob::kSync);
   if (const auto opened = bus_->open(ids); !opened) {
-    // The same refusal four times a second is one fault.
+    // Repeated attempts with the same refusal (four a second) are reported once.
     if (opened.error().text != refusal_) board_.fault(now, opened.error().text);
     refusal_ = opened.error().text;
     reopen_at_ = now + options_.reopen_after;
@@ -193,7 +194,7 @@ void EncoderDevice::follow_bus_off(HostTime now) {
     board_.fault(now, fmt::format("CAN {}: bus off", bus_->name()));
   } else if (sending_ && now - off_since_ <= ForeignSync::kShortBreak) {
     supervisor_.bus_recovered(now);
-  } else if (!external()) {  // what was on the bus meanwhile is not known: as after it was opened
+  } else if (!external()) {  // another producer may have appeared meanwhile: listen again
     stop_sending();
     foreign_.opened(now);
   }
@@ -225,12 +226,11 @@ void EncoderDevice::send_sync() {
   if (now < *next_sync_) return;
   const auto period = options_.receiver.sync_period;
   const auto late = now - *next_sync_;
-  *next_sync_ +=
-      period * (late / period + 1);  // on the grid; the receiver counts what was left out
-  if (late >= period) return;        // else two could follow each other closer than answers come
+  *next_sync_ += period * (late / period + 1);  // the receiver counts skipped periods
+  if (late >= period) return;  // the next SYNC could follow before the answers have arrived
 
   if (sync_under_way_.waits(now)) {
-    ++kept_back_;
+    ++withheld_syncs_;
     return;
   }
 
@@ -246,7 +246,7 @@ void EncoderDevice::send_configuration() {
 }
 
 bool EncoderDevice::send(const can::CanFrame& frame) {
-  const auto at = time_.now();  // before: no answer can be older than its question
+  const auto at = time_.now();  // before send(): no answer can have an earlier time
   if (const auto sent = bus_->send({&frame, 1}); !sent) {
     if (sent.error().code != ErrorCode::Unreachable) {
       close_bus(sent.error());
@@ -292,18 +292,18 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
     batch_count_ = came.size();
   }
 
-  for (const auto& received : std::span{batch_}.first(batch_count_)) look_at(received);
+  for (const auto& received : std::span{batch_}.first(batch_count_)) dispatch(received);
 }
 
-/// What the ordinary world does with a frame; the receiver sees it afterwards.
-void EncoderDevice::look_at(const ReceivedFrame& received) {
+/// The processing of a frame outside the RT path; receive() passes it to the receiver afterwards.
+void EncoderDevice::dispatch(const ReceivedFrame& received) {
   if (const auto report = can::decode_error_frame(received.frame)) {
     if (has(report->conditions, can::BusCondition::BusOff)) reopened_ = false;
     return;
   }
   if (received.echo) return;
   if (can::decode_sync(received.frame))
-    return foreign_.heard(received.time);  // no node of ours lives because of it
+    return foreign_.heard(received.time);  // does not show that a node is alive
   unreachable_ = false;
   last_heard_ = cycle_end_;
   together_.on_frame(received);

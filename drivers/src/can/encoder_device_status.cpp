@@ -1,4 +1,4 @@
-// What the encoder device makes known of itself: faults, state and condition. What it does is in
+// Status of the encoder device: faults, state and condition. Its operation is in
 // encoder_device.cpp.
 
 #include <fmt/format.h>
@@ -14,7 +14,7 @@ using protocol::HostTime;
 
 namespace {
 
-constexpr auto kToldAgainAfter = std::chrono::seconds{1};
+constexpr auto kRepeatReportAfter = std::chrono::seconds{1};
 
 }  // namespace
 
@@ -28,74 +28,74 @@ void EncoderDevice::account(HostTime now) {
 
   if (bus.refused != bus_seen_.refused) {
     board_.faults.add(bus.refused - bus_seen_.refused - 1);
-    board_.fault(now, fmt::format("CAN {}: read: {} datagrams that are no CAN frames", bus_->name(),
-                                  bus.refused - bus_seen_.refused));
+    board_.fault(now, fmt::format("CAN {}: read: {} datagrams without valid CAN frames",
+                                  bus_->name(), bus.refused - bus_seen_.refused));
   }
 
   bus_seen_ = bus;
   missed_seen_ = missed;
-  tell_of(kept_back_, kept_back_told_,
-          "SYNCs not sent: the one before has not left, or its echo comes later than a SYNC period",
-          now);
+  report_count(withheld_syncs_, withheld_reported_,
+               "SYNCs not sent: the previous SYNC was not transmitted, or its echo took longer "
+               "than a SYNC period",
+               now);
 
-  if (bus.strangers != strangers_told_.count)
-    tell_of(bus.strangers, strangers_told_,
-            fmt::format("datagrams from {}, which is not the peer: refused", bus_->stranger()),
-            now);
-  tell_of(receiver_.counters().short_frames, shorts_told_, "frames too short for a position", now);
-  tell_of_late_answers(now);
+  if (bus.strangers != strangers_reported_.count)
+    report_count(bus.strangers, strangers_reported_,
+                 fmt::format("datagrams from {}, which is not the peer: refused", bus_->stranger()),
+                 now);
+  report_count(receiver_.counters().short_frames, shorts_reported_,
+               "frames too short for a position", now);
+  report_late_answers(now);
 }
 
-/// The cause, not what follows from it: a tunnel that bundles makes late and second answers.
-void EncoderDevice::tell_of_late_answers(HostTime now) {
-  tell_of(together_.count(), bundled_told_,
-          "bundles of answers to several SYNCs: the tunnel holds frames back (cannelloni: give -t, "
-          "in us, well "
-          "below the SYNC period)",
-          now);
+/// Reports the cause only: a tunnel that bundles frames also causes late and second answers.
+void EncoderDevice::report_late_answers(HostTime now) {
+  report_count(together_.count(), bundled_reported_,
+               "bundles of answers to several SYNCs: the tunnel delays frames (cannelloni: set -t, "
+               "in us, well below the SYNC period)",
+               now);
   const auto& counters = receiver_.counters();
 
-  if (bundled_told_.at && now - *bundled_told_.at < 2 * kToldAgainAfter) {
-    duplicates_told_.count = counters.duplicate_frames;
-    late_told_ = {counters.late_frames, now};
+  if (bundled_reported_.at && now - *bundled_reported_.at < 2 * kRepeatReportAfter) {
+    duplicates_reported_.count = counters.duplicate_frames;
+    late_reported_ = {counters.late_frames, now};
     return;
   }
 
-  tell_of(counters.duplicate_frames, duplicates_told_,
-          "second answers in a cycle: a node answers later than a SYNC period, a SYNC left late, "
-          "the echo of a "
-          "SYNC was lost, or two nodes have one number",
-          now);
-  tell_of_many_late(now);
+  report_count(counters.duplicate_frames, duplicates_reported_,
+               "second answers in a cycle: a node answers later than a SYNC period, a SYNC was "
+               "transmitted late, the echo of a SYNC was lost, or two nodes have the same node ID",
+               now);
+  report_many_late(now);
 }
 
-/// A few late answers are lost cycles like any; many are how the bus is set up.
-void EncoderDevice::tell_of_many_late(HostTime now) {
+/// A few late answers are only counted. Many late answers have a cause in the set-up of the bus.
+void EncoderDevice::report_many_late(HostTime now) {
   constexpr std::uint64_t kMany = 20;
   const auto late = receiver_.counters().late_frames;
-  if (!late_told_.at || now - *late_told_.at < kToldAgainAfter) {
-    if (!late_told_.at) late_told_ = {late, now};
+  if (!late_reported_.at || now - *late_reported_.at < kRepeatReportAfter) {
+    if (!late_reported_.at) late_reported_ = {late, now};
     return;
   }
 
-  if (late - late_told_.count < kMany) {
-    late_told_ = {late, now};
+  if (late - late_reported_.count < kMany) {
+    late_reported_ = {late, now};
     return;
   }
 
-  tell_of(late, late_told_,
-          "answers after the end of their cycle: the tunnel (cannelloni -t) or the gateway holds "
-          "them back, "
-          "or the SYNC "
-          "period is too short",
-          now);
+  report_count(
+      late, late_reported_,
+      "answers after the end of their cycle: the tunnel (cannelloni -t) or the gateway delays "
+      "them, or the SYNC period is too short",
+      now);
 }
 
-void EncoderDevice::tell_of(std::uint64_t count, Told& told, std::string_view what, HostTime now) {
-  if (count == told.count || (told.at && now - *told.at < kToldAgainAfter)) return;
-  board_.faults.add(count - told.count - 1);
-  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - told.count, what));
-  told = {count, now};
+void EncoderDevice::report_count(std::uint64_t count, Reported& reported, std::string_view what,
+                                 HostTime now) {
+  if (count == reported.count || (reported.at && now - *reported.at < kRepeatReportAfter)) return;
+  board_.faults.add(count - reported.count - 1);
+  board_.fault(now, fmt::format("CAN {}: read: {} {}", bus_->name(), count - reported.count, what));
+  reported = {count, now};
 }
 
 void EncoderDevice::show_state(HostTime now) {
@@ -106,10 +106,11 @@ void EncoderDevice::show_state(HostTime now) {
   show_condition(now);
 }
 
-/// While nothing is asked of the nodes the state says it all.
+/// Empty while the nodes are not polled: then the state is sufficient.
 void EncoderDevice::show_condition(HostTime now) {
-  const bool asked = !bus_off() && (external() ? foreign_.present() && !no_sync_told_ : sending_);
-  auto text = asked ? emergencies_.condition(presence_.absent(), now) : std::string{};
+  const bool polled =
+      !bus_off() && (external() ? foreign_.present() && !no_sync_reported_ : sending_);
+  auto text = polled ? emergencies_.condition(presence_.absent(), now) : std::string{};
   if (text == condition_) return;
   board_.set_condition(now, text);
   condition_ = std::move(text);
@@ -121,7 +122,7 @@ const char* EncoderDevice::state_text(HostTime now) const {
   const bool all_absent = std::popcount(absent) == static_cast<int>(supervisor_.nodes());
 
   if (external()) {
-    if (no_sync_told_) return "no SYNC";
+    if (no_sync_reported_) return "no SYNC";
     if (!foreign_.present()) return "listening";
     return absent == 0 ? "streaming" : all_absent ? "silent" : "degraded";
   }

@@ -17,10 +17,11 @@ Result<void> check_axis(const EncoderAxis& axis) {
   if (!can::is_node_id(axis.node)) return refuse(name + ": node must be 1 to 127");
   if (axis.tpdo != 1 && axis.tpdo != 2) return refuse(name + ": TPDO must be 1 or 2");
   if (axis.scale && (*axis.scale == 0.0 || !std::isfinite(*axis.scale))) {
-    return refuse(fmt::format("{}: scale {} per count", name, *axis.scale));
+    return refuse(fmt::format("{}: scale {} per count is not possible", name, *axis.scale));
   }
   if (axis.wrap_counts == 1 || axis.wrap_counts >> 62 != 0) {
-    return refuse(fmt::format("{}: wraps after {} counts", name, axis.wrap_counts));
+    return refuse(fmt::format("{}: wrap_counts {}: 2 to 2^62 - 1 are possible, or 0", name,
+                              axis.wrap_counts));
   }
   return {};
 }
@@ -36,11 +37,11 @@ Result<void> check(const EncoderReceiverOptions& options) {
   if (options.sync_period.count() <= 0)
     return refuse("encoder bus: the SYNC period must be positive");
   if (options.answer_within > options.sync_period || options.answer_within.count() < 0) {
-    return refuse("encoder bus: the time for answers must lie within the SYNC period");
+    return refuse("encoder bus: the time for answers must be 0 to one SYNC period");
   }
 
   if (options.u_sampling_delay.count() < 0)
-    return refuse("encoder bus: an uncertainty cannot be negative");
+    return refuse("encoder bus: the uncertainty of the sampling delay must not be negative");
   for (std::size_t i = 0; i < options.axes.size(); ++i) {
     if (auto ok = check_axis(options.axes[i]); !ok) return ok;
     for (std::size_t j = 0; j < i; ++j) {

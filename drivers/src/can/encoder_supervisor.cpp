@@ -15,18 +15,18 @@ using protocol::HostTime;
 
 namespace {
 
-/// A node that boots twice within this is not configured twice: it would answer a storm with a
-/// storm.
+/// A second boot-up message within this time does not restart the configuration: otherwise every
+/// message of a node that boots repeatedly would cause further SDO traffic.
 constexpr std::chrono::milliseconds kBetweenStarts{50};
-/// A heartbeat from before the NMT start may still be on its way: believe the second one.
+/// The first non-operational heartbeat may have been sent before the NMT start: the second counts.
 constexpr unsigned kIdleBeats = 2;
-/// A node that has answered for so long is well again: its next fault is a new one.
+/// A node that has answered for this long has recovered: its next fault is reported again.
 constexpr std::chrono::seconds kSettledAfter{1};
 
 constexpr double kNanometresPerMetre = 1e9;
 
-/// What trying again does not change: it waits for another node, or for this one switched off and
-/// on.
+/// A repeated configuration would fail in the same way: wait for the boot-up message of a replaced
+/// or power-cycled node.
 bool is_final(const can::ConfigurationError& error) {
   switch (error.fault) {
     case ConfigurationFault::WrongStep:
@@ -46,7 +46,7 @@ std::string steps(const EncoderAxis& axis, std::uint32_t seen) {
   const double configured = std::abs(axis.scale.value_or(0.0)) * kNanometresPerMetre;
   if (axis.kind == AxisKind::Linear)
     return fmt::format("{} nm, configured is step_nm = {:.10g}", seen, configured);
-  return fmt::format("{} counts a revolution ({:.10g} nrad), configured is step_nrad = {:.10g}",
+  return fmt::format("{} counts per revolution ({:.10g} nrad), configured is step_nrad = {:.10g}",
                      seen, 2.0 * std::numbers::pi * kNanometresPerMetre / seen, configured);
 }
 
@@ -132,7 +132,7 @@ void EncoderSupervisor::stop() {
 void EncoderSupervisor::bus_recovered(HostTime now) {
   for (auto& node : nodes_) {
     resets_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, node.axis.node));
-    node.state = State::Waiting;  // the boot-up message starts it, or this time-out
+    node.state = State::Waiting;  // until the boot-up message or this time-out
     node.retry_at = now + options_.sdo.timeout;
   }
 }
@@ -160,14 +160,14 @@ void EncoderSupervisor::on_frame(const can::CanFrame& frame, HostTime now) {
 
 void EncoderSupervisor::on_sync(HostTime now) {
   for (auto& node : nodes_) {
-    if (node.state == State::Ready && !node.asked) node.asked = now;
+    if (node.state == State::Ready && !node.unanswered_sync) node.unanswered_sync = now;
   }
 }
 
 void EncoderSupervisor::on_position(Node& node, HostTime now) {
-  node.asked.reset();
+  node.unanswered_sync.reset();
   if (node.state == State::Ready && now - node.ready_at >= kSettledAfter)
-    node.told = ConfigurationFault::None;
+    node.reported = ConfigurationFault::None;
 }
 
 void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime now) {
@@ -176,21 +176,21 @@ void EncoderSupervisor::on_heartbeat(Node& node, can::NodeState state, HostTime 
       configure(node, now);
     return;
   }
-  if (node.state == State::Waiting && node.told == ConfigurationFault::Silent) {
-    return configure(node, now);  // it is back
+  if (node.state == State::Waiting && node.reported == ConfigurationFault::Silent) {
+    return configure(node, now);  // it sends heartbeats again
   }
   node.idle_beats = state == can::NodeState::Operational ? 0 : node.idle_beats + 1;
   if (node.state == State::Ready && node.idle_beats >= kIdleBeats) on_dropped(node, state, now);
 }
 
-/// It has left the state "operational" by itself. One that does so again and again is not
-/// configured without a pause.
+/// The node has left the state "operational" without a command. A node that does so repeatedly is
+/// configured at most once per retry_after.
 void EncoderSupervisor::on_dropped(Node& node, can::NodeState state, HostTime now) {
-  tell(node, ConfigurationFault::NotOperational,
-       fmt::format(
-           "encoder {} (node {}): left the state operational by itself ({}): is configured again",
-           node.axis.name, node.axis.node,
-           state == can::NodeState::Stopped ? "stopped" : "pre-operational"));
+  report(node, ConfigurationFault::NotOperational,
+         fmt::format("encoder {} (node {}): left the state operational without a command ({}): it "
+                     "is configured again",
+                     node.axis.name, node.axis.node,
+                     state == can::NodeState::Stopped ? "stopped" : "pre-operational"));
   if (now - node.ready_at >= kSettledAfter) return configure(node, now);
   node.state = State::Waiting;
   node.retry_at = now + options_.retry_after;
@@ -207,12 +207,13 @@ void EncoderSupervisor::on_time(HostTime now) {
         follow(node, now);
         break;
       case State::Ready:
-        if (!node.asked || now - *node.asked < options_.silence) break;
-        tell(node, ConfigurationFault::Silent,
-             fmt::format(
-                 "encoder {} (node {}): listen: no position for {} ms", node.axis.name,
-                 node.axis.node,
-                 std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
+        if (!node.unanswered_sync || now - *node.unanswered_sync < options_.silence) break;
+        report(
+            node, ConfigurationFault::Silent,
+            fmt::format(
+                "encoder {} (node {}): listen: no position for {} ms", node.axis.name,
+                node.axis.node,
+                std::chrono::duration_cast<std::chrono::milliseconds>(options_.silence).count()));
         configure(node, now);
         break;
     }
@@ -223,18 +224,18 @@ void EncoderSupervisor::follow(Node& node, HostTime now) {
   if (node.configurator.state() == can::EncoderConfigurator::State::Ready) {
     node.state = State::Ready;
     node.ready_at = now;
-    node.asked.reset();
+    node.unanswered_sync.reset();
   } else if (node.configurator.state() == can::EncoderConfigurator::State::Failed) {
     node.state = State::Waiting;
     const auto& error = node.configurator.error();
     node.retry_at = is_final(error) ? HostTime::max() : now + options_.retry_after;
-    tell(node, error.fault, describe(node.axis, error));
+    report(node, error.fault, describe(node.axis, error));
   }
 }
 
-void EncoderSupervisor::tell(Node& node, ConfigurationFault fault, std::string text) {
-  if (node.told != fault) faults_.push_back(std::move(text));
-  node.told = fault;
+void EncoderSupervisor::report(Node& node, ConfigurationFault fault, std::string text) {
+  if (node.reported != fault) faults_.push_back(std::move(text));
+  node.reported = fault;
 }
 
 std::optional<can::CanFrame> EncoderSupervisor::take_frame() {
@@ -261,7 +262,7 @@ HostTime EncoderSupervisor::deadline() const {
   for (const auto& node : nodes_) {
     const auto due = node.state == State::Waiting       ? node.retry_at
                      : node.state == State::Configuring ? node.configurator.deadline()
-                     : node.asked                       ? *node.asked + options_.silence
+                     : node.unanswered_sync             ? *node.unanswered_sync + options_.silence
                                                         : HostTime::max();
     earliest = std::min(earliest, due);
   }

@@ -24,9 +24,9 @@ void ForeignSync::opened(HostTime now) {
 void ForeignSync::heard(HostTime at) {
   may_send_ = false;
   quiet_since_ = at;
-  const bool anew = std::exchange(restarts_measuring_, false);
+  const bool restart = std::exchange(restarts_measuring_, false);
 
-  if (count_++ == 0 || anew) {
+  if (count_++ == 0 || restart) {
     first_ = at;
     intervals_ = 0;
     longest_ = {};

@@ -25,7 +25,8 @@ namespace {
 constexpr unsigned kSlots = CanBus::kMostRead;
 constexpr std::size_t kControlBytes = 256;
 
-/// What SO_RXQ_OVFL counts, among the frames: the controller would say the same of its own queue.
+/// Marks a loss that SO_RXQ_OVFL has counted among the frames. A CAN controller reports an overflow
+/// of its receive queue with the same error frame.
 can::CanFrame loss_mark() {
   return can::encode_error_frame(
       {.conditions = static_cast<can::BusConditions>(can::BusCondition::ReceiveOverflow)});
@@ -37,7 +38,7 @@ struct SocketCanBus::Batch {
   std::array<iovec, kSlots> io{};
   std::array<mmsghdr, kSlots> messages{};
   alignas(cmsghdr) std::array<std::array<char, kControlBytes>, kSlots> control{};
-  unsigned used = kSlots;  ///< slots that are not as recvmmsg wants them
+  unsigned used = kSlots;  ///< slots that must be initialised before the next recvmmsg
 
   void prepare() {
     for (unsigned i = 0; i < used; ++i) {
@@ -96,16 +97,15 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
 
   const can_err_mask_t errors = CAN_ERR_MASK;
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) != 0) {
-    return socket_error(ErrorCode::SystemRefused, name(), "ask for error frames", errno);
+    return socket_error(ErrorCode::SystemRefused, name(), "enable error frames", errno);
   }
 
   const int on = 1;
-  setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on,
-             sizeof on);  // find_interface() asks whether it matters
+  // The result is not used: find_interface() checks for CAN FD.
+  setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
 
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) != 0) {
-    return socket_error(ErrorCode::SystemRefused, name(), "ask for the echo of what is sent",
-                        errno);
+    return socket_error(ErrorCode::SystemRefused, name(), "enable the echo of sent frames", errno);
   }
 
   const int bytes_wanted = options_.receive_buffer_bytes;
@@ -118,7 +118,7 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
   return {};
 }
 
-/// The index of an interface that is there, is up, and carries what is wanted.
+/// Index of the interface. Error if it does not exist, is down, or lacks the required CAN FD.
 Result<int> SocketCanBus::find_interface() const {
   ifreq request{};
   options_.interface.copy(request.ifr_name, IFNAMSIZ - 1);
@@ -130,14 +130,15 @@ Result<int> SocketCanBus::find_interface() const {
 
   if (!ask(SIOCGIFINDEX)) return no("find the interface", errno);
   const int index = request.ifr_ifindex;
-  if (!ask(SIOCGIFFLAGS)) return no("look at the interface", errno);
+  if (!ask(SIOCGIFFLAGS)) return no("query the interface", errno);
   if ((request.ifr_flags & IFF_UP) == 0) return no("open (ip link set up)", ENETDOWN);
-  if (!ask(SIOCGIFMTU)) return no("look at the interface", errno);
+  if (!ask(SIOCGIFMTU)) return no("query the interface", errno);
 
   if (options_.require_fd && request.ifr_mtu < static_cast<int>(CANFD_MTU)) {
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration,
-              fmt::format("CAN {}: CAN FD is asked for: the interface is classic", name())});
+              fmt::format("CAN {}: CAN FD is required, but the interface supports classic CAN only",
+                          name())});
   }
 
   return index;
@@ -166,7 +167,7 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
   if (got < 0) {
     if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
       return socket_error(ErrorCode::SystemRefused, name(), "receive",
-                          errno);  // ENETDOWN: it went down
+                          errno);  // ENETDOWN: the interface is down
     if (errno == EINTR) return CanRead{.frames = count, .until = until};
     stamps_.nothing_older_than(begun);
     return CanRead{.frames = count, .all = true, .until = until};
@@ -195,7 +196,7 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
     }
     const auto frame = from_linux(batch_->frames[i], message.msg_len);
     if (!frame) continue;
-    // MSG_CONFIRM: sent by this socket, MSG_DONTROUTE: on this computer [Linux, networking/can].
+    // MSG_CONFIRM: sent by this socket; MSG_DONTROUTE: by this computer [Linux, networking/can].
     const bool by_us = (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0;
     const bool from_here = (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
     const bool by_the_kernel = kernel_sent_ && from_here;
@@ -211,7 +212,8 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
     }
   }
 
-  const bool at_end = static_cast<unsigned>(got) < slots;  // also of those that are not handed on
+  // The end of the queue was reached. Frames that are not delivered count as read.
+  const bool at_end = static_cast<unsigned>(got) < slots;
   if (at_end) stamps_.nothing_older_than(begun);
   return CanRead{.frames = count, .all = at_end && !held_, .until = until};
 }
@@ -221,7 +223,7 @@ Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
     sent_sync_ = sent_sync_ || can::decode_sync(frame).has_value();
     const auto out = to_linux(frame);
     if (write(fd_, &out.frame, out.size) >= 0) continue;
-    // A full transmit queue empties by itself, or the bus is off and an error frame says so.
+    // Not fatal: a full transmit queue empties again; bus-off is reported by an error frame.
     const bool passing = errno == ENOBUFS || errno == EAGAIN;
     return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send",
                         errno);
@@ -247,7 +249,7 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   if (connect(sync_fd_, any, sizeof address) != 0) return no("connect the broadcast manager");
 
   const auto sync = to_linux(can::encode_sync());
-  bcm_msg_head head;  // ends in an array of no length, which clang does not let us initialise
+  bcm_msg_head head;  // ends in a flexible array: clang rejects its initialisation
   std::memset(&head, 0, sizeof head);
   head.opcode = TX_SETUP;
   head.flags = SETTIMER | STARTTIMER;
@@ -255,8 +257,7 @@ Result<void> SocketCanBus::start_sync(std::chrono::nanoseconds period) {
   head.ival2 = {us / 1'000'000, us % 1'000'000};
   head.can_id = sync.frame.can_id;
   head.nframes = 1;
-  // The broadcast manager reads the frames right behind the head; a classic frame is the first
-  // CAN_MTU bytes.
+  // The frames follow the head in the same write; a classic frame is the first CAN_MTU bytes.
   std::array<std::byte, sizeof head + CAN_MTU> job{};
   std::memcpy(job.data(), &head, sizeof head);
   std::memcpy(job.data() + sizeof head, &sync.frame, CAN_MTU);

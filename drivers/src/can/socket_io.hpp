@@ -1,5 +1,5 @@
 #pragma once
-/// What the two socket transports share: waiting, stamps, error texts.
+/// Shared by the two socket transports: waiting, kernel timestamps, error texts.
 
 #include <fmt/format.h>
 #include <linux/errqueue.h>
@@ -26,25 +26,25 @@ inline tl::unexpected<Error> socket_error(ErrorCode code, std::string_view bus,
       Error{code, fmt::format("CAN {}: {}: {}", bus, what, std::strerror(error))});
 }
 
-/// Waits until there is something to read or `wall` has passed.
+/// Waits until `fd` is readable, at most `wall`.
 inline void wait_readable(int fd, std::chrono::nanoseconds wall) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   const auto ns = std::max<std::int64_t>(wall.count(), 0);
   const timespec timeout{static_cast<time_t>(ns / kSecond), static_cast<long>(ns % kSecond)};
   pollfd poll{fd, POLLIN, 0};
-  ppoll(&poll, 1, &timeout, nullptr);  // an interrupted wait is a short wait
+  ppoll(&poll, 1, &timeout, nullptr);  // interrupted: returns early
 }
 
-/// Asks for receive stamps of the kernel and, where there are any, of the hardware. The hardware's
-/// clock is another one and is not used yet. The kernel begins to stamp a little later, when a
-/// worker of its own has switched it on; frames that come before have no stamp. A refusal is no
-/// error: the user-space time, widened, remains.
+/// Enables software receive timestamps. Hardware timestamps are not used: they come from another
+/// clock. A kernel worker enables timestamping a little later; frames that arrive before that have
+/// no timestamp. A failure is not reported: then the user-space time is used, with widened
+/// uncertainty.
 inline void enable_stamps(int fd) {
   const int flags = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
   setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPING, &flags, sizeof flags);
 }
 
-/// The software stamp among the control messages.
+/// The software timestamp in the control messages; nullopt: none.
 inline std::optional<std::chrono::nanoseconds> stamp_of(msghdr& message) {
   for (auto* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPING) continue;

@@ -14,7 +14,7 @@ std::size_t node_of(const can::CanFrame& frame) {
 
 void SyncUnderWay::sent(HostTime at) {
   sent_ = at;
-  counted_ = Counted::NotYet;
+  substituted_ = Substituted::NotYet;
 }
 
 void SyncUnderWay::forget() {
@@ -24,12 +24,12 @@ void SyncUnderWay::forget() {
 }
 
 bool SyncUnderWay::waits(HostTime now) const {
-  const bool may_leave = sent_ && counted_ != Counted::ByItsAnswer && now < *sent_ + kPatience;
+  const bool may_leave = sent_ && substituted_ != Substituted::OnAnswer && now < *sent_ + kPatience;
   return may_leave || now < answers_until_;
 }
 
 HostTime SyncUnderWay::deadline() const {
-  return unheard() ? *sent_ + answer_within_ : HostTime::max();
+  return pending() ? *sent_ + answer_within_ : HostTime::max();
 }
 
 std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
@@ -40,39 +40,39 @@ std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<
       if (const auto sync = settle_echo(received)) out[n++] = *sync;
       continue;
     }
-    if (proves_that_it_left(received)) out[n++] = count(Counted::ByItsAnswer);
+    if (proves_transmission(received)) out[n++] = substitute(Substituted::OnAnswer);
     if (can::cob::is_tpdo(received.frame)) answered_.set(node_of(received.frame));
     out[n++] = received;
   }
-  if (all_read && now >= deadline()) out[n++] = count(Counted::ByTheDeadline);
+  if (all_read && now >= deadline()) out[n++] = substitute(Substituted::OnDeadline);
   return n;
 }
 
-/// What the receiver is to see of an echo.
+/// The frame for the receiver; nullopt if the receiver must not see this echo.
 std::optional<ReceivedFrame> SyncUnderWay::settle_echo(const ReceivedFrame& echo) {
-  if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // of one before
+  if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // earlier SYNC
   std::optional<ReceivedFrame> sync;
-  if (counted_ == Counted::NotYet) sync = echo.time_widened ? as_sent() : echo;
-  // Its cycle is over, and its answers come now: they must not meet the next one's.
-  if (counted_ == Counted::ByTheDeadline) answers_until_ = echo.time + period_;
+  if (substituted_ == Substituted::NotYet) sync = echo.time_widened ? as_sent() : echo;
+  // The SYNC was transmitted after its cycle: its answers must not mix with those of the next SYNC.
+  if (substituted_ == Substituted::OnDeadline) answers_until_ = echo.time + period_;
   sent_.reset();
   answered_.reset();
   return sync;
 }
 
-/// A node that has answered the SYNC before has no other one to answer.
-bool SyncUnderWay::proves_that_it_left(const ReceivedFrame& received) const {
-  return unheard() && can::cob::is_tpdo(received.frame) && received.time >= *sent_ &&
+/// The node has already answered the previous SYNC, so this answer belongs to the pending one.
+bool SyncUnderWay::proves_transmission(const ReceivedFrame& received) const {
+  return pending() && can::cob::is_tpdo(received.frame) && received.time >= *sent_ &&
          answered_.test(node_of(received.frame));
 }
 
-ReceivedFrame SyncUnderWay::count(Counted how) {
-  counted_ = how;
+ReceivedFrame SyncUnderWay::substitute(Substituted why) {
+  substituted_ = why;
   answered_.reset();
   return as_sent();
 }
 
-/// As if it had left when it was handed over.
+/// The SYNC as an echo with the time of send().
 ReceivedFrame SyncUnderWay::as_sent() const {
   return {.frame = can::encode_sync(), .time = *sent_, .time_widened = true, .echo = true};
 }

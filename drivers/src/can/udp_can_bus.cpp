@@ -15,11 +15,11 @@ using protocol::HostTime;
 
 namespace {
 
-/// Room in an Ethernet frame: a larger datagram would be cut into IP fragments, each of which can
-/// be lost.
+/// UDP payload of an Ethernet frame: a larger datagram would be split into IP fragments, each of
+/// which can be lost.
 constexpr std::size_t kDatagramBytes = 1472;
 
-/// A literal is taken as it is; a name is asked for, which may take its time.
+/// An address literal needs no look-up; the look-up of a name can block for seconds.
 Result<sockaddr_in> resolve(const std::string& host, std::uint16_t port) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
@@ -86,9 +86,10 @@ Result<void> UdpCanBus::open(std::span<const std::uint32_t> ids) {
   return bind_and_connect(*local, *peer);
 }
 
-/// The port is bound alone, so that a taken one is refused; then shared with a second socket of
-/// ours. Once the first one is connected the kernel gives it the peer's datagrams, and the second
-/// one all others: a flood of those takes no room from the peer.
+/// The port is bound without SO_REUSEPORT first, so that a port in use is refused; then a second
+/// socket of ours shares it. After connect() the kernel delivers the peer's datagrams to the first
+/// socket and all others to the second: a flood of foreign datagrams cannot fill the peer's receive
+/// queue.
 Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockaddr_in& peer) {
   const auto no = [this](std::string_view what) {
     const auto error = errno;
@@ -117,7 +118,7 @@ Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockadd
   return {};
 }
 
-/// Without it strangers are refused all the same, but not counted.
+/// If this fails, datagrams of other senders are still refused, but not counted.
 void UdpCanBus::listen_for_strangers(sockaddr_in local) {
   const int on = 1;
   setsockopt(fd_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on);
@@ -149,7 +150,7 @@ void UdpCanBus::count_strangers() {
     socklen_t size = sizeof from;
     auto* any = reinterpret_cast<sockaddr*>(&from);  // NOLINT: the sockets interface
     if (::recvfrom(stranger_fd_, nullptr, 0, MSG_DONTWAIT, any, &size) < 0) return;
-    // What the peer sent before the first socket was connected is lost, not refused.
+    // A datagram that the peer sent before connect() is lost; it does not count as refused.
     if (!is_peer(from)) count_stranger(from);
   }
 }
@@ -173,10 +174,10 @@ Result<CanRead> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanos
   return read;
 }
 
-/// The next datagram into the buffer. One that is no CAN datagram is counted and skipped; Unknown:
-/// many were, and there may be more.
+/// Reads the next datagram into the buffer. A datagram without valid CAN frames is counted and
+/// skipped. Unknown: the limit of skipped datagrams was reached; more datagrams may be queued.
 Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
-  for (unsigned skipped = 0; skipped < 64; ++skipped) {  // a flood of garbage must not keep us here
+  for (unsigned skipped = 0; skipped < 64; ++skipped) {  // bounded, also in a flood of them
     iovec io{buffer_.data(), buffer_.size()};
     alignas(cmsghdr) std::array<char, 256> control{};
     sockaddr_in from{};
@@ -194,7 +195,7 @@ Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
       const auto code = errno == ECONNREFUSED ? ErrorCode::Unreachable : ErrorCode::SystemRefused;
       return socket_error(code, name(), "receive", errno);
     }
-    if (!is_peer(from)) {  // it came before the socket was connected
+    if (!is_peer(from)) {  // it arrived before connect()
       count_stranger(from);
       continue;
     }

@@ -13,7 +13,7 @@ namespace {
 
 using protocol::RawBlock;
 
-constexpr std::size_t kMostTransferBytes = 16384;  // as the maker's library
+constexpr std::size_t kMostTransferBytes = 16384;  // as the manufacturer's library
 
 CounterCardOptions completed(const CounterCardOptions& options, const UsbLink& link) {
   CounterCardOptions all = options;
@@ -24,7 +24,7 @@ CounterCardOptions completed(const CounterCardOptions& options, const UsbLink& l
 }
 
 std::string seconds_text(double behind_s) {
-  return fmt::format("its clock channel is {:.3f} s {} where it must be", std::abs(behind_s),
+  return fmt::format("its clock channel is {:.3f} s {} its expected count", std::abs(behind_s),
                      behind_s < 0.0 ? "ahead of" : "behind");
 }
 
@@ -33,10 +33,11 @@ Result<void> check(const CounterCardOptions& options) {
     return tl::unexpected{
         Error{ErrorCode::BadConfiguration, fmt::format("{}: {}", options.name, what)}};
   };
-  if (auto fine = check(options.receiver.wiring); !fine) return fine;
-  if (options.transfer_time.count() <= 0) return refuse("the time of a transfer must be positive");
+  if (auto ok = check(options.receiver.wiring); !ok) return ok;
+  if (options.transfer_time.count() <= 0)
+    return refuse("the duration of a transfer must be positive");
   if (options.transfers_in_flight < 2) return refuse("at least 2 transfers must be in flight");
-  if (options.sample_every == 0) return refuse("a sample for every 0 scans");
+  if (options.sample_every == 0) return refuse("one sample for every 0 scans is not possible");
   return {};
 }
 
@@ -64,7 +65,7 @@ std::size_t transfer_bytes(const CounterCardOptions& options) {
 Result<std::unique_ptr<CounterCardDevice>> CounterCardDevice::create(
     const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
     CounterScanSink* sink) {
-  if (const auto fine = check(options); !fine) return tl::unexpected{fine.error()};
+  if (const auto ok = check(options); !ok) return tl::unexpected{ok.error()};
   const auto all = completed(options, *link);
   return std::unique_ptr<CounterCardDevice>{
       new CounterCardDevice{all, std::move(link), time, sink}};
@@ -89,8 +90,7 @@ CounterCardDevice::CounterCardDevice(const CounterCardOptions& options,
 CounterCardDevice::~CounterCardDevice() {
   try {
     if (session_.state() == CardState::Streaming) stop_scan();
-  } catch (
-      ...) {  // NOLINT(bugprone-empty-catch): out of memory; the card is disarmed when it is opened next
+  } catch (...) {  // NOLINT(bugprone-empty-catch): out of memory; the next open stops the scan
   }
 }
 
@@ -105,7 +105,7 @@ void CounterCardDevice::stop_scan() {
 
 bool CounterCardDevice::answered() {
   constexpr std::chrono::milliseconds kPatience{10};
-  constexpr int kMostWaits = 10;  // scans come in between
+  constexpr int kMostWaits = 10;  // scans arrive in between
   for (int i = 0; i < kMostWaits; ++i) {
     for (const auto& event : link_->wait(time_.wall(kPatience))) {
       if (std::holds_alternative<UsbControlDone>(event)) return true;
@@ -122,15 +122,14 @@ DeviceStatus CounterCardDevice::status() const {
 std::string CounterCardDevice::assumption() const {
   if (!rests_on_assumption(options_.receiver.wiring)) return {};
   return options_.name +
-         ": takes for granted that a latched counter gives, in a scan, its count at the latest "
-         "index edge; "
-         "not yet seen on hardware";
+         ": assumes that a latched counter delivers, in a scan, its count at the latest index "
+         "edge; not yet verified on hardware";
 }
 
 void CounterCardDevice::wait(std::chrono::nanoseconds at_most) {
   hand_over_scans();
   hand_over_events();
-  tell(CardTick{read_until_});
+  step_session(CardTick{read_until_});
   read_until_ = time_.now();
   const auto until_due = session_.deadline() - read_until_;
   events_ = link_->wait(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most)));
@@ -139,16 +138,16 @@ void CounterCardDevice::wait(std::chrono::nanoseconds at_most) {
   show();
 }
 
-/// What receive() made of the latest bytes.
+/// Passes the results of the latest receive() to the session.
 void CounterCardDevice::hand_over_scans() {
-  const auto anew = receiver_.counters().restarted;
-  if (anew != std::exchange(began_anew_seen_, anew))
-    tell(CardRestarted{seconds_text(receiver_.behind_s())});
-  if (const auto count = std::exchange(scans_, 0); count != 0) tell(CardScans{count});
+  const auto restarts = receiver_.counters().restarted;
+  if (restarts != std::exchange(restarts_seen_, restarts))
+    step_session(CardRestarted{seconds_text(receiver_.behind_s())});
+  if (const auto count = std::exchange(scans_, 0); count != 0) step_session(CardScans{count});
   if (!receiver_.out_of_step()) {
-    out_of_step_told_ = false;
-  } else if (!std::exchange(out_of_step_told_, true)) {
-    tell(CardOutOfStep{
+    out_of_step_reported_ = false;
+  } else if (!std::exchange(out_of_step_reported_, true)) {
+    step_session(CardOutOfStep{
         fmt::format("scans out of step: clock channel {} counted {} in one scan, {:.1f} expected",
                     options_.receiver.wiring.clock_channel, receiver_.refused_step(),
                     receiver_.expected_step())});
@@ -158,25 +157,24 @@ void CounterCardDevice::hand_over_scans() {
 void CounterCardDevice::hand_over_events() {
   for (const auto& event : std::exchange(events_, {})) {
     if (const auto* bulk = std::get_if<UsbBulkIn>(&event)) {
-      if (bulk->outcome != UsbOutcome::Done) tell(CardBulkFailed{bulk->outcome});
+      if (bulk->outcome != UsbOutcome::Done) step_session(CardBulkFailed{bulk->outcome});
     } else if (const auto* done = std::get_if<UsbControlDone>(&event)) {
-      tell(*done);
+      step_session(*done);
     } else if (const auto* lost = std::get_if<UsbLost>(&event)) {
       if (session_.connected()) raw_.push_bytes(cycle_end_, RawBlock::Direction::ToDevice, {});
-      tell(*lost);
+      step_session(*lost);
     } else if (const auto* opened = std::get_if<UsbOpened>(&event)) {
       raw_.push_bytes(cycle_end_, RawBlock::Direction::FromDevice, {});
       progress_.set_serial_number(opened->serial);
-      tell(*opened);
+      step_session(*opened);
     } else {
-      tell(UsbBulkStopped{});
+      step_session(UsbBulkStopped{});
     }
   }
 }
 
-void CounterCardDevice::tell(const CardInput& input) {
-  // An action that leaves nothing under way (starting the transfers) is followed by the next at
-  // once.
+void CounterCardDevice::step_session(const CardInput& input) {
+  // An action without a pending answer (start of the bulk transfers) is followed by the next one.
   for (bool again = act(session_.on(input, time_.now())); again;)
     again = act(session_.on(CardTick{read_until_}, time_.now()));
 }
@@ -210,7 +208,7 @@ void CounterCardDevice::report_clock() {
   constexpr double kPpm = 1e6;
   board_.fault(
       cycle_end_,
-      fmt::format("{}: the clock of channel {} runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: "
+      fmt::format("{}: the clock of channel {} runs {:.0f} ppm {}, the limit is {:.0f} ppm: "
                   "scans are marked ClockUnsettled; check the clock and clock_MHz",
                   options_.session.peer, options_.receiver.wiring.clock_channel,
                   kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",

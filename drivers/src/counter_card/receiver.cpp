@@ -1,13 +1,12 @@
-// Taking over the wiring; the rest runs in real time and is rt/counter_card_receiver.cpp.
+// Construction from the wiring; the real-time part is in rt/counter_card_receiver.cpp.
 #include "abbe/drivers/counter_card/receiver.hpp"
 
 namespace abbe::drivers {
 namespace {
 
-// Clock against pacer: two quartzes, each as far off the host's clock as the clock model believes
-// of any.
+// Relative rate error of clock and pacer: two quartzes, each with the limit of the clock model.
 constexpr double kQuartzDeviation = 2.0 * ClockModelOptions{}.max_skew;
-constexpr double kReading_counts = 2.0;  // each reading is whole periods
+constexpr double kReading_counts = 2.0;  // each reading is rounded to whole periods
 
 }  // namespace
 
@@ -36,7 +35,7 @@ CounterCardReceiver::CounterCardReceiver(const CounterCardReceiverOptions& optio
   if (options.goes_on_from) seed(*options.goes_on_from);
 }
 
-/// Counters are zeroed when they are set up: what they read is their count, but for whole rounds.
+/// A set-up zeroes the counters: a raw reading is the count modulo the counter's range.
 void CounterCardReceiver::seed(const CounterCardProgress& from) {
   const std::uint64_t round = quad08::modulus_of(width_) - 1;
   quad08::RawScan& last = last_.emplace();

@@ -10,7 +10,7 @@ namespace {
 
 using protocol::HostTime;
 
-constexpr unsigned kMostStatusTries = 100;  // as the maker's library
+constexpr unsigned kMostStatusTries = 100;  // as the manufacturer's library
 
 std::string in_milliseconds(std::chrono::nanoseconds d) {
   return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(d).count());
@@ -64,7 +64,7 @@ HostTime CounterCardSession::deadline() const {
     return expects_scans() ? std::min(overdue, last_scans_ + options_.silence) : overdue;
   }
   if (state_ == CardState::Streaming && !halt_) {
-    const auto silent = troubled_ ? retry_at_ : last_scans_ + options_.silence;
+    const auto silent = recovering_ ? retry_at_ : last_scans_ + options_.silence;
     return std::min(silent, next_status_);
   }
   return asked_at_;
@@ -93,32 +93,32 @@ CardAction CounterCardSession::take(const CardTick& tick, HostTime now) {
 
   if (asked_ || stopping_bulk_) {
     if (until - asked_at_ < options_.control_timeout)
-      return silent(until) ? trouble_of_silence(now) : CardAction{CardNothing{}};
+      return silent(until) ? restart_after_silence(now) : CardAction{CardNothing{}};
     return fail(now,
                 fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
   }
 
   if (state_ != CardState::Streaming) return next_step(now);
-  return !halt_ && silent(until) ? trouble_of_silence(now) : watch(now);
+  return !halt_ && silent(until) ? restart_after_silence(now) : watch(now);
 }
 
 bool CounterCardSession::expects_scans() const {
-  return state_ == CardState::Streaming && !halt_ && !troubled_;
+  return state_ == CardState::Streaming && !halt_ && !recovering_;
 }
 
 bool CounterCardSession::silent(HostTime until) const {
   return expects_scans() && until - last_scans_ >= options_.silence;
 }
 
-/// Also while the status is asked for: a card that is deaf answers neither.
-CardAction CounterCardSession::trouble_of_silence(HostTime now) {
-  return trouble(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
+/// Also called while a status request is pending: a card that has failed does not answer it.
+CardAction CounterCardSession::restart_after_silence(HostTime now) {
+  return restart_scan(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
 }
 
-/// Streaming, and nothing under way.
+/// Called while streaming, with no pending request.
 CardAction CounterCardSession::watch(HostTime now) {
   if (halt_) return halt(now);
-  if (troubled_ && now >= retry_at_) return trouble(now, {});
+  if (recovering_ && now >= retry_at_) return restart_scan(now, {});
   if (now < next_status_) return CardNothing{};
   next_status_ = now + options_.status_period;
   return send(quad08::read(quad08::Register::Acquisition), now);
@@ -135,9 +135,10 @@ CardAction CounterCardSession::take(const UsbOpened& opened, HostTime now) {
   if (state_ != CardState::Opening) return CardNothing{};
   if (set_up_ && opened.serial != serial_) {
     set_up_ = false;
-    report(fmt::format(
-        "{}: its serial number is \"{}\", the counters of \"{}\" were set up: these begin anew",
-        options_.peer, opened.serial, serial_));
+    report(
+        fmt::format("{}: its serial number is \"{}\", the card set up before is \"{}\": its "
+                    "counters restart at 0",
+                    options_.peer, opened.serial, serial_));
   }
   serial_ = opened.serial;
   enter(CardState::Testing);
@@ -169,8 +170,8 @@ CardAction CounterCardSession::send(const usb::Setup& setup, HostTime now) {
   return CardControl{setup};
 }
 
-/// One transfer that failed says nothing about the card: every request may be sent twice. Not so a
-/// wrong answer.
+/// A failed or refused transfer is repeated, up to control_tries: a single failure does not
+/// indicate a defective card. A request with a wrong answer is not repeated.
 std::optional<CardAction> CounterCardSession::send_again(const UsbControlDone& done, HostTime now) {
   if (done.outcome == UsbOutcome::Done || tries_ >= options_.control_tries) return std::nullopt;
   const unsigned tries = tries_ + 1;
@@ -214,8 +215,8 @@ CardAction CounterCardSession::stage_done(HostTime now) {
   return CardNothing{};
 }
 
-/// With its own timer as the clock the counters are set up while it stands: they begin with it, in
-/// step.
+/// With the card's own timer as the clock, the counters are set up while the timer is stopped: they
+/// start with it, from a common zero.
 void CounterCardSession::enter_setting_up() {
   enter(CardState::SettingUp);
   const auto& wiring = options_.wiring;
@@ -261,7 +262,7 @@ CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
     enter(CardState::Streaming);
     last_scans_ = now;
     next_status_ = now + options_.status_period;
-    if (troubled_) retry_at_ = now + options_.retry_after;
+    if (recovering_) retry_at_ = now + options_.retry_after;
     return CardNothing{};
   }
 
@@ -284,9 +285,10 @@ CardAction CounterCardSession::refused_step(const quad08::Step& step, const UsbC
 
 CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
   if (state_ == CardState::Streaming) {
-    if (status.overrun()) return trouble(now, fmt::format("overrun (status {:03X}h)", status.bits));
+    if (status.overrun())
+      return restart_scan(now, fmt::format("overrun (status {:03X}h)", status.bits));
     if (status.hardware_error())
-      return trouble(now, fmt::format("hardware error (status {:03X}h)", status.bits));
+      return restart_scan(now, fmt::format("hardware error (status {:03X}h)", status.bits));
     return CardNothing{};
   }
 
@@ -322,45 +324,46 @@ CardAction CounterCardSession::take(const UsbLost& lost, HostTime now) {
 CardAction CounterCardSession::take(const CardScans& scans, HostTime now) {
   if (scans.count == 0) return CardNothing{};
   last_scans_ = now;
-  troubled_ = resuming_ = false;
+  recovering_ = resuming_ = false;
   scans_since_fault_ = true;
   return CardNothing{};
 }
 
-CardAction CounterCardSession::take(const CardRestarted& anew, HostTime now) {
-  return state_ == CardState::Streaming && !halt_ ? set_up_again(now, anew.seen)
+CardAction CounterCardSession::take(const CardRestarted& restarted, HostTime now) {
+  return state_ == CardState::Streaming && !halt_ ? set_up_again(now, restarted.seen)
                                                   : CardAction{CardNothing{}};
 }
 
-/// The counters stand or are others: the card was without power, or somebody else used it.
+/// The counters have not continued: the card lost its power, or another program has used it.
 CardAction CounterCardSession::set_up_again(HostTime now, const std::string& seen) {
-  report(fmt::format("{}: its counters did not go on{}{}: they are set up and begin anew",
+  report(fmt::format("{}: its counters did not continue{}{}: they are set up and restart at 0",
                      options_.peer, seen.empty() ? "" : ", ", seen));
-  set_up_ = resuming_ = troubled_ = false;
+  set_up_ = resuming_ = recovering_ = false;
   halt_ = true;
   return asked_ ? CardAction{CardNothing{}} : watch(now);
 }
 
-/// Torn bytes look like a clock that stands, too (another counter's in its place): once the scan is
-/// started anew.
+/// Bytes that are shifted within the stream also look like a stopped clock (another counter is read
+/// in its place). Therefore the scan is restarted once before the counters are set up again.
 CardAction CounterCardSession::take(const CardOutOfStep& out, HostTime now) {
   if (state_ != CardState::Streaming || halt_) return CardNothing{};
   if (resuming_ && std::exchange(resumed_again_, true)) return set_up_again(now);
-  return trouble(now, out.seen);
+  return restart_scan(now, out.seen);
 }
 
 CardAction CounterCardSession::take(const CardBulkFailed& failed, HostTime now) {
   if (state_ != CardState::Streaming || halt_) return CardNothing{};
-  return trouble(now, failed.outcome == UsbOutcome::Stalled ? "scan endpoint: stalled"
-                                                            : "scan endpoint: transfer failed");
+  return restart_scan(now, failed.outcome == UsbOutcome::Stalled
+                               ? "scan endpoint: stalled"
+                               : "scan endpoint: transfer failed");
 }
 
-/// The scan is started anew; the counters go on. What follows before scans come again is the same
-/// trouble.
-CardAction CounterCardSession::trouble(HostTime now, std::string text) {
-  if (troubled_ && now < retry_at_) return CardNothing{};
-  if (!troubled_) report(fmt::format("{}: {}", options_.peer, text));
-  troubled_ = true;
+/// Restarts the scan; the counters continue. Further faults before the next scan are not reported:
+/// they belong to the same fault.
+CardAction CounterCardSession::restart_scan(HostTime now, std::string text) {
+  if (recovering_ && now < retry_at_) return CardNothing{};
+  if (!recovering_) report(fmt::format("{}: {}", options_.peer, text));
+  recovering_ = true;
   retry_at_ = now + options_.retry_after;
   ++restarts_;
   halt_ = true;
@@ -370,12 +373,12 @@ CardAction CounterCardSession::trouble(HostTime now, std::string text) {
 CardAction CounterCardSession::fail(HostTime now, std::string text) {
   if (!text.empty()) report(fmt::format("{}: {}", options_.peer, text));
   enter(CardState::Closed);
-  asked_ = stopping_bulk_ = halt_ = troubled_ = resuming_ = false;
+  asked_ = stopping_bulk_ = halt_ = recovering_ = resuming_ = false;
   open_at_ = now + options_.reopen_after;
   return CardClose{};
 }
 
-/// The same again before any scan came is the same fault: nobody is there each time we ask.
+/// The same text again without a scan in between is not a new fault: the card is still missing.
 void CounterCardSession::report(std::string text) {
   if (!std::exchange(scans_since_fault_, false) && text == fault_.text) return;
   ++fault_.count;

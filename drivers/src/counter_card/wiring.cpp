@@ -12,9 +12,9 @@
 namespace abbe::drivers {
 namespace {
 
-/// A lost scan must show in the clock's count beyond its rounding and its deviation from the pacer.
+/// A lost scan must change the clock's count by more than its rounding and its error to the pacer.
 constexpr double kFewestCountsPerScan = 8.0;
-/// An upward step must be told from a wrap.
+/// An upward step must be distinguishable from a wrap.
 constexpr double kMostCountsPerScan = 1e9;
 constexpr double kFastestClock_hz = 24e6;  // half of the card's own 48 MHz
 
@@ -25,8 +25,9 @@ Result<void> refuse(std::string text) {
 Result<void> check_axis(const CounterAxis& axis) {
   const auto name = fmt::format("axis {} (channel {})", axis.name, axis.channel);
   if (axis.scale == 0.0 || !std::isfinite(axis.scale))
-    return refuse(fmt::format("{}: scale {} per count", name, axis.scale));
-  if (!std::isfinite(axis.offset)) return refuse(fmt::format("{}: offset {}", name, axis.offset));
+    return refuse(fmt::format("{}: scale {} per count is not possible", name, axis.scale));
+  if (!std::isfinite(axis.offset))
+    return refuse(fmt::format("{}: offset {} must be finite", name, axis.offset));
   return {};
 }
 
@@ -69,21 +70,24 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
 
 Result<void> check_clock(const CounterCardWiring& wiring) {
   if (!quad08::pacer_divisor(wiring.scan_rate_hz))
-    return refuse(fmt::format("the card cannot scan at {} Hz", wiring.scan_rate_hz));
+    return refuse(
+        fmt::format("the card does not support a scan rate of {} Hz", wiring.scan_rate_hz));
   if (!(wiring.clock_hz > 0.0 && wiring.clock_hz <= kFastestClock_hz))
-    return refuse(fmt::format("a clock of {} Hz cannot be counted", wiring.clock_hz));
+    return refuse(fmt::format("clock {} Hz: above 0 to {} Hz are possible", wiring.clock_hz,
+                              kFastestClock_hz));
   const double counts = clock_counts_per_scan(wiring);
 
   if (counts < kFewestCountsPerScan || counts > kMostCountsPerScan) {
-    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to see lost scans",
+    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to detect lost scans",
                               counts, kFewestCountsPerScan, kMostCountsPerScan));
   }
 
   if (wiring.clock_source == ClockSource::External) return {};
   const double divisor = quad08::kPacerClock_hz / wiring.clock_hz;
   if (std::abs(divisor - std::round(divisor)) > 1e-9 * divisor || divisor < 2.0) {
-    return refuse(
-        fmt::format("the card's timer cannot make {} Hz: 48 MHz / n is possible", wiring.clock_hz));
+    return refuse(fmt::format(
+        "the card's timer cannot make {} Hz: 48 MHz divided by an integer above 1 is possible",
+        wiring.clock_hz));
   }
 
   return {};

@@ -9,10 +9,10 @@ namespace abbe::drivers {
 namespace {
 
 constexpr std::chrono::hours kNothingKnown{1};
-/// what an arrival may be late by before anything was seen; weighs one arrival
+/// Prior of the lateness of an arrival, with the weight of one arrival.
 constexpr double kPriorLateness_s = 0.020;
-constexpr std::chrono::seconds kLateForTooLong{
-    5};  ///< a stalled network drains in milliseconds, a jumped clock stays
+/// Lateness for longer than this is a jump: a stalled network recovers within milliseconds.
+constexpr std::chrono::seconds kLateForTooLong{5};
 
 double seconds(std::chrono::nanoseconds d) noexcept {
   return 1e-9 * static_cast<double>(d.count());
@@ -32,7 +32,7 @@ ClockModel::Observed ClockModel::observe(protocol::DeviceTime last_point,
   const double device_s = seconds(last_point - origin_device_);
   const Point p{device_s, seconds(arrival - origin_host_) - device_s};
   if (device_s == last_device_s_)
-    return Observed::Followed;  // the same instant again says nothing new
+    return Observed::Followed;  // the same instant contains no new information
 
   if (device_s < last_device_s_ || jumped(p, arrival)) {
     reset();
@@ -59,7 +59,7 @@ void ClockModel::begin_with(protocol::DeviceTime last_point, protocol::HostTime 
 bool ClockModel::jumped(const Point& p, protocol::HostTime arrival) ABBE_RT {
   const double lateness_s = p.offset_s - line_at(p.device_s);
   const double jump_s = seconds(options_.jump);
-  if (lateness_s < -jump_s) return true;  // the device clock went ahead: no delay is negative
+  if (lateness_s < -jump_s) return true;  // the device clock has jumped ahead: no delay is negative
   if (lateness_s < jump_s) {
     late_ = false;
     return false;
@@ -76,7 +76,7 @@ void ClockModel::reset() ABBE_RT {
   late_ = false;
 }
 
-/// One point per slice of the window, the lowest: the line can touch no other.
+/// Keeps the lowest point per slice of the window: the line can touch only such points.
 void ClockModel::keep(const Point& p) ABBE_RT {
   forget_before(p.device_s - seconds(options_.window));
   const double slice_s = seconds(options_.window) / static_cast<double>(kPoints - 1);
@@ -111,10 +111,10 @@ void ClockModel::fit() ABBE_RT {
   judge_skew();
 }
 
-/// Lower convex hull by monotone chain ([Andrew 1979]); the slope is that of the chord between the
-/// hull's heights at a quarter and at three quarters of the observed time. The one edge over the
-/// middle is the better line for exponential delays only if it is long; the chord scatters less for
-/// every kind of delay that was tried (by 10 to 20 %).
+/// Lower convex hull by monotone chain ([Andrew 1979]). The slope is that of the chord between the
+/// hull's heights at one quarter and at three quarters of the observed time. The alternative, the
+/// hull's edge over the middle, is better for exponential delays only if it is long; the chord
+/// scatters less (by 10 to 20 %) for every delay distribution that was tried.
 void ClockModel::fit_slope() ABBE_RT {
   const std::size_t size = find_hull();
   const double begin_s = points_[0].device_s;
@@ -149,13 +149,13 @@ double ClockModel::hull_height(std::size_t hull_size, double device_s) const ABB
          (device_s - a.device_s) * (b.offset_s - a.offset_s) / (b.device_s - a.device_s);
 }
 
-/// How far the line lies above the true envelope, from how densely arrivals crowd above it: q, the
-/// lateness of the tenth. If delays crowd towards their smallest (exponential), the lowest of many
-/// is late by 0.1 q; if they thin out towards it (a point's age in its packet plus an exponential),
-/// by 0.3 q; the freedom of the slope adds to both.
-/// Lowered by q / 2 with u = q / 2, the error over its uncertainty has root mean square 0.8 to 1.1
-/// for either kind and mean jitters of 0.5 to 8 ms (400 runs each). An order statistic, so that
-/// stalled packets shake nothing.
+/// Estimates how far the line lies above the true envelope, from the density of arrivals above it:
+/// q is the lateness of the tenth. If the density increases towards the smallest delay
+/// (exponential), the lowest of many arrivals is late by 0.1 q; if it decreases (a point's age in
+/// its packet plus an exponential), by 0.3 q. The freedom of the slope adds to both.
+/// The line is lowered by q / 2 with u = q / 2. Then the error divided by its uncertainty has a
+/// root mean square of 0.8 to 1.1 for both distributions and mean jitters of 0.5 to 8 ms (400 runs
+/// each). q is an order statistic, so that stalled packets do not affect it.
 void ClockModel::judge_lateness() ABBE_RT {
   std::array<double, kPoints> lateness{};
   for (std::size_t i = 0; i < count_; ++i)
@@ -175,9 +175,11 @@ void ClockModel::judge_lateness() ABBE_RT {
   u_slope_ = lever_s > 0.0 ? std::min(u_limit, std::sqrt(2.0) * u_touch_s_ / lever_s) : u_limit;
 }
 
-/// By chance a slope is off by sqrt(2) u over the lever, u as in judge_lateness(), here over the
-/// line that is not held; twice that, beyond a bound that sound clocks keep well within, is no
-/// chance. The points lie off the line that is held by up to the excess times the window.
+/// Tests whether the unconstrained slope exceeds max_skew. Its standard uncertainty is
+///     sqrt(2) u / lever
+/// with u as in judge_lateness(), but for the unconstrained line. An excess of more than twice this
+/// is not random: good clocks stay well within the bound. Then the points are off the constrained
+/// line by up to the excess times the window.
 void ClockModel::judge_skew() ABBE_RT {
   constexpr double kNoChance = 2.0;
   const double excess = std::abs(free_slope_) - options_.max_skew;

@@ -1,4 +1,4 @@
-// The real-time half of the counter card: what wait() collected becomes scans and samples.
+// The real-time part of the counter card: converts the events of wait() to scans and samples.
 #include <algorithm>
 #include <utility>
 

@@ -5,13 +5,13 @@
 namespace abbe::drivers {
 namespace {
 
-/// Both channels are read to whole periods.
+/// Rounding of a reading, counts: both channels count whole periods.
 constexpr std::int64_t kRounding = 1;
 
 }  // namespace
 
 void LatchTracker::reset() ABBE_RT {
-  // Zeroed counters have latched nothing: the first reading that differs from 0 is an edge.
+  // A zeroed counter has no latched count: the first reading other than 0 is an edge.
   last_raw_ = 0;
   offset_.reset();
   if (in_step_) offset_ = Offset{};
@@ -22,8 +22,7 @@ bool LatchTracker::on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw,
                            std::int64_t clock_count, std::int64_t previous_clock_count) ABBE_RT {
   if (latch_raw == last_raw_) return false;
   last_raw_ = latch_raw;
-  // How far the latch reads ahead of the clock now; counted from the offset known so far, so that
-  // it wraps with it.
+  // Latch minus clock, unwrapped relative to the known offset.
   const std::uint64_t base = offset_ ? static_cast<std::uint64_t>(offset_->low) : 0;
   const std::int64_t ahead =
       static_cast<std::int64_t>(base) +

@@ -10,26 +10,27 @@ namespace {
 
 using protocol::SampleFlag;
 
-/// How much later than a gap the clock's jump may be seen: no batch waits longer in a busy host.
+/// Longest time from a gap to the detection of the clock's jump: no batch waits longer in the host.
 constexpr double kJumpSeenWithin_s = 1.0;
 
-/// How far a clock that went on may be from where it must be, by the host's: behind by what the
-/// newest batch is late (the host was busy), ahead by what the clock model is off, and twice what
-/// the two may differ by.
+/// Limits of the difference between the card's clock and the host's, if the clock has continued.
+/// Behind: by the delay of the newest batch (busy host). Ahead: by the error of the clock model. In
+/// addition twice the rate error between the two clocks.
 constexpr double kLatest_s = 3.0;
 constexpr double kMostAhead_s = 1.0;
 constexpr double kLargestDrift = 1e-3;
-/// Of the clock's range: a wider interval would hold too many readings of other counters.
+/// Share of the clock's range: in a wider interval a restarted counter would often be accepted.
 constexpr double kWidestInterval = 0.02;
 
-/// The same of counters that an earlier run left. Both instants come from arrivals that are not
-/// late: the earlier from a settled clock model, this one from the least late of many. What is left
-/// is what the clock model calls a jump, and the rate beyond which it does not believe a clock.
+/// The same limits for counters of an earlier run of the program. Both instants come from arrivals
+/// with little delay: the earlier one from a settled clock model, the present one from the least
+/// delayed of many. The remaining tolerance is the clock model's limit of a jump, and its limit of
+/// the rate error.
 constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOptions{}.jump).count();
 constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
-constexpr double kResumedShown_s = 0.25;    // long enough for a host that was held up to catch up
+constexpr double kResumedShown_s = 0.25;    // enough time to process the backlog of a delayed host
 constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
-/// Narrower than kWidestInterval: nobody is there who saw the card fail.
+/// Narrower than kWidestInterval: this program has not observed a fault of the card.
 constexpr double kWidestResumed = 0.005;
 
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
@@ -39,13 +40,13 @@ std::uint32_t saturated(std::uint64_t n) ABBE_RT {
 
 }  // namespace
 
-bool CounterCardReceiver::beats(const quad08::RawScan& from,
-                                const quad08::RawScan& to) const ABBE_RT {
+bool CounterCardReceiver::clock_fits(const quad08::RawScan& from,
+                                     const quad08::RawScan& to) const ABBE_RT {
   return metronome_.beats(from[metronome_.place], to[metronome_.place], width_);
 }
 
 protocol::DeviceTime CounterCardReceiver::device_time(std::int64_t clock_count) const ABBE_RT {
-  // Whole seconds apart from the rest: a double alone would lose nanoseconds after weeks.
+  // Whole seconds are converted separately: a double loses nanoseconds after weeks.
   const double whole = std::floor(static_cast<double>(clock_count) / clock_hz_);
   const double rest = static_cast<double>(clock_count) - whole * clock_hz_;
   return protocol::DeviceTime{std::chrono::seconds{static_cast<std::int64_t>(whole)} +
@@ -98,7 +99,7 @@ void CounterCardReceiver::push(std::span<const std::byte> bytes,
 
 std::span<const CounterScan> CounterCardReceiver::next() ABBE_RT {
   scan_count_ = 0;
-  // One raw scan gives at most two: the one held back and itself.
+  // One raw scan gives at most two scans: the one held back and itself.
   while (scan_count_ + 2 <= scans_.size() && !out_of_step_) {
     const auto raw = next_raw();
     if (!raw) break;
@@ -112,14 +113,14 @@ std::optional<quad08::RawScan> CounterCardReceiver::next_raw() ABBE_RT {
   if (auto scan = decoder_.next()) return scan;
   if (seeking_) {
     seek();
-    if (auto scan = decoder_.next()) return scan;  // out of the window; the rest comes after
+    if (auto scan = decoder_.next()) return scan;  // from the window; pending_ follows
   }
   if (seeking_ || pending_.empty()) return std::nullopt;
   decoder_.push(std::exchange(pending_, {}));
   return decoder_.next();
 }
 
-/// Ends with all bytes taken into the window, or with the decoder at the beginning of a scan.
+/// Returns when all bytes are in the window, or when the decoder is at the beginning of a scan.
 void CounterCardReceiver::seek() ABBE_RT {
   const std::size_t needed = quad08::seek_window(decoder_.layout());
   while (!pending_.empty()) {
@@ -137,7 +138,7 @@ void CounterCardReceiver::seek() ABBE_RT {
       seeking_ = false;
       return;
     }
-    // None of these offsets: go on behind the last one that was tried.
+    // No scan begins at these offsets: continue after the last one that was tried.
     const std::size_t tried = decoder_.layout().scan_bytes();
     std::copy(window.begin() + static_cast<std::ptrdiff_t>(tried), window.end(), window_.begin());
     window_filled_ -= tried;
@@ -145,7 +146,7 @@ void CounterCardReceiver::seek() ABBE_RT {
 }
 
 void CounterCardReceiver::take(const quad08::RawScan& raw) ABBE_RT {
-  if (candidate_ && beats(*candidate_, raw)) {
+  if (candidate_ && clock_fits(*candidate_, raw)) {
     const quad08::RawScan confirmed = *candidate_;
     candidate_.reset();
     accept(confirmed);
@@ -153,7 +154,7 @@ void CounterCardReceiver::take(const quad08::RawScan& raw) ABBE_RT {
     refused_run_ = 0;
   } else if (candidate_) {
     refuse(*candidate_, raw);
-  } else if (last_ && !stream_restarted_ && beats(*last_, raw)) {
+  } else if (last_ && !stream_restarted_ && clock_fits(*last_, raw)) {
     accept(raw);
   } else {
     candidate_ = raw;
@@ -192,17 +193,17 @@ void CounterCardReceiver::accept(const quad08::RawScan& raw) ABBE_RT {
   scan = current_;
 }
 
-/// Only a card that was opened again may be another session of it. One that stayed open counts on,
-/// however long the host was held up.
+/// Called for the first scan of a stream. Only a card that was opened again may have restarted. The
+/// counters of a card that stayed open have continued, even after a long delay of the host.
 void CounterCardReceiver::judge_first_scan(const quad08::RawScan& raw) ABBE_RT {
   const bool same = goes_on(raw);
   if (std::exchange(reopened_, false) && !same) restart();
 }
 
-/// Whether these counters were counting all the time since the last scan: the clock channel stands
-/// where it must by the host's clock. A counter of 32 bits may have gone round meanwhile. The
-/// instant of the last scan comes from the clock model: its batch may have arrived late. A model
-/// that is not settled may be late, too.
+/// True if the counters have continued since the last scan: the clock channel agrees with the
+/// host's clock within the limits. A counter of 32 bits may have wrapped. The instant of the last
+/// scan comes from the clock model, because its batch may have arrived late; before the model is
+/// settled this instant may be late as well.
 bool CounterCardReceiver::goes_on(const quad08::RawScan& raw) ABBE_RT {
   const auto before = clock_.to_host(device_time(current_.clock_count));
   const double elapsed_s = std::chrono::duration<double>(arrival_ - before.time).count();
@@ -210,14 +211,14 @@ bool CounterCardReceiver::goes_on(const quad08::RawScan& raw) ABBE_RT {
   const double most_behind_s = kLatest_s + kLargestDrift * elapsed_s;
   const double most_ahead_s =
       (before.settled ? kMostAhead_s : kLatest_s) + kLargestDrift * elapsed_s;
-  const double round_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
-  behind_s_ = std::remainder(behind_s, round_s);  // for people: which round it is in is not known
-  if (most_behind_s + most_ahead_s > kWidestInterval * round_s) return false;
+  const double range_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
+  behind_s_ = std::remainder(behind_s, range_s);  // for messages; the number of wraps is unknown
+  if (most_behind_s + most_ahead_s > kWidestInterval * range_s) return false;
   return behind_s <= most_behind_s && -behind_s <= most_ahead_s;
 }
 
-/// How much less than the host's clock the clock channel counted since the last scan, at `since`.
-/// It may have gone round.
+/// Time by the host's clock minus time by the clock channel, both since the last scan at `since`,
+/// s. Takes wraps of the clock channel into account.
 double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw,
                                            protocol::HostTime since) ABBE_RT {
   const double elapsed_s = std::chrono::duration<double>(arrival_ - since).count();
@@ -229,8 +230,9 @@ double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw,
   return elapsed_s - (wraps * range + step) / clock_hz_;
 }
 
-/// No arrival is early: the clock channel is behind by at most what the least late one shows, and
-/// one that shows it ahead by more than the clocks may differ refutes it at once.
+/// True once the counters of the earlier run are known to have continued. Arrivals are late, never
+/// early: the least delayed one bounds how far the clock channel is behind. If an arrival shows it
+/// ahead by more than the tolerance, the counters have not continued.
 bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   Resumption& r = *resumption_;
   if (r.refused) return false;
@@ -241,13 +243,13 @@ bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   const double elapsed_s = std::chrono::duration<double>(arrival_ - r.since).count();
   const double shown_s = std::chrono::duration<double>(arrival_ - *r.begun).count();
   const double within_s = kResumedWithin_s + kResumedDrift * std::max(0.0, elapsed_s);
-  const double round_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
-  const bool too_long = 2.0 * within_s > kWidestResumed * round_s;
+  const double range_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
+  const bool too_long = 2.0 * within_s > kWidestResumed * range_s;
   const bool behind = r.least_behind_s > within_s;
   r.refused = elapsed_s < 0.0 || too_long || r.least_behind_s < -within_s ||
               (behind && shown_s >= kResumedPatience_s);
   if (r.refused) {
-    behind_s_ = std::remainder(r.least_behind_s, round_s);
+    behind_s_ = std::remainder(r.least_behind_s, range_s);
     ++counters_.restarted;
   }
   if (r.refused || behind || shown_s < kResumedShown_s) return false;
@@ -255,7 +257,7 @@ bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   return true;
 }
 
-/// What the earlier run knew of edges is not known any more: those that came meanwhile are no news.
+/// Edge counts of the earlier run are not stored: edges since then are not reported.
 void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
   if (edge_place_) (*last_)[*edge_place_] = raw[*edge_place_];
   if (latch_place_) latch_.begin_at(raw[*latch_place_]);
@@ -263,7 +265,7 @@ void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
   reopened_ = false;
 }
 
-/// Other counters than before: as after a set-up, but for where they stand.
+/// The counters have restarted: as after a set-up, but with unknown counts.
 void CounterCardReceiver::restart() ABBE_RT {
   ++counters_.restarted;
   counters_zeroed();
@@ -284,12 +286,12 @@ void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan
   scan.axes.head.lost_before = saturated(lost);
   scan.axes.head.flags |= SampleFlag::GapBefore;
   const double gap_s = static_cast<double>(lost) * metronome_.step / clock_hz_;
-  // Half the jump: what the clock model calls one is not sharp.
+  // Half the jump: the clock model's detection of a jump has a tolerance.
   if (gap_s >= 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count())
     keep_gap({scan.clock_count + static_cast<std::int64_t>(clock_step), gap_s});
 }
 
-/// A restart may be followed by a shorter gap before it is seen.
+/// Keeps the longest gap: a restart can be followed by a shorter gap before it is detected.
 void CounterCardReceiver::keep_gap(const LongGap& gap) ABBE_RT {
   const bool longer_before = long_gap_ && long_gap_->length_s >= gap.length_s &&
                              seconds_since(*long_gap_, gap.clock_count) < kJumpSeenWithin_s;
@@ -334,7 +336,7 @@ void CounterCardReceiver::follow_latch(const quad08::RawScan& raw, std::int64_t 
   scan.latch_half_width = latch_.latest()->half_width;
 }
 
-/// The last scan of a batch is the youngest: its age on arrival is the smallest.
+/// The last scan of a batch has the smallest delay to the arrival: it updates the clock model.
 void CounterCardReceiver::stamp() ABBE_RT {
   if (scan_count_ == 0) return;
   const auto youngest = device_time(scans_[scan_count_ - 1].clock_count);
@@ -352,9 +354,10 @@ void CounterCardReceiver::stamp() ABBE_RT {
   }
 }
 
-/// Counts that went on in step, but for a gap too short for the jump, are those of the same card:
-/// only its relation to our clock began anew. A batch that came late may hide the jump: the gap was
-/// in one before, and is as long as the clock is ahead. A clock that is behind was late for long.
+/// The clock model has detected a jump of the card's clock. Without a long gap the counters have
+/// continued, and only the clock model restarts. With a gap in this batch, the card was restarted.
+/// A late batch can hide the jump: then the gap was in an earlier batch and is at least as long as
+/// the clock is ahead. If the clock is behind, the batches were late for a long time: no restart.
 void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT {
   const auto gap = std::exchange(long_gap_, std::nullopt);
   if (!gap) return;

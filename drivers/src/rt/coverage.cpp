@@ -16,7 +16,7 @@ double integral_of_phi(double x) noexcept {
   return x * 0.5 * std::erfc(-x / std::numbers::sqrt2) + phi;
 }
 
-/// P(|R + N| <= U), all in units of the deviation of N.
+/// P(|R + N| <= U), all in units of the standard deviation of N.
 double probability_within(double U, double half_width) noexcept {
   const double one_side = integral_of_phi(U + half_width) - integral_of_phi(U - half_width);
   const double other = integral_of_phi(half_width - U) - integral_of_phi(-half_width - U);
@@ -26,7 +26,7 @@ double probability_within(double U, double half_width) noexcept {
 }  // namespace
 
 double expanded_95(double half_width, double u_normal) ABBE_RT {
-  // Beyond these ratios the smaller one changes the result by less than 1e-5 of it.
+  // Beyond these ratios the smaller part changes the result by a relative 1e-5 at most.
   if (half_width <= 5e-3 * u_normal) return kNormal95 * u_normal;
   if (u_normal <= 1e-4 * half_width) return kCoverage * half_width;
   const double a = half_width / u_normal;

@@ -1,5 +1,5 @@
-// The real-time half of the encoder device: what wait() read becomes samples. The other half is
-// can/encoder_device.cpp.
+// The real-time part of the encoder device: converts the frames that wait() read to samples. The
+// rest is in can/encoder_device.cpp.
 
 #include <utility>
 
@@ -18,13 +18,13 @@ void EncoderDevice::receive() ABBE_RT {
                        : receiver_.on_frame(received.frame, received.time, received.time_widened));
   }
   batch_count_ = 0;
-  // Behind a full read there may be more: only one that found the end says that nothing else came.
+  // on_time() requires that all frames that arrived before cycle_end_ were read.
   if (!all_read_ || cycle_end_ < receiver_.deadline()) return;
   (void)raw_.push_bytes(cycle_end_, RawBlock::Direction::FromDevice, {});
   push(receiver_.on_time(cycle_end_));
 }
 
-/// One block for each run of frames with one time and direction.
+/// Writes one block for every run of frames with the same time and direction.
 void EncoderDevice::record_frames(std::span<const ReceivedFrame> frames) ABBE_RT {
   std::size_t i = 0;
   while (i < frames.size()) {
@@ -53,7 +53,7 @@ void EncoderDevice::push(std::span<const protocol::AxisSample> samples) ABBE_RT 
     presence_.on_sample(sample);
     board_.set_last_sample(sample.head.time);
   }
-  const auto made = receiver_.counters().samples;  // one that is given again is none more
+  const auto made = receiver_.counters().samples;  // does not count corrected samples
   board_.samples.add(made - std::exchange(samples_seen_, made));
 }
 

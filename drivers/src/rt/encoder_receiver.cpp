@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
 
-/// [GUM] 4.3.7: the instant may be off by a period to either side.
+/// [GUM] 4.3.7: the instant is uncertain by +- one period, rectangular.
 std::chrono::nanoseconds widened(std::chrono::nanoseconds u,
                                  std::chrono::nanoseconds period) ABBE_RT {
   const double u_ns = std::hypot(static_cast<double>(u.count()),
@@ -33,7 +33,7 @@ std::uint64_t on_circle(std::int64_t count, std::uint64_t modulus) ABBE_RT {
   return static_cast<std::uint64_t>((count % m + m) % m);
 }
 
-/// The smallest step from `from` to `to`, both on the circle.
+/// The step of smallest magnitude from `from` to `to`, both on the circle.
 std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, std::uint64_t modulus) ABBE_RT {
   if (modulus == 0) return static_cast<std::int64_t>(to - from);
   const std::uint64_t ahead = to >= from ? to - from : to + modulus - from;
@@ -106,7 +106,7 @@ EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
 
 void EncoderReceiver::lose() ABBE_RT {
   close_cycle();
-  look_for_outstanding_replies(true);
+  note_outstanding_replies(true);
   received_mask_ = 0;
   gap_pending_ = true;
 }
@@ -143,7 +143,7 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
     }
     ++cycle_;
   }
-  look_for_outstanding_replies(paused);
+  note_outstanding_replies(paused);
   sync_time_ = time;
   time_widened_ = time_widened;
   received_mask_ = doubtful_mask_ = 0;
@@ -151,8 +151,9 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
   check_heartbeats(time);
 }
 
-/// At the end of a cycle. `paused`: whatever was under way has come, or was lost.
-void EncoderReceiver::look_for_outstanding_replies(bool paused) ABBE_RT {
+/// Called at the end of a cycle. `paused`: the SYNC paused, so that answers to earlier SYNCs have
+/// arrived or are lost.
+void EncoderReceiver::note_outstanding_replies(bool paused) ABBE_RT {
   for (std::size_t i = 0; i < axis_count_; ++i) {
     auto& axis = axes_[i];
     const bool unanswered = sync_time_ && ((received_mask_ >> i) & 1u) == 0;
@@ -215,7 +216,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
     ++counters_.short_frames;
     return;
   }
-  hear();
+  end_bus_off();
   const auto bit = static_cast<std::uint8_t>(1u << i);
   axes_[i].answers = true;
 
@@ -227,7 +228,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
 
   const bool again = (received_mask_ & bit) != 0;
   if (again) ++counters_.duplicate_frames;
-  if (!open_) return again ? take_back(i, time) : count_late(i);
+  if (!open_) return again ? correct_sample(i, time) : count_late(i);
   if (again || std::exchange(axes_[i].reply_outstanding, false))
     doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   take_position(i, *count);
@@ -236,17 +237,17 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   if (received_mask_ == all_mask_) close_cycle();
 }
 
-/// After the deadline: not used, but a debt less.
+/// A reply after the deadline is discarded and no longer awaited.
 void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
   ++counters_.late_frames;
   if (!std::exchange(axes_[i].reply_outstanding, false))
     received_mask_ = static_cast<std::uint8_t>(received_mask_ | (1u << i));
 }
 
-/// The sample of this cycle has left with an answer that may be an older one. An answer that comes
-/// more than a period after the SYNC is one to a SYNC we do not know of, and says nothing of that
-/// sample.
-void EncoderReceiver::take_back(std::size_t i, HostTime time) ABBE_RT {
+/// The sample of this cycle was output with an answer that may belong to an earlier SYNC: outputs
+/// it again with this axis missing. An answer more than a period after the SYNC belongs to a SYNC
+/// that was not recorded; it does not affect that sample.
+void EncoderReceiver::correct_sample(std::size_t i, HostTime time) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   const bool has_left = sync_time_ && time <= *sync_time_ + period_;
   if (!has_left || (current_.missing_mask & bit) != 0) return;
@@ -258,8 +259,8 @@ void EncoderReceiver::take_back(std::size_t i, HostTime time) ABBE_RT {
   if (out_count_ < out_.size()) out_[out_count_++] = current_;
 }
 
-/// A node was heard: who receives is on the bus.
-void EncoderReceiver::hear() ABBE_RT {
+/// A frame of a node was received, so the controller is no longer in bus-off.
+void EncoderReceiver::end_bus_off() ABBE_RT {
   if (!bus_off_) return;
   bus_off_ = false;
   restarted_pending_ = true;
@@ -268,8 +269,8 @@ void EncoderReceiver::hear() ABBE_RT {
 void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
   auto& axis = axes_[i];
   const auto raw = on_circle(count, axis.modulus);
-  // The first count is taken as the encoder means it (an absolute scale may be negative), later
-  // ones as steps from it.
+  // The first count is used as sent (an absolute scale may be negative), later counts as steps from
+  // the previous one.
   if (axis.seen) {
     const auto step = static_cast<std::uint64_t>(wrapped_step(axis.raw, raw, axis.modulus));
     current_.count[i] =
@@ -285,7 +286,7 @@ void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
 
 void EncoderReceiver::on_node_frame(Axis& axis, const can::CanFrame& frame, HostTime time) ABBE_RT {
   if (frame.id == can::cob::kHeartbeat + axis.node) {
-    hear();
+    end_bus_off();
     if (const auto heartbeat = can::decode_heartbeat(frame))
       on_heartbeat(axis, heartbeat->state, time);
   } else if (frame.id == can::cob::kEmergency + axis.node) {
@@ -304,7 +305,7 @@ void EncoderReceiver::on_heartbeat(Axis& axis, can::NodeState state, HostTime ti
   if (state != can::NodeState::BootUp) return;
   axis.emergency = 0;
   axis.answers = axis.reply_outstanding = false;
-  axis.last_heartbeat.reset();  // it beats again only once it is configured
+  axis.last_heartbeat.reset();  // no heartbeat before it is configured
   if (axis.seen) restarted_pending_ = true;
 }
 
@@ -332,7 +333,7 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
   if (has(report->conditions, BusCondition::BusOff) && !bus_off_) {
     bus_off_ = true;
     const auto last = open_ ? *sync_time_ + sampling_delay_ : time;
-    emit(last);  // at once: nobody should go on trusting the previous one until a deadline
+    emit(last);  // immediately: until the deadline subscribers would use the previous sample
   } else if (back && bus_off_) {
     bus_off_ = false;
     restarted_pending_ = true;
@@ -340,7 +341,7 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
 }
 
 void EncoderReceiver::on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT {
-  if (external_sync_) return;  // between others: how the PDO is mapped is configured
+  if (external_sync_) return;  // SDOs of the machine's master; the PDO mapping is configured
   const auto index = static_cast<std::uint16_t>(frame.byte(1) | (frame.byte(2) << 8));
   const can::ObjectId object{index, frame.byte(3)};
   constexpr std::uint8_t kWritten = 0x60;
@@ -353,14 +354,14 @@ void EncoderReceiver::on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < bytes; ++i) value |= std::uint32_t{frame.byte(4 + i)} << (8 * i);
   if (index == axis.mapping) {
-    learn_mapping(axis, object.sub, value);
+    read_mapping(axis, object.sub, value);
   } else {
-    learn(axis, object, value);
+    read_object(axis, object, value);
   }
 }
 
-/// The entries of a mapping that could not be written are read one after the other.
-void EncoderReceiver::learn_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT {
+/// Reads the next entry of a PDO mapping that could not be written.
+void EncoderReceiver::read_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT {
   constexpr unsigned kBitsPerByte = 8;
   if (sub <= 1) axis.bits_before = 0;
   if (sub == 0) return;
@@ -373,14 +374,14 @@ void EncoderReceiver::learn_mapping(Axis& axis, std::uint8_t sub, std::uint32_t 
   axis.bits_before += mapped.bits;
 }
 
-void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT {
+void EncoderReceiver::read_object(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT {
   namespace obj = can::object;
   const bool linear = axis.kind == AxisKind::Linear;
   const bool step = linear && (object == obj::kPositionStep || object == obj::kMeasuringStep);
   const bool turn =
       !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
   if (object == obj::kHeartbeatTime) {
-    // What it beats by itself, where it could not be told: three beats may fail.
+    // The heartbeat period could not be set: time-out after 3.5 periods of the node's own.
     axis.heartbeat_timeout = std::max(
         heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
   } else if (step || turn) {
@@ -397,7 +398,7 @@ void EncoderReceiver::learn(Axis& axis, can::ObjectId object, std::uint32_t valu
     axis.raw %= value;
   } else if (!linear && object == obj::kRevolutions && !axis.wrap_configured && value > 0 &&
              axis.units > 1) {
-    // Without scaling the position begins anew after the revolutions that can be told apart.
+    // Without scaling the position wraps after the number of distinguishable revolutions.
     const auto counts = std::uint64_t{axis.units} * value;
     axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);
     axis.raw %= axis.modulus;

@@ -1,4 +1,4 @@
-// The real-time half of the environment device: what wait() read becomes samples.
+// The real-time part of the environment device: converts the bytes that wait() read to samples.
 #include <utility>
 
 #include "abbe/drivers/environment/device.hpp"

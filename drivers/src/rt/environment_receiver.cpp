@@ -1,4 +1,4 @@
-// The real-time half of the environment: answers become samples.
+// The real-time part of the environment receiver: converts answers to samples.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -67,7 +67,7 @@ Progress EnvironmentReceiver::accept(std::span<const std::byte> registers) ABBE_
 Progress EnvironmentReceiver::prove(std::span<const std::byte> registers) ABBE_RT {
   const auto& proving = map_.proving[read_];
   const double value = modbus::decode_register(registers, proving.place.type, proving.place.order);
-  if (!(value == proving.expected))  // NaN is not equal, either
+  if (!(value == proving.expected))  // also fails for NaN
     return fail({.kind = Kind::Unproven, .index = read_, .value = value, .request = *pending_});
   pending_.reset();
   if (++read_ == proving_reads_.size()) {
@@ -162,8 +162,7 @@ bool EnvironmentReceiver::on_raw(const protocol::RawBlock& block) ABBE_RT {
   return push(bytes, block.time) == Progress::Sample;
 }
 
-/// A recording may begin anywhere, and go on after a hole: from the next round on it can be
-/// understood.
+/// Starts in the middle of a recording, or after missing blocks, at the beginning of a round.
 void EnvironmentReceiver::join() ABBE_RT {
   begin();
   proven_ = true;

@@ -12,13 +12,13 @@ double seconds(std::chrono::nanoseconds d) noexcept {
   return 1e-9 * static_cast<double>(d.count());
 }
 
-/// The two samples around an instant, their neighbours where they are close enough to be of use,
-/// and where between.
+/// The samples before and after an instant, their outer neighbours if these are close enough for
+/// the cubic, and the relative place of the instant.
 struct Around {
   const AxisSample* before = nullptr;
   const AxisSample* after = nullptr;
-  const AxisSample* neighbour_before = nullptr;  ///< none: the line
-  const AxisSample* neighbour_after = nullptr;   ///< none: the line
+  const AxisSample* neighbour_before = nullptr;  ///< null: linear interpolation
+  const AxisSample* neighbour_after = nullptr;   ///< null: linear interpolation
   double span_s = 0.0;
   double theta = 0.0;  ///< 0 at `before`, 1 at `after`
 };
@@ -37,8 +37,7 @@ double slope(const AxisSample& a, const AxisSample& b, std::size_t axis) noexcep
   return (b.position[axis] - a.position[axis]) / seconds(b.head.time - a.head.time);
 }
 
-/// The derivative at `middle` of the parabola through three samples, which need not be equally far
-/// apart.
+/// Derivative at `middle` of the parabola through three samples; their spacing may differ.
 double slope_at(const AxisSample& left, const AxisSample& middle, const AxisSample& right,
                 std::size_t axis) noexcept {
   const double before_s = seconds(middle.head.time - left.head.time);
@@ -85,8 +84,8 @@ tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample>
   s.theta = seconds(time - before->head.time) / s.span_s;
 
   const auto useful = [span](const AxisSample& left, const AxisSample& right) {
-    return 5 * (right.head.time - left.head.time) <=
-           6 * span;  // the bound of u_of_curve() holds up to 1.2
+    // The bound in u_of_curve() is valid for a ratio up to 1.2.
+    return 5 * (right.head.time - left.head.time) <= 6 * span;
   };
 
   if (before != samples.begin() && useful(*(before - 1), *before))

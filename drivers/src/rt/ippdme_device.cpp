@@ -1,4 +1,4 @@
-// The real-time half of the measuring machine: what wait() read becomes samples.
+// The real-time part of the measuring machine: converts the bytes that wait() read to samples.
 #include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/protocol/visit.hpp"
 

@@ -17,9 +17,8 @@ using protocol::TouchFlag;
 using std::chrono::nanoseconds;
 
 constexpr double kMetresPerMillimetre = 1e-3;
-constexpr double kCountsPerMillimetre =
-    1e6;                        // the machine has counts, but does not show them: nanometres
-constexpr int kRepairable = 2;  // severity from which on the command has failed
+constexpr double kCountsPerMillimetre = 1e6;  // the machine reports no counts: nanometres instead
+constexpr int kRepairable = 2;                // severity from which on the command has failed
 
 IppText text_of(std::string_view text) noexcept {
   IppText t;
@@ -32,10 +31,10 @@ std::string_view chars(std::span<const std::byte> bytes) noexcept {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// A touch that somebody made by hand comes as PtMeas(X(..),Y(..),Z(..)).
+/// The point of a touch made by the operator, PtMeas(X(..),Y(..),Z(..)); empty: other data.
 std::string_view picked(std::string_view data) noexcept {
   constexpr std::string_view kFront = "PtMeas(";
-  // Not starts_with(): where nothing is inlined, the library's needs a function that throws.
+  // Not starts_with(): without inlining, the library's version calls a function that can throw.
   if (data.size() <= kFront.size() || !std::equal(kFront.begin(), kFront.end(), data.begin()))
     return {};
   if (data.back() != ')') return {};
@@ -64,7 +63,7 @@ void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT 
     asked.touch = ++touches_;
   }
 
-  // The report goes on for as long as the connection: its place is the first.
+  // The move report lasts as long as the connection: it has the reserved first entry.
   if (asked.purpose == Purpose::MoveReport) {
     asked_[0] = asked;
     return;
@@ -118,7 +117,7 @@ IppError IppReceiver::refusal_of(const ippdme::Response& response) ABBE_RT {
   return {response.tag, response.error.severity, response.error.code, text_of(response.error.text)};
 }
 
-/// Nothing else is believed of a server that sent what is no line of the protocol.
+/// After a malformed line only the answer to the abort is accepted from this server.
 std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_RT {
   const auto response = ippdme::parse_response(line);
   if (!response || response->tag != ippdme::kAbort) return std::nullopt;
@@ -129,7 +128,7 @@ std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_
 
 IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line) ABBE_RT {
   silenced_ = true;
-  if (aborting_) framer_.resume();  // its answer may be behind
+  if (aborting_) framer_.resume();  // the answer to the abort may follow
   return IppProtocolError{error, text_of(line)};
 }
 
@@ -149,7 +148,7 @@ std::optional<IppMessage> IppReceiver::understand(std::string_view line) ABBE_RT
   return data(*response, line);
 }
 
-/// Somewhere between `from` and the arrival.
+/// Time of an event between `from` and the arrival: the middle, with rectangular uncertainty.
 SampleHead IppReceiver::between(HostTime from) ABBE_RT {
   const nanoseconds half = std::max(nanoseconds{0}, arrival_ - from) / 2;
   SampleHead head;
@@ -164,7 +163,7 @@ std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response,
   const bool unsolicited = response.tag == ippdme::kUnsolicited;
   const std::string_view by_hand = unsolicited ? picked(response.data) : std::string_view{};
   if (by_hand.empty() && (asked == nullptr || asked->purpose == Purpose::Other)) {
-    if (unsolicited) return std::nullopt;  // a key, a changed property: nobody here wants it
+    if (unsolicited) return std::nullopt;  // a key or a changed property: not used
     return IppMessage{IppData{response.tag, text_of(response.data)}};
   }
   const auto point = ippdme::parse_point(unsolicited ? by_hand : response.data);
@@ -228,7 +227,7 @@ ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead&
   return t;
 }
 
-/// A touch that failed is one too: who asked for it must hear that there is no position.
+/// A failed touch is also reported as a touch, without a position, to the caller that requested it.
 IppMessage IppReceiver::error(const ippdme::Response& response) ABBE_RT {
   const IppError report{response.tag, response.error.severity, response.error.code,
                         text_of(response.error.text)};

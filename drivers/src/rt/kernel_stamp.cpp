@@ -9,8 +9,8 @@ Arrival KernelStampMap::arrival(std::optional<std::chrono::nanoseconds> stamp, c
                                 protocol::HostTime host_now) ABBE_RT {
   if (!stamp || !believable(now.realtime - *stamp, now)) {
     ++widened_;
-    // It came after the queue was empty: where that is less ago than the wake-up bound, it says
-    // more.
+    // The frame arrived after the queue was empty: this bounds its age if the queue was empty more
+    // recently than the wake-up bound.
     const auto possible = empty_at_ ? now.monotonic - empty_at_->monotonic : options_.u_user_space;
     return {host_now, std::min(options_.u_user_space, possible), true};
   }
@@ -20,7 +20,7 @@ Arrival KernelStampMap::arrival(std::optional<std::chrono::nanoseconds> stamp, c
 }
 
 bool KernelStampMap::believable(std::chrono::nanoseconds age, const ClockPair& now) const ABBE_RT {
-  if (!empty_at_) return false;  // nothing to hold the age against yet
+  if (!empty_at_) return false;  // no bound of the age yet
   const auto possible = now.monotonic - empty_at_->monotonic;
   const auto stepped = (now.realtime - empty_at_->realtime) - possible;
   return age.count() >= 0 && age <= possible + options_.step &&

@@ -28,7 +28,7 @@ bool RawRing::push_bytes(protocol::HostTime time, RawBlock::Direction direction,
   const std::size_t needed = blocks_for(bytes.size());
   if (indices_.free_slots(needed) < needed) {
     lost_ += needed;
-    // relaxed, and no read-modify-write: the writer is the only one who stores
+    // relaxed, and no read-modify-write: only the writer stores
     dropped_.store(dropped_.load(std::memory_order_relaxed) + needed, std::memory_order_relaxed);
     return false;
   }

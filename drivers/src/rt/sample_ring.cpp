@@ -1,5 +1,5 @@
-// The ring's real-time functions for every sample there is, so that the proof over this folder's
-// object files sees them. Members one by one: the constructor allocates and has no place here.
+// Instantiates the ring's real-time functions for every sample type, so that the symbol check of
+// this folder's object files covers them. Single members only: the constructor allocates.
 
 #include "abbe/drivers/sample_ring.hpp"
 

@@ -23,8 +23,8 @@ void ScanHistory::clear() ABBE_RT {
 }
 
 DeviceTime ScanHistory::instant(std::int64_t clock_count) const ABBE_RT {
-  // In long double: a day of 10 MHz is 8.6e11 counts and 8.6e13 ns, whose product with a period has
-  // no place in a double.
+  // long double: a day at 10 MHz is 8.6e11 counts or 8.6e13 ns; the precision of a double is not
+  // sufficient for the product with the period.
   const auto ns =
       (static_cast<long double>(clock_count) + 0.5L) * 1e9L * static_cast<long double>(period_s_);
   return DeviceTime{nanoseconds{std::llround(ns)}};

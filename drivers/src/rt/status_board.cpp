@@ -8,8 +8,7 @@ namespace abbe::drivers {
 
 namespace {
 
-/// How many bytes of a text longer than kCapacity are kept: it is cut between two characters of
-/// UTF-8.
+/// Number of bytes kept of a text longer than kCapacity: it is cut between two UTF-8 characters.
 std::size_t whole_code_points(std::string_view text) ABBE_RT {
   constexpr unsigned kContinuationMask = 0xC0, kContinuation = 0x80;
   std::size_t length = FaultText::kCapacity;
@@ -28,10 +27,10 @@ void FaultText::set(protocol::HostTime at, std::string_view text) ABBE_RT {
   std::array<std::uint64_t, kWords> words{};
   std::memcpy(words.data(), bytes.data(), kCapacity);
 
-  const std::uint64_t next = begun_.load(std::memory_order_relaxed) + 1;  // own counter
+  const std::uint64_t next = begun_.load(std::memory_order_relaxed) + 1;  // only this thread writes
   begun_.store(next, std::memory_order_relaxed);  // made visible by the releases that follow
   Text& to = texts_[next % 2];
-  // release: pairs with the acquires in read(); carries the count of texts begun along
+  // release: pairs with the acquires in read(); also publishes begun_
   to.length.store(length, std::memory_order_release);
   to.at_ns.store(at.time_since_epoch().count(), std::memory_order_release);
   for (std::size_t i = 0; i < kWords; ++i) to.words[i].store(words[i], std::memory_order_release);

@@ -12,7 +12,7 @@ namespace {
 using protocol::SampleFlag;
 using protocol::TouchFlag;
 
-// Scans of a window that leave with one new scan: the window catches up without a burst.
+// Most scans of a window that are output per new scan: limits the work of one call.
 constexpr int kWindowScansPerScan = 4;
 
 EdgeInterval between(const CounterScan& before, const CounterScan& scan) noexcept {
@@ -38,10 +38,10 @@ protocol::TouchScan window_scan(const CounterScan& scan, std::uint32_t touch) no
 void TouchDetector::on_scan(const CounterScan& scan) ABBE_RT {
   if (has(scan.axes.head.flags, SampleFlag::Restarted)) restart();
   const bool first = history_.empty();
-  // A clock that does not go on is the card's fault to report; nothing can be placed on it.
+  // A clock that does not advance is reported by the card's receiver; edges cannot be located.
   if (!first && scan.clock_count <= history_.newest().clock_count) return restart();
   history_.push(scan);
-  if (!first) look(history_.scan(history_.end_number() - 2), scan);
+  if (!first) detect(history_.scan(history_.end_number() - 2), scan);
   emit_window();
 }
 
@@ -52,9 +52,9 @@ void TouchDetector::restart() ABBE_RT {
   window_open_ = false;
 }
 
-void TouchDetector::look(const CounterScan& before, const CounterScan& scan) ABBE_RT {
+void TouchDetector::detect(const CounterScan& before, const CounterScan& scan) ABBE_RT {
   refused_latest_ = false;
-  note(debounce_counts_ > 0 ? look_at_debounced(before, scan) : look_at_every_edge(before, scan));
+  note(debounce_counts_ > 0 ? detect_debounced(before, scan) : detect_edge(before, scan));
   if (edges_.state() == EdgeConfirmation::State::Touched) rearm_when_free(scan);
 }
 
@@ -66,7 +66,7 @@ bool TouchDetector::latch_moved(const CounterScan& before, const CounterScan& sc
 EdgeInterval TouchDetector::latched_edge(const CounterScan& before,
                                          const CounterScan& scan) ABBE_RT {
   const std::int64_t h = scan.latch_half_width;
-  // One count of room: edge and scan may fall into the same period of the clock.
+  // Tolerance of one count: edge and scan may be in the same period of the clock.
   const bool plausible = scan.latch_count + h + 1 >= before.clock_count &&
                          scan.latch_count - h - 1 <= scan.clock_count;
   if (plausible) return {scan.latch_count - h, scan.latch_count + h, true};
@@ -75,19 +75,19 @@ EdgeInterval TouchDetector::latched_edge(const CounterScan& before,
   return between(before, scan);
 }
 
-EdgeConfirmation::Event TouchDetector::look_at_every_edge(const CounterScan& before,
-                                                          const CounterScan& scan) ABBE_RT {
+EdgeConfirmation::Event TouchDetector::detect_edge(const CounterScan& before,
+                                                   const CounterScan& scan) ABBE_RT {
   const std::int64_t counted = scan.edge_count - before.edge_count;
   const bool moved = latch_moved(before, scan);
   if (counted <= 0 && !moved) return edges_.on_time(scan.clock_count);
   EdgeInterval edge = moved ? latched_edge(before, scan) : between(before, scan);
-  // The latch is that of the last edge, the touch is the first: somewhere before.
+  // The latch holds the last edge, the touch is the first: it lies anywhere before it.
   if (counted > 1) edge = {before.clock_count, std::max(before.clock_count, edge.to), false};
   return edges_.on_edge(edge, counted > 1);
 }
 
-EdgeConfirmation::Event TouchDetector::look_at_debounced(const CounterScan& before,
-                                                         const CounterScan& scan) ABBE_RT {
+EdgeConfirmation::Event TouchDetector::detect_debounced(const CounterScan& before,
+                                                        const CounterScan& scan) ABBE_RT {
   Event event = Event::Nothing;
   if (latch_moved(before, scan)) {
     event = edges_.on_edge(latched_edge(before, scan), false);
@@ -128,7 +128,7 @@ void TouchDetector::touched() ABBE_RT {
 }
 
 bool TouchDetector::retracted(const CounterScan& scan) const ABBE_RT {
-  // Where the axes cannot tell, quiet alone has to do.
+  // Without positions or approach direction only the time without edges is used.
   if (touch_.missing_mask != 0 || scan.axes.missing_mask != 0 || touch_.speed_m_s == 0.0)
     return true;
   double back_m = 0.0;

@@ -16,7 +16,7 @@ using protocol::TouchFlag;
 using std::chrono::nanoseconds;
 using Axes = std::array<double, protocol::kMaxAxes>;
 
-constexpr double kLostScans = 2.5;  // one may be lost and its neighbours still enclose the instant
+constexpr double kLostScans = 2.5;  // periods: one scan between its neighbours may be lost
 
 double seconds(nanoseconds d) noexcept {
   return 1e-9 * static_cast<double>(d.count());
@@ -37,7 +37,7 @@ double norm_of_linear(const Axes& v, std::uint8_t linear_axes) noexcept {
   return std::sqrt(sum);
 }
 
-/// The approach in two halves: how fast, and whether it was steady.
+/// Velocity of the approach, and whether its two halves had the same velocity.
 struct Approach {
   Axes velocity{};
   double speed = 0.0;
@@ -81,8 +81,8 @@ protocol::TouchFlags judge(const Approach& approach, const ProbeApproach& rules)
   return flags;
 }
 
-/// Of the instant of contact: half the width of what is only bounded, and the deviation of all the
-/// rest.
+/// Uncertainty of the instant of contact: half-width of the rectangular part (the edge's interval),
+/// and standard uncertainty of all other parts.
 struct InstantUncertainty {
   double half_width_s = 0.0;
   double u_s = 0.0;
@@ -139,7 +139,7 @@ ProbeTrigger locate_touch(const EdgeInterval& edge, const ScanHistory& scans,
   const auto u_contact = std::llround(1e9 * std::hypot(u.half_width_s / std::sqrt(3.0), u.u_s));
   trigger.head.u_time = nanoseconds{std::llround(
       std::hypot(static_cast<double>(at->u_host_time.count()), static_cast<double>(u_contact)))};
-  // What was lost or restarted between scans is no gap between touches.
+  // A gap or restart between scans is not a gap between touches.
   trigger.head.flags = at->axes.flags & ~(SampleFlag::GapBefore | SampleFlag::Restarted);
   trigger.axis_count = at->axes.axis_count;
   trigger.missing_mask = at->axes.missing_mask;

@@ -1,4 +1,4 @@
-// The real-time half of the tracker: what wait() read becomes samples.
+// The real-time part of the tracker: converts the bytes that wait() read to samples.
 #include "abbe/drivers/tracker/device.hpp"
 
 #include <utility>
@@ -36,7 +36,7 @@ void TrackerDevice::take(const TrackerBurst& burst) ABBE_RT {
   take(TrackerPointsArrived{burst.points.size()});
 }
 
-/// One message for all bursts of a turn.
+/// Posts one message for all bursts of a cycle.
 void TrackerDevice::take(const TrackerPointsArrived& arrived) ABBE_RT {
   auto* last = last_posted();
   if (auto* points = last == nullptr ? nullptr : std::get_if<TrackerPointsArrived>(last)) {

@@ -18,8 +18,8 @@ constexpr double kZeroCelsius_K = 273.15;
 constexpr double kPascalsPerMillibar = 100.0;
 constexpr double kPerPercent = 0.01;
 
-/// Points measured before a break may arrive after its report: the beam is back at the first point
-/// after a hole at least this long, or of three separations.
+/// Points measured before a beam break may arrive after its report. The beam has returned at the
+/// first point after a gap of at least this duration, and of at least three point separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
 
 SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
@@ -34,7 +34,7 @@ SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
     case emscon::PointStatus::TriggerTimeViolation:
       break;
   }
-  return SampleFlag::PointInvalid;  // and what is not known here is not to be trusted
+  return SampleFlag::PointInvalid;  // also for unknown values
 }
 
 bool finite(const std::array<double, 3>& v) ABBE_RT {
@@ -45,7 +45,7 @@ std::array<double, 3> metres(const std::array<double, 3>& mm) ABBE_RT {
   return {kMetresPerMillimetre * mm[0], kMetresPerMillimetre * mm[1], kMetresPerMillimetre * mm[2]};
 }
 
-/// Bit for bit, so that a NaN from the device is not news every time.
+/// Compares bit by bit, so that a NaN is equal to itself.
 bool same(const emscon::Environment& a, const emscon::Environment& b) ABBE_RT {
   const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v); };
   return bits(a.temperature) == bits(b.temperature) && bits(a.pressure) == bits(b.pressure) &&
@@ -136,8 +136,8 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::StatusChange& 
   return change;
 }
 
-/// The number of a broken beam is not public, so any unsolicited error while points come counts as
-/// one.
+/// The error code of a broken beam is not published: any unsolicited error while points arrive
+/// counts as a beam loss.
 void TrackerReceiver::beam_lost() ABBE_RT {
   if (!last_.known || beam_lost_) return;
   beam_lost_ = true;
@@ -149,8 +149,8 @@ TrackerMessage TrackerReceiver::burst(std::size_t count) ABBE_RT {
   return TrackerBurst{std::span{points_}.first(count)};
 }
 
-/// A mean over [arrival - delay - T, arrival - delay]: the middle of it, rectangular ([GUM] 4.3.7)
-/// in both.
+/// A mean over [arrival - delay - T, arrival - delay]. The time is the middle; delay and T each
+/// contribute a rectangular distribution ([GUM] 4.3.7).
 std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& result) ABBE_RT {
   if (!accepting_) {
     ++counters_.points_refused;
@@ -213,8 +213,8 @@ void TrackerReceiver::convert(const emscon::MultiPoint& from, emscon::Status sta
   mark_pending(to.head);
 }
 
-/// Compares with the point before: the device's clock must go on, and holes in it are lost points
-/// or a lost beam.
+/// Compares the point with the previous one: the device time must increase; a gap in it means lost
+/// points or a lost beam.
 void TrackerReceiver::follow(TrackerPoint& point) ABBE_RT {
   if (!last_.known) {
     last_ = {point.device_time, true};

@@ -8,7 +8,7 @@
 namespace abbe::drivers {
 namespace {
 
-// Marks of one scale lie on whole periods; more than this away from one is not noise any more.
+// Marks of one scale lie on whole periods; a larger distance from one, periods, is not noise.
 constexpr double kMostFraction = 0.25;
 
 tl::unexpected<Error> bad(std::string what) {
@@ -26,7 +26,7 @@ std::int64_t on_circle(const DistanceCode& code, std::int64_t position) noexcept
   return rest < 0 ? rest + code.length : rest;
 }
 
-/// k of the pair's fixed mark, that is which of the coded marks.
+/// Number of coded marks on the scale.
 std::int64_t coded_marks(const DistanceCode& code) noexcept {
   const std::int64_t k = code.length / code.increment;
   return code.rotary ? k : k + 1;
@@ -40,29 +40,30 @@ bool on_scale(const DistanceCode& code, std::int64_t position) noexcept {
 
 Result<void> check(const DistanceCode& code) {
   if (code.increment < 8 || code.increment % 2 != 0)
-    return bad("the increment is not an even number above 7");
+    return bad("the increment must be an even number above 7");
   if (code.length < 2 * code.increment)
-    return bad("a scale shorter than two increments has not four marks");
+    return bad("the scale is shorter than two increments: it has fewer than four marks");
   if (code.rotary && code.length % code.increment != 0)
     return bad("a revolution is not a whole number of increments");
-  // From here on the distance of a coded mark to its neighbours is no longer between 0 and the
+  // Beyond this length the distances of a coded mark to its neighbours are not between 0 and the
   // increment.
-  if (coded_marks(code) >= code.increment / 2) return bad("the scale is longer than the code");
+  if (coded_marks(code) >= code.increment / 2)
+    return bad("the scale is longer than its code allows");
   return {};
 }
 
 std::string_view name(MarkFault fault) noexcept {
   switch (fault) {
     case MarkFault::NotWhole:
-      return "the distance of two marks is no whole number of periods";
+      return "the distance of two marks is not an integer number of periods";
     case MarkFault::NotOfCode:
-      return "two marks are at a distance that the scale does not have";
+      return "the scale has no neighbouring marks at this distance";
     case MarkFault::Disagree:
       return "neighbouring marks contradict each other";
     case MarkFault::Reversed:
       return "the direction changed between marks";
     case MarkFault::WrongScale:
-      return "mark after mark was refused: not the scale that is configured";
+      return "repeated marks were refused: this is not the configured scale";
   }
 
   return "?";
@@ -95,7 +96,7 @@ tl::expected<MarkDatum, MarkFault> datum_of(
     const auto P = first_mark(code, M, datum.direction);
     if (!P) return tl::unexpected(MarkFault::NotOfCode);
     if (expected && on_circle(code, *expected) != *P) return tl::unexpected(MarkFault::Disagree);
-    // Not reduced to the circle: an offset must not jump between the four.
+    // Not reduced modulo the circle: the four offsets must be comparable.
     position[i] = expected ? *expected : *P;
     expected = position[i] + datum.direction * M;
   }

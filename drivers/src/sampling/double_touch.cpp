@@ -9,7 +9,7 @@ namespace {
 using protocol::ProbeTrigger;
 using protocol::TouchFlag;
 
-// Approaches within this of one another are the same: 10 degrees.
+// Cosine of 10 degrees: approaches within this angle have the same direction.
 constexpr double kSameSide = 0.985;
 
 bool usable(const ProbeTrigger& touch) noexcept {
@@ -68,7 +68,7 @@ double DoubleTouch::cosine(const ProbeTrigger& a, const ProbeTrigger& b) const n
 
 DoubleTouch::Outcome DoubleTouch::on_touch(const ProbeTrigger& touch) noexcept {
   if (touch.speed_m_s > rules_.fast_above_m_s) {
-    // Of a find only the place counts: its speed may be out of the range that measures.
+    // Only the position of a fast touch is used: its speed may be out of the measuring range.
     if (has(touch.touch_flags, TouchFlag::NoPosition)) return reject(TouchRejection::NotUsable);
     reset();
     found_ = true;

@@ -17,7 +17,8 @@ void MarkTraverse::on_position(std::int64_t count) noexcept {
   follow(static_cast<double>(count) / options_.counts_per_period);
 }
 
-/// Direction by the way since the farthest point: noise does not turn it round.
+/// The direction changes only after travel of reversal_periods back from the farthest point, so
+/// that noise does not change it.
 void MarkTraverse::follow(double position) noexcept {
   if (!moving_) {
     moving_ = true;
@@ -69,8 +70,8 @@ std::optional<tl::expected<MarkDatum, MarkFault>> MarkTraverse::on_mark(
   auto datum = datum_of(options_.code, marks_);
 
   if (!datum) {
-    // One of the four is wrong, nobody knows which: none of them is used again but the latest, as a
-    // first.
+    // One of the four marks is wrong, and which one is unknown: keep only the latest, as the first
+    // of the next four.
     count_ = 0;
     keep(position);
     return tl::expected<MarkDatum, MarkFault>{refuse(datum.error())};

@@ -16,12 +16,12 @@ namespace {
 
 constexpr int kInterface = 0;
 constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
-/// Cancelled transfers come back at once; those of a host controller that hangs do not. They are
-/// waited for so many turns, then for one turn each time the device is to be opened.
-constexpr int kMostCloseTurns = 20;
-constexpr timeval kCloseTurn{0, 50'000};
+/// Cancelled transfers normally end immediately, but not if the host controller hangs. close()
+/// waits for them this many cycles; each later open() waits one cycle more.
+constexpr int kMostCloseCycles = 20;
+constexpr timeval kCloseCycle{0, 50'000};
 
-std::string words_for(int error) {
+std::string error_text(int error) {
   return libusb_strerror(static_cast<libusb_error>(error));
 }
 
@@ -59,10 +59,10 @@ struct LibusbLink::State {
     State* state = nullptr;
     libusb_transfer* transfer = nullptr;
     std::vector<unsigned char> buffer;
-    bool lent = false;  ///< its bytes are read until the next wait()
+    bool resubmit = false;  ///< in the next wait(); until then the caller may read its bytes
   };
 
-  /// A device with the right vendor and product, where it was plugged in.
+  /// A connected device with matching vendor and product, and its bus address.
   struct Seen {
     std::uint8_t bus;
     std::uint8_t address;
@@ -82,7 +82,7 @@ struct LibusbLink::State {
   ~State() {
     if (context == nullptr) return;
     close();
-    if (handle != nullptr) return;  // the library still has our transfers: they are left to it
+    if (handle != nullptr) return;  // libusb still owns transfers: they are not freed
     free_bulk();
     libusb_free_transfer(control_transfer);
     libusb_exit(context);
@@ -103,10 +103,10 @@ struct LibusbLink::State {
 
     if (handle != nullptr) {
       return lose(ErrorCode::Unreachable,
-                  "its cancelled transfers have not come back: the USB host controller hangs");
+                  "its cancelled transfers have not ended: the USB host controller hangs");
     }
 
-    if (init_error != 0) return lose(ErrorCode::SystemRefused, "libusb: " + words_for(init_error));
+    if (init_error != 0) return lose(ErrorCode::SystemRefused, "libusb: " + error_text(init_error));
     if (!find()) return;
     if (!take_over()) {
       libusb_close(std::exchange(handle, nullptr));
@@ -116,8 +116,8 @@ struct LibusbLink::State {
     events.emplace_back(UsbOpened{serial});
   }
 
-  /// Opens the one with the right serial number. Another one may be streaming to somebody else: it
-  /// is opened once, for its serial number, and not again as long as it stays plugged in.
+  /// Opens the device with the configured serial number. Another device may be streaming to another
+  /// program: it is opened only once, to read its serial number, while it stays connected.
   bool find() {
     const DeviceList list{context};
     std::vector<Seen> there;
@@ -146,14 +146,14 @@ struct LibusbLink::State {
       if (const int error = libusb_open(ours, &handle); error != 0) {
         handle = nullptr;
         serials.clear();
-        refused = words_for(error);
+        refused = error_text(error);
       }
     }
 
     return judge(serials, refused);
   }
 
-  /// A device that is plugged in again has another address.
+  /// Serial numbers are kept per address: a device that is connected again has a new address.
   std::optional<Seen> look_at(libusb_device* device, std::uint8_t serial_string,
                               std::string& refused) const {
     Seen one{libusb_get_bus_number(device), libusb_get_device_address(device), {}};
@@ -164,7 +164,7 @@ struct LibusbLink::State {
     if (known != cards.end()) return *known;
     libusb_device_handle* candidate = nullptr;
     if (const int error = libusb_open(device, &candidate); error != 0) {
-      refused = words_for(error);
+      refused = error_text(error);
       return std::nullopt;
     }
 
@@ -176,15 +176,15 @@ struct LibusbLink::State {
   bool judge(const std::vector<std::string>& serials, const std::string& refused) {
     if (identity.serial.empty() && serials.size() > 1) {
       lose(ErrorCode::BadConfiguration,
-           fmt::format("{} are there ({}): the serial number must be configured", serials.size(),
-                       fmt::join(serials, ", ")));
+           fmt::format("{} such devices are connected ({}): configure the serial number",
+                       serials.size(), fmt::join(serials, ", ")));
     } else if (handle == nullptr && !serials.empty()) {
       lose(ErrorCode::Protocol, fmt::format("its serial number is \"{}\", configured is \"{}\"",
                                             fmt::join(serials, "\", \""), identity.serial));
     } else if (handle == nullptr && !refused.empty()) {
-      lose(ErrorCode::SystemRefused, refused + " (a udev rule must give access)");
+      lose(ErrorCode::SystemRefused, refused + " (access needs a udev rule)");
     } else if (handle == nullptr) {
-      lose(ErrorCode::Unreachable, "no such device is plugged in");
+      lose(ErrorCode::Unreachable, "no such device is connected");
     }
 
     return handle != nullptr;
@@ -196,13 +196,13 @@ struct LibusbLink::State {
     if (libusb_get_configuration(handle, &configuration) != 0 ||
         configuration != identity.configuration) {
       if (const int error = libusb_set_configuration(handle, identity.configuration); error != 0) {
-        lose(ErrorCode::SystemRefused, "configuration: " + words_for(error));
+        lose(ErrorCode::SystemRefused, "configuration: " + error_text(error));
         return false;
       }
     }
 
     if (const int error = libusb_claim_interface(handle, kInterface); error != 0) {
-      lose(ErrorCode::SystemRefused, "interface: " + words_for(error));
+      lose(ErrorCode::SystemRefused, "interface: " + error_text(error));
       return false;
     }
 
@@ -223,12 +223,13 @@ struct LibusbLink::State {
       if (control_under_way) libusb_cancel_transfer(control_transfer);
     }
 
-    for (int turn = first ? 0 : kMostCloseTurns - 1; busy() && turn < kMostCloseTurns; ++turn) {
-      timeval patience = kCloseTurn;
-      libusb_handle_events_timeout_completed(context, &patience, nullptr);
+    for (int cycle = first ? 0 : kMostCloseCycles - 1; busy() && cycle < kMostCloseCycles;
+         ++cycle) {
+      timeval timeout = kCloseCycle;
+      libusb_handle_events_timeout_completed(context, &timeout, nullptr);
     }
 
-    if (busy()) return;  // still closing: what the library has is neither freed nor used again
+    if (busy()) return;  // still closing: transfers owned by libusb are neither freed nor reused
     libusb_release_interface(handle, kInterface);
     libusb_close(std::exchange(handle, nullptr));
     closing = false;
@@ -250,14 +251,14 @@ struct LibusbLink::State {
     libusb_fill_control_transfer(control_transfer, handle, control_buffer.data(),
                                  &State::on_control, this, 0);
     const int error = libusb_submit_transfer(control_transfer);
-    if (error != 0) return lose(ErrorCode::Unreachable, "request: " + words_for(error));
+    if (error != 0) return lose(ErrorCode::Unreachable, "request: " + error_text(error));
     control_under_way = true;
   }
 
-  /// Also resets the host's data toggle, which a bare request does not.
+  /// Also resets the data toggle in the host; a plain control request does not.
   void clear_halt() {
     const int error = libusb_clear_halt(handle, identity.bulk_endpoint);
-    if (error == LIBUSB_ERROR_NO_DEVICE) return lose(ErrorCode::Unreachable, words_for(error));
+    if (error == LIBUSB_ERROR_NO_DEVICE) return lose(ErrorCode::Unreachable, error_text(error));
     UsbControlDone done{.setup = control_setup};
     if (error != 0) done.outcome = UsbOutcome::Failed;
     events.emplace_back(done);
@@ -284,9 +285,9 @@ struct LibusbLink::State {
   }
 
   void submit(Bulk& bulk) {
-    bulk.lent = false;
+    bulk.resubmit = false;
     const int error = libusb_submit_transfer(bulk.transfer);
-    if (error != 0) return lose(ErrorCode::Unreachable, "scan endpoint: " + words_for(error));
+    if (error != 0) return lose(ErrorCode::Unreachable, "scan endpoint: " + error_text(error));
     ++in_flight;
   }
 
@@ -295,34 +296,34 @@ struct LibusbLink::State {
     streaming = false;
     stopping = true;
     for (auto& bulk : bulks) libusb_cancel_transfer(bulk.transfer);
-    tell_if_stopped();
+    report_if_stopped();
   }
 
-  void tell_if_stopped() {
+  void report_if_stopped() {
     if (!stopping || in_flight != 0) return;
     stopping = false;
     events.emplace_back(UsbBulkStopped{});
   }
 
   std::span<const UsbEvent> wait(std::chrono::nanoseconds wall) {
-    given.clear();
+    delivered.clear();
     if (streaming) {
       for (auto& bulk : bulks)
-        if (bulk.lent) submit(bulk);
+        if (bulk.resubmit) submit(bulk);
     }
     if (context == nullptr) {
       std::this_thread::sleep_for(wall);
     } else {
       poll(events.empty() ? wall : std::chrono::nanoseconds{0});
     }
-    std::swap(given, events);
-    return given;
+    std::swap(delivered, events);
+    return delivered;
   }
 
   void poll(std::chrono::nanoseconds wall) {
     const auto us = std::chrono::duration_cast<std::chrono::microseconds>(wall);
-    timeval patience{us.count() / 1'000'000, us.count() % 1'000'000};
-    libusb_handle_events_timeout_completed(context, &patience, nullptr);
+    timeval timeout{us.count() / 1'000'000, us.count() % 1'000'000};
+    libusb_handle_events_timeout_completed(context, &timeout, nullptr);
     if (lost) close();
   }
 
@@ -335,13 +336,13 @@ struct LibusbLink::State {
       if (!s.closing) s.lose(ErrorCode::Unreachable, "unplugged");
     } else if (s.streaming && transfer->status != LIBUSB_TRANSFER_CANCELLED) {
       const auto outcome = outcome_of(transfer->status);
-      bulk.lent = outcome == UsbOutcome::Done;
+      bulk.resubmit = outcome == UsbOutcome::Done;
       const auto bytes = std::as_bytes(std::span{bulk.buffer});
       s.events.emplace_back(UsbBulkIn{
           bytes.first(static_cast<std::size_t>(transfer->actual_length)), s.time.now(), outcome});
     }
 
-    s.tell_if_stopped();
+    s.report_if_stopped();
   }
 
   static void LIBUSB_CALL on_control(libusb_transfer* transfer) {
@@ -375,9 +376,9 @@ struct LibusbLink::State {
   libusb_context* context = nullptr;
   int init_error = 0;
   libusb_device_handle* handle = nullptr;
-  std::vector<Seen> cards;  ///< at the latest find()
-  std::string serial;       ///< of the one that was opened
-  bool closing = false;     ///< with a handle: its transfers have not come back yet
+  std::vector<Seen> cards;  ///< found by the latest find()
+  std::string serial;       ///< of the opened device
+  bool closing = false;     ///< close() was called, but transfers have not ended
   bool lost = false;
 
   usb::Setup control_setup;
@@ -390,8 +391,8 @@ struct LibusbLink::State {
   bool streaming = false;
   bool stopping = false;
 
-  std::vector<UsbEvent> events;  ///< gathered
-  std::vector<UsbEvent> given;   ///< by the latest wait()
+  std::vector<UsbEvent> events;     ///< for the next return of wait()
+  std::vector<UsbEvent> delivered;  ///< by the latest wait()
 };
 
 LibusbLink::LibusbLink(const UsbIdentity& identity, const TimeSource& time)

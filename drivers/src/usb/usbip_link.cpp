@@ -13,7 +13,7 @@ namespace {
 
 using usbip::UrbStatus;
 
-constexpr std::size_t kBuffer = std::size_t{512} * 1024;  // several of the largest transfers
+constexpr std::size_t kBuffer = std::size_t{512} * 1024;  // holds several transfers of maximum size
 
 UsbOutcome outcome_of(UrbStatus status) {
   if (status == UrbStatus::Ok) return UsbOutcome::Done;
@@ -42,10 +42,10 @@ void UsbipLink::open() {
 
 void UsbipLink::close() noexcept {
   disconnect();
-  early_events_.clear();
+  pending_events_.clear();
 }
 
-/// What came before stays lent: the bytes are not touched before the next wait().
+/// The bytes of delivered events stay valid: the buffer is not changed before the next wait().
 void UsbipLink::disconnect() noexcept {
   tcp_.close();
   state_ = State::Closed;
@@ -57,7 +57,7 @@ void UsbipLink::disconnect() noexcept {
 
 void UsbipLink::lose(ErrorCode code, const std::string& seen) {
   disconnect();
-  early_events_.emplace_back(UsbLost{Error{code, name() + ": " + seen}});
+  pending_events_.emplace_back(UsbLost{Error{code, name() + ": " + seen}});
 }
 
 void UsbipLink::send(std::span<const std::byte> bytes) {
@@ -123,20 +123,20 @@ void UsbipLink::stop_bulk_in() {
   }
 
   send(outgoing_);
-  tell_if_stopped();
+  report_if_stopped();
 }
 
-void UsbipLink::tell_if_stopped() {
+void UsbipLink::report_if_stopped() {
   if (!stopping_ || std::ranges::any_of(pending_, &Pending::bulk)) return;
   stopping_ = false;
-  early_events_.emplace_back(UsbBulkStopped{});
+  pending_events_.emplace_back(UsbBulkStopped{});
 }
 
 std::span<const UsbEvent> UsbipLink::wait(std::chrono::nanoseconds wall) {
   events_.clear();
   make_room();
-  if (const auto again = std::exchange(resubmit_, 0); again != 0 && streaming_) submit_bulk(again);
-  const auto ready = tcp_.wait(early_events_.empty() ? wall : std::chrono::nanoseconds{0});
+  if (const auto count = std::exchange(resubmit_, 0); count != 0 && streaming_) submit_bulk(count);
+  const auto ready = tcp_.wait(pending_events_.empty() ? wall : std::chrono::nanoseconds{0});
 
   if (!ready) {
     lose(ready.error().code, ready.error().text);
@@ -150,13 +150,12 @@ std::span<const UsbEvent> UsbipLink::wait(std::chrono::nanoseconds wall) {
     parse();
   }
 
-  // In the order in which they happened: what was early, then what came now.
-  events_.insert(events_.end(), early_events_.begin(), early_events_.end());
-  early_events_.clear();
+  events_.insert(events_.end(), pending_events_.begin(), pending_events_.end());
+  pending_events_.clear();
   return events_;
 }
 
-/// What was lent is taken back: only the beginning of a message stays.
+/// Bytes of delivered events become invalid; only the beginning of an incomplete message is kept.
 void UsbipLink::make_room() {
   std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
             buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
@@ -216,7 +215,7 @@ bool UsbipLink::parse_urb() {
   }
   if (const auto* reply = std::get_if<usbip::SubmitReply>(&*urb)) return take(*reply);
   if (const auto* reply = std::get_if<usbip::UnlinkReply>(&*urb)) return take(*reply);
-  lose(ErrorCode::Protocol, "a server that asks");
+  lose(ErrorCode::Protocol, "the server sent a request");
   return false;
 }
 
@@ -224,14 +223,14 @@ bool UsbipLink::take(const usbip::SubmitReply& reply) {
   const auto found = std::ranges::find(pending_, reply.head.sequence, &Pending::sequence);
   if (found == pending_.end()) {
     lose(ErrorCode::Protocol,
-         fmt::format("an answer to request {}, which was not made", reply.head.sequence));
+         fmt::format("answer to request {}, which was not sent", reply.head.sequence));
     return false;
   }
 
   const Pending pending = *found;
   if (reply.length > pending.length) {
     lose(ErrorCode::Protocol,
-         fmt::format("{} bytes where {} were asked for", reply.length, pending.length));
+         fmt::format("{} bytes received, {} requested", reply.length, pending.length));
     return false;
   }
 
@@ -246,12 +245,12 @@ bool UsbipLink::take(const usbip::SubmitReply& reply) {
   return true;
 }
 
-/// A request answered in the meantime is not pending any more.
+/// A request that was answered before its cancellation is no longer in pending_.
 bool UsbipLink::take(const usbip::UnlinkReply& reply) {
   begin_ += usbip::kUrbHeaderSize;
   std::erase_if(pending_,
                 [&](const Pending& p) { return p.bulk && p.unlink == reply.head.sequence; });
-  tell_if_stopped();
+  report_if_stopped();
   return true;
 }
 
@@ -265,9 +264,9 @@ void UsbipLink::finish(const Pending& pending, UrbStatus status, std::span<const
 }
 
 void UsbipLink::finish_bulk(UsbOutcome outcome, std::span<const std::byte> bytes) {
-  if (stopping_) return tell_if_stopped();
+  if (stopping_) return report_if_stopped();
   if (outcome == UsbOutcome::Done) ++resubmit_;
-  early_events_.emplace_back(UsbBulkIn{bytes, arrival_, outcome});
+  pending_events_.emplace_back(UsbBulkIn{bytes, arrival_, outcome});
 }
 
 void UsbipLink::finish_control(UsbOutcome outcome, std::span<const std::byte> bytes) {
@@ -278,7 +277,7 @@ void UsbipLink::finish_control(UsbOutcome outcome, std::span<const std::byte> by
   UsbControlDone done{.setup = control_setup_, .outcome = outcome};
   done.length = std::min(bytes.size(), done.data.size());
   std::copy_n(bytes.begin(), done.length, done.data.begin());
-  early_events_.emplace_back(done);
+  pending_events_.emplace_back(done);
 }
 
 void UsbipLink::inspect(std::span<const std::byte> bytes) {
@@ -300,12 +299,12 @@ void UsbipLink::inspect(std::span<const std::byte> bytes) {
     }
     case Inspection::Select:
       state_ = State::Open;
-      early_events_.emplace_back(UsbOpened{serial_});
+      pending_events_.emplace_back(UsbOpened{serial_});
       return;
   }
 
   inspection_ = static_cast<Inspection>(static_cast<unsigned>(inspection_) + 1);
-  ask_next();
+  request_next();
 }
 
 void UsbipLink::inspected_device(std::span<const std::byte> bytes) {
@@ -316,10 +315,10 @@ void UsbipLink::inspected_device(std::span<const std::byte> bytes) {
   serial_string_ = device->serial_string;
   serial_.clear();
   inspection_ = Inspection::Configuration;
-  ask_next();
+  request_next();
 }
 
-void UsbipLink::ask_next() {
+void UsbipLink::request_next() {
   if (inspection_ == Inspection::Serial && serial_string_ == 0) {
     const auto wrong = wrong_serial(options_.identity, "");
     if (!wrong.empty()) return lose(ErrorCode::Protocol, wrong);
@@ -328,7 +327,7 @@ void UsbipLink::ask_next() {
 
   switch (inspection_) {
     case Inspection::Device:
-      break;  // asked on import
+      break;  // requested in parse_import()
     case Inspection::Configuration:
       return submit_control(
           usb::get_descriptor(usb::DescriptorType::Configuration, 0, usb::kMaxDescriptor));

@@ -1,7 +1,9 @@
 #pragma once
-/// Which axes are current: an axis is absent when the samples of the last 150 ms, at least three,
-/// all missed it, and until a sample first had it. Counted in samples, not in time: a device thread
-/// that was held up made no sample in which an axis could be missing. Real time; one thread.
+/// Which axes deliver current positions. An axis is absent
+///  - before the first sample that contains it, and
+///  - while it is missing in all samples of the last 150 ms, and in at least the last three.
+/// The 150 ms are counted in samples: while the device thread is delayed there are no samples, and
+/// no axis becomes absent. Real time; one thread.
 
 #include <algorithm>
 #include <array>
@@ -42,7 +44,7 @@ class AxisPresence {
  private:
   std::size_t axes_;
   std::int64_t limit_;
-  std::array<std::int64_t, protocol::kMaxAxes> missed_{};  ///< samples in a row
+  std::array<std::int64_t, protocol::kMaxAxes> missed_{};  ///< consecutive samples without it
 };
 
 }  // namespace abbe::drivers

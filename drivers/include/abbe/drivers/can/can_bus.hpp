@@ -1,7 +1,7 @@
 #pragma once
-/// The seam for CAN transports: frames in with the time they arrived, frames out. Ordinary world
-/// (system calls); one thread. SocketCanBus is the real bus, UdpCanBus the tunnel and the
-/// simulator.
+/// Interface of the CAN transports: frames in with their arrival times, frames out. Makes system
+/// calls: not for the RT path; one thread. SocketCanBus is a CAN interface of Linux, UdpCanBus a
+/// tunnel or the simulator.
 
 #include <chrono>
 #include <cstddef>
@@ -19,29 +19,30 @@ namespace can = protocol::can;
 
 struct ReceivedFrame {
   can::CanFrame frame;
-  protocol::HostTime time{};  ///< arrival; of an echo: when it left
-  /// the kernel stamp was not believed: `time` is when user space saw it
+  protocol::HostTime time{};  ///< arrival; of an echo: transmission
+  /// There is no usable kernel timestamp: `time` was read when the frame reached user space.
   bool time_widened = false;
-  /// our own SYNC (start_sync() or, with echoes_sync(), send()), heard back as it left
+  /// The frame is our own SYNC (start_sync() or, with echoes_sync(), send()), received back when
+  /// it was transmitted.
   bool echo = false;
 };
 
-/// What a transport lost or refused since it was made; never goes back.
+/// Losses and refusals since construction; the counters never decrease.
 struct CanBusCounters {
-  std::uint64_t lost = 0;     ///< the kernel's queue was full, or datagrams missing in the sequence
-  std::uint64_t refused = 0;  ///< datagrams that are no CAN frames
-  std::uint64_t time_widened = 0;  ///< arrivals whose kernel stamp could not be used
-  std::uint64_t strangers = 0;     ///< datagrams of others than the peer: refused
+  std::uint64_t lost = 0;          ///< the kernel's queue was full, or datagrams are missing
+  std::uint64_t refused = 0;       ///< datagrams that contain no valid CAN frames
+  std::uint64_t time_widened = 0;  ///< arrivals without a usable kernel timestamp
+  std::uint64_t strangers = 0;     ///< refused datagrams of senders other than the peer
 };
 
-/// What read() gave. The bus may have looked at more frames than it hands on: `frames` alone says
-/// nothing of what else is there.
+/// Result of read(). The transport filters frames out: fewer frames than out.size() do not mean
+/// that the receive queue is empty. Only `all` states that.
 struct CanRead {
   std::size_t frames = 0;
-  bool all = false;  ///< nothing else was there
-  protocol::HostTime
-      /// after the wait, before the first look: what came before this is among them, if `all`
-      until{};
+  bool all = false;  ///< the receive queue was read to its end
+  /// Read after the wait and before the first frame: if `all`, every frame that arrived before
+  /// `until` was delivered.
+  protocol::HostTime until{};
 };
 
 class CanBus {
@@ -53,31 +54,31 @@ class CanBus {
   CanBus& operator=(const CanBus&) = delete;
   virtual ~CanBus() = default;
 
-  /// Opens, or closes and opens again, for these 11-bit identifiers and all error frames; others
-  /// are not delivered.
+  /// Opens the transport; closes it first if it is open. read() delivers frames with these 11-bit
+  /// identifiers and all error frames, no others.
   [[nodiscard]] virtual Result<void> open(std::span<const std::uint32_t> ids) = 0;
   virtual void close() noexcept = 0;
-  /// Waits at most `wall` (the operating system's time, 0 = look only) and reads what is there, at
-  /// most out.size(), itself at most kMostRead. Where the kernel had no room for frames, an error
-  /// frame ReceiveOverflow stands in their place. Error code Unreachable: nobody there now, the bus
-  /// stays open; any other code: close and open again.
+  /// Waits at most `wall` (time of the operating system; 0: does not wait) and reads the frames
+  /// that have arrived, at most out.size(), which must not exceed kMostRead. Frames that the kernel
+  /// dropped are replaced by one error frame ReceiveOverflow. Error code Unreachable: the peer does
+  /// not answer at present, the bus stays open; after any other code: close and open again.
   [[nodiscard]] virtual Result<CanRead> read(std::span<ReceivedFrame> out,
                                              std::chrono::nanoseconds wall) = 0;
   /// Errors as for read().
   [[nodiscard]] virtual Result<void> send(std::span<const can::CanFrame> frames) = 0;
-  /// Lets the operating system send the SYNC every `period` from now on, whatever this thread does,
-  /// until stop_sync() or close(). read() gives each as an echo, if its identifier was among those
-  /// of open(). BadConfiguration if this transport cannot.
+  /// From now on the operating system sends the SYNC every `period`, independently of this thread,
+  /// until stop_sync() or close(). read() delivers each SYNC as an echo if its identifier was
+  /// passed to open(). Error BadConfiguration if the transport has no cyclic transmission.
   [[nodiscard]] virtual Result<void> start_sync(std::chrono::nanoseconds period);
   virtual void stop_sync() noexcept {}
   [[nodiscard]] virtual bool has_sync() const noexcept { return false; }
-  /// read() also gives a SYNC of send() as an echo when it has left, if its identifier was among
-  /// those of open().
+  /// read() delivers a SYNC of send() as an echo after its transmission, if its identifier was
+  /// passed to open().
   [[nodiscard]] virtual bool echoes_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
-  /// Where the latest stranger's datagram came from: "127.0.0.1:4711"; empty: there was none.
+  /// Sender of the latest datagram that did not come from the peer, "127.0.0.1:4711"; empty: none.
   [[nodiscard]] virtual std::string stranger() const { return {}; }
-  /// For people: "can0", "udp 127.0.0.1:20000".
+  /// For messages: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// What the encoders of a bus report of themselves (EMCY), in words. Sans-I/O. Ordinary world; one
-/// thread.
+/// Emergency messages (EMCY, [CiA 301]) of the encoders of a bus, as text. Sans-I/O. Allocates: not
+/// for the RT path; one thread.
 
 #include <chrono>
 #include <cstdint>
@@ -20,23 +20,23 @@ class EmergencyReports {
   explicit EmergencyReports(std::span<const EncoderAxis> axes);
 
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
-  /// A fault not reported yet: of each node the latest, at most one a second, with how many others
-  /// it stands for.
+  /// The next fault that was not returned yet: per node the latest emergency, at most one a second,
+  /// with the number of other emergencies since the previous report.
   [[nodiscard]] std::optional<std::string> take_fault(protocol::HostTime now);
-  /// Axes that are absent, each with the latest emergency of its node, and axes with an emergency
-  /// that was not taken back; empty: none. The emergency of an axis that was well for kSettledAfter
-  /// is forgotten.
+  /// Axes that are absent, with the latest emergency of their node, and axes whose emergency is not
+  /// reset; empty: none. The latest emergency is deleted once the axis has been present and free of
+  /// emergencies for kSettledAfter.
   [[nodiscard]] std::string condition(std::uint8_t absent_mask, protocol::HostTime now);
 
  private:
   struct Node {
     std::string axis;
     can::NodeId id = 0;
-    std::uint16_t code = 0;  ///< 0: none, or taken back
+    std::uint16_t code = 0;  ///< 0: none, or error reset
     std::optional<can::Emergency> latest;
-    std::optional<protocol::HostTime> told;
-    unsigned to_tell = 0;
-    protocol::HostTime unwell{};  ///< when it last was absent or had an emergency
+    std::optional<protocol::HostTime> reported_at;
+    unsigned unreported = 0;
+    protocol::HostTime disturbed_at{};  ///< the axis was last absent or had an emergency
   };
   void on_emergency(Node& node, const can::Emergency& emergency, protocol::HostTime now);
 

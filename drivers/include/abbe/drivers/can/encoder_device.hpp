@@ -1,21 +1,29 @@
 #pragma once
-/// All encoders of one CAN bus as a Device: configures the nodes, is the SYNC producer, and turns
-/// their answers into one AxisSample per SYNC. The sample leaves as soon as the last axis has
+/// All encoders of one CAN bus as a Device: configures the nodes, produces the SYNC, and converts
+/// the answers to one AxisSample per SYNC. The sample is output as soon as the last axis has
 /// answered.
 ///
-/// Before it sends anything it listens (ForeignSync): on a bus with another SYNC producer it sends
-/// nothing. With SyncSource::External it never sends anything: the SYNC and the configuration of
-/// the nodes are the machine's own.
+/// The device listens before it sends (ForeignSync): on a bus with another SYNC producer it sends
+/// nothing. With SyncSource::External it never sends: the machine produces the SYNC and configures
+/// the nodes.
 ///
-/// The SYNC runs on the host clock at start + n x period: no drift; a period that could not be
-/// served is left out, counted, and marked as a gap on the next sample. It runs while at least one
-/// node is configured and the bus is not off. With SyncSource::Kernel the SYNC comes from the
-/// kernel's timer instead. On SocketCAN its echo is the time in both cases: on most controllers
-/// when the frame was on the wire.
+/// SYNC number n is due at start + n x period on the host clock, so the period does not drift. A
+/// SYNC that is late by a period or more is skipped and counted, and the next sample is marked with
+/// a gap. The SYNC runs while at least one node is configured and the bus is not off. With
+/// SyncSource::Kernel the kernel's timer sends it. On SocketCAN the time of a SYNC is that of its
+/// echo, with either source: on most controllers the end of its transmission.
 ///
-/// States: "closed", "listening", "foreign SYNC" (refused), "no SYNC" (External), "configuring",
-/// "silent", "degraded" (some axes are missing), "streaming" (all axes are current), "bus off".
-/// Time-outs are judged only when everything that had come was read.
+/// States:
+///   "closed"
+///   "listening"
+///   "foreign SYNC"  another SYNC producer is on the bus: nothing is sent
+///   "no SYNC"       SyncSource::External only
+///   "configuring"
+///   "silent"        no node answers
+///   "degraded"      some axes are missing
+///   "streaming"     all axes are current
+///   "bus off"
+/// Time-outs are checked only after all frames that have arrived were read.
 
 #include <array>
 #include <cstdint>
@@ -41,10 +49,11 @@
 namespace abbe::drivers {
 
 enum class SyncSource {
-  /// the device thread sends it, on any transport; without an echo its time is read just before
+  /// The device thread sends the SYNC, on any transport. Without an echo its time is read
+  /// immediately before send().
   Thread,
-  Kernel,  ///< CAN_BCM sends it, whatever the thread does; SocketCAN only
-  /// the machine sends it, and has configured the nodes: nothing at all is sent from here
+  Kernel,  ///< CAN_BCM sends the SYNC, independently of the thread; SocketCAN only
+  /// The machine sends the SYNC and configures the nodes; this device sends nothing.
   External,
 };
 
@@ -53,7 +62,7 @@ struct EncoderDeviceOptions {
   EncoderReceiverOptions receiver;
   SupervisorOptions supervisor;
   SyncSource sync = SyncSource::Thread;
-  /// after the transport failed
+  /// wait after a failure of the transport
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
   std::size_t sample_capacity = 8192;  ///< 8 s at 1 kHz
   std::size_t raw_capacity_blocks = 8192;
@@ -61,8 +70,8 @@ struct EncoderDeviceOptions {
 
 class EncoderDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(), and for a SYNC that `bus` cannot
-  /// send. The bus is opened by the first wait().
+  /// `time` must outlive the device. Error BadConfiguration: as check(), or SyncSource::Kernel on a
+  /// `bus` without cyclic transmission. The first wait() opens the bus.
   [[nodiscard]] static Result<std::unique_ptr<EncoderDevice>> create(
       const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
 
@@ -73,7 +82,7 @@ class EncoderDevice final : public Device {
   /// One reader each.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
-  /// The device thread's own view.
+  /// Only for the device thread.
   [[nodiscard]] const EncoderReceiver& receiver() const noexcept { return receiver_; }
 
  private:
@@ -86,24 +95,25 @@ class EncoderDevice final : public Device {
   [[nodiscard]] bool bus_off() const { return receiver_.bus_off() && !reopened_; }
   [[nodiscard]] bool external() const { return options_.sync == SyncSource::External; }
   [[nodiscard]] bool is_behind(protocol::HostTime now) const;
-  void judge(protocol::HostTime now);
+  void check_timeouts(protocol::HostTime now);
   void stop_sending();
   void follow_foreign_sync(protocol::HostTime now);
   void follow_external_sync(protocol::HostTime now);
   void send_sync();
   void follow_kernel_sync();
-  /// Faults that come by the frame, told once a second.
-  struct Told {
+  /// The latest report of a fault that can occur with every frame: it is reported once a second.
+  struct Reported {
     std::uint64_t count = 0;
     std::optional<protocol::HostTime> at;
   };
-  void tell_of(std::uint64_t count, Told& told, std::string_view what, protocol::HostTime now);
-  void tell_of_late_answers(protocol::HostTime now);
-  void tell_of_many_late(protocol::HostTime now);
+  void report_count(std::uint64_t count, Reported& reported, std::string_view what,
+                    protocol::HostTime now);
+  void report_late_answers(protocol::HostTime now);
+  void report_many_late(protocol::HostTime now);
   void send_configuration();
   [[nodiscard]] bool send(const can::CanFrame& frame);
   void read_batch(protocol::HostTime now, std::chrono::nanoseconds at_most);
-  void look_at(const ReceivedFrame& received);
+  void dispatch(const ReceivedFrame& received);
   void account(protocol::HostTime now);
   void show_state(protocol::HostTime now);
   void show_condition(protocol::HostTime now);
@@ -127,21 +137,22 @@ class EncoderDevice final : public Device {
   ForeignSync foreign_;
   AxisPresence presence_;
   EmergencyReports emergencies_;
-  std::string condition_;  ///< as shown
+  std::string condition_;  ///< as on board_
 
   bool open_ = false;
   bool sending_ = false;  ///< the supervisor runs
   bool bus_was_off_ = false;
   protocol::HostTime off_since_{};
-  /// since the bus went off: its controller was started again, whoever heard it
+  /// The bus was opened again after bus-off, which restarts the controller; receiver_ still reports
+  /// bus-off until it receives a frame.
   bool reopened_ = false;
-  bool caught_up_ = true;     ///< everything that came before this SYNC is read
-  bool unreachable_ = false;  ///< told already
-  std::string refusal_;       ///< why it could not be opened, as told already
-  bool kernel_sync_ = false;  ///< runs
-  bool foreign_told_ = false;
-  bool no_sync_told_ = false;
-  bool period_told_ = false;
+  bool caught_up_ = true;     ///< all frames that arrived before the latest SYNC were read
+  bool unreachable_ = false;  ///< already reported
+  std::string refusal_;       ///< reported reason why the bus could not be opened
+  bool kernel_sync_ = false;  ///< the kernel sends the SYNC
+  bool foreign_reported_ = false;
+  bool no_sync_reported_ = false;
+  bool period_reported_ = false;
   protocol::HostTime opened_at_{};
   protocol::HostTime reopen_at_{};
   std::optional<protocol::HostTime> next_sync_;
@@ -149,15 +160,16 @@ class EncoderDevice final : public Device {
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
   std::uint64_t samples_seen_ = 0;
-  std::uint64_t kept_back_ = 0;  ///< SYNCs
-  Told kept_back_told_, shorts_told_, duplicates_told_, strangers_told_, bundled_told_, late_told_;
+  std::uint64_t withheld_syncs_ = 0;
+  Reported withheld_reported_, shorts_reported_, duplicates_reported_, strangers_reported_,
+      bundled_reported_, late_reported_;
   TogetherArrivals together_;
 
-  std::array<ReceivedFrame, CanBus::kMostRead> came_{};
-  std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< what the receiver sees of it
+  std::array<ReceivedFrame, CanBus::kMostRead> came_{};       ///< read from the bus
+  std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< for the receiver
   std::size_t batch_count_ = 0;
-  bool all_read_ = true;            ///< nothing else came
-  protocol::HostTime cycle_end_{};  ///< what came before is read, if all_read_
+  bool all_read_ = true;            ///< CanRead::all
+  protocol::HostTime cycle_end_{};  ///< frames that arrived before this are read, if all_read_
   std::uint8_t raw_sequence_ = 0;
   std::array<std::byte, protocol::RawBlock::kCapacity> datagram_{};
 };

@@ -1,34 +1,40 @@
 #pragma once
-/// Frames of an encoder bus to AxisSamples. Sans-I/O and deterministic: the same events in the same
-/// order give the same samples, so replay from raw bytes uses it unchanged. Real time: no
-/// allocation after construction. One thread.
+/// Converts the frames of an encoder bus to AxisSamples. Sans-I/O and deterministic: the same
+/// events in the same order give the same samples, so replay from raw bytes uses the same class.
+/// Real time: no allocation after construction. One thread.
 ///
-/// A cycle begins when our SYNC goes out (on_sent), or with external_sync when the machine's
-/// arrives. The sample leaves when the last axis has answered, or at the deadline, the next SYNC or
-/// bus-off with the axes that are not known marked in missing_mask: who did not answer keeps the
-/// previous value. All axes carry one time: SYNC + sampling delay. An axis that never answered has
-/// position NaN. An answer that comes after its cycle is closed is counted and not used; one
-/// stamped before the SYNC cannot be its answer.
+/// A cycle begins when our SYNC is sent (on_sent), or with external_sync when the machine's SYNC
+/// arrives. It ends, and its sample is output, when the last axis has answered, at the deadline, at
+/// the next SYNC, or at bus-off. Axes without an answer are marked in missing_mask and keep their
+/// previous value; an axis that never answered has position NaN. All axes have one time: SYNC +
+/// sampling delay. An answer that arrives after the end of its cycle is counted and not used. An
+/// answer with a time before the SYNC is not an answer to this SYNC.
 ///
-/// An answer does not say to which SYNC. It is doubtful, and its axis missing, where it may be that
-/// to an earlier one: the first after cycles without any (but not where the node booted, or the
-/// SYNC paused for a period, in between), and those of a cycle in which the node answers twice. If
-/// the cycle's sample has left before the second one, it is given again, with the same time and
-/// cycle number and that axis missing: of two samples of one time the later takes back what the
-/// earlier said. What is left: a node that is late in more than two cycles in a row is doubtful at
-/// the beginning and at the end of that, not in between; one that is late from its first answer on,
-/// or whose lateness survives a pause, not at the beginning either. The period must be longer than
-/// the slowest answer.
+/// An answer does not identify its SYNC. An answer that may belong to an earlier SYNC is doubtful,
+/// and its axis is marked missing. Doubtful are
+///  - the first answer after cycles without an answer, unless the node booted or the SYNC paused
+///    for a period in between, and
+///  - all answers of a cycle in which the node answers twice.
+/// If the sample of that cycle was output before the second answer, it is output again with the
+/// same time and cycle number and with that axis missing: of two samples with the same time the
+/// later one replaces the earlier one.
 ///
-/// The scale is configured or read along from the SDO answers on the bus (6005h:01, else 6501h;
-/// rotary: 6001h, else 6501h), so that a recording carries it. 0 is refused: the axis stays
-/// missing. So is the place of the position in a mapping that could not be written, and the period
-/// of a heartbeat that could not be set.
+/// What this does not detect: if a node answers late in more than two consecutive cycles, its first
+/// and its last late answers are doubtful, those in between are not. If a node is late from its
+/// first answer on, or still late after a pause, its first late answers are not doubtful either.
+/// Therefore the period must be longer than the slowest answer.
 ///
-/// Raw blocks of a CAN bus: each is one whole datagram of protocol/can/udp_framing.hpp with all its
-/// frames at one host time. FromDevice: as received. ToDevice: as sent, the SYNC among them.
-/// FromDevice without frames (no bytes or count 0): nothing came until that time, which is what
-/// closes a cycle at its deadline. The sequence number counts blocks.
+/// The scale is configured, or read from SDO answers on the bus (6005h:01, else 6501h; rotary:
+/// 6001h, else 6501h), so that a recording contains it. A scale of 0 is refused: the axis stays
+/// missing. Also read from SDO answers: the position's place in a PDO mapping that could not be
+/// written, and the period of a heartbeat that could not be set.
+///
+/// Raw blocks of a CAN bus: each block is one whole datagram of protocol/can/udp_framing.hpp; all
+/// its frames have one host time.
+///   FromDevice  frames as received; without frames (no bytes or count 0): no further frame arrived
+///               before that time, which ends a cycle at its deadline
+///   ToDevice    frames as sent, including the SYNC
+/// The sequence number counts blocks.
 
 #include <algorithm>
 #include <array>
@@ -62,30 +68,30 @@ struct EncoderAxis {
   can::PositionType position = can::PositionType::Signed32;
   std::uint8_t tpdo = 1;           ///< 1 or 2
   std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
-  std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: ask the encoder
+  std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: read by SDO
   double offset = 0.0;             ///< m or rad: the reading at count 0
-  /// counts after which it begins anew; 0: what the encoder says, else 2^32 (2^64)
+  /// The count wraps to 0 after this many; 0: range read from the encoder, else 2^32 (2^64).
   std::uint64_t wrap_counts = 0;
-  std::optional<std::uint32_t> serial{};  ///< checked when given
+  std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };
 
 struct EncoderReceiverOptions {
   std::vector<EncoderAxis> axes;  ///< 1 to protocol::kMaxAxes, in the order of the sample
   std::chrono::nanoseconds sync_period = std::chrono::milliseconds{1};
   std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
-  std::chrono::nanoseconds
-      sampling_delay{};  ///< the SYNC's time to position taken; device specific, to be calibrated
-  /// its standard uncertainty
+  /// From the time of the SYNC to the sampling of the position; device specific, to be calibrated.
+  std::chrono::nanoseconds sampling_delay{};
+  /// standard uncertainty of sampling_delay
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
   std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
-  bool external_sync = false;  ///< the machine's SYNC begins a cycle, as it arrives, not ours
+  bool external_sync = false;  ///< a cycle begins when the machine's SYNC arrives
 };
 /// BadConfiguration names the axis and what is wrong with it.
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
 /// `options.answer_within`, or 0.8 of the period.
 [[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
-/// What two readings of two clocks may disagree by: a stamp this little before the SYNC is not
-/// before it.
+/// Tolerance when times of two clocks are compared: an answer earlier than the SYNC by less than
+/// this counts as simultaneous with it.
 [[nodiscard]] constexpr std::chrono::nanoseconds stamp_slack(
     std::chrono::nanoseconds sync_period) ABBE_RT {
   return sync_period / 50;
@@ -94,7 +100,7 @@ struct EncoderReceiverOptions {
 /// Since construction.
 struct EncoderCounters {
   std::uint64_t samples = 0;
-  std::uint64_t missing_answers = 0;  ///< axes x cycles, the doubtful among them
+  std::uint64_t missing_answers = 0;  ///< axes x cycles, including doubtful answers
   std::uint64_t late_frames = 0;
   std::uint64_t duplicate_frames = 0;  ///< answers after the first one in a cycle
   std::uint64_t short_frames = 0;      ///< TPDOs too short for a position
@@ -103,7 +109,7 @@ struct EncoderCounters {
   std::uint64_t heartbeat_losses = 0;
   std::uint64_t bus_reports = 0;  ///< error frames
   std::uint64_t scale_refusals = 0;
-  std::uint64_t bad_blocks = 0;  ///< raw blocks that are no datagram
+  std::uint64_t bad_blocks = 0;  ///< raw blocks that are not a valid datagram
 };
 
 class EncoderReceiver {
@@ -111,28 +117,29 @@ class EncoderReceiver {
   /// `options` have passed check(). Allocates.
   explicit EncoderReceiver(const EncoderReceiverOptions& options);
 
-  // Events in the order in which they happened. The samples they complete (at most two) are valid
-  // until the next event.
+  // Events, in the order in which they happened. Each returns the samples it completes (at most
+  // two), valid until the next event.
   //
-  // `time_widened`: the kernel stamp was not believed. A position that came so may be the answer to
-  // the SYNC before, and a SYNC heard so left earlier: the sample is flagged TimeWidened and its
-  // u_time widened by a period, rectangular. Raw blocks do not tell: a replay from raw bytes has
-  // the same positions without this flag.
+  // `time_widened`: the frame has no usable kernel timestamp. Then a position may be the answer to
+  // the previous SYNC, and a SYNC may have been sent earlier than `time`: the sample is flagged
+  // TimeWidened and its u_time is widened by one period, rectangular. Raw blocks do not contain
+  // this flag: a replay from raw bytes gives the same positions without it.
   [[nodiscard]] std::span<const protocol::AxisSample> on_sent(const can::CanFrame& frame,
                                                               protocol::HostTime time,
                                                               bool time_widened = false) ABBE_RT;
   [[nodiscard]] std::span<const protocol::AxisSample> on_frame(const can::CanFrame& frame,
                                                                protocol::HostTime time,
                                                                bool time_widened = false) ABBE_RT;
-  /// Nothing more came until `now`.
+  /// No further frame arrived before `now`.
   [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
-  /// Frames are missing here: the open cycle ends, as an answer that comes now may be one to a SYNC
-  /// that is missing; the next sample says so.
+  /// Frames were lost at this point. The open cycle ends, because the next answer may belong to a
+  /// SYNC that was lost; the next sample is flagged GapBefore.
   [[nodiscard]] std::span<const protocol::AxisSample> on_loss() ABBE_RT;
   /// When on_time() has something to do: the deadline of the open cycle, else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
 
-  /// Replay: all events of one raw block, every sample to sink(const AxisSample&). Total.
+  /// Replay: processes all events of one raw block and passes every sample to
+  /// sink(const AxisSample&). Accepts any bytes.
   template <class Sink>
   void on_raw(const protocol::RawBlock& block, Sink&& sink) {
     const auto give = [&](std::span<const protocol::AxisSample> samples) {
@@ -162,10 +169,10 @@ class EncoderReceiver {
     AxisKind kind{};
     can::PositionType type{};
     std::uint32_t tpdo_id = 0;
-    std::uint16_t mapping = 0;  ///< the object of it, 1A00h or 1A01h
+    std::uint16_t mapping = 0;  ///< mapping object of this TPDO, 1A00h or 1A01h
     std::uint8_t position_byte = 0;
-    std::uint32_t bits_before = 0;  ///< the entry of a mapping that is read next
-    std::uint32_t units = 0;        ///< rotary: counts a revolution, as read
+    std::uint32_t bits_before = 0;  ///< offset of the mapping entry that is read next
+    std::uint32_t units = 0;        ///< rotary: counts per revolution, as read
     std::chrono::nanoseconds heartbeat_timeout{};
     bool scale_configured = false;
     bool wrap_configured = false;
@@ -173,8 +180,8 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
-    bool answers = false;            ///< has since it booted, without a pause of the SYNC
-    bool reply_outstanding = false;  ///< the answer to an earlier SYNC may still come
+    bool answers = false;            ///< has answered since its boot-up or the last SYNC pause
+    bool reply_outstanding = false;  ///< the answer to an earlier SYNC may still arrive
     std::uint64_t raw = 0;           ///< the latest count as sent, modulo `modulus`
     std::uint16_t emergency = 0;     ///< the latest code; 0: none
     bool heartbeat_lost = false;
@@ -190,17 +197,17 @@ class EncoderReceiver {
   [[nodiscard]] Samples done() const ABBE_RT { return {out_.data(), out_count_}; }
   void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time,
                    bool time_widened) ABBE_RT;
-  void hear() ABBE_RT;
+  void end_bus_off() ABBE_RT;
   void count_late(std::size_t i) ABBE_RT;
-  void take_back(std::size_t i, protocol::HostTime time) ABBE_RT;
-  void look_for_outstanding_replies(bool paused) ABBE_RT;
+  void correct_sample(std::size_t i, protocol::HostTime time) ABBE_RT;
+  void note_outstanding_replies(bool paused) ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;
   void on_bus_report(const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT;
-  void learn_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT;
-  void learn(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
+  void read_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT;
+  void read_object(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
   void check_heartbeats(protocol::HostTime time) ABBE_RT;
   void count_bad_block() ABBE_RT { ++counters_.bad_blocks; }
 
@@ -215,18 +222,18 @@ class EncoderReceiver {
   std::chrono::nanoseconds heartbeat_timeout_;
   bool external_sync_;
 
-  bool open_ = false;                            ///< a cycle waits for answers
+  bool open_ = false;                            ///< the cycle has not ended
   std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
   std::uint32_t cycle_ = 0;
-  std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, in time or not
-  std::uint8_t doubtful_mask_ = 0;  ///< maybe to another SYNC
+  std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, also too late
+  std::uint8_t doubtful_mask_ = 0;  ///< the answer may belong to another SYNC
   bool bus_off_ = false;
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
-  bool time_widened_ = false;       ///< of the open cycle: its SYNC, or an answer
+  bool time_widened_ = false;       ///< for the SYNC or an answer of the open cycle
   std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
-  protocol::AxisSample current_;    ///< counts and positions stay from cycle to cycle
+  protocol::AxisSample current_;    ///< counts and positions are kept between cycles
   std::array<protocol::AxisSample, 4> out_{};
   std::size_t out_count_ = 0;
   EncoderCounters counters_;

@@ -1,7 +1,7 @@
 #pragma once
-/// Keeps every node of an encoder bus configured: at start, after a boot-up message, after silence,
-/// after bus-off. Sans-I/O: frames and a time in, frames out; one configurator per node, all at
-/// once. Ordinary world (composes texts). One thread.
+/// Configures every node of an encoder bus: at start, after a boot-up message, when a node does not
+/// answer, and after bus-off. Sans-I/O: frames and a time in, frames out. Each node has its own
+/// configurator; they run concurrently. Composes texts: not for the RT path. One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -18,9 +18,10 @@ namespace abbe::drivers {
 
 struct SupervisorOptions {
   std::uint16_t heartbeat_ms = 100;
-  std::chrono::nanoseconds silence = std::chrono::milliseconds{
-      350};  ///< a ready node that does not answer the SYNC for so long is lost
-  /// after a configuration that failed
+  /// A configured node that does not answer the SYNC for this long is reported and configured
+  /// again.
+  std::chrono::nanoseconds silence = std::chrono::milliseconds{350};
+  /// wait after a failed configuration
   std::chrono::nanoseconds retry_after = std::chrono::seconds{1};
   can::SdoClientOptions sdo{};
 };
@@ -30,26 +31,26 @@ class EncoderSupervisor {
   EncoderSupervisor(std::span<const EncoderAxis> axes, const SupervisorOptions& options);
 
   void start(protocol::HostTime now);
-  /// Nothing may be sent any more: forgets what was under way. start() begins again.
+  /// From now on nothing may be sent: pending frames are discarded. start() begins again.
   void stop();
-  /// The bus is back from bus-off: resets the communication of these nodes, each by its own number
-  /// (node 0 would be every drive on the bus), then configures them.
+  /// The bus has recovered from bus-off: sends NMT reset communication to each of these nodes by
+  /// its own node ID (node ID 0 would address every drive on the bus), then configures them.
   void bus_recovered(protocol::HostTime now);
-  /// A SYNC was sent: ready nodes have to answer.
+  /// A SYNC was sent: configured nodes must answer.
   void on_sync(protocol::HostTime now);
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
-  /// Everything that had come until `now` was handed to on_frame().
+  /// Precondition: all frames that arrived before `now` were passed to on_frame().
   void on_time(protocol::HostTime now);
   [[nodiscard]] std::optional<can::CanFrame> take_frame();
-  /// When on_time() has something to do.
+  /// When on_time() must be called next.
   [[nodiscard]] protocol::HostTime deadline() const;
 
   [[nodiscard]] std::size_t nodes() const { return nodes_.size(); }
   [[nodiscard]] std::size_t ready() const;
-  /// A fault not reported yet, in words; each node reports the same fault once until its positions
-  /// came again for a second.
+  /// The next fault that was not returned yet, as text. The same fault of a node is returned once,
+  /// and again only after the node has delivered positions for a second.
   [[nodiscard]] std::optional<std::string> take_fault();
-  /// Identifiers that nodes send with: what the bus must deliver.
+  /// Identifiers of all frames from the nodes, for CanBus::open().
   [[nodiscard]] std::vector<std::uint32_t> ids() const;
 
  private:
@@ -61,9 +62,9 @@ class EncoderSupervisor {
     protocol::HostTime started{};
     protocol::HostTime retry_at{};
     protocol::HostTime ready_at{};
-    std::optional<protocol::HostTime> asked;  ///< the first SYNC it has not answered
-    unsigned idle_beats = 0;                  ///< heartbeats in a row that were not "operational"
-    can::ConfigurationFault told = can::ConfigurationFault::None;
+    std::optional<protocol::HostTime> unanswered_sync;  ///< the first one
+    unsigned idle_beats = 0;  ///< heartbeats in a row that were not "operational"
+    can::ConfigurationFault reported = can::ConfigurationFault::None;
   };
 
   void configure(Node& node, protocol::HostTime now);
@@ -71,7 +72,7 @@ class EncoderSupervisor {
   void on_position(Node& node, protocol::HostTime now);
   void on_dropped(Node& node, can::NodeState state, protocol::HostTime now);
   void on_heartbeat(Node& node, can::NodeState state, protocol::HostTime now);
-  void tell(Node& node, can::ConfigurationFault fault, std::string text);
+  void report(Node& node, can::ConfigurationFault fault, std::string text);
   [[nodiscard]] static bool is_from(const Node& node, const can::CanFrame& frame);
 
   SupervisorOptions options_;

@@ -1,12 +1,13 @@
 #pragma once
-/// The SYNC of another producer: whether there is one on this bus, and its period. Sans-I/O. One
-/// thread.
+/// Detects a foreign SYNC, that of another producer on this bus, and measures its period. Sans-I/O.
+/// One thread.
 ///
-/// A bus with two SYNC producers is broken for both, and nodes that another master has configured
-/// are not ours: nothing at all is sent on a bus before it was listened to for kListenFor each time
-/// it was opened or came back from bus-off, and nothing while another SYNC was heard within the
-/// last kQuietFor of an open bus. After a break shorter than kShortBreak of a bus that was ours
-/// kListenAgainFor is enough.
+/// Two SYNC producers disturb each other, and nodes that another master has configured must not be
+/// reconfigured. Therefore nothing may be sent
+///  - for the first kListenFor after the bus was opened or has recovered from bus-off, and
+///  - until the bus was open for kQuietFor without a foreign SYNC, once there was one.
+/// After an interruption shorter than kShortBreak of a bus on which sending was permitted,
+/// kListenAgainFor replaces kListenFor.
 
 #include <chrono>
 #include <cstdint>
@@ -18,46 +19,45 @@ namespace abbe::drivers {
 
 class ForeignSync {
  public:
-  /// Slow producers send a SYNC every second: an older position is of no use to a control. Half a
-  /// second more for a tunnel that holds frames back (cannelloni: 0.1 s) and for a SYNC that is
-  /// late itself.
+  /// The slowest producers send a SYNC every second: older positions are useless to a control. The
+  /// additional 0.5 s cover a tunnel that delays frames (cannelloni: 0.1 s) and a late SYNC.
   static constexpr std::chrono::nanoseconds kListenFor = std::chrono::milliseconds{1500};
-  /// A control that restarts its bus finds the nodes as it left them.
+  /// A control that restarts within this time finds its nodes unchanged.
   static constexpr std::chrono::nanoseconds kQuietFor = std::chrono::seconds{60};
 
-  /// No control starts within this: one that is on the bus now was on it, or was switched on
-  /// before.
+  /// A control takes longer than this to start: after a shorter interruption no control is on the
+  /// bus that was not on it, or starting, before.
   static constexpr std::chrono::nanoseconds kShortBreak = std::chrono::seconds{2};
-  /// Or three of the longest intervals ever heard on this bus, if that is longer, up to kListenFor.
-  /// A slower producer is found by its first SYNC while we send, as one that is connected to an
-  /// open bus.
+  /// Extended to three times the longest SYNC interval ever measured on this bus, up to kListenFor.
+  /// A slower producer is detected by its first SYNC while we send, like a producer that is
+  /// connected to an open bus.
   static constexpr std::chrono::nanoseconds kListenAgainFor = std::chrono::milliseconds{200};
 
-  /// The bus is open, or back from bus-off: what was on it before is not known. Listens, and all
-  /// quiet counts from now.
+  /// The bus was opened, or has recovered from bus-off. Listening restarts: time without a SYNC
+  /// counts from `now`.
   void opened(protocol::HostTime now);
   void heard(protocol::HostTime at);
-  /// All that came until `now` was handed to heard().
+  /// Precondition: every SYNC that arrived before `now` was passed to heard().
   [[nodiscard]] bool may_send(protocol::HostTime now);
-  /// When may_send() may become true; HostTime::max() if it is.
+  /// When may_send() can become true; HostTime::max() if it is true.
   [[nodiscard]] protocol::HostTime deadline() const;
 
   [[nodiscard]] bool present() const { return count_ > 0; }
   [[nodiscard]] protocol::HostTime last() const { return last_; }
-  /// The mean over up to a second in which no SYNC was left out; nullopt before the second SYNC.
+  /// Mean over at most a second in which no SYNC was missing; nullopt before the second SYNC.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> period() const;
 
  private:
   std::optional<protocol::HostTime> quiet_since_;
   std::chrono::nanoseconds listen_for_ = kListenFor;
   bool may_send_ = false;
-  bool restarts_measuring_ = false;  ///< SYNCs of before and after the opening make no interval
+  bool restarts_measuring_ = false;  ///< no interval from a SYNC before the opening to one after it
   protocol::HostTime heard_until_{};
-  std::uint64_t count_ = 0;  ///< since it appeared
+  std::uint64_t count_ = 0;  ///< since the foreign SYNC was first detected
   protocol::HostTime first_{}, last_{};
   std::uint64_t intervals_ = 0;  ///< since first_
   std::chrono::nanoseconds longest_{};
-  std::chrono::nanoseconds slowest_{};  ///< the longest interval ever
+  std::chrono::nanoseconds slowest_{};  ///< the longest interval since construction
   std::optional<std::chrono::nanoseconds> period_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// CanFrame to and from the structures of SocketCAN [linux/can.h], and the receive filters for a
-/// set of identifiers. Pure; from_linux is total.
+/// Conversion between CanFrame and the structures of SocketCAN [linux/can.h], and the receive
+/// filters for a set of identifiers. Pure; from_linux accepts any bytes.
 
 #include <linux/can.h>
 
@@ -16,8 +16,8 @@ namespace abbe::drivers {
 
 namespace can = protocol::can;
 
-/// A read of `size` bytes: CAN_MTU is a classic frame, CANFD_MTU a CAN FD frame; anything else is
-/// none.
+/// `size`: bytes that read() returned. CAN_MTU: a classic frame; CANFD_MTU: a CAN FD frame; any
+/// other size gives nullopt.
 [[nodiscard]] std::optional<can::CanFrame> from_linux(const canfd_frame& frame,
                                                       std::size_t size) noexcept;
 
@@ -27,7 +27,7 @@ struct LinuxFrame {
 };
 [[nodiscard]] LinuxFrame to_linux(const can::CanFrame& frame) noexcept;
 
-/// One filter for each identifier: data frames with exactly these 11 bits.
+/// One filter per identifier: data frames with exactly this 11-bit identifier.
 [[nodiscard]] std::vector<can_filter> filters_for(std::span<const std::uint32_t> ids);
 
 }  // namespace abbe::drivers

@@ -1,8 +1,8 @@
 #pragma once
-/// The real bus: a Linux SocketCAN RAW socket, filtered to the identifiers in use, with error
-/// frames, kernel receive stamps and the kernel's own loss counter; a BCM socket beside it sends
-/// the cyclic SYNC from the kernel's timer. Bit rate and restart-ms belong to the interface (ip
-/// link), not to us.
+/// A CAN interface of Linux: a SocketCAN RAW socket, filtered to the identifiers in use, with error
+/// frames, kernel receive timestamps and the kernel's loss counter. A second socket (CAN_BCM) sends
+/// the cyclic SYNC from the kernel's timer. Bit rate and restart-ms are set on the interface with
+/// `ip link`, not here.
 
 #include <cstdint>
 #include <memory>
@@ -17,12 +17,12 @@ namespace abbe::drivers {
 
 struct SocketCanOptions {
   std::string interface = "can0";
-  /// Asked for; without CAP_NET_ADMIN the kernel gives net.core.rmem_max at most (by default some
-  /// 500 frames).
+  /// Requested size; without CAP_NET_ADMIN the kernel limits it to net.core.rmem_max (by default
+  /// about 500 frames).
   int receive_buffer_bytes = 1 << 20;
-  bool require_fd =
-      /// refuse an interface that carries no CAN FD; where it does, FD frames are read anyway
-      false;
+  /// Refuse an interface without CAN FD. On an interface with CAN FD, FD frames are read in either
+  /// case.
+  bool require_fd = false;
   double speed = 1.0;  ///< as UdpCanOptions::speed
 };
 
@@ -45,7 +45,7 @@ class SocketCanBus final : public CanBus {
   [[nodiscard]] std::string name() const override { return options_.interface; }
 
  private:
-  struct Batch;  ///< the buffers of recvmmsg
+  struct Batch;  ///< buffers for recvmmsg
   [[nodiscard]] Result<void> configure(std::span<const std::uint32_t> ids);
   [[nodiscard]] Result<int> find_interface() const;
   [[nodiscard]] Result<void> bind_to_interface(int index);
@@ -54,16 +54,16 @@ class SocketCanBus final : public CanBus {
   const TimeSource& time_;
   int fd_ = -1;
   int sync_fd_ = -1;          ///< CAN_BCM; closing it ends the SYNC
-  bool kernel_sent_ = false;  ///< since open(): what was on its way when it ended is ours, too
+  bool kernel_sent_ = false;  ///< start_sync() since open(); its SYNCs may arrive after stop_sync()
   bool sent_sync_ = false;    ///< since open()
-  /// A socket closed before sent a SYNC: one of this computer that is no echo may be its, still on
-  /// the way.
+  /// An earlier socket of ours sent a SYNC that may still arrive: a SYNC from this computer that is
+  /// not an echo of the open socket is ignored.
   bool left_over_ = false;
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;
-  std::optional<ReceivedFrame> held_;  ///< found no room beside the mark of a loss
+  std::optional<ReceivedFrame> held_;  ///< did not fit into `out` together with a loss mark
   std::uint64_t lost_ = 0;
-  std::uint32_t last_overflow_ = 0;  ///< SO_RXQ_OVFL counts per socket
+  std::uint32_t last_overflow_ = 0;  ///< of SO_RXQ_OVFL, which counts per socket
 };
 
 }  // namespace abbe::drivers

@@ -1,13 +1,15 @@
 #pragma once
-/// Our SYNC between send() and its echo, on a bus that has one (CanBus::echoes_sync). The echo
-/// tells when it left. While it has not come, no other is sent: on a bus on which nothing leaves
-/// they would wait in line, and leave all at once when it can again.
+/// Our SYNC between send() and its echo, on a bus with echoes (CanBus::echoes_sync). The time of
+/// the echo is the time of transmission. No further SYNC is sent before the echo has arrived: on a
+/// bus that transmits nothing, SYNCs would accumulate in the queue and be transmitted in one burst
+/// later.
 ///
-/// Without an echo in the time in which a node has to answer, the SYNC counts from when it was
-/// handed over, so that its cycle ends with all axes missing. So it does where a node answers first
-/// (some controllers tell what they received before what they sent), and where the echo's stamp was
-/// not believed; its time is then marked as widened. An echo that comes later is dropped. Sans-I/O.
-/// One thread.
+/// The receiver sees the SYNC with the time of send(), marked as widened, if
+///  - no echo arrives within the time for answers: the cycle then ends with all axes missing,
+///  - a node answers before the echo arrives: some controllers report received frames before sent
+///    frames, or
+///  - the echo has no usable timestamp.
+/// An echo that arrives after that is discarded. Sans-I/O. One thread.
 
 #include <bitset>
 #include <chrono>
@@ -29,17 +31,17 @@ class SyncUnderWay {
       : period_(options.sync_period), answer_within_(answer_within(options)) {}
 
   void sent(protocol::HostTime at);
-  /// The bus was closed or went off: nothing is under way.
+  /// The bus was closed or is off: no echo is expected.
   void forget();
-  /// It may still leave, or just has, and its answers come: no other one yet. At most kPatience,
-  /// for an echo may be lost.
+  /// True: no further SYNC may be sent yet. The latest SYNC may still be queued, or it was
+  /// transmitted late and its answers are arriving. A missing echo blocks for at most kPatience.
   [[nodiscard]] bool waits(protocol::HostTime now) const;
-  /// When settle() has something to do although nothing came; else HostTime::max().
+  /// When settle() must be called even without new frames; HostTime::max(): not needed.
   [[nodiscard]] protocol::HostTime deadline() const;
 
-  /// What the receiver is to see of what read() gave until `now`: every SYNC once, as an echo,
-  /// before its answers. `all_read`: nothing else had come. Returns how many are in `out`, at most
-  /// one more than came.
+  /// Converts the frames that read() delivered until `now` to the frames for the receiver: every
+  /// SYNC exactly once, as an echo, before its answers. `all_read`: CanRead::all. Returns the
+  /// number of frames in `out`, at most one more than in `came`.
   [[nodiscard]] std::size_t settle(std::span<const ReceivedFrame> came,
                                    std::span<ReceivedFrame> out, protocol::HostTime now,
                                    bool all_read);
@@ -47,20 +49,21 @@ class SyncUnderWay {
   static constexpr std::chrono::nanoseconds kPatience = std::chrono::milliseconds{100};
 
  private:
-  enum class Counted : std::uint8_t { NotYet, ByItsAnswer, ByTheDeadline };
+  /// Why the receiver has seen the SYNC without its echo.
+  enum class Substituted : std::uint8_t { NotYet, OnAnswer, OnDeadline };
 
-  [[nodiscard]] bool unheard() const { return sent_ && counted_ == Counted::NotYet; }
+  [[nodiscard]] bool pending() const { return sent_ && substituted_ == Substituted::NotYet; }
   [[nodiscard]] std::optional<ReceivedFrame> settle_echo(const ReceivedFrame& echo);
-  [[nodiscard]] bool proves_that_it_left(const ReceivedFrame& received) const;
-  [[nodiscard]] ReceivedFrame count(Counted how);
+  [[nodiscard]] bool proves_transmission(const ReceivedFrame& received) const;
+  [[nodiscard]] ReceivedFrame substitute(Substituted why);
   [[nodiscard]] ReceivedFrame as_sent() const;
 
   std::chrono::nanoseconds period_;
   std::chrono::nanoseconds answer_within_;
   std::optional<protocol::HostTime> sent_;
-  Counted counted_ = Counted::NotYet;   ///< how the receiver came to see it without its echo
-  protocol::HostTime answers_until_{};  ///< of one that left after its cycle
-  std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, the SYNC before
+  Substituted substituted_ = Substituted::NotYet;
+  protocol::HostTime answers_until_{};  ///< to a SYNC that was transmitted after its cycle
+  std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, for the previous SYNC
 };
 
 }  // namespace abbe::drivers

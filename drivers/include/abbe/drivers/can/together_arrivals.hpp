@@ -1,7 +1,7 @@
 #pragma once
-/// Answers that arrive together with later ones of the same node: a tunnel or gateway collects
-/// frames for longer than a SYNC period and sends them at once (cannelloni: 0.1 s unless told
-/// otherwise), and every cycle is lost. Sans-I/O. One thread.
+/// Detects bundles: several answers of one node with the same arrival time. A tunnel or gateway
+/// that collects frames for longer than a SYNC period and sends them together (cannelloni: 0.1 s by
+/// default) causes bundles, and every cycle is lost. Sans-I/O. One thread.
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace abbe::drivers {
 
 class TogetherArrivals {
  public:
-  /// Two may meet because one was late.
+  /// Answers in a bundle. Two can arrive together because one of them was late.
   static constexpr unsigned kBundle = 3;
 
   void on_frame(const ReceivedFrame& received) {
@@ -25,7 +25,7 @@ class TogetherArrivals {
     last.at = received.time;
     if (last.answers == kBundle) ++count_;
   }
-  /// Bundles so far.
+  /// Number of bundles since construction.
   [[nodiscard]] std::uint64_t count() const { return count_; }
 
  private:

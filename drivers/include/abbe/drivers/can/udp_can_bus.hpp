@@ -1,7 +1,7 @@
 #pragma once
-/// CAN over UDP with the framing of protocol/can/udp_framing.hpp: peers are the cannelloni tunnel,
-/// gateways and abbe-sim. All frames of a datagram get the arrival time of the datagram; a tunnel
-/// that buffers makes it a late one, which costs nothing here: positions are dated by the SYNC.
+/// CAN over UDP with the framing of protocol/can/udp_framing.hpp. Peers are the cannelloni tunnel,
+/// gateways and abbe-sim. All frames of a datagram have the arrival time of the datagram. A tunnel
+/// that buffers delays this time; the time of a position is not affected, it comes from the SYNC.
 
 #include <netinet/in.h>
 
@@ -19,15 +19,15 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  /// The peer may be on any network of this computer; only its datagrams, by address and port, are
-  /// taken.
+  /// The default receives on every network interface. Only datagrams from the peer's address and
+  /// port are accepted.
   std::string local_address = "0.0.0.0";
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
-  std::string peer_address = "127.0.0.1";  ///< IPv4, or a name that open() looks up
+  std::string peer_address = "127.0.0.1";  ///< IPv4 address, or a name that open() resolves
   std::uint16_t peer_port = 20000;
-  double speed =
-      /// host time per monotonic time, as given to the TimeSource; 0: stepped, stamps are not used
-      1.0;
+  /// Host time per monotonic time, as in the TimeSource; 0: the time is stepped, kernel timestamps
+  /// are not used.
+  double speed = 1.0;
 };
 
 class UdpCanBus final : public CanBus {
@@ -45,7 +45,7 @@ class UdpCanBus final : public CanBus {
   [[nodiscard]] std::string stranger() const override { return stranger_; }
   [[nodiscard]] std::string name() const override;
 
-  /// The port bound to; 0 while closed.
+  /// Bound port; 0 while closed.
   [[nodiscard]] std::uint16_t local_port() const noexcept { return bound_port_; }
 
  private:
@@ -62,7 +62,8 @@ class UdpCanBus final : public CanBus {
   UdpCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  /// the same port, not connected: what others than the peer send arrives there
+  /// Bound to the same port but not connected: receives the datagrams of senders other than the
+  /// peer.
   int stranger_fd_ = -1;
   sockaddr_in peer_{};
   std::uint64_t strangers_ = 0;
@@ -73,7 +74,7 @@ class UdpCanBus final : public CanBus {
   can::SequenceGaps gaps_;
   std::uint64_t refused_ = 0;
   std::uint8_t sequence_ = 0;
-  std::optional<can::DatagramView> rest_;  ///< of the datagram in `buffer_`, not yet taken
+  std::optional<can::DatagramView> rest_;  ///< frames in `buffer_` that read() has not returned
   Arrival rest_arrival_;
   std::array<std::byte, 65536> buffer_{};
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// One sample for so many scans, without losing what the others were flagged with. For the device
-/// and its replay alike. Real time, one thread.
+/// Decimation: outputs every n-th scan and keeps the flags and losses of the skipped scans. Used by
+/// the device and by replay. Real time, one thread.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@ class ScanDecimation {
  public:
   explicit ScanDecimation(std::size_t every) noexcept : every_(every) {}
 
-  /// Every n-th scan, with the flags of those before it and what was lost between them.
+  /// Returns every n-th scan, with the flags and the lost scans of those skipped before it.
   [[nodiscard]] std::optional<protocol::AxisSample> take(const protocol::AxisSample& scan) ABBE_RT {
     if (++skipped_ < every_) {
       flags_ |= scan.head.flags;

@@ -1,9 +1,10 @@
 #pragma once
 /// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB
-/// link. wait(): sends what the session asks for, collects what the card sent. receive(): bytes to
-/// scans, raw blocks. States: those of CardState. After the connection was lost the counts go on if
-/// the card's clock channel did. After the card was without power its counters begin at zero where
-/// the axes then stand (SampleFlag::Restarted): positions are true again once a datum was taken.
+/// link. wait() sends the requests of the session and collects the card's answers; receive()
+/// converts bytes to scans and raw blocks. States: those of CardState. After a lost connection the
+/// counts continue if the card's clock channel has continued. After a loss of power the counters
+/// restart at zero at the present axis positions (SampleFlag::Restarted): the axes must be
+/// referenced again.
 
 #include <array>
 #include <cstddef>
@@ -27,47 +28,47 @@ namespace abbe::drivers {
 
 struct CounterCardOptions {
   std::string name = "counter card";
-  std::string serial;  ///< empty: the only card there is
+  std::string serial;  ///< empty: exactly one card must be connected
   CounterCardReceiverOptions receiver;
-  CounterCardSessionOptions session;  ///< `peer`, `wiring` and `stream` are made from the rest
-  /// How much time one transfer holds: the resolution of arrival times, and what is lost when it is
-  /// lost.
+  CounterCardSessionOptions session;  ///< `peer`, `wiring` and `stream` are set by create()
+  /// Duration of the scans in one transfer: the resolution of arrival times, and the loss if a
+  /// transfer fails.
   std::chrono::nanoseconds transfer_time = std::chrono::microseconds{1500};
   std::size_t transfers_in_flight = 32;
-  /// one sample in the ring for so many scans; the sink sees them all
+  /// Decimation: every n-th scan becomes a sample in the ring; the sink receives every scan.
   std::size_t sample_every = 1;
   std::size_t sample_capacity = 65536;  ///< 2 s at 33 kHz
   std::size_t raw_capacity_blocks = 4096;
 };
 
-/// Which device a link must lead to.
+/// The device that a link must open.
 [[nodiscard]] UsbIdentity identity_of(const CounterCardOptions& options);
 /// Bytes of one transfer: whole packets, at most 16 KiB.
 [[nodiscard]] std::size_t transfer_bytes(const CounterCardOptions& options);
 
 class CounterCardDevice final : public Device {
  public:
-  /// `time` and `sink` (may be null) must outlive the device. BadConfiguration as check(). The link
-  /// is opened by the first wait().
+  /// `time` and `sink` (may be null) must outlive the device. Error BadConfiguration: as check().
+  /// The first wait() opens the link.
   [[nodiscard]] static Result<std::unique_ptr<CounterCardDevice>> create(
       const CounterCardOptions& options, std::unique_ptr<UsbLink> link, const TimeSource& time,
       CounterScanSink* sink = nullptr);
 
-  /// Stops a running scan, for as long as the card answers at once.
+  /// Stops a running scan; gives up if the card does not answer a request within about 100 ms.
   ~CounterCardDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// One reader each. No samples come from a card all of whose axes are latched on their index.
+  /// One reader each. A card that latches all its axes on their index delivers no samples.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
-  /// Once a second while the clock model is settled, after the sample of that scan; one reader.
+  /// One entry a second while the clock model is settled, after the scan's sample; one reader.
   [[nodiscard]] SampleRing<CounterCardProgress>& progress() noexcept { return progress_ring_; }
-  /// The device thread's own view.
+  /// Only for the device thread.
   [[nodiscard]] const CounterCardReceiver& receiver() const noexcept { return receiver_; }
-  /// What the configuration takes for granted, in a sentence; empty if nothing.
+  /// The unverified assumption of the configuration, as a sentence; empty: none.
   [[nodiscard]] std::string assumption() const;
 
  private:
@@ -76,7 +77,7 @@ class CounterCardDevice final : public Device {
   CounterCardDevice(const CounterCardOptions& options, std::unique_ptr<UsbLink> link,
                     const TimeSource& time, CounterScanSink* sink);
 
-  void tell(const CardInput& input);
+  void step_session(const CardInput& input);
   [[nodiscard]] bool act(const CardAction& action);
   void send(const usb::Setup& setup);
   void stop_scan();
@@ -107,18 +108,17 @@ class CounterCardDevice final : public Device {
   CounterCardReceiver receiver_;
   CounterCardSession session_;
 
-  std::span<const UsbEvent>
-      events_;  ///< of the latest wait(); the session hears of them in the next
+  std::span<const UsbEvent> events_;  ///< of the latest wait(); the session gets them in the next
   protocol::HostTime cycle_end_{};
-  protocol::HostTime read_until_{};  ///< what came before was read by the latest wait()
+  protocol::HostTime read_until_{};  ///< events before this were read by the latest wait()
   std::size_t scans_ = 0;            ///< of the latest receive()
-  bool out_of_step_told_ = false;
+  bool out_of_step_reported_ = false;
   std::uint64_t faults_seen_ = 0;
   std::uint64_t gaps_seen_ = 0;
   std::uint64_t disagreements_seen_ = 0;
-  std::uint64_t began_anew_seen_ = 0;
+  std::uint64_t restarts_seen_ = 0;
   std::uint64_t withheld_seen_ = 0;
-  bool clock_reported_ = false;   ///< too far off
+  bool clock_reported_ = false;   ///< rate error beyond the limit
   CounterCardProgress progress_;  ///< the latest
   std::uint32_t raw_sequence_ = 0;
 

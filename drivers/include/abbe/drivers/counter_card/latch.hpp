@@ -1,9 +1,10 @@
 #pragma once
-/// From the count of a latch channel to the count of the clock channel at the same instant. Both
-/// count the same clock, but were zeroed at different moments: latch = clock + offset. With the
-/// card's own timer the offset is 0; else each edge narrows it: an edge came between two scans, so
-/// the offset lies in an interval as long as the scan, and in that of every other edge. Pure state
-/// machine, real time, one thread.
+/// Converts the count of a latch channel to the count of the clock channel at the same instant.
+/// Both count the same clock, but were zeroed at different moments:
+///     latch = clock + offset
+/// With the card's own timer as the clock the offset is 0. Otherwise each edge bounds it: the edge
+/// lies between two scans, so the offset lies in an interval as long as the scan period. The offset
+/// lies in the intersection of the intervals of all edges. No I/O; real time, one thread.
 
 #include <cstdint>
 #include <optional>
@@ -15,7 +16,7 @@ namespace abbe::drivers {
 
 class LatchTracker {
  public:
-  /// `in_step`: both counters begin with the clock (the card's own timer).
+  /// `in_step`: both counters start together with the clock (the card's own timer): offset 0.
   LatchTracker(protocol::quad08::CountWidth width, bool in_step) ABBE_RT : width_(width),
                                                                            in_step_(in_step) {
     reset();
@@ -23,21 +24,22 @@ class LatchTracker {
 
   /// The counters were zeroed.
   void reset() ABBE_RT;
-  /// Begun in the middle of a stream: what the latch reads now is no news.
+  /// Starts in the middle of a stream: the present reading is not a new edge.
   void begin_at(std::uint64_t latch_raw) ABBE_RT { last_raw_ = latch_raw; }
 
   struct Latch {
     std::int64_t clock_count = 0;  ///< unwrapped, of the clock channel
-    std::int64_t half_width = 0;   ///< the truth is within
+    std::int64_t half_width = 0;   ///< the true value is clock_count +- half_width
   };
-  /// Every scan in order: what both channels read, and the unwrapped clock of this and of the
-  /// previous scan. True: the latch has changed since the previous scan.
+  /// To be called for every scan in order, with the readings of both channels and the unwrapped
+  /// clock counts of this and of the previous scan. True: the latch has changed since the previous
+  /// scan.
   bool on_scan(std::uint64_t latch_raw, std::uint64_t clock_raw, std::int64_t clock_count,
                std::int64_t previous_clock_count) ABBE_RT;
-  /// The latest latch; nothing before the first edge.
+  /// The latest latch; nullopt before the first edge.
   [[nodiscard]] std::optional<Latch> latest() const ABBE_RT { return latest_; }
-  /// Times a latch lay outside the scan in which it came: another clock, or an input latched
-  /// otherwise than assumed.
+  /// Number of latches outside their scan interval: the latch channel counts another clock, or the
+  /// input does not latch as assumed.
   [[nodiscard]] std::uint64_t disagreements() const ABBE_RT { return disagreements_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// How far the counters of a card had come at one scan: what a later run of the program needs to
-/// see that they went on counting. Counts are those of CounterScan.
+/// State of a card's counters at one scan. A later run of the program uses it to detect whether the
+/// counters have continued. Counts as in CounterScan.
 
 #include <array>
 #include <cstddef>
@@ -13,12 +13,12 @@
 namespace abbe::drivers {
 
 struct CounterCardProgress {
-  protocol::SampleHead head;  ///< `time`: host time of the scan, by a clock model that was settled
+  protocol::SampleHead head;  ///< `time`: host time of the scan, by a settled clock model
   std::int64_t clock_count = 0;
   std::uint8_t axis_count = 0;
   std::array<std::int64_t, protocol::kMaxAxes> count{};
-  std::array<char, 64>
-      serial{};  ///< USB serial number, cut off at 63 characters; empty: the card has none
+  /// USB serial number, cut off at 63 characters; empty: the card has none.
+  std::array<char, 64> serial{};
 
   [[nodiscard]] std::string_view serial_number() const noexcept { return serial.data(); }
   void set_serial_number(std::string_view text) noexcept {

@@ -1,17 +1,19 @@
 #pragma once
-/// From the bytes of a counter card to scans in SI and in host time. Sans-I/O and deterministic:
-/// the same bytes with the same arrival times give the same scans, live or replayed. Real time:
-/// allocation-free, no system call. One thread. About 200 kB: keep it on the heap.
+/// Converts the bytes of a counter card to scans in SI units and host time. Sans-I/O and
+/// deterministic: the same bytes with the same arrival times give the same scans, live or replayed.
+/// Real time: no allocation, no system call. One thread. About 200 kB: keep it on the heap.
 ///
-/// The stream has neither head nor number. What keeps it honest is the clock channel: it must
-/// advance by the same count from scan to scan. A scan that does not fit is held back until the
-/// next one confirms it (then it comes after a gap, of so many scans) or does not (then it was no
-/// scan; kMostRefused of these in a row: out of step).
+/// The stream has neither headers nor sequence numbers. The clock channel serves as the check: it
+/// must advance by the same count from scan to scan. A scan that does not fit is held back.
+///  - If the next scan fits to it, both are output after a gap. The clock's count gives the number
+///    of lost scans.
+///  - Otherwise it is refused: it was not a scan. After kMostRefused consecutive refusals the
+///    receiver is out of step.
 ///
-/// Raw blocks of a counter card: USB/IP messages, whatever the transport was
-/// (protocol/usbip/urb.hpp). ToDevice: the header of each control request, as sent. FromDevice:
-/// header and data of each answer, the endpoint filled in. A recording may begin anywhere: the
-/// receiver seeks the beginning of a scan by the clock.
+/// Raw blocks of a counter card are USB/IP messages (protocol/usbip/urb.hpp), for any transport:
+///   ToDevice    header of each control request, as sent
+///   FromDevice  header and data of each answer, with the endpoint filled in
+/// A recording may begin at any byte: the receiver finds the beginning of a scan by the clock.
 
 #include <array>
 #include <chrono>
@@ -35,12 +37,13 @@ namespace abbe::drivers {
 
 struct CounterCardReceiverOptions {
   CounterCardWiring wiring;
-  ClockModelOptions clock{.max_constant_delay =
-                              std::chrono::milliseconds{1}};  ///< FIFO, bus, host controller
-  /// The counters as an earlier run of the program left them. Their scans are withheld until the
-  /// clock channel has shown, for 0.25 s, that it stands where it must if they went on (to 50 ms
-  /// and 200 ppm of the time between); then the counts go on after a gap. Else
-  /// CounterCardCounters::restarted, and no scans before the counters were set up.
+  /// The delay: FIFO, bus and host controller.
+  ClockModelOptions clock{.max_constant_delay = std::chrono::milliseconds{1}};
+  /// State of the counters at the end of an earlier run of the program. Scans are withheld until
+  /// the clock channel agrees for 0.25 s with the count expected if the counters have continued
+  /// (tolerance: 50 ms and 200 ppm of the time between); then the counts continue after a gap.
+  /// Otherwise CounterCardCounters::restarted increases, and scans are withheld until the counters
+  /// are set up.
   std::optional<CounterCardProgress> goes_on_from;
 };
 
@@ -48,13 +51,13 @@ struct CounterCardReceiverOptions {
 struct CounterCardCounters {
   std::uint64_t scans = 0;
   std::uint64_t gaps = 0;
-  std::uint64_t lost_scans = 0;           ///< by the clock's count
-  std::uint64_t refused_scans = 0;        ///< that the clock did not fit
+  std::uint64_t lost_scans = 0;           ///< computed from the clock's count
+  std::uint64_t refused_scans = 0;        ///< their clock count did not fit
   std::uint64_t edges = 0;                ///< changes of the latch
-  std::uint64_t latch_disagreements = 0;  ///< latches outside the scan in which they came
-  std::uint64_t clock_jumps = 0;          ///< the time base went away from the host's clock
-  std::uint64_t restarted = 0;            ///< an opened card did not continue the clock's count
-  std::uint64_t withheld_scans = 0;       ///< while it was not known whether the counters went on
+  std::uint64_t latch_disagreements = 0;  ///< latches outside their scan interval
+  std::uint64_t clock_jumps = 0;          ///< the card's clock jumped relative to the host's
+  std::uint64_t restarted = 0;            ///< after opening, the clock's count had not continued
+  std::uint64_t withheld_scans = 0;       ///< before the counters were known to have continued
 };
 
 class CounterCardReceiver {
@@ -68,27 +71,29 @@ class CounterCardReceiver {
   CounterCardReceiver(const CounterCardReceiver&) = delete;
   CounterCardReceiver& operator=(const CounterCardReceiver&) = delete;
 
-  /// A control request on its way to the card: asking for the firmware version opens it, setting a
-  /// counter up zeroes it, starting the data transfer begins the stream anew.
+  /// To be called for every control request to the card: reading the firmware version opens the
+  /// card, a counter set-up zeroes the counters, and a start of the data transfer restarts the
+  /// stream.
   void on_control(const protocol::usb::Setup& setup) ABBE_RT;
-  /// Bytes of the scan endpoint; then next() until it gives nothing. The bytes are borrowed until
-  /// then.
+  /// Takes bytes of the scan endpoint. Call next() until it returns an empty span; the bytes must
+  /// stay valid until then.
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
-  /// Scans in order, valid until the next call; none: push more.
+  /// The next scans in order, valid until the next call; empty: all pushed bytes are processed.
   [[nodiscard]] std::span<const CounterScan> next() ABBE_RT;
-  /// A hole in a recording: seeks the next scan.
+  /// Bytes of a recording are missing: searches for the next scan.
   void bytes_lost() ABBE_RT;
 
-  /// Bytes come that are no scans; nothing more is taken until the stream begins anew.
+  /// The bytes received are not scans; further bytes are ignored until the stream restarts.
   [[nodiscard]] bool out_of_step() const ABBE_RT { return out_of_step_; }
-  /// What the clock channel counted in the latest scan that was refused, and what it had to.
+  /// Clock counts per scan: as observed in the latest refused scan, and as expected.
   [[nodiscard]] std::uint64_t refused_step() const ABBE_RT { return refused_step_; }
   [[nodiscard]] double expected_step() const ABBE_RT { return metronome_.step; }
-  /// How far the clock channel was behind where it must stand, s, when the counters were last seen
-  /// not to go on.
+  /// Delay of the clock channel relative to its expected count, s, when the counters were last
+  /// found not to have continued; negative: ahead.
   [[nodiscard]] double behind_s() const ABBE_RT { return behind_s_; }
 
-  /// Replay: one raw block; every scan it completes to sink(const CounterScan&). Total.
+  /// Replay: processes one raw block and passes every scan to sink(const CounterScan&). Accepts
+  /// any bytes.
   template <class Sink>
   void on_raw(const protocol::RawBlock& block, Sink&& sink) {
     if (!join(block)) return;
@@ -108,19 +113,19 @@ class CounterCardReceiver {
     double scale = 0.0;
     double offset = 0.0;
   };
-  /// Counters of an earlier run, as long as it is not known whether they went on.
+  /// Counters of an earlier run, until it is known whether they have continued.
   struct Resumption {
     protocol::HostTime since{};               ///< of `last_`
-    std::optional<protocol::HostTime> begun;  ///< first scan withheld
+    std::optional<protocol::HostTime> begun;  ///< arrival of the first withheld scan
     double least_behind_s = 0.0;
     bool refused = false;
   };
   struct LongGap {
-    std::int64_t clock_count = 0;  ///< of the scan after it
+    std::int64_t clock_count = 0;  ///< of the scan after the gap
     double length_s = 0.0;
   };
 
-  /// True: a message of scans is pushed.
+  /// True: the block completed a message with scans, which was passed to push().
   [[nodiscard]] bool join(const protocol::RawBlock& block) ABBE_RT;
   [[nodiscard]] bool on_raw_message(protocol::RawBlock::Direction direction,
                                     protocol::HostTime time) ABBE_RT;
@@ -147,7 +152,8 @@ class CounterCardReceiver {
                     CounterScan& scan) ABBE_RT;
   void stamp() ABBE_RT;
   void mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT;
-  [[nodiscard]] bool beats(const quad08::RawScan& from, const quad08::RawScan& to) const ABBE_RT;
+  [[nodiscard]] bool clock_fits(const quad08::RawScan& from,
+                                const quad08::RawScan& to) const ABBE_RT;
   [[nodiscard]] protocol::DeviceTime device_time(std::int64_t clock_count) const ABBE_RT;
 
   quad08::CountWidth width_;
@@ -161,7 +167,7 @@ class CounterCardReceiver {
   CounterCardCounters counters_;
 
   quad08::ScanDecoder decoder_;
-  std::span<const std::byte> pending_;  ///< pushed, not yet given to the decoder
+  std::span<const std::byte> pending_;  ///< pushed, not yet decoded
   protocol::HostTime arrival_{};
   bool seeking_ = true;
   std::array<std::byte, 512> window_{};  ///< while seeking
@@ -171,18 +177,18 @@ class CounterCardReceiver {
   std::uint64_t refused_step_ = 0;
   std::size_t refused_run_ = 0;
   std::optional<quad08::RawScan> last_;  ///< accepted
-  bool reopened_ = false;                ///< the card was closed since
+  bool reopened_ = false;                ///< the card was opened again since `last_`
   std::optional<Resumption> resumption_;
   double behind_s_ = 0.0;
-  std::uint64_t clock_wraps_ = 0;  ///< whole ranges the clock counted while the stream stood
+  std::uint64_t clock_wraps_ = 0;             ///< wraps of the clock while the stream was stopped
   std::optional<quad08::RawScan> candidate_;  ///< held back until the next one confirms it
   protocol::SampleFlags pending_flags_ = 0;
   bool stream_restarted_ = false;
-  std::optional<LongGap> long_gap_;  ///< that may be a restart of the card: the longest of late
-  CounterScan current_;              ///< counts go on from scan to scan
+  std::optional<LongGap> long_gap_;  ///< longest recent gap; possibly a restart of the card
+  CounterScan current_;              ///< counts are kept between scans
   std::array<CounterScan, kBatch> scans_{};
   std::size_t scan_count_ = 0;
-  bool zeroed_ = false;  ///< the stream is known from where the counters were set up
+  bool zeroed_ = false;  ///< the stream was received since the set-up of the counters
 
   std::array<std::byte, kLongestMessage> raw_{};  ///< replay: parts of one message
   std::size_t raw_filled_ = 0;

@@ -1,7 +1,7 @@
 #pragma once
-/// One scan of a counter card: all counters as they stood at one instant, the start of the scan.
-/// Units: axes in m or rad, the rest in counts. Whoever needs more than the axes (trigger
-/// detection, reference marks) sees every scan through a CounterScanSink.
+/// One scan of a counter card: the values of all counters at one instant, the start of the scan.
+/// Units: axes in m or rad, the rest in counts. A CounterScanSink receives every scan; touch
+/// detection and reference marks need it.
 
 #include <cstdint>
 #include <type_traits>
@@ -11,31 +11,32 @@
 
 namespace abbe::drivers {
 
-/// All counts are unwrapped to 64 bit. Zero is where the card's set-up put them: after a restart of
-/// the card (SampleFlag::Restarted) every count begins anew. Counts go on over lost scans
+/// All counts are unwrapped to 64 bit and are 0 at the set-up of the counters. After a restart of
+/// the card (SampleFlag::Restarted) every count restarts at 0. Counts continue across lost scans
 /// (SampleFlag::GapBefore).
 struct CounterScan {
-  /// Time, flags and uncertainty of the scan in `axes.head`; `axes.cycle` is the number of the
-  /// scan, lost ones included. An axis in `index_latched_mask` has no live reading: it is also in
+  /// `axes.head`: time, flags and uncertainty of the scan. `axes.cycle`: number of the scan,
+  /// including lost scans. An axis in `index_latched_mask` has no live reading: it is also in
   /// axes.missing_mask.
   protocol::AxisSample axes;
   std::int64_t clock_count = 0;  ///< the time base; periods of the counted clock
-  /// clock_count at the latest probe edge. ASSUMPTION, to be verified on hardware: a counter set up
-  /// with latch-on-index gives, in a scan, its count at the latest index edge.
+  /// clock_count at the latest probe edge. ASSUMPTION, to be verified on hardware: in a scan, a
+  /// counter with latch-on-index delivers its count at the latest index edge.
   std::int64_t latch_count = 0;
-  /// The true latch lies in [latch_count - h, latch_count + h]; 0 if latch and clock channel count
-  /// in step.
+  /// h: the true latch lies in [latch_count - h, latch_count + h]; 0 if latch and clock channel
+  /// have the same zero.
   std::int64_t latch_half_width = 0;
-  /// probe edges; two or more more than before: the latch is that of the last
+  /// Number of probe edges. If there are several edges since the previous scan, latch_count is that
+  /// of the last one.
   std::int64_t edge_count = 0;
-  /// false: no probe edge since the counters were set up, latch_count says nothing
+  /// false: no probe edge since the set-up of the counters, latch_count is invalid
   bool latched = false;
-  /// bit i: axes.count[i] is that of axis i at its latest index pulse
+  /// bit i: axes.count[i] is the count of axis i at its latest index pulse
   std::uint8_t index_latched_mask = 0;
 };
 static_assert(std::is_trivially_copyable_v<CounterScan>);
 
-/// Called by the device thread (or by a replay), in real time, once a scan, in order.
+/// Receives every scan, in order. The device thread or a replay calls it, in real time.
 class CounterScanSink {
  public:
   CounterScanSink() = default;

@@ -1,9 +1,9 @@
 #pragma once
-/// What is to be said to a counter card, and when: open and self-test, counter set-up, scan start,
-/// status poll, restart after an overrun, open again after it was unplugged. To set a counter up
-/// zeroes it: after opening again the scan is started without, and only if the card does not go on
-/// counting its clock is it set up. Sans-I/O: inputs and a time in, one action out; after each
-/// input ask again with CardTick until nothing is to be done. Ordinary world. One thread.
+/// The requests to a counter card and their order: open and self-test, counter set-up, scan start,
+/// status poll, restart after an overrun, reopening after removal. A set-up zeroes the counters.
+/// Therefore, after reopening, the scan starts without a set-up; the counters are set up only if
+/// the clock count has not continued. Sans-I/O: inputs and a time in, one action out. After each
+/// input, call on(CardTick) until it returns CardNothing. Not for the RT path. One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -20,28 +20,28 @@
 namespace abbe::drivers {
 
 struct CounterCardSessionOptions {
-  std::string peer = "counter card";  ///< begins every message
+  std::string peer = "counter card";  ///< prefix of every message
   CounterCardWiring wiring;
   UsbBulkStream stream;
   std::chrono::nanoseconds open_timeout = std::chrono::seconds{2};
   std::chrono::nanoseconds control_timeout = std::chrono::milliseconds{500};
-  std::chrono::nanoseconds silence = std::chrono::milliseconds{
-      90};  ///< no scans for so long is a fault, seen before 100 ms are over
+  /// No scans for this long is a fault. 90 ms: it is detected within 100 ms.
+  std::chrono::nanoseconds silence = std::chrono::milliseconds{90};
   std::chrono::nanoseconds status_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
-  /// after a restart that brought no scans
+  /// wait after a restart without scans
   std::chrono::nanoseconds retry_after = std::chrono::milliseconds{500};
-  unsigned control_tries =
-      3;  ///< of a request the card refuses or that fails, before the device is closed
-  /// The card of this serial number was set up by an earlier run of the program: its counters are
-  /// set up only if they do not go on.
+  /// attempts for a request that fails or that the card refuses, before the device is closed
+  unsigned control_tries = 3;
+  /// Serial number of a card whose counters an earlier run of the program has set up: they are set
+  /// up again only if they have not continued.
   std::optional<std::string> set_up_serial;
 };
 
 // Inputs.
 struct CardTick {
-  /// Whatever came before this instant was handed over: only what is overdue then is missing. A
-  /// host that was held up looks first.
+  /// All inputs that arrived before this instant were passed on: time-outs are measured up to it.
+  /// So a delayed host reads its input before a time-out expires.
   protocol::HostTime read_until = protocol::HostTime::max();
 };
 struct CardScans {
@@ -50,9 +50,9 @@ struct CardScans {
 struct CardOutOfStep {
   std::string seen;
 };
-/// The clock channel did not go on from where it was: another session of the card.
+/// The clock count has not continued: the card was restarted or set up by another program.
 struct CardRestarted {
-  std::string seen;  ///< how that showed; may be empty
+  std::string seen;  ///< text with the observed clock error; may be empty
 };
 struct CardBulkFailed {
   UsbOutcome outcome = UsbOutcome::Failed;
@@ -76,13 +76,13 @@ enum class CardState : std::uint8_t {
   Closed,
   Opening,
   Testing,    ///< firmware version and registers
-  SettingUp,  ///< counters; zeroes them. Left out while they may still count
-  Loading,    ///< stops what ran, loads scan list and pacer
-  Arming,     ///< data transfer on, list started, until the card is ready
+  SettingUp,  ///< zeroes the counters; skipped while they may have continued
+  Loading,    ///< stops a running scan, loads scan list and pacer
+  Arming,     ///< starts data transfer and scan list, waits until the card is ready
   Streaming,
-  Halting,  ///< on the way from Streaming to Loading
+  Halting,  ///< stops the scan before a restart: from Streaming to Loading
 };
-/// A literal, for DeviceStatus.
+/// A string literal, for DeviceStatus.
 [[nodiscard]] const char* name_of(CardState state) noexcept;
 
 class CounterCardSession {
@@ -90,14 +90,14 @@ class CounterCardSession {
   explicit CounterCardSession(const CounterCardSessionOptions& options);
 
   [[nodiscard]] CardAction on(const CardInput& input, protocol::HostTime now);
-  /// When a CardTick has something to do.
+  /// When the next CardTick is due.
   [[nodiscard]] protocol::HostTime deadline() const;
 
   [[nodiscard]] CardState state() const { return state_; }
-  /// The device is there, is the right one and has passed its test.
+  /// The device is connected, its identity matches, and it has passed the self-test.
   [[nodiscard]] bool connected() const { return state_ > CardState::Testing; }
 
-  /// A control transfer is under way.
+  /// A control transfer is pending.
   [[nodiscard]] bool asking() const { return asked_; }
 
   struct Fault {
@@ -105,7 +105,7 @@ class CounterCardSession {
     std::string text;  ///< of the latest
   };
   [[nodiscard]] const Fault& fault() const { return fault_; }
-  /// Times the scan was started anew.
+  /// Number of restarts of the scan.
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
 
  private:
@@ -117,7 +117,7 @@ class CounterCardSession {
   CardAction take(const UsbLost& lost, Now now);
   CardAction take(const CardScans& scans, Now now);
   CardAction take(const CardOutOfStep& out, Now now);
-  CardAction take(const CardRestarted& anew, Now now);
+  CardAction take(const CardRestarted& restarted, Now now);
   CardAction take(const CardBulkFailed& failed, Now now);
 
   void load(const quad08::Sequence& sequence);
@@ -132,10 +132,10 @@ class CounterCardSession {
   CardAction on_status(quad08::Status status, Now now);
   [[nodiscard]] bool expects_scans() const;
   [[nodiscard]] bool silent(Now until) const;
-  CardAction trouble_of_silence(Now now);
+  CardAction restart_after_silence(Now now);
   CardAction watch(Now now);
   CardAction halt(Now now);
-  CardAction trouble(Now now, std::string text);
+  CardAction restart_scan(Now now, std::string text);
   CardAction fail(Now now, std::string text);
   void report(std::string text);
 
@@ -143,18 +143,18 @@ class CounterCardSession {
   CardState state_ = CardState::Closed;
   std::vector<quad08::Step> steps_;
   std::size_t step_ = 0;
-  bool asked_ = false;  ///< a control transfer is under way
+  bool asked_ = false;  ///< a control transfer is pending
   bool stopping_bulk_ = false;
-  bool halt_ = false;      ///< as soon as the control transfer under way is answered
-  bool troubled_ = false;  ///< restarted, and no scans since: not again before retry_at_
+  bool halt_ = false;        ///< halt the scan as soon as the pending control transfer is answered
+  bool recovering_ = false;  ///< no scans since the restart; next restart not before retry_at_
   bool scans_since_fault_ = false;
-  bool set_up_ = false;  ///< the counters were, by this session or an earlier run
-  std::string serial_;   ///< of the card that was set up
-  /// scans are expected from counters that were set up before the card was opened
+  bool set_up_ = false;  ///< this session or an earlier run has set the counters up
+  std::string serial_;   ///< of the card whose counters were set up
+  /// The card was opened with counters set up before; no scan has confirmed yet that they continue.
   bool resuming_ = false;
-  bool resumed_again_ = false;  ///< these were out of step once, and the scan was started anew
+  bool resumed_again_ = false;  ///< the scan was restarted once because they were out of step
   unsigned status_tries_ = 0;
-  unsigned tries_ = 0;  ///< of the control transfer under way
+  unsigned tries_ = 0;  ///< of the pending control transfer
   Now open_at_{};
   Now asked_at_{};
   Now last_scans_{};

@@ -1,8 +1,8 @@
 #pragma once
 /// Two cards count the same scale from different zeros: one live, one latched at reference marks.
-/// Their scans are put beside each other by the clock that both count; at a mark, the live counter
-/// was somewhere between its values before and after. Every mark narrows the difference of the
-/// zeros; none may contradict. Pure.
+/// The clock that both cards count aligns their scans. At a mark, the live count lies between its
+/// values before and after the mark, so every mark bounds the difference of the zeros. The bounds
+/// of all marks must intersect. Pure.
 
 #include <algorithm>
 #include <cstdint>
@@ -13,17 +13,17 @@ namespace abbe::drivers {
 
 class CounterAlignment {
  public:
-  /// `latched`: counter of the latching card at the mark. `before`, `after`: live counter at the
-  /// scans around it. False: no difference satisfies this and all earlier marks, one of the cards
-  /// miscounted.
+  /// `latched`: count of the latching card at the mark. `before`, `after`: live counts of the scans
+  /// before and after it. False: no difference satisfies this and all earlier marks; one of the
+  /// cards has miscounted.
   [[nodiscard]] bool add(std::int64_t latched, std::int64_t before, std::int64_t after) noexcept {
     low_ = std::max(low_, latched - std::max(before, after));
     high_ = std::min(high_, latched - std::min(before, after));
     known_ = true;
     return low_ <= high_;
   }
-  /// latched - live; nothing before the first mark or after a contradiction. The middle of what is
-  /// possible.
+  /// latched - live, the middle of the possible interval; nullopt before the first mark and after a
+  /// contradiction.
   [[nodiscard]] std::optional<double> difference() const noexcept {
     if (!known_ || low_ > high_) return std::nullopt;
     return 0.5 * static_cast<double>(low_) + 0.5 * static_cast<double>(high_);

@@ -1,15 +1,18 @@
 #pragma once
-/// Distance-coded reference marks: where a scale stands from the distances between neighbouring
+/// Distance-coded reference marks: the position of a scale from the distances between neighbouring
 /// marks. Pure.
 ///
-/// Fixed marks lie at k N, coded ones at k N + N / 2 + (k + 1), k = 0, 1, ..., all in signal
-/// periods from the scale's zero mark. Two neighbours at the distance M, crossed in the direction D
-/// (+1, -1), give with B = 2 M - N the position of the first one crossed:
-///     P1 = (|B| - sgn B - 1) N / 2 + (sgn B - sgn D) |M| / 2
-/// A rotary scale has the same code around a circle of `length` periods; positions are modulo that.
+/// Positions of the marks, in signal periods from the scale's zero mark, k = 0, 1, ...:
+///     fixed marks  k N
+///     coded marks  k N + N / 2 + (k + 1)
+/// Two neighbouring marks at the distance M, crossed in the direction D (+1, -1), give the position
+/// of the mark crossed first:
+///     P1 = (|B| - sgn B - 1) N / 2 + (sgn B - sgn D) |M| / 2,   B = 2 M - N
+/// A rotary scale has the same code around a circle of `length` periods; positions are modulo
+/// `length`.
 ///
-/// One wrong period at one of three marks can give another legal triple. Four do not: every single
-/// one-period error at any mark of any four neighbours is refused (the tests try them all).
+/// With three marks, an error of one period at one mark can give another valid triple. With four
+/// marks, every error of one period at one mark is refused (the tests try all of them).
 
 #include <array>
 #include <cstdint>
@@ -24,25 +27,25 @@ namespace abbe::drivers {
 
 struct DistanceCode {
   std::int64_t increment = 1000;  ///< N: signal periods between two fixed marks; even
-  /// Signal periods: of the measuring length (marks beyond it do not exist), or of one revolution.
+  /// Signal periods of the measuring length (there are no marks beyond it), or of one revolution.
   std::int64_t length = 50'000;
   bool rotary = false;
 };
-/// BadConfiguration says what cannot be.
+/// Error BadConfiguration names the impossible value.
 [[nodiscard]] Result<void> check(const DistanceCode& code);
 
 enum class MarkFault : std::uint8_t {
-  NotWhole,  ///< the distance of two marks is no whole number of periods: wrong period, or noise
-  /// two neighbours at a distance that the scale does not have: a mark was missed, a wrong scale
+  NotWhole,  ///< the distance of two marks is not an integer number of periods: wrong period, noise
+  /// The scale has no neighbouring marks at this distance: a mark was missed, or a wrong scale.
   NotOfCode,
   Disagree,    ///< the decodings of neighbouring pairs contradict each other: a miscount
   Reversed,    ///< the direction changed between marks
-  WrongScale,  ///< mark after mark was refused: this is not the scale that is configured
+  WrongScale,  ///< repeated refusals: this is not the configured scale
 };
 [[nodiscard]] std::string_view name(MarkFault fault) noexcept;
 
-/// Position of the first of two neighbours, in periods; nothing if no two neighbours are so far
-/// apart. `distance` > 0; `direction` of crossing +1 or -1.
+/// Position of the first of two neighbouring marks, in periods; nullopt if no two neighbours have
+/// this distance. `distance` > 0; `direction` of crossing +1 or -1.
 [[nodiscard]] std::optional<std::int64_t> first_mark(const DistanceCode& code,
                                                      std::int64_t distance, int direction) noexcept;
 
@@ -50,13 +53,13 @@ inline constexpr std::size_t kMarksForDatum = 4;
 
 struct MarkDatum {
   std::int64_t first_mark = 0;  ///< position of the first of the four, periods
-  int direction = 1;            ///< in which they were crossed
+  int direction = 1;            ///< of crossing
   double offset_periods = 0.0;  ///< scale position = counter + offset, mean of the four
-  double spread_periods = 0.0;  ///< largest less smallest of the four offsets
+  double spread_periods = 0.0;  ///< largest minus smallest of the four offsets
 };
 
-/// `marks`: the counter at four consecutive marks, in periods, in the order of crossing, which is
-/// in one direction.
+/// `marks`: counts at four consecutive marks, in periods, in the order of crossing; all crossed in
+/// the same direction.
 [[nodiscard]] tl::expected<MarkDatum, MarkFault> datum_of(
     const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept;
 

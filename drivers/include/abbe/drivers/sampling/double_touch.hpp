@@ -1,13 +1,14 @@
 #pragma once
-/// One measured point out of several touches of the same place: a fast one finds the surface, after
-/// backing off slow ones measure it. The slow ones must agree, and their mean is the point.
-/// Ordinary world, no allocation; one thread.
+/// One measured point from several touches at the same place: a fast touch finds the surface; after
+/// retraction, slow touches measure it. The slow touches must agree; the point is their mean. Not
+/// for the RT path, but no allocation; one thread.
 ///
-/// Along the approach, |p1 - p2| of any two slow touches must be <= agree_sigmas times the
-/// deviation of such a difference, sqrt(2) u_random. u_random: the touch's own uncertainty without
-/// what all touches share (the error of the delay, v u_delay), with the probe's repeatability. The
-/// mean's uncertainty: u_random / sqrt(n), or the scatter seen where that is larger, and the shared
-/// part whole.
+/// Any two slow touches must agree along the approach direction:
+///     |p1 - p2| <= agree_sigmas * sqrt(2) * u_random
+/// sqrt(2) u_random is the standard deviation of such a difference. u_random is the uncertainty of
+/// a touch including the probe's repeatability, without the part common to all touches (the error
+/// of the delay, u_common = v u_delay). The variance of the mean is
+///     max(u_random^2, observed variance) / n + u_common^2
 
 #include <array>
 #include <chrono>
@@ -22,34 +23,34 @@
 namespace abbe::drivers {
 
 struct DoubleTouchRules {
-  double fast_above_m_s = 0.002;       ///< a faster touch is a find, a slower one is a measurement
+  double fast_above_m_s = 0.002;       ///< faster touches find the surface, slower ones measure it
   std::size_t slow_touches = 2;        ///< 2 to DoubleTouch::kMostTouches
-  double same_place_m = 0.5e-3;        ///< between find and measurement, over the linear axes
-  double agree_sigmas = 4.0;           ///< 3 would refuse every 370th good pair
-  double u_repeatability_m = 0.25e-6;  ///< of the probe, not of the instant of its edge
+  double same_place_m = 0.5e-3;        ///< distance of fast and slow touch, over the linear axes
+  double agree_sigmas = 4.0;           ///< 3 would refuse one of 370 good pairs
+  double u_repeatability_m = 0.25e-6;  ///< of the probe, without that of the edge's instant
   std::chrono::nanoseconds u_delay{};  ///< ProbeDelay::u_delay
   std::uint8_t linear_axes = 0b111;
 };
 
 /// The axes at contact, m or rad.
 struct MeasuredTouch {
-  std::uint32_t touch = 0;  ///< number of the last one
+  std::uint32_t touch = 0;  ///< number of the last touch
   std::uint32_t probe = 0;
   std::size_t touches = 0;
-  protocol::HostTime time{};  ///< of the last one
+  protocol::HostTime time{};  ///< of the last touch
   std::uint8_t axis_count = 0;
   std::array<double, protocol::kMaxAxes> position{};
   std::array<double, protocol::kMaxAxes> u_position{};
   std::array<double, protocol::kMaxAxes> velocity{};  ///< mean of the approaches
   double speed_m_s = 0.0;
-  double spread_m = 0.0;  ///< along the approach, largest less smallest
+  double spread_m = 0.0;  ///< along the approach, largest minus smallest
 };
 
 enum class TouchRejection : std::uint8_t {
-  NotUsable,   ///< no position, a speed out of range or unsteady, a refusal of the machine
-  NoFind,      ///< a slow touch that no fast one announced
-  OtherPlace,  ///< a slow touch too far from the find
-  OtherSide,   ///< a slow touch from another direction than the one before
+  NotUsable,   ///< no position, speed out of range or not constant, or refused by the machine
+  NoFind,      ///< a slow touch without a fast touch before it
+  OtherPlace,  ///< a slow touch too far from the fast touch
+  OtherSide,   ///< a slow touch from another direction than the first slow touch
   Disagree,    ///< the slow touches do not agree
 };
 [[nodiscard]] std::string_view name(TouchRejection rejection) noexcept;
@@ -60,8 +61,8 @@ class DoubleTouch {
 
   explicit DoubleTouch(const DoubleTouchRules& rules) noexcept : rules_(rules) {}
 
-  /// A point when the last touch of one came, a rejection when it had to be given up (the next
-  /// begins with a find), nothing otherwise.
+  /// Returns the point after its last touch; a rejection if the point was abandoned (the next point
+  /// begins with a fast touch); nullopt otherwise.
   [[nodiscard]] std::optional<tl::expected<MeasuredTouch, TouchRejection>> on_touch(
       const protocol::ProbeTrigger& touch) noexcept;
   void reset() noexcept;

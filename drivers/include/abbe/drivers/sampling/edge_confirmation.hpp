@@ -1,13 +1,14 @@
 #pragma once
-/// Which edges of a probe's signal are touches. The time of the first edge is kept; whether it was
-/// a touch is decided later. Times are counts of the card's clock. Real time; one thread.
+/// Decides which edges of a probe signal are touches. The time of the first edge is kept until the
+/// signal was stable for the confirmation time. Times are counts of the card's clock. Real time;
+/// one thread.
 ///
-///   Armed --edge--> Pending --stands--> Touched --rearm()--> Armed
-///                      \--did not stand--> Armed, or Pending with the later edge
+///   Armed --edge--> Pending --signal stable--> Touched --rearm()--> Armed
+///                      \--signal not stable--> Armed, or Pending with the later edge
 ///
-/// An edge counter that is not debounced sees rising edges only: that the signal stands means that
-/// no further edge came. A single pulse shorter than the confirmation cannot be told from a touch;
-/// debounce the counter where that matters.
+/// An edge counter without debounce counts rising edges only: the signal counts as stable if no
+/// further edge follows. Then a single pulse shorter than the confirmation time is taken for a
+/// touch; debounce the counter to avoid this.
 
 #include <cstdint>
 
@@ -15,8 +16,8 @@
 
 namespace abbe::drivers {
 
-/// Where an edge lies on the card's clock: in [from, to]. Latched: from and to are the latch's own
-/// width.
+/// Interval of the card's clock that contains an edge: [from, to]. `latched`: the interval comes
+/// from the latch; otherwise from the scans before and after the edge.
 struct EdgeInterval {
   std::int64_t from = 0;
   std::int64_t to = 0;
@@ -27,7 +28,7 @@ struct EdgeInterval {
 struct EdgeRules {
   std::int64_t confirm = 0;
   std::int64_t chatter = 0;
-  bool counter_debounced = false;  ///< an edge that is counted has stood for `confirm`
+  bool counter_debounced = false;  ///< counted edges were stable for `confirm`
 };
 
 class EdgeConfirmation {
@@ -37,12 +38,12 @@ class EdgeConfirmation {
 
   explicit EdgeConfirmation(const EdgeRules& rules) noexcept : rules_(rules) {}
 
-  /// One scan without news.
+  /// A scan without an edge.
   [[nodiscard]] Event on_time(std::int64_t now) ABBE_RT;
-  /// One scan in which the signal rose, last at `edge`; `several`: more than once.
+  /// A scan with rising edges, the last at `edge`; `several`: more than one edge.
   [[nodiscard]] Event on_edge(const EdgeInterval& edge, bool several) ABBE_RT;
-  /// Debounced counters: one scan in which the counter counted. `edge`: where it must have been if
-  /// no latch showed it before.
+  /// Debounced counters: a scan in which the counter has counted. `edge`: interval of the edge,
+  /// used if no latch has shown it before.
   [[nodiscard]] Event on_counted(const EdgeInterval& edge) ABBE_RT;
 
   void rearm() ABBE_RT;
@@ -50,7 +51,7 @@ class EdgeConfirmation {
   [[nodiscard]] State state() const ABBE_RT { return state_; }
   [[nodiscard]] const EdgeInterval& first() const ABBE_RT { return first_; }
   [[nodiscard]] bool chattered() const ABBE_RT { return chattered_; }
-  /// The latest edge that was seen, in any state.
+  /// The latest edge, in any state.
   [[nodiscard]] std::int64_t last_edge() const ABBE_RT { return last_edge_; }
 
  private:

@@ -1,7 +1,8 @@
 #pragma once
-/// The marks of one scale as they are crossed, up to a datum: four consecutive ones in one
-/// direction whose decodings agree. Any fault begins the four anew; too many in a row say that the
-/// scale is another one. Ordinary world, no allocation; one thread.
+/// Collects the marks of one scale as they are crossed, until they give a datum: four consecutive
+/// marks, crossed in one direction, whose decodings agree. After a fault four new marks are needed;
+/// too many consecutive refusals mean that the scale is not the configured one. Not for the RT
+/// path, but no allocation; one thread.
 
 #include <array>
 #include <cstdint>
@@ -14,20 +15,20 @@ namespace abbe::drivers {
 
 struct MarkTraverseOptions {
   DistanceCode code;
-  double counts_per_period = 4.0;  ///< negative: the counter runs against the scale
-  /// going back by this much is a change of direction, less is noise
+  double counts_per_period = 4.0;  ///< negative: the counter counts against the scale
+  /// Motion back by this much is a change of direction; less is noise.
   double reversal_periods = 0.5;
-  std::size_t most_refusals = 4;  ///< fours refused in a row, none of them by a reversal
+  std::size_t most_refusals = 4;  ///< consecutive, reversals not counted
 };
 
 class MarkTraverse {
  public:
   explicit MarkTraverse(const MarkTraverseOptions& options) noexcept : options_(options) {}
 
-  /// The live counter, as often as it is known; at least about once a period of the scale.
+  /// The live count; to be called at least about once per period of the scale.
   void on_position(std::int64_t count) noexcept;
-  /// The counter at a mark that was just crossed. A datum, why these marks give none, or nothing
-  /// yet.
+  /// The count at a mark that was crossed. Returns a datum, the reason why the marks give none, or
+  /// nullopt if more marks are needed.
   [[nodiscard]] std::optional<tl::expected<MarkDatum, MarkFault>> on_mark(
       std::int64_t count) noexcept;
   void reset() noexcept;
@@ -44,8 +45,8 @@ class MarkTraverse {
   std::array<double, kMarksForDatum> marks_{};  ///< oldest first
   std::size_t count_ = 0;
   std::size_t refusals_ = 0;
-  bool moving_ = false;  ///< positions are known
-  int direction_ = 0;    ///< of travel; 0: not known yet
+  bool moving_ = false;  ///< a position is known
+  int direction_ = 0;    ///< of travel; 0: unknown
   double farthest_ = 0.0;
   bool reversed_ = false;  ///< since the latest mark
 };

@@ -1,7 +1,7 @@
 #pragma once
-/// Crossings of reference marks out of the scans of a counter card whose axes are latched on their
-/// index. A CounterScanSink; real time. A mark that latches the very count that is latched already
-/// is not seen: it can only be the same mark, crossed back.
+/// Detects crossings of reference marks in the scans of a counter card whose axes are latched on
+/// their index. A CounterScanSink; real time. A mark that latches the same count as the previous
+/// one is not detected: it can only be the same mark, crossed in the other direction.
 
 #include <array>
 #include <cstddef>
@@ -14,10 +14,11 @@
 namespace abbe::drivers {
 
 struct MarkCrossing {
-  protocol::SampleHead
-      head;  ///< of the scan in which it was seen; Restarted: the card's counts began anew
-  protocol::HostTime not_before{};  ///< the scan before that
-  std::uint8_t axis = 0;            ///< place in the sample
+  /// Of the scan that shows the crossing. Restarted: the card's counts restarted since the previous
+  /// crossing.
+  protocol::SampleHead head;
+  protocol::HostTime not_before{};  ///< time of the scan before `head`
+  std::uint8_t axis = 0;            ///< index in the sample
   std::int64_t count = 0;           ///< of the latching card at the mark
 };
 
@@ -34,7 +35,7 @@ class MarkWatcher final : public CounterScanSink {
  private:
   SampleRing<MarkCrossing> crossings_;
   bool known_ = false;
-  bool restarted_ = false;  ///< not yet told
+  bool restarted_ = false;  ///< to be reported with the next crossing
   protocol::HostTime last_{};
   std::array<std::int64_t, protocol::kMaxAxes> count_{};
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// What is known of one touch probe and the way it is approached. Defaults: a hard-wired kinematic
+/// Properties of one touch probe, its wiring and its approach. Defaults: a hard-wired kinematic
 /// probe.
 
 #include <array>
@@ -13,47 +13,46 @@
 
 namespace abbe::drivers {
 
-/// From contact to the edge at the counter's input. Every probe and interface (wire, optical,
-/// radio) has its own, found by calibration: `id` says which.
+/// Delay from contact to the edge at the counter's input. It is calibrated for every combination of
+/// probe and interface (wire, optical, radio); `id` identifies the combination.
 struct ProbeDelay {
   std::uint32_t id = 1;
   std::chrono::nanoseconds delay = std::chrono::microseconds{5};
-  std::chrono::nanoseconds u_jitter =
-      std::chrono::microseconds{1};    ///< deviation from touch to touch
-  std::chrono::nanoseconds u_delay{};  ///< of `delay` itself: the same error in every touch
+  /// standard deviation between touches
+  std::chrono::nanoseconds u_jitter = std::chrono::microseconds{1};
+  std::chrono::nanoseconds u_delay{};  ///< standard uncertainty of `delay`: common to all touches
 };
 
 struct ProbeApproach {
   double min_speed_m_s = 0.0;
   double max_speed_m_s = 0.010;  ///< 600 mm/min
-  /// Largest change of speed within `speed_window`, as a share of it: pre-travel is qualified at
-  /// one speed.
+  /// Largest change of speed within `speed_window`, relative to the speed: pre-travel is calibrated
+  /// at one speed.
   double max_speed_change = 0.10;
   std::chrono::nanoseconds speed_window = std::chrono::milliseconds{5};
 };
 
 struct ProbeSwitching {
-  /// The signal must stand for so long from its last edge on, else it was vibration.
+  /// The signal must be stable for this time after its last edge; otherwise it was vibration.
   std::chrono::nanoseconds confirm = std::chrono::milliseconds{5};
-  /// Edges within this of the first are the contacts chattering: the first stands. Later ones,
-  /// before `confirm` has passed, say that the first was none.
+  /// Edges within this time after the first edge are contact chatter: the first edge stays valid. A
+  /// later edge before the end of `confirm` replaces the first edge.
   std::chrono::nanoseconds chatter = std::chrono::milliseconds{1};
-  /// Armed again when no edge came for so long ...
+  /// The detector is armed again after this time without an edge, and
   std::chrono::nanoseconds rearm_quiet = std::chrono::milliseconds{20};
-  /// ... and the axes went back from the contact by this much: what comes while retracting is the
-  /// release.
+  /// after this retraction from the contact: edges before that belong to the release of the probe.
   double rearm_retract_m = 50e-6;
 };
 
 /// The probe's channels on the counter card.
 struct ProbeWiring {
   double clock_hz = 10e6;  ///< of the counted time base
-  /// Of the edge counter: it counts an edge once the signal has stood for so long, and that is then
-  /// the confirmation. 0: it counts every edge.
+  /// Debounce time of the edge counter: it counts an edge after the signal was stable for this
+  /// time, which then replaces `confirm`. 0: it counts every edge.
   std::chrono::nanoseconds counter_debounce{};
-  bool use_latch = true;  ///< false: the latched clock is not wired; edges are placed between scans
+  bool use_latch = true;  ///< false: no latch channel; an edge is located to one scan period
   std::chrono::nanoseconds scan_period = std::chrono::microseconds{30};
-  std::uint8_t linear_axes = 0b111;  ///< bit i: axis i is in m and counts for the speed
+  std::uint8_t linear_axes = 0b111;  ///< bit i: axis i is in m and contributes to the speed
   std::array<double, protocol::kMaxAxes> resolution{};  ///< m or rad per count
 };
 
@@ -63,7 +62,7 @@ struct TouchOptions {
   ProbeSwitching switching;
   ProbeWiring wiring;
   std::array<double, protocol::kMaxAxes> max_acceleration = InterpolationOptions{}.max_acceleration;
-  /// scans kept, from the contact
+  /// recorded scans before and after the contact
   std::chrono::nanoseconds window_before = std::chrono::milliseconds{10};
   std::chrono::nanoseconds window_after = std::chrono::milliseconds{10};
   std::size_t touch_capacity = 256;

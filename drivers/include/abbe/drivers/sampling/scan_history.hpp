@@ -1,7 +1,7 @@
 #pragma once
-/// The latest scans of a counter card, and where the axes were at an instant of its clock. Instants
-/// are nanoseconds of the card's own clock, so that the mapping to host time has no part in a
-/// position. Fixed memory, taken by the constructor. Real time; one thread.
+/// The latest scans of a counter card, and the axis positions at an instant of its clock. Instants
+/// are nanoseconds of the card's clock, so that errors of the mapping to host time do not affect
+/// positions. Fixed memory, allocated by the constructor. Real time; one thread.
 
 #include <chrono>
 #include <cstddef>
@@ -19,7 +19,8 @@ class ScanHistory {
   /// Capacity is rounded up to a power of two, at least 8. Allocates.
   ScanHistory(std::size_t capacity, double clock_hz);
 
-  /// Clock counts of successive scans must rise; clear() when the card began anew.
+  /// Precondition: clock counts of successive scans increase. Call clear() after a restart of the
+  /// card.
   void push(const CounterScan& scan) ABBE_RT;
   void clear() ABBE_RT;
 
@@ -35,13 +36,13 @@ class ScanHistory {
   /// Number of the first kept scan later than `instant`; end_number() if there is none.
   [[nodiscard]] std::uint64_t first_after(protocol::DeviceTime instant) const ABBE_RT;
 
-  /// Of a count of the clock, in the middle of its period.
+  /// Instant of a clock count: the middle of its period.
   [[nodiscard]] protocol::DeviceTime instant(std::int64_t clock_count) const ABBE_RT;
   [[nodiscard]] std::chrono::nanoseconds clock_period() const ABBE_RT;
   [[nodiscard]] double clock_period_s() const ABBE_RT { return period_s_; }
 
-  /// Where the axes were; `u_position` states the interpolation alone. `host_time` is that of
-  /// `instant`.
+  /// Axis positions at `instant`; `u_position` contains only the uncertainty of the interpolation.
+  /// `host_time` is the host time of `instant`.
   struct At {
     AxesAt axes;
     protocol::HostTime host_time{};

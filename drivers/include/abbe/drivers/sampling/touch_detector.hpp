@@ -1,11 +1,11 @@
 #pragma once
-/// Touches out of the scans of a counter card: first edge, confirmation, position at the contact,
-/// re-arming on retract; and the scans around every touch. A CounterScanSink: live and in a replay
-/// the same scans give the same touches. A touch leaves when it is confirmed, its window as the
-/// scans come.
+/// Detects touches in the scans of a counter card: first edge, confirmation, position at the
+/// contact, re-arming on retraction. It also outputs the scans around every touch (the window). A
+/// CounterScanSink: the same scans give the same touches, live and in a replay. A touch is output
+/// when it is confirmed, its window as the scans arrive.
 ///
-/// Real time: on_scan() takes no memory and does a bounded amount of work. One thread; counters are
-/// for any.
+/// Real time: on_scan() allocates no memory and does a bounded amount of work. One thread; any
+/// thread may read the counters.
 
 #include <array>
 #include <cstdint>
@@ -23,9 +23,9 @@ namespace abbe::drivers {
 /// Since construction.
 struct TouchCounters {
   Counter touches;
-  Counter dismissed;      ///< edges that did not stand
-  Counter latch_refused;  ///< a latched clock that lies outside of its scan
-  Counter windows_cut;    ///< windows that ended early because the next touch came
+  Counter dismissed;      ///< edges whose signal was not stable
+  Counter latch_refused;  ///< latched clock counts outside their scan interval
+  Counter windows_cut;    ///< windows that ended early because of the next touch
 };
 
 class TouchDetector final : public CounterScanSink {
@@ -44,10 +44,9 @@ class TouchDetector final : public CounterScanSink {
   using Event = EdgeConfirmation::Event;
 
   void restart() ABBE_RT;
-  void look(const CounterScan& before, const CounterScan& scan) ABBE_RT;
-  [[nodiscard]] Event look_at_every_edge(const CounterScan& before,
-                                         const CounterScan& scan) ABBE_RT;
-  [[nodiscard]] Event look_at_debounced(const CounterScan& before, const CounterScan& scan) ABBE_RT;
+  void detect(const CounterScan& before, const CounterScan& scan) ABBE_RT;
+  [[nodiscard]] Event detect_edge(const CounterScan& before, const CounterScan& scan) ABBE_RT;
+  [[nodiscard]] Event detect_debounced(const CounterScan& before, const CounterScan& scan) ABBE_RT;
   [[nodiscard]] bool latch_moved(const CounterScan& before, const CounterScan& scan) const ABBE_RT;
   [[nodiscard]] EdgeInterval latched_edge(const CounterScan& before,
                                           const CounterScan& scan) ABBE_RT;
@@ -69,14 +68,14 @@ class TouchDetector final : public CounterScanSink {
   std::int64_t quiet_counts_ = 0;
   std::int64_t after_counts_ = 0;
 
-  bool refused_latest_ = false;     ///< the edge of this scan had no usable latch
-  bool refused_first_ = false;      ///< the edge the pending touch began with
-  bool restarted_pending_ = false;  ///< for the next touch
+  bool refused_latest_ = false;     ///< the latch of this scan's edge is implausible
+  bool refused_first_ = false;      ///< the same of the first edge of the pending touch
+  bool restarted_pending_ = false;  ///< to be reported with the next touch
   std::uint32_t number_ = 0;
   protocol::ProbeTrigger touch_;  ///< the latest
   bool window_open_ = false;
-  std::uint64_t window_next_ = 0;  ///< number of the scan to come next
-  std::int64_t window_end_ = 0;    ///< clock count of the last one
+  std::uint64_t window_next_ = 0;  ///< number of the next scan to output
+  std::int64_t window_end_ = 0;    ///< clock count at the end of the window
 };
 
 }  // namespace abbe::drivers

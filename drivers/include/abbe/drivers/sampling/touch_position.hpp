@@ -1,12 +1,16 @@
 #pragma once
-/// Where the axes were at the contact: at the edge less the probe's delay, by interpolation between
-/// the enclosing scans, with its uncertainty. Pure; real time.
+/// Axis positions at the contact, with uncertainty. The contact is at the edge minus the probe's
+/// delay; positions are interpolated between the scans before and after it. Pure; real time.
 ///
-/// Uncertainty of an axis that moves at v: v times that of the instant (jitter and calibration of
-/// the delay, normal; the clock's period, triangular because edge and scan are both counted; the
-/// edge's interval, rectangular), the interpolation, and the resolution of the scale (rectangular).
-/// The 95 % interval is that of the rectangle of the edge's interval convolved with all the rest
-/// taken as normal.
+/// Contributions to the uncertainty of an axis that moves at the velocity v:
+///   v times the uncertainty of the instant:
+///     jitter and calibration of the delay: normal
+///     period of the clock: triangular, because edge and scan are both counted
+///     interval of the edge: rectangular
+///   interpolation
+///   resolution of the scale: rectangular
+/// The 95 % interval is that of the convolution of the edge's rectangle with a normal distribution
+/// of all other contributions.
 
 #include "abbe/drivers/sampling/edge_confirmation.hpp"
 #include "abbe/drivers/sampling/probe_options.hpp"
@@ -15,8 +19,8 @@
 
 namespace abbe::drivers {
 
-/// All but the number of the touch. Without scans around it: TouchFlag::NoPosition, every axis
-/// missing and NaN.
+/// Sets all members except the number of the touch. Without scans on both sides of the contact:
+/// TouchFlag::NoPosition, every axis missing and NaN.
 [[nodiscard]] protocol::ProbeTrigger locate_touch(const EdgeInterval& edge,
                                                   const ScanHistory& scans,
                                                   const TouchOptions& options) ABBE_RT;

@@ -1,8 +1,8 @@
 #pragma once
-/// A USB device on this computer through libusb: asynchronous transfers, hot-plug. An unplug shows
-/// itself in one of two ways, both of which end in UsbLost: transfers end with "no device", or they
-/// fail first and the hot-plug notice comes after. Without a running udev there is no notice; then
-/// the next request says it.
+/// A USB device on this computer through libusb: asynchronous transfers, hot-plug. Removal of the
+/// device gives UsbLost. It is detected in one of two ways: transfers end with "no device", or they
+/// fail and the hot-plug event follows. Without a running udev there is no hot-plug event; then the
+/// next request detects the removal.
 
 #include <memory>
 
@@ -13,8 +13,8 @@ namespace abbe::drivers {
 
 class LibusbLink final : public UsbLink {
  public:
-  /// `time` must outlive the link. The interface 0 of the device is claimed, a kernel driver on it
-  /// detached.
+  /// `time` must outlive the link. open() claims interface 0 of the device and detaches a kernel
+  /// driver from it.
   LibusbLink(const UsbIdentity& identity, const TimeSource& time);
   ~LibusbLink() override;
 

@@ -1,8 +1,8 @@
 #pragma once
-/// One USB device as a driver needs it: control transfers one at a time, many bulk-in transfers in
-/// flight, and word of its going. Two back-ends: libusb (LibusbLink) and a USB/IP client in the
-/// process (UsbipLink). All calls from one thread, in the ordinary world; nothing blocks but
-/// wait(). What goes wrong is an event.
+/// Interface to one USB device: one control transfer at a time, many bulk-in transfers in flight,
+/// and notification of its removal. Two implementations: LibusbLink (libusb) and UsbipLink (a
+/// USB/IP client in this process). All calls from one thread, not in the RT path; only wait()
+/// blocks. Errors are reported as events.
 
 #include <array>
 #include <chrono>
@@ -21,27 +21,27 @@ namespace abbe::drivers {
 
 namespace usb = protocol::usb;
 
-/// Which device: another one on the same port is refused by name.
+/// Identifies the device. A different device is refused; the error names both.
 struct UsbIdentity {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::string serial;              ///< empty: the only one there is
+  std::string serial;              ///< empty: exactly one such device must be connected
   std::uint8_t configuration = 1;  ///< selected when opened
-  std::uint8_t bulk_endpoint = 0;  ///< must exist; address with direction bit
+  std::uint8_t bulk_endpoint = 0;  ///< must exist; address including the direction bit
 };
 
 struct UsbBulkStream {
   std::size_t transfer_bytes = 2048;  ///< a multiple of the endpoint's packet
-  std::size_t in_flight = 32;         ///< requests the device always has to answer
+  std::size_t in_flight = 32;         ///< number of pending requests
 };
 
 enum class UsbOutcome : std::uint8_t {
   Done,
-  Stalled,  ///< refused by the device; a bulk endpoint stays so until its halt is cleared
-  Failed,   ///< anything else that leaves the device there
+  Stalled,  ///< refused by the device; a bulk endpoint stays stalled until its halt is cleared
+  Failed,   ///< any other failure with the device still connected
 };
 
-/// Opened: it is the configured device and its configuration is selected.
+/// The device is open: its identity matches and its configuration is selected.
 struct UsbOpened {
   std::string serial;  ///< empty: the device has none
 };
@@ -55,16 +55,16 @@ struct UsbControlDone {
     return std::span{data}.first(length);
   }
 };
-/// One transfer that ended; its request goes out again by itself. The bytes are lent until the next
-/// wait().
+/// A bulk-in transfer has ended; its request is submitted again automatically. `bytes` are valid
+/// until the next wait().
 struct UsbBulkIn {
   std::span<const std::byte> bytes;
   protocol::HostTime arrival{};
   UsbOutcome outcome = UsbOutcome::Done;
 };
-/// After stop_bulk_in(): none is in flight any more.
+/// After stop_bulk_in(): no transfer is in flight.
 struct UsbBulkStopped {};
-/// Closed: unplugged, refused, never there. open() tries again.
+/// The link is closed: the device was removed, was refused, or was not found. open() tries again.
 struct UsbLost {
   Error error;
 };
@@ -77,16 +77,17 @@ class UsbLink {
   UsbLink& operator=(const UsbLink&) = delete;
   virtual ~UsbLink() = default;
 
-  /// Begins to open; UsbOpened or UsbLost follows.
+  /// Starts to open the device; UsbOpened or UsbLost follows.
   virtual void open() = 0;
-  /// At once and without an event.
+  /// Closes immediately and without an event.
   virtual void close() noexcept = 0;
-  /// One at a time; UsbControlDone follows, or nothing ever if the device does not answer. Writes
-  /// have no data. usb::clear_halt() also clears the host's side of it.
+  /// Starts a control transfer; only one may be pending. UsbControlDone follows; no event if the
+  /// device does not answer. Writes have no data stage. usb::clear_halt() also clears the halt
+  /// state in the host.
   virtual void control(const usb::Setup& setup) = 0;
-  /// Requests from the bulk endpoint of the identity, always `in_flight` of them.
+  /// Keeps `in_flight` requests to the bulk endpoint of the identity pending.
   virtual void start_bulk_in(const UsbBulkStream& stream) = 0;
-  /// Takes all requests back; UsbBulkStopped follows.
+  /// Cancels all bulk requests; UsbBulkStopped follows.
   virtual void stop_bulk_in() = 0;
   /// Waits for at most `wall` of the operating system's time. The events are valid until the next
   /// call.
@@ -95,10 +96,10 @@ class UsbLink {
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
-/// "it is 1209:0001, configured is 09DB:00CA"; empty if it is the right one.
+/// "it is 1209:0001, configured is 09DB:00CA"; empty if the IDs match.
 [[nodiscard]] std::string wrong_ids(const UsbIdentity& wanted, std::uint16_t vendor,
                                     std::uint16_t product);
-/// "its serial number is A, configured is B"; empty if it is the right one or none is configured.
+/// "its serial number is A, configured is B"; empty if they match or none is configured.
 [[nodiscard]] std::string wrong_serial(const UsbIdentity& wanted, std::string_view serial);
 
 }  // namespace abbe::drivers

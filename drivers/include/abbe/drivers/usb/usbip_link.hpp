@@ -1,6 +1,6 @@
 #pragma once
-/// A USB device behind a USB/IP server, without the kernel: for simulated devices, for devices on
-/// another computer, and where no kernel module may be loaded. TCP; the server may be `usbipd` or
+/// A USB device behind a USB/IP server (TCP), without a kernel driver: for simulated devices, for
+/// devices on another computer, and where no kernel module may be loaded. Servers: `usbipd`,
 /// abbe-sim.
 
 #include <cstdint>
@@ -39,13 +39,13 @@ class UsbipLink final : public UsbLink {
 
  private:
   enum class State : std::uint8_t { Closed, Connecting, Importing, Inspecting, Open };
-  /// What is asked of the device before it counts as opened, in this order.
+  /// Requests to the device before it is reported as opened, in this order.
   enum class Inspection : std::uint8_t { Device, Configuration, Serial, Select };
   struct Pending {
     std::uint32_t sequence;
     bool bulk;
-    std::uint32_t length;  ///< most bytes that may come
-    std::uint32_t unlink;  ///< sequence number of the request to take it back; 0: none
+    std::uint32_t length;  ///< maximum length of the answer, bytes
+    std::uint32_t unlink;  ///< sequence number of the request that cancels it; 0: none
   };
 
   void disconnect() noexcept;
@@ -67,8 +67,8 @@ class UsbipLink final : public UsbLink {
   void finish_bulk(UsbOutcome outcome, std::span<const std::byte> bytes);
   void inspect(std::span<const std::byte> bytes);
   void inspected_device(std::span<const std::byte> bytes);
-  void ask_next();
-  void tell_if_stopped();
+  void request_next();
+  void report_if_stopped();
   [[nodiscard]] std::span<const std::byte> unread() const {
     return std::span{buffer_}.subspan(begin_, end_ - begin_);
   }
@@ -87,9 +87,9 @@ class UsbipLink final : public UsbLink {
   UsbBulkStream stream_;
   bool streaming_ = false;
   bool stopping_ = false;
-  std::size_t resubmit_ = 0;  ///< transfers lent since the last wait()
+  std::size_t resubmit_ = 0;  ///< transfers to submit again in the next wait()
   std::vector<UsbEvent> events_;
-  std::vector<UsbEvent> early_events_;  ///< happened between two waits
+  std::vector<UsbEvent> pending_events_;  ///< for the next return of wait()
   std::vector<std::byte> outgoing_;
   std::vector<std::byte> buffer_;
   std::size_t begin_ = 0;

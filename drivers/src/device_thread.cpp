@@ -43,20 +43,20 @@ void set_affinity(int cpu, Refusals& refusals) {
 
 Refusals prepare_this_thread(const DeviceThreadOptions& o) {
   pthread_setname_np(pthread_self(), o.name.substr(0, 15).c_str());
-  touch_stack();  // far more than any receive() was seen to use
+  touch_stack();  // 64 kB is far more than any measured use by receive()
   Refusals refusals = o.lock_memory ? lock_memory() : Refusals{};
   if (o.cpu) set_affinity(*o.cpu, refusals);
   if (o.priority != 0) set_priority(o.priority, refusals);
   return refusals;
 }
 
-std::string in_words(const std::exception_ptr& cause) {
+std::string text_of(const std::exception_ptr& cause) {
   try {
     std::rethrow_exception(cause);
   } catch (const std::exception& e) {
     return e.what();
   } catch (...) {
-    return "an exception that is no std::exception";
+    return "an exception not derived from std::exception";
   }
 }
 
@@ -68,8 +68,8 @@ struct DeviceThread::State {
   std::vector<std::string> warnings;
   LatencyHistogram latency;
   std::atomic<bool> stop{false};
-  FaultText failure;               ///< what ended the loop the last time
-  std::atomic<bool> ended{false};  ///< from then until a wait() has returned again
+  FaultText failure;               ///< the latest exception that ended the loop
+  std::atomic<bool> ended{false};  ///< from the exception until a wait() returns again
   std::atomic<std::uint64_t> failures{0};
   std::thread thread;
 
@@ -92,14 +92,13 @@ struct DeviceThread::State {
   }
 
   void fail(const std::exception_ptr& cause) {
-    failure.set({}, in_words(cause));
+    failure.set({}, text_of(cause));
     ended.store(true, std::memory_order_release);  // pairs with the acquire in failure()
-    // release: pairs with the acquire in failures(); who sees the count sees that the loop has
-    // ended
+    // release: pairs with the acquire in failures(); a reader of the count also sees `ended`
     failures.fetch_add(1, std::memory_order_release);
   }
 
-  /// In steps, so that stop() is heard.
+  /// Sleeps in steps of wait_at_most, so that the thread reacts to stop().
   void pause(std::chrono::nanoseconds time) const {
     const auto until = std::chrono::steady_clock::now() + time;
     while (!stopping()) {
@@ -109,7 +108,7 @@ struct DeviceThread::State {
     }
   }
 
-  /// The thread's top function: what the loop throws ends here and is kept, and the loop begins
+  /// The thread's top function: catches and stores an exception of the loop, and starts the loop
   /// again.
   void run(std::promise<Refusals> ready) noexcept {
     Refusals refusals = prepare_this_thread(options);
@@ -124,7 +123,7 @@ struct DeviceThread::State {
       } catch (...) {
         fail(std::current_exception());
         if (std::chrono::steady_clock::now() - begun > options.longest_back_off)
-          back_off = options.first_back_off;  // it ran well for a while
+          back_off = options.first_back_off;  // the loop ran long enough
         pause(back_off);
         back_off = std::min(2 * back_off, options.longest_back_off);
       }
@@ -187,7 +186,7 @@ DeviceStatus DeviceThread::status() const {
   if (const auto cause = failure()) {
     status.state = "internal error";
     status.connected = false;
-    status.last_fault = fmt::format("{}: internal error, its thread starts again: {}",
+    status.last_fault = fmt::format("{}: internal error, the device thread restarts: {}",
                                     state_->options.name, *cause);
   }
   return status;

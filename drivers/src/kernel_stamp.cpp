@@ -14,7 +14,7 @@ std::chrono::nanoseconds read(clockid_t clock) noexcept {
 }  // namespace
 
 ClockPair read_clock_pair() noexcept {
-  constexpr std::chrono::microseconds kUndisturbed{20};  // three readings take a tenth of one
+  constexpr std::chrono::microseconds kUndisturbed{20};  // three readings take about 0.1 us
   constexpr int kMostTries = 5;
   ClockPair best;
   auto apart = std::chrono::nanoseconds::max();

@@ -8,8 +8,7 @@ namespace abbe::drivers {
 std::chrono::nanoseconds LatencyHistogram::upper_bound(std::size_t bucket) noexcept {
   const std::size_t octave = bucket / kBucketsPerOctave;
   const std::size_t quarter = bucket % kBucketsPerOctave;
-  // linear quarters of an octave [2^o, 2^(o+1)): the same rule as bucket_of(), which has integers
-  // only
+  // Each octave [2^o, 2^(o+1)) has four equal buckets, as in bucket_of(). Integers only.
   const std::uint64_t base = std::uint64_t{1} << octave;
   return std::chrono::nanoseconds{
       static_cast<std::int64_t>(base + (base * (quarter + 1) + 3) / kBucketsPerOctave)};

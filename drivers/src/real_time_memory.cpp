@@ -27,8 +27,9 @@ namespace {
 
 std::vector<std::string> lock_now() {
   std::vector<std::string> refusals;
-  if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0) refusals.push_back(refusal("no huge pages"));
-  // In two calls: one with all three flags would not load what is mapped now.
+  if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0)
+    refusals.push_back(refusal("disabling huge pages"));
+  // Two calls: one call with all three flags would not load the memory that is mapped now.
   if (mlockall(MCL_CURRENT) != 0 || mlockall(MCL_FUTURE | MCL_ONFAULT) != 0)
     refusals.push_back(refusal("mlockall") + " (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)");
   return refusals;
@@ -42,22 +43,23 @@ std::vector<std::string> lock_memory() {
 }
 
 void keep_heap() noexcept {
-  (void)mallopt(M_MMAP_THRESHOLD, 32 * kMB);  // the most that glibc accepts
+  (void)mallopt(M_MMAP_THRESHOLD, 32 * kMB);  // the maximum of glibc
   (void)mallopt(M_TRIM_THRESHOLD, 64 * kMB);
   (void)mallopt(M_TOP_PAD, kMB);
-  // Threads beyond this number share heaps, and their locks. glibc's default, 8 per processor, is
-  // fewer than the threads of abbed on a small computer.
+  // Threads beyond this number share heaps and the locks of these heaps. glibc's default of 8 per
+  // processor is less than the number of threads of abbed on a small computer.
   (void)mallopt(M_ARENA_MAX, 64);
 }
 
 [[gnu::noinline]] void touch_stack() noexcept {
-  std::array<volatile char, 64 * 1024> room;  // NOLINT: touched, not initialised, on purpose
-  for (std::size_t i = 0; i < room.size(); i += kPage) room[i] = 0;
+  std::array<volatile char, 64 * 1024> stack;  // NOLINT: touched, not initialised, on purpose
+  for (std::size_t i = 0; i < stack.size(); i += kPage) stack[i] = 0;
 }
 
 void prepare_heap_of_this_thread() {
   touch_stack();
-  // Blocks below any threshold for a mapping of their own; freed together they become one.
+  // Blocks of this size are taken from the heap, not mapped separately. When all are freed, the
+  // heap combines them into one free area.
   constexpr std::size_t kBlock = 64 * 1024, kBlocks = 256;
   std::array<std::unique_ptr<volatile char[]>, kBlocks> blocks;  // NOLINT: an array of raw memory
   for (auto& block : blocks) {

@@ -15,8 +15,8 @@ FaultText::Read FaultText::read() const {
     // acquire: pairs with the last release in set()
     const std::uint64_t latest = complete_.load(std::memory_order_acquire);
     const Text& from = texts_[latest % 2];
-    // acquire: pairs with the releases in set(); whoever sees a newer word also sees that it was
-    // begun
+    // acquire: pairs with the releases in set(); a reader of a newer word also sees the newer
+    // begun_
     length = from.length.load(std::memory_order_acquire);
     at_ns = from.at_ns.load(std::memory_order_acquire);
     std::transform(from.words.begin(), from.words.end(), words.begin(),

@@ -20,10 +20,10 @@
 namespace abbe::drivers {
 namespace {
 
-/// Longest wait given to the kernel at once; the caller comes back anyway.
+/// Longest time of one wait in the kernel; the caller calls wait() again.
 constexpr std::chrono::seconds kLongestPoll{1};
 
-std::string words_for(int error) {
+std::string error_text(int error) {
   return std::system_category().message(error);
 }
 
@@ -52,7 +52,7 @@ const addrinfo& nth(const Addresses& addresses, unsigned n) {
   return *chosen;
 }
 
-bool later(int error) {
+bool try_again(int error) {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
 }
 
@@ -65,17 +65,17 @@ Result<void> TcpClient::open(const std::string& host, std::uint16_t port) {
   const addrinfo& address = nth(*addresses, tries_++);
   fd_ = ::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0)
-    return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", words_for(errno)));
+    return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", error_text(errno)));
   const int yes = 1;
   ::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
 
   if (::connect(fd_, address.ai_addr, address.ai_addrlen) != 0 && errno != EINPROGRESS) {
     const int error = errno;
     close();
-    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", words_for(error)));
+    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", error_text(error)));
   }
 
-  opening_ = true;  // also when it is there already: wait() tells
+  opening_ = true;  // also if already connected: wait() reports Established
   return {};
 }
 
@@ -88,10 +88,10 @@ void TcpClient::close() noexcept {
 void TcpClient::finish() noexcept {
   if (!established()) return;
   ::shutdown(fd_, SHUT_WR);
-  // Closing a socket with unread bytes resets the connection and may overtake what was just
+  // Closing a socket with unread bytes resets the connection, and the peer may lose the bytes just
   // written.
-  std::array<std::byte, 4096> thrown_away;  // NOLINT(cppcoreguidelines-pro-type-member-init)
-  for (int i = 0; i < 1000 && ::recv(fd_, thrown_away.data(), thrown_away.size(), MSG_DONTWAIT) > 0;
+  std::array<std::byte, 4096> discarded;  // NOLINT(cppcoreguidelines-pro-type-member-init)
+  for (int i = 0; i < 1000 && ::recv(fd_, discarded.data(), discarded.size(), MSG_DONTWAIT) > 0;
        ++i) {
   }
 }
@@ -121,7 +121,7 @@ Result<TcpClient::Ready> TcpClient::end_of_opening() {
   ::getsockopt(fd_, SOL_SOCKET, SO_ERROR, &error, &size);
   if (error != 0) {
     close();
-    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", words_for(error)));
+    return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", error_text(error)));
   }
   opening_ = false;
   return Ready::Established;
@@ -131,8 +131,8 @@ Result<std::size_t> TcpClient::read(std::span<std::byte> into) {
   const ssize_t n = ::recv(fd_, into.data(), into.size(), MSG_DONTWAIT);
   if (n > 0) return static_cast<std::size_t>(n);
   if (n == 0) return failed(ErrorCode::Unreachable, "connection closed by the peer");
-  if (later(errno)) return std::size_t{0};
-  return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
+  if (try_again(errno)) return std::size_t{0};
+  return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", error_text(errno)));
 }
 
 Result<void> TcpClient::write(std::span<const std::byte> bytes) {
@@ -143,9 +143,9 @@ Result<void> TcpClient::write(std::span<const std::byte> bytes) {
 Result<void> TcpClient::flush() {
   while (!unsent_.empty()) {
     const ssize_t n = ::send(fd_, unsent_.data(), unsent_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-    if (n < 0 && later(errno)) return {};
+    if (n < 0 && try_again(errno)) return {};
     if (n < 0)
-      return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", words_for(errno)));
+      return failed(ErrorCode::Unreachable, fmt::format("connection lost: {}", error_text(errno)));
     unsent_.erase(unsent_.begin(), unsent_.begin() + n);
   }
   return {};

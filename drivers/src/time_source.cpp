@@ -7,7 +7,7 @@ namespace abbe::drivers {
 namespace {
 
 std::chrono::nanoseconds scaled(std::chrono::nanoseconds d, double factor) noexcept {
-  if (factor == 1.0) return d;  // exact, also where a double has no nanoseconds left
+  if (factor == 1.0) return d;  // exact: a double cannot hold large times to the nanosecond
   return std::chrono::nanoseconds{std::llround(static_cast<double>(d.count()) * factor)};
 }
 

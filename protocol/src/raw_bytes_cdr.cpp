@@ -13,14 +13,14 @@ using tl::unexpected;
 constexpr std::array<std::byte, 4> kPlainCdrLe{std::byte{0}, std::byte{1}, std::byte{0},
                                                std::byte{0}};
 static_assert(std::endian::native == std::endian::little,
-              "integers are copied as they lie in memory");
+              "integers are copied without byte swapping");
 
 constexpr std::size_t padding(std::size_t position, std::size_t alignment) noexcept {
   return (alignment - position % alignment) % alignment;
 }
 
-/// Fields of the CDR body, aligned from its first byte. After the first failure all reads are zero
-/// or empty.
+/// Reads fields of the CDR body, aligned from its first byte. After the first failure all values
+/// are zero or empty.
 class BodyReader {
  public:
   explicit BodyReader(std::span<const std::byte> body) noexcept : body_(body) {}
@@ -43,7 +43,7 @@ class BodyReader {
     return take(length);
   }
   std::string_view string(std::size_t bound) noexcept {
-    const auto field = octets(bound + 1);  // the NUL counts
+    const auto field = octets(bound + 1);  // the length includes the NUL
     if (failed_) return {};
     const std::string_view text{reinterpret_cast<const char*>(field.data()), field.size()};
     if (text.empty() || text.find('\0') != text.size() - 1) {
@@ -77,7 +77,8 @@ class BodyReader {
   CdrError error_ = CdrError::Truncated;
 };
 
-/// Writes fields aligned from the body's first byte into a buffer known to be large enough.
+/// Writes fields, aligned from the first byte of the body. Precondition: the buffer is large
+/// enough.
 class BodyWriter {
  public:
   explicit BodyWriter(std::byte* body) noexcept : body_(body) {}
@@ -141,7 +142,7 @@ tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value,
 
 tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(std::span<const std::byte> cdr) noexcept {
   if (cdr.size() < kPlainCdrLe.size()) return unexpected(CdrError::Truncated);
-  // The last two of the four bytes are options, which a reader ignores.
+  // The last two of the four bytes are options, which a reader must ignore.
   if (cdr[0] != kPlainCdrLe[0] || cdr[1] != kPlainCdrLe[1]) return unexpected(CdrError::NotCdrLe);
   BodyReader body{cdr.subspan(kPlainCdrLe.size())};
   RawBytes value;

@@ -1,3 +1,3 @@
-// Compiles the vocabulary once, so that its static assertions hold in every build.
+// Compiles the header, so that its static assertions are checked in every build.
 #include "abbe/protocol/samples.hpp"
 #include "abbe/protocol/rt.hpp"

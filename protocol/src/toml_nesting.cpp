@@ -6,13 +6,13 @@
 namespace abbe::protocol {
 namespace {
 
-/// Follows the nesting of a TOML text. A number's point counts as a dot of a key: one too many at
-/// most.
+/// Tracks the nesting depth of a TOML text. The decimal point of a number is counted like a dot of
+/// a key: the result is then too large by one.
 class TomlNesting {
  public:
   explicit TomlNesting(std::string_view text) : text_(text) {}
 
-  /// Where it first exceeds `most`.
+  /// Offset at which the depth first exceeds `most`.
   std::optional<std::size_t> exceeds(std::size_t most) {
     while (at_ < text_.size()) {
       step();
@@ -57,7 +57,7 @@ class TomlNesting {
 
   void begin_header() {
     in_header_ = true;
-    header_ = 2;  // a table, or a table in an array
+    header_ = 2;  // counted as an array of tables, the deeper case
     forget_dots();
   }
 
@@ -83,9 +83,9 @@ class TomlNesting {
       if (text_[at_] == '\\' && quote == '"') {
         ++at_;
       } else if (!multi_line && text_[at_] == '\n') {
-        return;  // not closed: an error, for the parser to report
+        return;  // not closed: the parser reports the error
       } else if (text_[at_] == quote && (!multi_line || closes(quote))) {
-        // up to two quotes may stand before the closing three
+        // Up to two quotes may precede the closing three.
         return pass_quotes(quote, multi_line ? 5 : 1);
       }
     }
@@ -106,9 +106,9 @@ class TomlNesting {
   std::size_t at_ = 0;
   bool line_begins_ = true;
   bool in_header_ = false;
-  std::size_t header_ = 0;  // levels the table's name opens
-  std::vector<std::size_t> open_ = {
-      0};  // dots of the key under way, for each open array or inline table
+  std::size_t header_ = 0;  // levels of the present table name
+  // Dots of the current key, for each open array or inline table.
+  std::vector<std::size_t> open_ = {0};
   std::size_t dots_in_all_ = 0;
 };
 

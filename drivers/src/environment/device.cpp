@@ -37,7 +37,7 @@ Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
 
 Result<std::unique_ptr<EnvironmentDevice>> EnvironmentDevice::create(
     const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link) {
-  if (const auto fine = check(options.map); !fine) return tl::unexpected(fine.error());
+  if (const auto valid = check(options.map); !valid) return tl::unexpected(valid.error());
   if (!has_address(options.address))
     return tl::unexpected(
         Error{ErrorCode::BadConfiguration, options.name + ": host, port or path is missing"});
@@ -63,10 +63,10 @@ DeviceStatus EnvironmentDevice::status() const {
 }
 
 void EnvironmentDevice::wait(nanoseconds at_most) {
-  heed_progress(time_.now());
+  handle_progress(time_.now());
   if (!ensure_open(at_most)) return;
-  ask();
-  if (on_line()) listen(at_most);
+  send_request();
+  if (on_line()) read_answer(at_most);
 }
 
 bool EnvironmentDevice::busy() const noexcept {
@@ -79,7 +79,7 @@ HostTime EnvironmentDevice::due() const noexcept {
   return receiver_.between_rounds() ? next_round_ : arrival_;
 }
 
-void EnvironmentDevice::heed_progress(HostTime now) {
+void EnvironmentDevice::handle_progress(HostTime now) {
   const auto progress = std::exchange(progress_, Progress::Waiting);
   if (progress == Progress::Failed) {
     const bool refused = is_refusal(receiver_.failure());
@@ -96,11 +96,11 @@ void EnvironmentDevice::heed_progress(HostTime now) {
   if (progress == Progress::Sample) plan_next_round(now);
   const auto implausible = receiver_.counters().implausible;
   if (std::exchange(implausible_seen_, implausible) != implausible)
-    board_.fault(now, fmt::format("{} {}: a value beyond all sense, given as not available",
+    board_.fault(now, fmt::format("{} {}: a value is outside the plausible range and is not used",
                                   options_.name, text_of(options_.address)));
 }
 
-/// On the grid; rounds that were slept through are left out.
+/// The next multiple of the period; rounds that are already late are omitted.
 void EnvironmentDevice::plan_next_round(HostTime now) {
   const auto late = std::max(now - next_round_, nanoseconds{0});
   next_round_ += options_.period * (late / options_.period + 1);
@@ -110,7 +110,7 @@ bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
   if (on_line()) return true;
   const auto now = time_.now();
   if (const auto from = due(); now < from) {
-    // Where others wait for the line it is theirs, now.
+    // On a shared line do not sleep: other devices use it meanwhile.
     if (own_link_)
       std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
     return false;
@@ -134,9 +134,9 @@ bool EnvironmentDevice::open_line() {
   return opened.has_value();
 }
 
-void EnvironmentDevice::ask() {
+void EnvironmentDevice::send_request() {
   const auto request = receiver_.next_request();
-  const auto at = time_.now();  // before: no answer can be older than its question
+  const auto at = time_.now();  // read before sending: no answer is earlier than its request
   if (!request || (receiver_.between_rounds() && at < next_round_)) return;
   if (const auto sent = link_.line.send(*request); !sent) return lose(sent.error().text);
   receiver_.sent(*request, at);
@@ -146,7 +146,7 @@ void EnvironmentDevice::ask() {
   raw_.push_bytes(at, RawBlock::Direction::ToDevice, std::span{frame}.first(length));
 }
 
-void EnvironmentDevice::listen(nanoseconds at_most) {
+void EnvironmentDevice::read_answer(nanoseconds at_most) {
   const auto due = receiver_.awaiting() ? answer_due_ : next_round_;
   const auto budget = std::clamp(nanoseconds{due - time_.now()}, nanoseconds{0}, at_most);
   const auto read = link_.line.read(buffer_, time_.wall(budget));
@@ -158,7 +158,7 @@ void EnvironmentDevice::listen(nanoseconds at_most) {
          "closed", options_.answer_timeout);
 }
 
-/// Recorded as nothing sent, into a line that was open.
+/// A lost connection is recorded as an empty block ToDevice.
 void EnvironmentDevice::lose(std::string_view what) {
   raw_.push_bytes(time_.now(), RawBlock::Direction::ToDevice, {});
   link_.line.close();
@@ -171,15 +171,16 @@ void EnvironmentDevice::line_closed() noexcept {
   board_.set_state("closed");
 }
 
-/// Since the latest fault here: then the connection is not what failed.
+/// True if another device has answered since the latest fault of this one: then the connection
+/// works.
 bool EnvironmentDevice::others_answered() noexcept {
   const auto others = link_.answers - answers_;
   return std::exchange(others_at_fault_, others) != others;
 }
 
-/// Of a connection that is closed by one all devices begin anew; one that stays open rests for as
-/// long as an answer may still come, and the others have their rounds before this device asks
-/// again.
+/// If other devices answer, the line stays open: it is not used while a late answer may still
+/// arrive, and this device waits at least one period, so that the others complete their rounds.
+/// Otherwise the line is closed, and all devices restart on the next connection.
 void EnvironmentDevice::leave_line(nanoseconds retry, nanoseconds quiet) {
   const auto now = time_.now();
   opening_ = 0;

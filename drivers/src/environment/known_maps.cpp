@@ -20,8 +20,8 @@ Error bad(std::string text) {
 }
 
 /// Vaisala M212287EN p. 73, 114 (Indigo520) and M212022EN p. 101 (HMP series): 32-bit floats, low
-/// word first; documented numbers are 1-based, these are not. Unit 240 is the transmitter, 241 the
-/// probe on port 1.
+/// word first. The register numbers in the documentation count from 1, the addresses here from 0.
+/// Unit 240 is the transmitter, 241 the probe on port 1.
 RegisterMap indigo520_hmp() {
   const auto at = [](std::uint8_t unit, std::uint16_t address) {
     return RegisterPlace{unit, Function::ReadHoldingRegisters, address, RegisterType::Float32,
@@ -40,7 +40,7 @@ RegisterMap indigo520_hmp() {
   return map;
 }
 
-/// Comet Modbus description for Tx5xx/Tx6xx v3.2: int16, tenths; serial number in BCD.
+/// Comet Modbus description for Tx5xx/Tx6xx v3.2: int16 in units of 0.1; serial number in BCD.
 RegisterMap comet_t7510(const KnownMapOptions& options) {
   const auto at = [&](std::uint16_t address, RegisterType type) {
     return RegisterPlace{options.unit, Function::ReadHoldingRegisters, address, type,
@@ -71,7 +71,7 @@ RegisterMap comet_t7510(const KnownMapOptions& options) {
   return map;
 }
 
-/// ICP DAS ZT-2005-C8 manual p. 42: inputs 30001 to 30008, int16, here in engineering units of
+/// ICP DAS ZT-2005-C8 manual p. 42: inputs 30001 to 30008, int16, format "engineering units" of
 /// 0.1 C.
 RegisterMap zt2005_c8(const KnownMapOptions& options) {
   RegisterMap map;
@@ -84,8 +84,8 @@ RegisterMap zt2005_c8(const KnownMapOptions& options) {
                RegisterType::Int16, WordOrder::HighFirst};
     m.scale = 0.1;
     m.offset = kZeroCelsius_K;
-    m.unavailable = {-32768.0,
-                     32767.0};  // ends of the scale: broken wire, short circuit; not confirmed
+    // End values of the scale: broken wire, short circuit. Not confirmed by the documentation.
+    m.unavailable = {-32768.0, 32767.0};
     map.measured.push_back(std::move(m));
   }
 
@@ -110,14 +110,14 @@ Result<RegisterMap> known_map(std::string_view name, const KnownMapOptions& opti
     return tl::unexpected(bad(fmt::format("register map {}: no such map", name)));
   if (!options.serial_number && name == kComet)
     return tl::unexpected(
-        bad(fmt::format("register map {}: needs the serial number: by it alone an address "
-                        "base that is off by one is found",
+        bad(fmt::format("register map {}: needs the serial number, the only check that the "
+                        "register addresses are not off by one",
                         name)));
   if (options.serial_number && name != kComet)
-    return tl::unexpected(
-        bad(fmt::format("register map {}: has no register with the serial number", name)));
+    return tl::unexpected(bad(
+        fmt::format("register map {}: has no register for the serial number: remove it", name)));
   if (!options.inputs.empty() && name != kZt2005)
-    return tl::unexpected(bad(fmt::format("register map {}: has no inputs to be named", name)));
+    return tl::unexpected(bad(fmt::format("register map {}: has no inputs to configure", name)));
   if (options.inputs.size() > kZt2005Inputs)
     return tl::unexpected(bad(fmt::format("register map {}: has {} inputs, not {}", name,
                                           kZt2005Inputs, options.inputs.size())));

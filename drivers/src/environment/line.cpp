@@ -13,7 +13,8 @@ using std::chrono::nanoseconds;
 
 namespace {
 
-constexpr nanoseconds kEndOfRemains = std::chrono::milliseconds{50};  // without a byte
+/// A late answer is complete when no byte has arrived for this time.
+constexpr nanoseconds kEndOfLateAnswer = std::chrono::milliseconds{50};
 
 }  // namespace
 
@@ -28,7 +29,7 @@ Result<std::unique_ptr<EnvironmentLine>> EnvironmentLine::create(
     if (!same_line(o.address, address) || !same_settings(o.address, address))
       return tl::unexpected(
           Error{ErrorCode::BadConfiguration,
-                fmt::format("{} {} and {} {} are not one line", options.front().name,
+                fmt::format("{} {} and {} {} are not on the same line", options.front().name,
                             text_of(address), o.name, text_of(o.address))});
     auto device = EnvironmentDevice::create(o, time, line->link_);
     if (!device) return tl::unexpected(device.error());
@@ -44,7 +45,7 @@ void EnvironmentLine::wait(nanoseconds at_most) {
   active_ = nullptr;
 
   if (!device.busy()) {
-    if (!alone && must_be_quiet()) return throw_away(device, at_most);
+    if (!alone && must_be_quiet()) return discard_late_answer(device, at_most);
     const auto now = time_.now();
     if (!device.on_line() && now < device.due())
       return std::this_thread::sleep_for(
@@ -58,8 +59,8 @@ void EnvironmentLine::wait(nanoseconds at_most) {
     if (other.get() != &device) other->line_closed();
 }
 
-/// Whoever awaits an answer, or has one that it did not look at yet; else who has waited longest,
-/// of several the one after the last.
+/// The device with an outstanding or unhandled answer; else the device that has waited longest.
+/// Among equals it is the next one after the device chosen last.
 EnvironmentDevice& EnvironmentLine::next() {
   for (const auto& device : devices_)
     if (device->busy()) return *device;
@@ -72,21 +73,22 @@ EnvironmentDevice& EnvironmentLine::next() {
   return *devices_[first];
 }
 
-/// After an answer the line rests before another device is asked.
+/// True while the line must stay silent: after an answer and before the next request, and while a
+/// late answer may still arrive.
 bool EnvironmentLine::must_be_quiet() {
   if (std::exchange(answers_seen_, link_.answers) != link_.answers)
     link_.quiet_until = std::max(link_.quiet_until, time_.now() + silence_);
   return link_.line.is_open() && time_.now() < link_.quiet_until;
 }
 
-/// An answer that comes too late would look like the answer to the next question.
-void EnvironmentLine::throw_away(EnvironmentDevice& device, nanoseconds at_most) {
+/// A late answer would otherwise be taken for the answer to the next request.
+void EnvironmentLine::discard_late_answer(EnvironmentDevice& device, nanoseconds at_most) {
   std::array<std::byte, modbus::kMaxAduSize> bytes{};
   const auto budget =
       std::clamp(nanoseconds{link_.quiet_until - time_.now()}, nanoseconds{0}, at_most);
   const auto read = link_.line.read(bytes, time_.wall(budget));
   if (!read) device.lose(read.error().text);
-  if (read && *read != 0) link_.quiet_until = time_.now() + kEndOfRemains;
+  if (read && *read != 0) link_.quiet_until = time_.now() + kEndOfLateAnswer;
 }
 
 }  // namespace abbe::drivers

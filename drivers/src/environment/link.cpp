@@ -6,7 +6,7 @@
 namespace abbe::drivers {
 namespace {
 
-constexpr int kFastLine_baud = 19200;  // above it the silence is constant
+constexpr int kFastLine_baud = 19200;  // at higher baud rates the silent interval is constant
 constexpr std::chrono::nanoseconds kShortestSilence = std::chrono::microseconds{1750};
 constexpr std::int64_t kBitsOfSilence_tenths = 385;  // 3.5 characters of 11 bits
 

@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr int kDataBits = 8;  // RTU knows no other
+constexpr int kDataBits = 8;  // RTU always has 8
 
 tl::unexpected<Error> failed(std::string_view what, int error) {
   const auto code = error == ETIMEDOUT ? ErrorCode::Timeout : ErrorCode::Unreachable;
@@ -38,7 +38,7 @@ bool wait_readable(int fd, nanoseconds wall) {
   const auto ns = std::max<std::int64_t>(wall.count(), 0);
   const timespec timeout{static_cast<time_t>(ns / kSecond), static_cast<long>(ns % kSecond)};
   pollfd poll{fd, POLLIN, 0};
-  return ppoll(&poll, 1, &timeout, nullptr) > 0;  // an interrupted wait is a short wait
+  return ppoll(&poll, 1, &timeout, nullptr) > 0;  // false also if a signal interrupts the wait
 }
 
 }  // namespace
@@ -69,9 +69,9 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
   if (const auto* serial = std::get_if<ModbusSerial>(&address))
     if (auto locked = lock.take(serial->path); !locked) return locked;
   decltype(context_) fresh{make_context(address)};
-  if (!fresh) return failed("set up", errno);
+  if (!fresh) return failed("configure", errno);
 
-  // libmodbus takes it for the connection, too; less than a microsecond would be refused.
+  // libmodbus uses the response time-out also for connecting; it rejects less than 1 us.
   const auto us = std::max<std::int64_t>(
       std::chrono::duration_cast<std::chrono::microseconds>(wall).count(), 1);
   constexpr std::int64_t kSecond = 1'000'000;
@@ -107,8 +107,8 @@ Result<void> SerialLock::take(const std::string& path) {
   if (errno != EWOULDBLOCK) return failed("lock", errno);
   return tl::unexpected(
       Error{ErrorCode::Unreachable,
-            "open: this serial line is in use, by an [[environment]] with another name of it "
-            "or by another program: give all devices of one line the same name"});
+            "open: this serial line is in use by another program, or by an [[environment]] that "
+            "names it by another path: give all devices of one line the same path"});
 }
 
 Result<void> ModbusLine::send(const modbus::ReadRequest& request) {

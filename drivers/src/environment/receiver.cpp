@@ -39,7 +39,7 @@ std::vector<EnvironmentReceiver::Spot> EnvironmentReceiver::spots_in(
 }
 
 bool is_refusal(const EnvironmentFailure& failure) noexcept {
-  // 1 to 3: function, address or value unknown to the device. The others may pass.
+  // Exceptions 1 to 3: function, address or value unknown to the device. Others may be temporary.
   return failure.kind == Kind::Unproven || failure.kind == Kind::Implausible ||
          (failure.kind == Kind::Exception && failure.exception <= 3);
 }
@@ -53,7 +53,7 @@ std::string text_of(const EnvironmentFailure& failure, const RegisterMap& map) {
     case Kind::None:
       return {};
     case Kind::Unasked:
-      return "bytes that were not asked for";
+      return "bytes without a request";
     case Kind::Malformed:
       return fmt::format("{}: {}", asked, modbus::name_of(failure.error));
     case Kind::Exception:

@@ -42,7 +42,7 @@ PlausibleRange plausible_range(Quantity quantity) noexcept {
     case Quantity::AirPressure:
       return {50'000.0, 120'000.0};
     case Quantity::RelativeHumidity:
-      return {0.0, 1.05};  // at saturation sensors read a little more
+      return {0.0, 1.05};  // sensors may read slightly more than 1 at saturation
     case Quantity::Temperature:
       return {223.15, 473.15};
   }
@@ -70,23 +70,23 @@ Result<void> check(const RegisterMap& map) {
 
   for (const auto& m : map.measured) {
     if (m.quantity == Quantity::Temperature && m.channel >= protocol::kMaxTemperatures)
-      return bad(map, fmt::format("{}: channel {}, there are 0 to {}", m.name, m.channel,
+      return bad(map, fmt::format("{}: channel {} is not in 0 to {}", m.name, m.channel,
                                   protocol::kMaxTemperatures - 1));
     if ((seen & mask_of(m)) != 0)
-      return bad(map, fmt::format("{} is there twice", name_of(m.quantity)));
+      return bad(map, fmt::format("{} is measured twice", name_of(m.quantity)));
     seen |= mask_of(m);
     if (!std::isfinite(m.scale) || m.scale == 0.0 || !std::isfinite(m.offset))
       return bad(map, fmt::format("{}: scale must not be 0", m.name));
     if (!on_the_wire(m.place, map.base_offset))
-      return bad(map, fmt::format("{}: address {} with base offset {}", m.name, m.place.address,
-                                  map.base_offset));
+      return bad(map, fmt::format("{}: address {} with base offset {} is not in 0 to 65535", m.name,
+                                  m.place.address, map.base_offset));
     places.push_back(m.place);
   }
 
   for (const auto& p : map.proving) {
     if (!on_the_wire(p.place, map.base_offset))
-      return bad(map, fmt::format("{}: address {} with base offset {}", p.name, p.place.address,
-                                  map.base_offset));
+      return bad(map, fmt::format("{}: address {} with base offset {} is not in 0 to 65535", p.name,
+                                  p.place.address, map.base_offset));
   }
 
   if (reads_for(places, map.base_offset).size() + map.proving.size() > kMaxReads)

@@ -11,8 +11,8 @@ Result<std::unique_ptr<IppDevice>> IppDevice::create(const IppDeviceOptions& opt
   const TcpPeer peer = tcp_peer(options.name, options.host, options.port);
   IppDeviceOptions named = options;
   named.session.peer = peer.name;
-  if (const auto fine = check(named.session); !fine) return tl::unexpected{fine.error()};
-  if (const auto fine = check(peer); !fine) return tl::unexpected{fine.error()};
+  if (const auto valid = check(named.session); !valid) return tl::unexpected{valid.error()};
+  if (const auto valid = check(peer); !valid) return tl::unexpected{valid.error()};
   return std::unique_ptr<IppDevice>{new IppDevice{named, peer, time}};
 }
 
@@ -29,16 +29,15 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
 
 IppDevice::~IppDevice() {
   try {
-    tell(IppStopRequested{});
+    handle(IppStopRequested{});
     await_standstill();
     leave(IppStopRequested{});
-  } catch (
-      ...) {  // NOLINT(bugprone-empty-catch): out of memory; a server ends the session of a lost client
+  } catch (...) {  // NOLINT(bugprone-empty-catch)
+    // Out of memory: the connection closes, and the server ends the session of a lost client.
   }
 }
 
-/// Closing the connection before the answer has come would leave it to the server whether the
-/// machine stops.
+/// If the connection were closed before AbortE is answered, the machine might not stop.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto& time_out = options_.session.command_timeout;
@@ -63,15 +62,15 @@ void IppDevice::release() {
 
 void IppDevice::measure(std::span<const ProbePoint> points) {
   asked_.fetch_add(points.size(), std::memory_order_relaxed);
-  requests_.put(std::vector<ProbePoint>{
-      points.begin(), points.end()});  // orders what was asked before what is finished
+  // put() also orders the increment of asked_ before the counting of finished points.
+  requests_.put(std::vector<ProbePoint>{points.begin(), points.end()});
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
-  read_mail();
+  handle_posted_messages();
   read_requests();
   if (!reads_before_due()) {
-    tell(IppTick{});
+    handle(IppTick{});
     poll(at_most);
   }
   show_session();
@@ -104,43 +103,44 @@ void IppDevice::read_requests() {
 
   const auto is_end = [](const Request& r) { return std::holds_alternative<IppStopRequested>(r); };
   const auto stops = [&](const Request& r) { return is_abort(r) || is_end(r); };
-  const auto asked_again = std::find_if(requests.rbegin(), requests.rend(), stops).base();
+  const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), stops).base();
 
   for (auto request = requests.begin(); request != requests.end(); ++request) {
     if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
       taken_ += points->size();
-      if (request >= asked_again) ask_for(*points);  // what was asked before a stop is not begun
+      if (request >= after_last_stop) request_points(*points);  // earlier points are not begun
     } else if (is_abort(*request)) {
-      tell(IppAbortRequested{});
+      handle(IppAbortRequested{});
     } else if (is_end(*request)) {
-      tell(IppStopRequested{});
+      handle(IppStopRequested{});
     } else {
-      tell(IppReleaseRequested{});
+      handle(IppReleaseRequested{});
     }
   }
 }
 
-void IppDevice::ask_for(const std::vector<ProbePoint>& points) {
-  const auto lost = session().fault().count;  // while they are told: what is behind is void
+/// A fault while the points are passed to the session discards the remaining ones.
+void IppDevice::request_points(const std::vector<ProbePoint>& points) {
+  const auto faults_before = session().fault().count;
   for (const ProbePoint& point : points)
-    if (session().fault().count == lost) tell(point);
+    if (session().fault().count == faults_before) handle(point);
 }
 
 void IppDevice::count_points() {
-  finished_.store(taken_ - session().points_left(),
-                  std::memory_order_release);  // pairs with points_left()
+  // release: pairs with the acquire in points_left()
+  finished_.store(taken_ - session().points_left(), std::memory_order_release);
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
-  report_machine();  // kept before the machine moves
+  report_machine();  // the state is stored before the machine moves
   const auto bytes = std::as_bytes(std::span{command.line});
-  const protocol::HostTime now = time_.now();  // once: a replay knows only the recorded one
+  const protocol::HostTime now = time_.now();  // one value: a replay has only the recorded time
   raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);
   receiver_.sent(bytes, now);
   return bytes;
 }
 
-/// The receiver must hear of the new connection before of the first command on it.
+/// The receiver must be reset for the new connection before the first command on it.
 void IppDevice::connected() {
   raw_.push_bytes(arrival_, protocol::RawBlock::Direction::FromDevice, {});
   receiver_.push({}, arrival_);

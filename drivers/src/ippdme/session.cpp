@@ -56,13 +56,14 @@ Result<void> check(const IppSessionOptions& o) {
   const nanoseconds zero{};
   // The server gives at most 10 reports a second.
   if (o.poll_period < std::chrono::milliseconds{100})
-    return bad(o, "polled more than 10 times a second");
+    return bad(o, "poll period below 100 ms: a server gives at most 10 reports a second");
   if (o.connect_timeout <= zero || o.command_timeout <= zero || o.motion_timeout <= zero)
-    return bad(o, "a time-out not above 0");
+    return bad(o, "all time-outs must be above 0");
   if (o.first_pause <= zero || o.longest_pause < o.first_pause)
-    return bad(o, "pauses between tries not rising");
+    return bad(o, "first pause must be above 0 and not above the longest pause");
   const auto printable = [](char c) { return c >= ' ' && c <= '~' && c != '"'; };
-  if (!std::ranges::all_of(o.tool, printable)) return bad(o, "a tool name that cannot be sent");
+  if (!std::ranges::all_of(o.tool, printable))
+    return bad(o, "tool name: only printable ASCII without \" can be sent");
   return {};
 }
 
@@ -72,7 +73,7 @@ IppSession::IppSession(IppSessionOptions options)
   if (options_.held.empty()) return;
   (void)hold(options_.held);
   moving_ = options_.moving;
-  if (moving_) due_ = {};  // connects for its AbortE
+  if (moving_) due_ = {};  // connect at once to send AbortE
 }
 
 void IppSession::write_script() {
@@ -94,7 +95,8 @@ void IppSession::write_script() {
   }
 }
 
-/// A refusal of severity 2 or more would come again after every release.
+/// For a server that refuses OnMoveReportE with severity 2 or more. Otherwise it would refuse it
+/// again after every release.
 void IppSession::without_move_reports() {
   options_.move_reports = false;
   write_script();
@@ -120,7 +122,7 @@ void IppSession::note(const std::string& what) {
 
 IppAction IppSession::give_up(IppState into, const std::string& what) {
   note(what);
-  points_.clear();  // whoever asked begins anew: the machine may have moved
+  points_.clear();  // the machine may have moved: the caller must request all points again
   if (state_ == IppState::Aborting) {
     close_then_ = true;
     return IppNothing{};
@@ -163,7 +165,7 @@ IppAction IppSession::take(const IppTick&) {
     case IppState::Ready:
       return send(
           {.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
-    case IppState::AwaitingRelease:  // whether the server is still there
+    case IppState::AwaitingRelease:  // GetErrStatusE checks that the server still answers
       if (!open_) return connect();
       return send({.state = IppState::AwaitingRelease,
                    .method = "GetErrStatusE()",
@@ -196,15 +198,15 @@ IppAction IppSession::take(const IppConnectionLost& lost) {
   if (awaited && state_ != IppState::Stopping) note(lost.what);
   points_.clear();
   if (awaited) (void)close(IppState::Disconnected);
-  return IppNothing{};  // there is nothing to close any more
+  return IppNothing{};  // the connection is already closed
 }
 
-/// Whoever asked saw the machine stand somewhere: what is asked of one that is away must not be
-/// driven when it returns.
+/// A request while the connection is lost must not move the machine after a reconnection: the
+/// caller planned it from a position that may have changed.
 IppAction IppSession::take(const ProbePoint& point) {
   if (stopped_) return IppNothing{};
   if (state_ != IppState::Ready && state_ != IppState::Measuring) {
-    note(fmt::format("asked to move while {}: not done", name_of(state_)));
+    note(fmt::format("asked to move while {}: the request was discarded", name_of(state_)));
     return IppNothing{};
   }
   points_.push_back(point);
@@ -218,7 +220,7 @@ IppAction IppSession::send(const Step& step) {
   moving_ = moving_ || step.moves;
   if (!step.event) tag_ = tag_ % kLastTag + 1;
   const ippdme::Tag tag = step.event.value_or(ippdme::Tag{false, tag_});
-  due_ = ipp_text::kNever;  // nothing else until it is complete
+  due_ = ipp_text::kNever;  // no other command until this one is complete
   const auto patience = step.moves ? options_.motion_timeout : options_.command_timeout;
   pending_ = Pending{.step = step, .tag = tag, .due = now_ + patience};
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
@@ -243,24 +245,24 @@ IppAction IppSession::ready() {
                .moves = true});
 }
 
-/// Of a command that is not the pending one, and no event.
+/// True for the tag of a command that is neither the pending one nor an event.
 bool IppSession::foreign(ippdme::Tag tag) const noexcept {
   return !tag.event && (!pending_ || tag != pending_->tag);
 }
 
-IppAction IppSession::strange(std::string_view what, ippdme::Tag tag) {
+IppAction IppSession::unexpected_response(std::string_view what, ippdme::Tag tag) {
   const bool late = state_ == IppState::Stopping || state_ == IppState::Aborting ||
                     state_ == IppState::AwaitingRelease || state_ == IppState::Clearing;
-  if (late) return IppNothing{};  // of what was under way
+  if (late) return IppNothing{};  // a late response to the previous command
   return give_up(IppState::Faulted,
-                 fmt::format("{} for {}, which was not asked{}", what, ippdme::to_string(tag),
+                 fmt::format("{} for tag {} without a command{}", what, ippdme::to_string(tag),
                              pending_ ? " (pending: " + ippdme::to_string(pending_->tag) + ")"
                                       : std::string{}));
 }
 
 IppAction IppSession::take(const IppAck& ack) {
   if (!open_) return IppNothing{};
-  if (foreign(ack.tag)) return strange("an acknowledgement", ack.tag);
+  if (foreign(ack.tag)) return unexpected_response("an acknowledgement", ack.tag);
   if (!pending_ || ack.tag != pending_->tag) return IppNothing{};
   pending_->acknowledged = true;
   return pending_->step.event ? done() : IppAction{IppNothing{}};
@@ -268,7 +270,7 @@ IppAction IppSession::take(const IppAck& ack) {
 
 IppAction IppSession::take(const IppData& data) {
   if (!open_) return IppNothing{};
-  if (foreign(data.tag)) return strange("data", data.tag);
+  if (foreign(data.tag)) return unexpected_response("data", data.tag);
   if (pending_ && data.tag == pending_->tag) pending_->data = data.text.view();
   return IppNothing{};
 }
@@ -279,24 +281,23 @@ IppAction IppSession::take(const IppError& error) {
   const bool of_abort = error.tag == ippdme::kAbort && error.code != ipp_text::kAborted;
   if (failed && of_abort && state_ == IppState::Aborting) return abort_refused(error);
   if (failed && error.tag == kMoveReportTag) without_move_reports();
-  const bool mine = pending_ && error.tag == pending_->tag;
-  if (mine && failed && !pending_->error) pending_->error = error;
-  if (mine && pending_->step.event)
-    return done();  // an event that is refused is never acknowledged
+  const bool of_pending = pending_ && error.tag == pending_->tag;
+  if (of_pending && failed && !pending_->error) pending_->error = error;
+  if (of_pending && pending_->step.event) return done();  // a refused event is not acknowledged
   if (!failed) return IppNothing{};
-  if (mine && !(pending_->step.moves && error.severity >= ipp_text::kUserNeeded))
+  if (of_pending && !(pending_->step.moves && error.severity >= ipp_text::kUserNeeded))
     return IppNothing{};
 
   return take_foreign(error);
 }
 
-/// Of no command that is under way, or one that must not go on.
+/// An error that belongs to no pending command, or one that requires to stop the pending motion.
 IppAction IppSession::take_foreign(const IppError& error) {
   const std::string what = fmt::format("reports {}", ipp_text::text_of(error));
   const bool held = state_ == IppState::Aborting || state_ == IppState::AwaitingRelease;
   if (!held) return hold(what);
-  const bool ours = error.code == ipp_text::kAborted || error.tag == ippdme::kAbort;
-  if (ours) return IppNothing{};
+  const bool caused_by_abort = error.code == ipp_text::kAborted || error.tag == ippdme::kAbort;
+  if (caused_by_abort) return IppNothing{};
   hold_for(what);
   note(what);
   return IppNothing{};
@@ -305,17 +306,18 @@ IppAction IppSession::take_foreign(const IppError& error) {
 IppAction IppSession::take(const IppComplete& complete) {
   if (!open_) return IppNothing{};
   if (state_ == IppState::Aborting && complete.tag == ippdme::kAbort) return stopped_moving();
-  if (foreign(complete.tag)) return strange("completion", complete.tag);
+  if (foreign(complete.tag)) return unexpected_response("completion", complete.tag);
   if (!pending_ || complete.tag != pending_->tag) return IppNothing{};
-  if (!pending_->acknowledged) return strange("completion before acknowledgement", complete.tag);
+  if (!pending_->acknowledged)
+    return unexpected_response("completion before acknowledgement", complete.tag);
   return done();
 }
 
-IppAction IppSession::take(const IppProtocolError& nonsense) {
+IppAction IppSession::take(const IppProtocolError& malformed) {
   if (!open_) return IppNothing{};
   return give_up(IppState::Faulted, fmt::format("this is no I++ DME server: {}: \"{}\"",
-                                                ippdme::name_of(nonsense.error),
-                                                ipp_text::escaped(nonsense.line.view())));
+                                                ippdme::name_of(malformed.error),
+                                                ipp_text::escaped(malformed.line.view())));
 }
 
 IppAction IppSession::done() {
@@ -334,9 +336,10 @@ IppAction IppSession::done() {
         return give_up(IppState::Faulted, "GetDMEVersion was answered without a version");
       return next_step();
     case Purpose::IsHomed:
-      return judge_home(was.data);
+      return check_homed(was.data);
     case Purpose::Get:
-      due_ = was.due - options_.command_timeout + options_.poll_period;  // from when it was sent
+      // One poll period after the command was sent.
+      due_ = was.due - options_.command_timeout + options_.poll_period;
       return ready();
     case Purpose::Move:
     case Purpose::Touch:
@@ -345,7 +348,7 @@ IppAction IppSession::done() {
     case Purpose::Watch:
       return await_release();
     case Purpose::Clear:
-      step_ = 1;  // the session has begun
+      step_ = 1;  // without StartSession: the session exists
       return next_step();
     case Purpose::Other:
       break;
@@ -354,15 +357,17 @@ IppAction IppSession::done() {
   return next_step();
 }
 
-IppAction IppSession::judge_home(const std::string& data) {
+IppAction IppSession::check_homed(const std::string& data) {
   const bool homed = data.find('1') != std::string::npos;  // "IsHomed(1)" or "1"
   if (homed) return next_step();
-  if (!options_.home) return give_up(IppState::Faulted, "the machine is not homed");
+  if (!options_.home)
+    return give_up(IppState::Faulted, "the machine is not homed: home it at its controller");
   if (!may_home_) return hold("the machine is not homed any more");
   return send({.state = IppState::Configuring, .method = "Home()", .moves = true});
 }
 
-/// Another client's session, or ours of before, has not ended yet: it may soon.
+/// StartSession is refused while another client's session, or the previous one of this client, has
+/// not ended. That is a temporary fault; every other refusal holds the machine.
 IppAction IppSession::failed(const Pending& was) {
   const std::string what = fmt::format("{} was refused: {}", ipp_text::method_name(was.step.method),
                                        ipp_text::text_of(*was.error));

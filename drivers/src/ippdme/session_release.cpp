@@ -1,4 +1,4 @@
-// How a motion ends that must not go on, and the wait for a person's release after it.
+// Stopping a motion after a fault or on request, and waiting for the release by an operator.
 #include <fmt/format.h>
 
 #include <utility>
@@ -8,7 +8,7 @@
 
 namespace abbe::drivers {
 
-/// A machine that nobody watches any more must not go on moving.
+/// A motion is stopped with AbortE: its progress can no longer be monitored.
 IppAction IppSession::stop_motion(bool close_then) {
   pending_.reset();
   points_.clear();
@@ -21,23 +21,23 @@ IppAction IppSession::stop_motion(bool close_then) {
 
 IppAction IppSession::stopped_moving() {
   moving_ = false;
-  if (stopped_) return goodbye();
+  if (stopped_) return end_session();
   hold_for(stop_reason_);
   return close_then_ ? close(IppState::AwaitingRelease) : await_release();
 }
 
-/// The next connection begins with another AbortE. Outside a session silence may mean that the
-/// server wants one first: the next connection tries it the other way. A machine that is held gets
-/// no session.
+/// The next connection begins with another AbortE. Some servers do not answer AbortE outside a
+/// session. So if AbortE was sent outside a session, the next connection starts a session first,
+/// and the one after that does not. No session is started for a machine that is held.
 IppAction IppSession::abort_unanswered() {
   note(fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
                    ipp_text::seconds(options_.command_timeout)));
   if (!in_session_) session_first_ = !session_first_ && !held_;
-  return stopped_ ? goodbye() : close(IppState::Faulted);
+  return stopped_ ? end_session() : close(IppState::Faulted);
 }
 
-/// Outside a session the server may want one first. A machine that is held gets none: a person must
-/// look.
+/// Some servers refuse AbortE outside a session: a session is started first, once. No session is
+/// started for a machine that is held: an operator must inspect it.
 IppAction IppSession::abort_refused(const IppError& error) {
   if (!in_session_ && !held_ && !session_first_ && !stopped_) {
     session_first_ = true;
@@ -47,17 +47,17 @@ IppAction IppSession::abort_refused(const IppError& error) {
   const std::string what = fmt::format("AbortE was refused: {}: the machine may still be moving",
                                        ipp_text::text_of(error));
   note(what);
-  if (stopped_) return goodbye();
+  if (stopped_) return end_session();
   hold_for(what);
   session_first_ = false;
-  const bool again = in_session_;  // outside of it
+  const bool retry = in_session_;  // the next connection sends AbortE outside a session
   (void)close(IppState::AwaitingRelease);
-  if (!again) due_ = ipp_text::kNever;
+  if (!retry) due_ = ipp_text::kNever;
 
   return IppClose{};
 }
 
-/// The first reason stays until the release.
+/// Holds the machine. The first reason is kept until the release.
 void IppSession::hold_for(const std::string& reason) {
   if (!std::exchange(held_, true)) hold_reason_ = reason;
 }
@@ -88,18 +88,17 @@ IppAction IppSession::take(const IppAbortRequested&) {
   return close(IppState::AwaitingRelease);
 }
 
-/// Also between the tries to send the AbortE of a motion that an earlier connection left
-/// unfinished.
+/// Releasable also between the attempts to send AbortE for a motion of an earlier connection.
 bool IppSession::releasable() const noexcept {
   const bool trying =
       state_ == IppState::Connecting || (state_ == IppState::Aborting && !in_session_);
   return !stopped_ && (state_ == IppState::AwaitingRelease || (held_ && trying));
 }
 
-/// Errors are cleared here and nowhere else.
+/// The only place where errors of the machine are cleared.
 IppAction IppSession::take(const IppReleaseRequested&) {
   if (!releasable()) return IppNothing{};
-  held_ = moving_ = session_first_ = false;  // a person has looked
+  held_ = moving_ = session_first_ = false;  // an operator has inspected the machine
   hold_reason_.clear();
   may_home_ = options_.home;
   pause_ = options_.first_pause;
@@ -118,10 +117,10 @@ IppAction IppSession::take(const IppStopRequested&) {
   if (std::exchange(stopped_, true)) return IppNothing{};
   points_.clear();
   if (state_ == IppState::Aborting) return IppNothing{};
-  return moving_ && open_ ? stop_motion(false) : goodbye();
+  return moving_ && open_ ? stop_motion(false) : end_session();
 }
 
-IppAction IppSession::goodbye() {
+IppAction IppSession::end_session() {
   const bool connecting = state_ == IppState::Connecting;
   due_ = ipp_text::kNever;
   pending_.reset();

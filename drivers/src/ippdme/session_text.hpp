@@ -1,6 +1,5 @@
 #pragma once
-/// What the session writes: commands for the server, and what the server reported in words for
-/// people.
+/// Texts of the session: commands for the server, and errors of the server as messages.
 
 #include <string>
 #include <string_view>
@@ -10,10 +9,10 @@
 namespace abbe::drivers::ipp_text {
 
 inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
-inline constexpr int kRepairable = 2;  ///< severity: from here on the command has failed
-inline constexpr int kUserNeeded = 3;  ///< and from here on a motion is not waited for
-inline constexpr int kAborted = 6;     ///< code: the command ended because of our AbortE
-/// code: for StartSession, another session has not ended yet
+inline constexpr int kRepairable = 2;  ///< severity: from this value on the command has failed
+inline constexpr int kUserNeeded = 3;  ///< severity: from this value on a motion is aborted
+inline constexpr int kAborted = 6;     ///< code: the command was ended by AbortE
+/// Code of StartSession while another session has not ended.
 inline constexpr int kProtocolError = 8;
 
 [[nodiscard]] double seconds(std::chrono::nanoseconds d);

@@ -24,8 +24,8 @@ Result<std::unique_ptr<TrackerDevice>> TrackerDevice::create(const TrackerDevice
   const TcpPeer peer = tcp_peer(options.name, options.host, options.port);
   TrackerDeviceOptions named = options;
   named.session.peer = peer.name;
-  if (const auto fine = check(named.session); !fine) return tl::unexpected{fine.error()};
-  if (const auto fine = check(peer); !fine) return tl::unexpected{fine.error()};
+  if (const auto valid = check(named.session); !valid) return tl::unexpected{valid.error()};
+  if (const auto valid = check(peer); !valid) return tl::unexpected{valid.error()};
   return std::unique_ptr<TrackerDevice>{new TrackerDevice{named, peer, time}};
 }
 
@@ -42,18 +42,18 @@ TrackerDevice::TrackerDevice(const TrackerDeviceOptions& options, TcpPeer peer,
 
 TrackerDevice::~TrackerDevice() {
   try {
-    put_back_settings();
+    restore_settings();
     leave(TrackerStopRequested{});
-  } catch (
-      ...) {  // NOLINT(bugprone-empty-catch): out of memory; the closed connection stops the controller too
+  } catch (...) {  // NOLINT(bugprone-empty-catch)
+    // Out of memory: the connection closes, which stops the controller, too.
   }
 }
 
 void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
-  read_mail();
-  carry_orders();
+  handle_posted_messages();
+  handle_orders();
   if (!reads_before_due()) {
-    tell(TrackerTick{});
+    handle(TrackerTick{});
     poll(at_most);
   }
   report_clock();
@@ -61,8 +61,9 @@ void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
   show();
 }
 
-/// The session gives each step its time; a stepped clock gives it none.
-void TrackerDevice::put_back_settings() {
+/// The steady clock limits the whole: a SteppedTime does not advance here, so the session's own
+/// time-outs would never end the loop.
+void TrackerDevice::restore_settings() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto until = std::chrono::steady_clock::now() + time_.wall(options_.session.leave_within);
   while (!finish() && std::chrono::steady_clock::now() < until) {
@@ -71,10 +72,10 @@ void TrackerDevice::put_back_settings() {
   }
 }
 
-void TrackerDevice::carry_orders() {
-  keep_report();  // of an order that ended in read_mail(): the session keeps one
+void TrackerDevice::handle_orders() {
+  keep_report();  // of an order that ended in handle_posted_messages(): the session stores only one
   for (TrackerOrder& order : orders_.take()) {
-    tell(std::move(order));
+    handle(std::move(order));
     keep_report();
   }
   keep_report();
@@ -91,12 +92,12 @@ void TrackerDevice::report_clock() {
   board_.fault(
       time_.now(),
       fmt::format("{}: the tracker's clock runs {:.0f} ppm {}, a sound one at most {:.0f} ppm: its "
-                  "points are marked ClockUnsettled, have it checked",
+                  "points are marked ClockUnsettled; have the tracker serviced",
                   peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
                   kPpm * options_.clock.max_skew));
 }
 
-/// A state that is no fault has a cause, too. Faults are in show().
+/// Reports the cause of a state without points that is no fault. show() reports faults.
 void TrackerDevice::report_cause() {
   const std::string& cause = session().cause();
   if (cause == cause_reported_) return;
@@ -106,7 +107,7 @@ void TrackerDevice::report_cause() {
 }
 
 bool TrackerDevice::finish() {
-  tell(TrackerStopRequested{});
+  handle(TrackerStopRequested{});
   show();
   return session().has_left();
 }

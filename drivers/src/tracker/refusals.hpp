@@ -1,5 +1,5 @@
 #pragma once
-/// What the statuses of a controller mean to a session.
+/// Classification of the statuses with which a controller refuses a command.
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@ namespace emscon = protocol::emscon;
 
 inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
 
-/// Waiting helps.
+/// True for a temporary status: the command is repeated later.
 inline bool passes(emscon::Status s) {
   switch (s) {
     case emscon::Status::ServerBusy:
@@ -29,7 +29,7 @@ inline bool passes(emscon::Status s) {
   }
 }
 
-/// A reflector in the beam helps.
+/// True for a status that ends when a reflector is in the beam.
 inline bool needs_beam(emscon::Status s) {
   switch (s) {
     case emscon::Status::NoDistanceSet:

@@ -47,17 +47,16 @@ const char* name_of(TrackerState state) noexcept {
   return "unknown";
 }
 
-std::string describe(const TrackerProtocolError& nonsense) {
+std::string describe(const TrackerProtocolError& malformed) {
   std::string hex;
   std::string text;
-  for (std::size_t i = 0; i < nonsense.length; ++i) {
-    const auto value = static_cast<unsigned char>(nonsense.first_bytes[i]);
+  for (std::size_t i = 0; i < malformed.length; ++i) {
+    const auto value = static_cast<unsigned char>(malformed.first_bytes[i]);
     hex += fmt::format("{}{:02x}", i == 0 ? "" : " ", value);
     text += value >= 0x20 && value < 0x7f ? static_cast<char>(value) : '.';
   }
-  return fmt::format(
-      "expected emScon answer, got {} \"{}\" ({})", hex, text,
-      nonsense.error ? emscon::name_of(*nonsense.error) : "a packet size that cannot be");
+  return fmt::format("expected emScon answer, got {} \"{}\" ({})", hex, text,
+                     malformed.error ? emscon::name_of(*malformed.error) : "invalid packet size");
 }
 
 Result<void> check(const TrackerSessionOptions& o) {
@@ -66,16 +65,16 @@ Result<void> check(const TrackerSessionOptions& o) {
   };
 
   if (o.time_separation_ms < 1 || o.time_separation_ms > 60'000)
-    return bad("time separation not in 1 to 60000 ms");
-  if (!(o.spatial_distance_mm > 0.0)) return bad("spatial distance not above 0 mm");
+    return bad("time separation is not in 1 to 60000 ms");
+  if (!(o.spatial_distance_mm > 0.0)) return bad("spatial distance must be above 0 mm");
   if (o.stationary_time_ms < 1 || o.stationary_time_ms > 60'000)
-    return bad("stationary time not in 1 to 60000 ms");
+    return bad("stationary time is not in 1 to 60000 ms");
   if (o.packets_per_second < 3 || o.packets_per_second > 10)
-    return bad("packet rate not in 3 to 10 per second");
+    return bad("packet rate is not in 3 to 10 per second");
   if (o.search && (!(o.search->radius > 0.0) || o.search->timeout_ms < 1))
-    return bad("search radius and time-out not above 0");
+    return bad("search radius and time-out must be above 0");
   if (o.first_pause <= std::chrono::nanoseconds{0} || o.longest_pause < o.first_pause)
-    return bad("pauses between tries not rising");
+    return bad("first pause must be above 0 and not above the longest pause");
 
   return {};
 }
@@ -91,8 +90,9 @@ bool TrackerSession::online() const noexcept {
 protocol::HostTime TrackerSession::deadline() const noexcept {
   if (stopped_ && !online()) return kNever;
   if (order_ && !order_begun_ && !pending_) return now_;
-  // Without a beam the next question waits for the answer to this one: a due_ that passed meanwhile
-  // is no deadline, else the device thread would poll without pause.
+  // Without a beam the next query is sent only after the answer to the pending one. due_ may have
+  // passed meanwhile. It must not count as a deadline, or the device thread would poll without
+  // pause.
   auto next = pending_ && without_beam() ? kNever : due_;
   if (pending_) next = std::min(next, pending_->due);
   if (restart_at_ && !pending_) next = std::min(next, *restart_at_);
@@ -128,10 +128,10 @@ TrackerAction TrackerSession::take(const TrackerTick&) {
       return tick_streaming();
     case TrackerState::BeamLost:
     case TrackerState::WaitBeam:
-      return pending_ ? TrackerAction{TrackerNothing{}} : ask_alive();
+      return pending_ ? TrackerAction{TrackerNothing{}} : query_status();
     case TrackerState::Stopping:
     case TrackerState::Restoring:
-      return plan_done();  // the controller is too slow
+      return plan_done();  // leave_within has passed
     default:
       return TrackerNothing{};
   }
@@ -150,12 +150,12 @@ TrackerAction TrackerSession::take(const TrackerConnectionLost& lost) {
   }
   if (state_ != TrackerState::Connecting && !online()) return TrackerNothing{};
   give_up(TrackerState::Disconnected, lost.what);
-  return TrackerNothing{};  // there is nothing to close any more
+  return TrackerNothing{};  // the connection is already closed
 }
 
-TrackerAction TrackerSession::take(const TrackerProtocolError& nonsense) {
+TrackerAction TrackerSession::take(const TrackerProtocolError& malformed) {
   if (!online()) return TrackerNothing{};
-  return give_up(TrackerState::Faulted, describe(nonsense));
+  return give_up(TrackerState::Faulted, describe(malformed));
 }
 
 TrackerAction TrackerSession::take(const TrackerStopRequested&) {
@@ -163,11 +163,11 @@ TrackerAction TrackerSession::take(const TrackerStopRequested&) {
   end_order(Outcome::Failed, "abbed is stopping");
   const bool connected = online() || state_ == TrackerState::Connecting;
   const bool measuring = state_ == TrackerState::Streaming || state_ == TrackerState::BeamLost;
-  const bool speaks =
+  const bool may_have_set =
       online() && state_ != TrackerState::Querying && state_ != TrackerState::WaitWarm;
   new_plan(Goal::Leave);
   if (measuring) plan(TrackerState::Stopping, emscon::StopMeasurement{}, true);
-  if (speaks) plan_restoring(TrackerState::Stopping);
+  if (may_have_set) plan_restoring(TrackerState::Stopping);
 
   if (plan_.empty() || !connected) {
     pending_.reset();
@@ -180,7 +180,7 @@ TrackerAction TrackerSession::take(const TrackerStopRequested&) {
   due_ = now_ + options_.leave_within;
   if (!pending_ || pending_->waiting_to_resend) return next_step();
 
-  // one command at a time: its answer comes first
+  // One command at a time: the answer to the pending one must arrive first.
   pending_->step.optional = pending_->scripted = true;
   return TrackerNothing{};
 }
@@ -230,7 +230,7 @@ TrackerAction TrackerSession::take(const emscon::StatusChange& change) {
     case Event::ServerClosing:
       return give_up(TrackerState::Disconnected, "the controller is shutting down");
     case Event::ServerStarted:
-      return begin();  // what was set is lost with its memory
+      return begin();  // the settings are lost with the server's memory
     default:
       return TrackerNothing{};
   }

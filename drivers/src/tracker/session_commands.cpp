@@ -1,4 +1,4 @@
-/// The commands of a tracker session: what is sent in which order, and what the answers lead to.
+/// The commands of a tracker session: their order, and the reactions to the answers.
 
 #include <fmt/format.h>
 
@@ -16,9 +16,9 @@ using std::chrono::nanoseconds;
 
 // --- plans
 
-/// The first question of a connection; its answer says how much there is to do.
+/// Sends the first query of a connection. Its answer determines the next commands.
 TrackerAction TrackerSession::begin() {
-  end_order(Outcome::Failed, "the connection began anew");
+  end_order(Outcome::Failed, "the session with the controller restarted");
   new_plan(Goal::Stay);
   due_ = kNever;
   pending_.reset();
@@ -40,8 +40,8 @@ void TrackerSession::plan_sets(std::initializer_list<Command> commands, bool opt
   }
 }
 
-/// The order matters to a controller: units before everything that has one, parameters of a mode
-/// after the mode.
+/// Controllers require this order: units before every value with a unit, parameters of a mode after
+/// the mode.
 void TrackerSession::plan_set_up(bool initialised) {
   using enum TrackerState;
   new_plan(Goal::Stream);
@@ -77,8 +77,8 @@ TrackerAction TrackerSession::plan_done() {
     case Goal::Stream:
       streaming();
       return TrackerNothing{};
-    case Goal::
-        Stay:  // a result that came during the plan has not been followed by the next measurement
+    case Goal::Stay:
+      // If a result arrived during the plan, the next measurement is not yet started.
       return result_came_ && state_ == TrackerState::Streaming ? measure_again()
                                                                : TrackerAction{TrackerNothing{}};
     case Goal::SetUp:
@@ -111,7 +111,7 @@ nanoseconds time_for_search(const TrackerSessionOptions& options) {
 }  // namespace
 
 nanoseconds longest_order(const TrackerSessionOptions& options) noexcept {
-  // what is under way, StopMeasurement, GetReflector, SetReflector or the list
+  // the pending command, StopMeasurement, GetReflector, and SetReflector or GetReflectors
   constexpr int kShort = 4;
   constexpr int kLong = 2;  // Initialize and GoBirdBath
   return kShort * options.command_timeout +
@@ -175,13 +175,13 @@ TrackerAction TrackerSession::overdue() {
 TrackerAction TrackerSession::take(const emscon::Answer& answer) {
   const bool awaited = pending_ && !pending_->waiting_to_resend &&
                        emscon::command_of(pending_->step.request) == emscon::command_of(answer);
-  if (!awaited) return TrackerNothing{};  // of an earlier client
+  if (!awaited) return TrackerNothing{};  // answer to a command of an earlier client
   keep(answer);
   if (!list_complete(answer)) return TrackerNothing{};
   const Status status = emscon::status_of(answer);
   if (emscon::accepted(status)) return done(answer);
   if (status == Status::ServerBusy && now_ < pending_->patience) {
-    cause_ = refusal_text(emscon::command_of(answer), status) + "; asked again";
+    cause_ = refusal_text(emscon::command_of(answer), status) + "; repeating the command";
     return send_later();
   }
   return pending_->step.optional ? done(answer) : refused(status);
@@ -218,14 +218,14 @@ TrackerAction TrackerSession::refused(Status status) {
   }
 
   if (passes(status) && now_ < pending_->patience) {
-    cause_ = text + "; asked again";
+    cause_ = text + "; repeating the command";
     return send_later();
   }
 
   return refuse(text);
 }
 
-/// The controller answers, so it can be left as it was found.
+/// Gives up after a refusal. The controller still answers, so its settings are restored first.
 TrackerAction TrackerSession::refuse(const std::string& what) {
   note_fault(what);
   end_order(Outcome::Failed, what);
@@ -238,7 +238,8 @@ TrackerAction TrackerSession::refuse(const std::string& what) {
 
 TrackerAction TrackerSession::done(const emscon::Answer& answer) {
   const Pending was = *std::exchange(pending_, std::nullopt);
-  if (const auto* status = std::get_if<emscon::SystemStatusAnswer>(&answer)) return judge(*status);
+  if (const auto* status = std::get_if<emscon::SystemStatusAnswer>(&answer))
+    return evaluate(*status);
   if (was.scripted) {
     const bool listed = !stopped_ && emscon::command_of(answer) == Command::GetReflectors;
     if (const std::string unknown = listed ? choose_reflector() : ""; !unknown.empty()) {
@@ -255,7 +256,7 @@ TrackerAction TrackerSession::done(const emscon::Answer& answer) {
   return without_beam() ? done_without_beam(answer) : TrackerAction{TrackerNothing{}};
 }
 
-TrackerAction TrackerSession::judge(const emscon::SystemStatusAnswer& status) {
+TrackerAction TrackerSession::evaluate(const emscon::SystemStatusAnswer& status) {
   switch (status.laser) {
     case emscon::LaserStatus::Heating:
       state_ = TrackerState::WaitWarm;
@@ -263,7 +264,7 @@ TrackerAction TrackerSession::judge(const emscon::SystemStatusAnswer& status) {
       due_ = now_ + options_.warm_poll;
       return TrackerNothing{};
     case emscon::LaserStatus::CommunicationFailed:
-      return refuse("the controller does not reach the laser");
+      return refuse("the controller has no communication with the laser");
     case emscon::LaserStatus::Unable:
       return refuse("the laser is unable to measure");
     case emscon::LaserStatus::Off:
@@ -274,7 +275,7 @@ TrackerAction TrackerSession::judge(const emscon::SystemStatusAnswer& status) {
   }
 
   const bool initialised = status.tracker_processor == emscon::TrackerProcessorStatus::Initialised;
-  if (!initialised) settings_.ask_again();  // a controller that began anew may have forgotten them
+  if (!initialised) settings_.ask_again();  // a restarted controller may have lost its settings
   initialised_ = initialised;
   new_plan(Goal::SetUp);
   for (const emscon::Request& question : settings_.questions())

@@ -1,4 +1,4 @@
-/// The measurement of a tracker session: points, silence, the beam.
+/// The measurement of a tracker session: points, missing points, loss of the beam.
 
 #include <fmt/format.h>
 
@@ -10,8 +10,7 @@
 namespace abbe::drivers {
 namespace {
 
-/// Points of before a break may still arrive one burst (at most a third of a second) after its
-/// report.
+/// Points measured before a beam loss may arrive up to one burst (at most 1/3 s) after its report.
 constexpr std::chrono::milliseconds kLastBurst{500};
 
 std::string no_beam(const std::string& why) {
@@ -20,8 +19,8 @@ std::string no_beam(const std::string& why) {
 
 }  // namespace
 
-/// Continuous distance has no period: a machine that stands still sends nothing, and only the
-/// controller can be asked.
+/// In mode ContinuousDistance the points have no fixed interval: none come while the machine stands
+/// still. Only a status query shows that the controller still answers.
 std::chrono::nanoseconds TrackerSession::silence_allowed() const noexcept {
   switch (options_.mode) {
     case TrackerMode::ContinuousTime:
@@ -44,12 +43,12 @@ void TrackerSession::streaming() {
 }
 
 TrackerAction TrackerSession::tick_streaming() {
-  if (options_.mode == TrackerMode::ContinuousDistance) return ask_alive();
+  if (options_.mode == TrackerMode::ContinuousDistance) return query_status();
   const double allowed_s = std::chrono::duration<double>(silence_allowed()).count();
   return give_up(TrackerState::Faulted, fmt::format("no points in {:g} s", allowed_s));
 }
 
-TrackerAction TrackerSession::ask_alive() {
+TrackerAction TrackerSession::query_status() {
   due_ = now_ + options_.keep_alive;
   if (pending_) return TrackerNothing{};
   return send({state_, emscon::GetTrackerStatus{}, true}, false);
@@ -73,7 +72,7 @@ TrackerAction TrackerSession::take(const TrackerPointsArrived&) {
   return result_came_ && !pending_ && !order_ ? measure_again() : TrackerAction{TrackerNothing{}};
 }
 
-/// Stationary: one result for one StartMeasurement.
+/// Mode Stationary: each StartMeasurement gives one result.
 TrackerAction TrackerSession::measure_again() {
   state_ = TrackerState::Ready;
   due_ = kNever;
@@ -91,9 +90,9 @@ TrackerAction TrackerSession::beam_lost(const std::string& why) {
   return TrackerNothing{};
 }
 
-/// StartMeasurement was refused for want of a beam: the controller reports when it is there, and is
-/// asked in case the report is missed. Nothing is sent meanwhile that could disturb who brings the
-/// reflector.
+/// StartMeasurement was refused because there is no beam. The controller reports when the beam is
+/// back; in case that report is missed, it is queried too. Meanwhile no command is sent that could
+/// disturb the operator with the reflector.
 TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
   pending_.reset();
   if (!without_beam()) {
@@ -106,9 +105,9 @@ TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
   return TrackerNothing{};
 }
 
-/// After a lost beam StartMeasurement may be refused. If because the old measurement still runs,
-/// stopping it is what helps; if not, it does no harm. If points came meanwhile, the old
-/// measurement runs and all is well.
+/// StartMeasurement may be refused after a beam loss because the previous measurement is still
+/// running. Then StopMeasurement is necessary; otherwise it has no effect. If points arrive
+/// meanwhile, the previous measurement is running and the session streams.
 TrackerAction TrackerSession::start_refused() {
   const TrackerState state = state_;
   pending_.reset();
@@ -118,10 +117,10 @@ TrackerAction TrackerSession::start_refused() {
 TrackerAction TrackerSession::done_without_beam(const emscon::Answer& answer) {
   const emscon::Command command = emscon::command_of(answer);
   if (command == emscon::Command::StartMeasurement) streaming();
-  if (command == emscon::Command::StopMeasurement) return ask_alive();
+  if (command == emscon::Command::StopMeasurement) return query_status();
   const auto* tracker = std::get_if<emscon::TrackerStatusAnswer>(&answer);
   if (tracker != nullptr && tracker->tracker == emscon::TrackerStatus::Ready && !restart_at_) {
-    restart_at_ = now_ + options_.resume_within;  // the event that says so was missed
+    restart_at_ = now_ + options_.resume_within;  // the event of the controller was missed
   }
   return TrackerNothing{};
 }

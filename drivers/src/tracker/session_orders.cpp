@@ -1,4 +1,4 @@
-/// What a person asks of a tracker, and the reflectors its controller knows.
+/// Orders of an operator to a tracker, and the reflector list of its controller.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,16 +14,16 @@ namespace abbe::drivers {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000.0;
-// a controller that lists more is not listened to for ever
+// Reading the list ends here, so that a faulty controller cannot extend it without limit.
 constexpr std::int32_t kMostReflectors = 256;
 
-/// A terminal obeys control characters.
+/// Control characters are replaced: a terminal would execute them.
 bool is_control(char32_t c) {
   return c < 0x20 || (c >= 0x7F && c < 0xA0);
 }
 
-/// UTF-16 as the controller sends it; a lone surrogate or a control character becomes a question
-/// mark.
+/// Converts the controller's UTF-16 to UTF-8; an unpaired surrogate or a control character becomes
+/// a question mark.
 std::string utf8_of(const emscon::Name& name) {
   std::string out;
   const auto put = [&out](char32_t c) {
@@ -86,8 +86,8 @@ const char* name_of(TrackerOrder::What what) noexcept {
 
 // --- reflectors
 
-/// Which one is in use, then the list, one answer each; SetReflector follows when the list is
-/// there.
+/// Plans GetReflector (the one in use), then GetReflectors (one answer per reflector). SetReflector
+/// is planned when the list is complete.
 void TrackerSession::plan_reflector(TrackerState state, bool of_order) {
   plan(state, emscon::GetReflector{}, true, of_order);
   plan(state, emscon::GetReflectors{}, as_id(wanted_reflector()).has_value(), of_order);
@@ -106,8 +106,8 @@ bool TrackerSession::list_complete(const emscon::Answer& answer) {
   return static_cast<std::int32_t>(reflectors_.size()) >= std::min(one->total, kMostReflectors);
 }
 
-/// The list is there: plans SetReflector unless the reflector is set already, which would cost the
-/// beam. Returns what is wrong with the name.
+/// Called when the list is complete. Plans SetReflector unless the reflector is already set:
+/// SetReflector would lose the beam. Returns an error text, or an empty string.
 std::string TrackerSession::choose_reflector() {
   if (order_begun_ && order_->what == TrackerOrder::What::ListReflectors) return {};
   const std::string& wanted = wanted_reflector();
@@ -146,7 +146,7 @@ TrackerAction TrackerSession::take(const TrackerOrder& order) {
     report_ = TrackerOrderReport{order.number, Outcome::Refused, std::move(text), {}};
     return TrackerNothing{};
   };
-  if (order_) return refuse_order(fmt::format("{} is under way", name_of(order_->what)));
+  if (order_) return refuse_order(fmt::format("{} is in progress", name_of(order_->what)));
   if (!takes_orders()) {
     return refuse_order(
         fmt::format("the tracker is {}{}{}", name_of(state_), cause_.empty() ? "" : ": ", cause_));
@@ -163,7 +163,7 @@ TrackerAction TrackerSession::begin_order() {
   const bool measuring = state_ == Streaming || state_ == BeamLost;
 
   if (order.what == TrackerOrder::What::ListReflectors) {
-    const auto restart_at = restart_at_;  // a beam that is back is measured after the list, too
+    const auto restart_at = restart_at_;  // keep a planned StartMeasurement
     new_plan(Goal::Stay);
     restart_at_ = restart_at;
     plan(state_, emscon::GetReflector{}, true, true);
@@ -203,7 +203,7 @@ std::string TrackerSession::outcome_of(const TrackerOrder& order) const {
     case TrackerOrder::What::Initialize:
       return "the tracker is initialised";
     case TrackerOrder::What::ListReflectors:
-      return fmt::format("the controller knows {} reflectors", reflectors_.size());
+      return fmt::format("the controller lists {} reflectors", reflectors_.size());
     case TrackerOrder::What::SetReflector:
       return fmt::format("reflector {} is set", order.reflector);
     case TrackerOrder::What::GoHome:
@@ -221,8 +221,8 @@ void TrackerSession::end_order(Outcome outcome, const std::string& text) {
   if (report.done() && order_->what == TrackerOrder::What::ListReflectors)
     report.reflectors = reflectors_;
   if (report.done() && order_->what == TrackerOrder::What::SetReflector) {
-    options_.reflector = order_->reflector;  // also after the next connection
-    reflector_before_.reset();               // a person's choice stays
+    options_.reflector = order_->reflector;  // applies to later connections, too
+    reflector_before_.reset();               // the operator's choice is not restored
   }
   report_ = std::move(report);
   order_.reset();

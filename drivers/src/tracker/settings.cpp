@@ -13,7 +13,7 @@ namespace {
 
 using emscon::Request;
 
-/// The request that sets what an answer reports; none for an answer that reports no setting.
+/// The request that sets the reported value; nullopt for an answer that reports no setting.
 struct SetterOf {
   std::optional<Request> operator()(const emscon::UnitsAnswer& a) const {
     return emscon::SetUnits{a.units};
@@ -47,9 +47,9 @@ bool same(const Request& a, const Request& b) {
 
 }  // namespace
 
-/// In the order in which they are put back: a value is read and written in the units found, so
-/// units come first; the system settings come last, because they may end the messages the session
-/// relies on.
+/// Settings in the order of restoring. Units are first, because each previous value is in the
+/// previous units. The system settings are last, because they may disable messages that the session
+/// needs.
 TrackerSettings::TrackerSettings(const TrackerSessionOptions& options) {
   using emscon::MeasurementMode;
   const auto add = [this](const Request& question, const Request& wanted) {
@@ -116,7 +116,7 @@ void TrackerSettings::ask_again() noexcept {
   for (Setting& s : settings_) s.asked = false;
 }
 
-/// Keeps what abbe has no opinion of.
+/// The wanted setting, with the previous values of the fields that abbe does not set.
 Request TrackerSettings::adapted(const Setting& setting) {
   const auto* ours = std::get_if<emscon::SetSystemSettings>(&setting.wanted);
   const auto* before =

@@ -8,8 +8,8 @@ namespace abbe::protocol::can {
 
 namespace {
 
-/// The node of a frame base + node, nullopt when the identifier is outside base + 1..127 or the
-/// frame is no plain data.
+/// The node of a frame with the identifier base + node; nullopt if the identifier is not in
+/// base + 1 to base + 127, or if it is not a standard data frame.
 std::optional<NodeId> node_of(const CanFrame& frame, std::uint32_t base) noexcept {
   if (!frame.is_standard_data() || frame.id <= base || frame.id > base + kMaxNodeId)
     return std::nullopt;

@@ -13,7 +13,7 @@ struct EmergencyClass {
   const char* text;
 };
 
-/// Emergency error code classes [CiA 301, EMCY], the narrow ones first.
+/// Emergency error code classes [CiA 301, EMCY]; specific classes before general ones.
 constexpr std::array kClasses{
     EmergencyClass{0x0000, 0xFF00, "error reset"},
     EmergencyClass{0x1000, 0xFF00, "generic error"},

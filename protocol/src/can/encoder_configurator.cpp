@@ -7,7 +7,7 @@ namespace abbe::protocol::can {
 
 namespace {
 
-/// Places in the list of pdo_configuration().
+/// Indices in the list of pdo_configuration().
 constexpr std::size_t kDisable = 0, kClearMapping = 1, kMap = 2, kMapCount = 3, kType = 4,
                       kEnable = 7, kBeat = 8;
 
@@ -73,7 +73,7 @@ const char* to_text(ConfigurationFault fault) noexcept {
     case ConfigurationFault::NotOperational:
       return "is not operational";
     case ConfigurationFault::BadAnswer:
-      return "answers nonsense";
+      return "sends malformed answers";
   }
 
   return "unknown fault";
@@ -186,8 +186,8 @@ void EncoderConfigurator::advance(HostTime now) noexcept {
   next_step(now);
 }
 
-/// A refusal that says "I have no such object" where the object is not essential. 1018h has only
-/// :01 for certain.
+/// True if the refusal is "object does not exist" for an object that is not required. In 1018h only
+/// sub-index 01 is mandatory.
 bool EncoderConfigurator::tolerated() const noexcept {
   if (!sdo_.aborted_by_server()) return false;
   switch (step_) {
@@ -208,7 +208,7 @@ bool EncoderConfigurator::tolerated() const noexcept {
     case Step::Scale:
     case Step::ScaleFallback:
     case Step::Range:
-      return true;  // the caller may know the scale; if not it refuses
+      return true;  // a missing scale is an error only with needs_scale: see next_step()
     case Step::DeviceType:
     case Step::MappingCount:
     case Step::MappingEntry:
@@ -282,8 +282,8 @@ bool EncoderConfigurator::take_number(std::uint32_t value) noexcept {
   return true;
 }
 
-/// A write was refused: true if what the node has instead is read. The refusal is kept for when
-/// that does not do.
+/// Called after a refused write: true if the object is read instead. The refusal is stored; it is
+/// reported if the value read is not acceptable.
 bool EncoderConfigurator::read_instead() noexcept {
   if (step_ != Step::Write || !sdo_.aborted_by_server()) return false;
   refusal_ = {ConfigurationFault::Refused, sdo_.object(), sdo_.abort_code(), 0};
@@ -293,7 +293,7 @@ bool EncoderConfigurator::read_instead() noexcept {
       step_ = Step::MappingCount;
       return true;
     case kMap:
-      step_ = Step::FirstEntry;  // its count is 0 by now
+      step_ = Step::FirstEntry;  // the number of entries is already 0
       return true;
     case kType:
       step_ = Step::Type;
@@ -302,7 +302,7 @@ bool EncoderConfigurator::read_instead() noexcept {
       step_ = Step::CobId;
       return true;
     case kBeat:
-      step_ = Step::Heartbeat;  // how often it beats is for those to see who listen
+      step_ = Step::Heartbeat;  // the heartbeat period is not checked here
       return true;
     default:
       return false;
@@ -351,10 +351,10 @@ bool EncoderConfigurator::scaling_off() const noexcept {
   return parameters && (*parameters & object::kScalingOn) == 0;
 }
 
-/// What the node says of its step against what is configured.
+/// Compares the step that the node reports with the configured one.
 void EncoderConfigurator::check_step() noexcept {
   constexpr double kHalf_nm = 0.5;
-  constexpr double kRounded = 1e-5;  // of a step written in nrad: 13 arcsec a revolution
+  constexpr double kRounded = 1e-5;  // for a step rounded to nrad; 13 arcsec per revolution
   const auto differs = [](double seen, double wanted, double tolerance) {
     return seen - wanted > tolerance || wanted - seen > tolerance;
   };

@@ -1,6 +1,6 @@
 #pragma once
-/// Little-endian numbers of any width inside frames (SDO carries 1 to 8 bytes, 3 too): CANopen's
-/// byte order [CiA 301]. The caller has checked the bounds.
+/// Little-endian numbers of any width in frames (an SDO value has 1 to 8 bytes, also 3): the byte
+/// order of CANopen [CiA 301]. Precondition: the caller has checked the bounds.
 
 #include <concepts>
 #include <cstddef>

@@ -50,7 +50,7 @@ void SdoClient::send_initiate() noexcept {
 }
 
 void SdoClient::send(const CanFrame& frame) noexcept {
-  if (outbox_count_ == outbox_.size()) {  // nobody took them: the oldest is worth the least
+  if (outbox_count_ == outbox_.size()) {  // the caller did not take the frames: drop the oldest
     outbox_head_ = (outbox_head_ + 1) % outbox_.size();
     --outbox_count_;
   }
@@ -89,7 +89,7 @@ void SdoClient::on_frame(const CanFrame& frame, HostTime now) noexcept {
   if (state_ != State::Busy || !frame.is_standard_data()) return;
   if (frame.id != cob::kSdoResponse + node_ || frame.length != sdo::kFrameBytes) return;
   if (sdo::specifier(frame) == sdo::kAbort) {
-    // An abort names its object: one for another object is left over from an earlier transfer.
+    // An abort contains its object. An abort for another object belongs to an earlier transfer.
     if (sdo::object_of(frame) == object_) fail(AbortCode{sdo::word_of(frame)}, true);
     return;
   }
@@ -106,8 +106,8 @@ void SdoClient::on_frame(const CanFrame& frame, HostTime now) noexcept {
 
 void SdoClient::on_initiate_answer(const CanFrame& frame) noexcept {
   const auto expected = upload_ ? sdo::kUploadInitiateAnswer : sdo::kDownloadInitiateAnswer;
-  // Anything else is a late answer to an attempt we gave up; a mute server is caught by the
-  // time-out.
+  // Any other frame is a late answer to an earlier attempt. If the server does not answer, the
+  // time-out ends the attempt.
   if (sdo::specifier(frame) != expected || sdo::object_of(frame) != object_) return;
   if (upload_) return on_upload_initiated(frame);
   if (size_ <= sdo::kExpeditedBytes) {

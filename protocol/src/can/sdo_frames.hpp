@@ -1,5 +1,5 @@
 #pragma once
-/// The first bytes of SDO frames, by name [CiA 301, SDO protocols]. Shared by client and server.
+/// Constants for the first byte of SDO frames [CiA 301, SDO protocols]. Used by client and server.
 
 #include <algorithm>
 #include <cstddef>
@@ -16,7 +16,7 @@ inline constexpr std::size_t kFrameBytes = 8;
 inline constexpr std::size_t kExpeditedBytes = 4;
 inline constexpr std::size_t kSegmentBytes = 7;
 
-// Bits 7..5: command specifier, the same number means different things in the two directions.
+// Bits 7..5: command specifier. The meaning of a number depends on the direction.
 inline constexpr std::uint8_t kSpecifierMask = 0xE0;
 inline constexpr std::uint8_t kDownloadSegmentRequest = 0x00;
 inline constexpr std::uint8_t kDownloadInitiateRequest = 0x20;
@@ -59,7 +59,8 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
   return f;
 }
 
-/// Initiate with the data inside: both directions share the low bits `nnes`.
+/// Expedited initiate frame, which contains the data. The low bits `nnes` are the same in both
+/// directions.
 [[nodiscard]] inline CanFrame expedited(std::uint32_t cob_id, unsigned command, ObjectId object,
                                         std::span<const std::byte> value) noexcept {
   const auto unused = static_cast<unsigned>(kExpeditedBytes - value.size());
@@ -67,13 +68,14 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
   std::copy(value.begin(), value.end(), f.data.begin() + 4);
   return f;
 }
-/// Bytes of an expedited initiate; four when the sender left the size open.
+/// Number of data bytes of an expedited initiate frame; 4 if the sender did not give the size.
 [[nodiscard]] inline std::size_t expedited_size(const CanFrame& f) noexcept {
   return (f.byte(0) & kSizeGiven) != 0 ? kExpeditedBytes - ((f.byte(0) >> 2) & 3u)
                                        : kExpeditedBytes;
 }
 
-/// A segment out of `value` from `done` on: both directions share the low bits `tnnnc`.
+/// The segment of `value` that begins at byte `done`. The low bits `tnnnc` are the same in both
+/// directions.
 [[nodiscard]] inline CanFrame segment(std::uint32_t cob_id, bool toggle_bit,
                                       std::span<const std::byte> rest) noexcept {
   const auto n = std::min(rest.size(), kSegmentBytes);

@@ -11,7 +11,7 @@ namespace {
 constexpr std::uint8_t kVersion = 2;
 constexpr std::uint8_t kOpcodeData = 0;
 constexpr std::uint8_t kFdBit = 0x80;
-// Linux's flag bits in the identifier word.
+// Flag bits of Linux in the identifier word.
 constexpr std::uint32_t kExtendedBit = 0x80000000;
 constexpr std::uint32_t kRemoteBit = 0x40000000;
 constexpr std::uint32_t kErrorBit = 0x20000000;
@@ -21,7 +21,7 @@ std::uint8_t byte_at(std::span<const std::byte> bytes, std::size_t i) noexcept {
   return std::to_integer<std::uint8_t>(bytes[i]);
 }
 
-/// One frame from the front of `bytes`; `used` says how many of them it took.
+/// Decodes one frame from the front of `bytes`; `used` is set to its size in bytes.
 std::optional<DatagramError> read_frame(std::span<const std::byte> bytes, CanFrame& frame,
                                         std::size_t& used) noexcept {
   if (bytes.size() < kIdAndLength) return DatagramError::Truncated;
@@ -39,7 +39,7 @@ std::optional<DatagramError> read_frame(std::span<const std::byte> bytes, CanFra
   if (fd) frame.set(FrameFlag::Fd);
   used = kIdAndLength + (fd ? 1u : 0u);
 
-  // CAN FD has no remote frames: whoever sends one means something we do not know.
+  // CAN FD has no remote frames: such a frame is invalid.
   if (frame.length > (fd ? CanFrame::kMaxData : CanFrame::kMaxClassicData))
     return DatagramError::BadLength;
   if (fd && frame.is(FrameFlag::Remote)) return DatagramError::BadLength;
@@ -62,7 +62,7 @@ std::uint32_t flagged_id(const CanFrame& frame) noexcept {
   return id;
 }
 
-/// `length`, cut to what the format can carry.
+/// `length`, limited to the maximum of the frame's format.
 std::size_t length_on_wire(const CanFrame& frame) noexcept {
   const auto longest = frame.is(FrameFlag::Fd) ? CanFrame::kMaxData : CanFrame::kMaxClassicData;
   return std::min<std::size_t>(frame.length, longest);
@@ -86,15 +86,18 @@ bool DatagramWriter::add(const CanFrame& frame) ABBE_RT {
   const auto need = encoded_size(frame);
   if (buffer_.size() - size_ < need || count_ == std::numeric_limits<std::uint16_t>::max())
     return false;
+
   const auto id = flagged_id(frame);
   auto* out = buffer_.data() + size_;
   for (const int shift : {24, 16, 8, 0}) *out++ = static_cast<std::byte>((id >> shift) & 0xFFu);
+
   const bool fd = frame.is(FrameFlag::Fd);
   const auto length = length_on_wire(frame);
   *out++ = static_cast<std::byte>(length | (fd ? kFdBit : 0u));
   if (fd) *out++ = std::byte{frame.fd_flags};
   const auto data = frame.payload();
   out = std::copy_n(data.begin(), std::min(data.size(), length), out);
+
   size_ = static_cast<std::size_t>(out - buffer_.data());
   ++count_;
   return true;
@@ -149,7 +152,7 @@ bool DatagramView::next(CanFrame& frame) ABBE_RT {
   if (left_ == 0) return false;
   --left_;
   std::size_t used = 0;
-  if (read_frame(rest_, frame, used)) return false;  // cannot happen: parse() has checked all of it
+  if (read_frame(rest_, frame, used)) return false;  // cannot happen: parse() checked all frames
   rest_ = rest_.subspan(used);
   return true;
 }

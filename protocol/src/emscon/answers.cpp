@@ -18,7 +18,7 @@ constexpr std::size_t largest_answer(std::index_sequence<I...>) {
 static_assert(largest_answer(std::make_index_sequence<std::variant_size_v<Answer>>{}) ==
               kMaxAnswerSize);
 
-// The first alternative, Acknowledge, stands for every command; the others name theirs.
+// The first alternative, Acknowledge, is valid for every command; the others have a kCommand.
 using OwnAnswers = std::make_index_sequence<std::variant_size_v<Answer> - 1>;
 template <std::size_t I>
 using OwnAnswer = std::variant_alternative_t<I + 1, Answer>;

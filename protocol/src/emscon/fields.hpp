@@ -1,7 +1,7 @@
 #pragma once
-/// The layout of every packet, once, for reading, writing and counting alike: so both directions
-/// agree by construction. Offsets follow from the order, because the structures are packed to 4
-/// bytes and have no padding.
+/// The layout of every packet. Reading, writing and counting use the same definition, so both
+/// directions always agree. The offsets follow from the order of the fields, because the structures
+/// are packed to 4 bytes and have no padding.
 
 #include <array>
 #include <cstddef>
@@ -24,7 +24,7 @@ template <class T, class Packet>
 inline constexpr bool kIs = std::is_same_v<std::remove_const_t<T>, Packet>;
 
 // NOLINTBEGIN(bugprone-branch-clone): packets of equal layout are listed each, as the documents do.
-/// Calls io(field, ...) with the fields of `p` after the head that all packets of its kind share.
+/// Calls io(field, ...) with the fields of `p` after the common head of its kind of packet.
 template <class P, class Io>
 constexpr void fields(P& p, Io&& io) ABBE_RT {
   if constexpr (kIs<P, Units>) {
@@ -199,7 +199,7 @@ struct Writer {
   }
 };
 
-/// Bytes of the fields of P on the wire.
+/// Size of the fields of P on the wire, in bytes.
 template <class P>
 [[nodiscard]] constexpr std::size_t size_of() ABBE_RT {
   P p{};
@@ -213,7 +213,7 @@ inline void put_header(ByteWriter& out, std::size_t size, PacketType type) ABBE_
   out.little(type);
 }
 
-/// Size and type of a packet that is all there.
+/// Size and type of a complete packet.
 struct Header {
   std::size_t size = 0;
   PacketType type{};

@@ -20,6 +20,7 @@ bool looks_like_a_head(std::span<const std::byte> bytes) ABBE_RT {
   const std::size_t size = in.little<std::uint32_t>();
   const auto type = in.little<PacketType>();
   if (size < kSmallestFromController || size > kMaxPacketSize) return false;
+
   switch (type) {
     case PacketType::MultiResult:
       return size >= kMultiHeadSize && (size - kMultiHeadSize) % kMultiPointSize == 0;

@@ -88,6 +88,7 @@ tl::expected<ControllerPacket, DecodeError> decode(std::span<const std::byte> pa
   ByteReader in{packet};
   const auto header = wire::take_header(in);
   if (!header) return tl::unexpected{header.error()};
+
   const auto as_packet = [](const auto& p) { return ControllerPacket{p}; };
   switch (header->type) {
     case PacketType::Command:

@@ -18,8 +18,7 @@ tl::expected<int, LineError> whole_number(Scanner& scan, int most) noexcept {
   return static_cast<int>(*value);
 }
 
-/// Error(F1,F2,F3,"text"); F3 is a name or a number, whatever the server calls the place of the
-/// fault.
+/// Error(F1,F2,F3,"text"); F3 is the origin of the error, a name or a number chosen by the server.
 tl::expected<ErrorReport, LineError> error_report(Scanner& scan) noexcept {
   const auto bad = tl::unexpected(LineError::BadError);
   if (scan.name() != "Error" || !scan.separator('(')) return bad;
@@ -82,23 +81,23 @@ bool printable(char c) noexcept {
 const char* name_of(LineError error) ABBE_RT {
   switch (error) {
     case LineError::IllegalCharacter:
-      return "a character that is not printable ASCII outside of a text in quotes";
+      return "a character outside quotes is not printable ASCII";
     case LineError::TooLong:
       return "a line of more than 65536 characters";
     case LineError::BadTag:
-      return "no tag of five digits or of E and four digits";
+      return "no tag of five digits, or of E and four digits";
     case LineError::NoSpace:
-      return "no space behind the tag";
+      return "no space after the tag";
     case LineError::BadMarker:
-      return "none of & % # ! behind the tag";
+      return "none of & % # ! after the tag";
     case LineError::BadError:
       return "an error that is not Error(severity,code,origin,\"text\")";
     case LineError::BadMethod:
       return "no method with parentheses";
     case LineError::BadArgument:
-      return "an argument that is neither number, string, name nor property";
+      return "an argument is not a number, string, name or property";
     case LineError::BadNumber:
-      return "a number that cannot be";
+      return "an invalid number";
   }
   return "?";
 }
@@ -108,6 +107,7 @@ tl::expected<Response, LineError> parse_response(std::string_view line) ABBE_RT 
   const auto tag = scan.tag();
   if (!tag) return tl::unexpected(LineError::BadTag);
   if (!scan.take(' ')) return tl::unexpected(LineError::NoSpace);
+
   Response response{.tag = *tag};
   const char marker = scan.peek();
   (void)scan.take(marker);
@@ -134,6 +134,7 @@ tl::expected<Response, LineError> parse_response(std::string_view line) ABBE_RT 
     default:
       return tl::unexpected(LineError::BadMarker);
   }
+
   scan.spaces();
   if (!scan.at_end()) return tl::unexpected(LineError::BadMarker);
   return response;
@@ -147,10 +148,12 @@ tl::expected<CommandLine, LineError> parse_command(std::string_view line) ABBE_R
   CommandLine command{.tag = *tag};
   command.method = scan.name();
   if (command.method.empty() || !scan.separator('(')) return tl::unexpected(LineError::BadMethod);
+
   std::string_view inside = scan.rest();
   while (!inside.empty() && inside.back() == ' ') inside.remove_suffix(1);
   if (inside.empty() || inside.back() != ')') return tl::unexpected(LineError::BadMethod);
   inside.remove_suffix(1);
+
   ArgumentReader reader{inside};
   while (const auto argument = reader.next())
     if (!*argument) return tl::unexpected(argument->error());
@@ -174,7 +177,7 @@ std::optional<tl::expected<Argument, LineError>> ArgumentReader::next() ABBE_RT 
   auto read = argument(scan);
   scan.spaces();
 
-  // A comma announces another one.
+  // After a comma an argument must follow.
   if (read && !scan.at_end() && (scan.peek() != ',' || scan.rest().size() == 1))
     read = tl::unexpected(LineError::BadArgument);
   rest_ = read ? scan.rest() : std::string_view{};
@@ -187,6 +190,7 @@ tl::expected<PointReport, LineError> parse_point(std::string_view data) ABBE_RT 
   ArgumentReader reader{data};
   while (const auto argument = reader.next()) {
     if (!*argument) return tl::unexpected(argument->error());
+
     const Argument& a = **argument;
     if (a.kind != Argument::Kind::Property) continue;
     if (a.text.size() == 1 && a.text[0] >= 'X' && a.text[0] <= 'Z') {
@@ -229,13 +233,13 @@ std::optional<tl::expected<std::string_view, LineError>> LineFramer::next() ABBE
   }
   for (; looked_ < end_; ++looked_) {
     const char c = buffer_[looked_];
-    if (c == '\r' && looked_ + 1 == end_) return std::nullopt;  // its LF may still come
+    if (c == '\r' && looked_ + 1 == end_) return std::nullopt;  // the LF may arrive later
     if (c == '\r' && buffer_[looked_ + 1] == '\n') {
       const std::string_view line{buffer_.data() + begin_, looked_ - begin_};
       begin_ = looked_ += 2;
       quoted_ = false;
       if (std::exchange(skipping_, false)) {
-        --looked_;  // the loop steps over it
+        --looked_;  // the loop increments it
         continue;
       }
       return Line{line};

@@ -23,7 +23,7 @@ std::size_t digits_at(std::string_view text, std::size_t from) noexcept {
   return n;
 }
 
-/// Length of the number at the front, by the grammar; nothing if there is none.
+/// Length of the number at the front according to the grammar; nullopt if there is none.
 std::optional<std::size_t> number_length(std::string_view text) noexcept {
   std::size_t at = !text.empty() && (text[0] == '+' || text[0] == '-') ? 1 : 0;
   const std::size_t whole = digits_at(text, at);
@@ -92,7 +92,7 @@ std::string_view Scanner::name() ABBE_RT {
     if (begins ? !is_letter(c) : !(is_letter(c) || is_digit(c) || c == '_' || c == '.')) break;
     begins = c == '.';
   }
-  if (begins) return {};  // none, or a dot at the end
+  if (begins) return {};  // no name, or a dot at the end
   const std::string_view name{rest_.data(), n};
   rest_.remove_prefix(n);
   return name;
@@ -101,11 +101,11 @@ std::string_view Scanner::name() ABBE_RT {
 tl::expected<double, LineError> Scanner::number() ABBE_RT {
   const auto length = number_length(rest_);
   if (!length) return tl::unexpected(LineError::BadNumber);
-  const std::size_t sign = rest_[0] == '+' ? 1 : 0;  // which from_chars does not read
+  const std::size_t sign = rest_[0] == '+' ? 1 : 0;  // from_chars does not accept '+'
   double value = 0.0;
   const char* const end = rest_.data() + *length;
   const auto read = std::from_chars(rest_.data() + sign, end, value);
-  // Out of range: an exponent that no double has.
+  // Out of range: the exponent is too large for a double.
   if (read.ec != std::errc{} || read.ptr != end) return tl::unexpected(LineError::BadNumber);
   rest_.remove_prefix(*length);
   return value;

@@ -1,5 +1,6 @@
 #pragma once
-/// Reads a line of I++ DME from the left. Every function consumes what it names or nothing.
+/// Reads a line of I++ DME from the left. Each function consumes the element in its name, or
+/// nothing.
 
 #include <optional>
 #include <string_view>
@@ -17,7 +18,7 @@ class Scanner {
   [[nodiscard]] char peek() const ABBE_RT { return rest_.empty() ? '\0' : rest_.front(); }
   bool take(char c) ABBE_RT;
   void spaces() ABBE_RT;
-  /// A comma or parenthesis with the spaces that may stand around it.
+  /// A comma or parenthesis, with optional spaces before and after it.
   bool separator(char c) ABBE_RT;
   [[nodiscard]] std::optional<Tag> tag() ABBE_RT;
   /// BasicName {"." BasicName}; empty if there is none.

@@ -1,5 +1,5 @@
-// What is written rather than read: allocates, so it stands apart from the decoders of the
-// real-time path.
+// Encoding of I++ DME text. It allocates, so it is separate from the decoders of the real-time
+// path.
 #include <algorithm>
 #include <cstdio>
 
@@ -16,7 +16,7 @@ std::string to_string(Tag tag) {
 std::string number_text(double value) {
   if (!(value > -1e15 && value < 1e15)) return "0";
   char text[40];
-  // Nine decimals of a millimetre are a picometre; 16 digits are kept for lengths below 10 km.
+  // Nine decimals of 1 mm are 1 pm; lengths below 10 km then have at most 16 digits.
   const int decimals = value > -1e6 && value < 1e6 ? 9 : 0;
   const int n = std::snprintf(text, sizeof text, "%.*f", decimals, value);
   std::string s(text, static_cast<std::size_t>(n));

@@ -11,7 +11,7 @@ constexpr std::uint32_t kReflectedPolynomial = 0xEDB88320u;
 constexpr std::size_t kSlices = 8;
 using Tables = std::array<std::array<std::uint32_t, 256>, kSlices>;
 
-/// tables[0] advances a register by one byte; tables[k] by one byte followed by k zero bytes.
+/// tables[0] advances the CRC register by one byte, tables[k] by one byte and k zero bytes.
 constexpr Tables make_tables() {
   Tables tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

@@ -7,7 +7,7 @@ namespace {
 
 using tl::unexpected;
 
-/// A whole record, or Truncated if any of its fields was.
+/// The record, or Truncated if one of its fields is truncated.
 template <class T>
 Decoded<T> whole(const FieldReader& fields, const T& record) noexcept {
   if (!fields.ok()) return unexpected(DecodeError::Truncated);

@@ -1,6 +1,6 @@
 #pragma once
-/// Reading and writing the fields of a record: little-endian integers, and strings, bytes and maps
-/// behind a u32 length.
+/// Reads and writes the fields of a record: little-endian integers; strings, bytes and maps with a
+/// u32 length before them.
 
 #include <algorithm>
 #include <bit>
@@ -12,10 +12,10 @@
 namespace abbe::protocol::mcap {
 
 static_assert(std::endian::native == std::endian::little,
-              "integers are copied as they lie in memory");
+              "integers are copied without byte swapping");
 
-/// Takes fields off the front; once one is missing, every later one is zero or empty and ok() stays
-/// false.
+/// Reads fields from the front. Once a field is missing, every later one is zero or empty, and ok()
+/// stays false.
 class FieldReader {
  public:
   explicit FieldReader(Bytes bytes) noexcept : rest_(bytes) {}
@@ -33,7 +33,7 @@ class FieldReader {
     const Bytes field = bytes();
     return {reinterpret_cast<const char*>(field.data()), field.size()};
   }
-  /// Whatever is left, at most `limit` bytes.
+  /// The remaining bytes, at most `limit`.
   [[nodiscard]] Bytes remainder(
       std::uint64_t limit = std::numeric_limits<std::uint64_t>::max()) noexcept {
     return take(std::min<std::uint64_t>(limit, rest_.size()));
@@ -73,7 +73,7 @@ inline void append_string(Buffer& buffer, std::string_view text) {
   append_bytes(buffer, std::as_bytes(std::span{text.data(), text.size()}));
 }
 
-/// Writes opcode and room for the length; the length is filled in when the scope ends.
+/// Writes opcode and a placeholder for the length. The destructor fills in the length.
 class RecordScope {
  public:
   RecordScope(Buffer& buffer, Opcode opcode) : buffer_(buffer) {

@@ -9,24 +9,24 @@
 namespace abbe::protocol::mcap {
 namespace {
 
-/// Opcode to records_size of a Chunk record without compression: its size is always the same, so
-/// room for it is left in front of the records and the whole chunk can be written in one piece
-/// without copying it.
+/// Size of a Chunk record without compression, from opcode to records_size. It is constant, so the
+/// buffer has a placeholder for it before the records, and the chunk can be written in one piece
+/// without a copy.
 constexpr std::size_t kChunkHeadSize = kRecordHeadSize + 8 + 8 + 8 + 4 + 4 + 8;
 
-static_assert(sizeof(IndexEntry) == 16, "index entries are written as they lie in memory");
+static_assert(sizeof(IndexEntry) == 16, "index entries are written without padding");
 
 }  // namespace
 
 ChunkBuilder::ChunkBuilder(std::size_t capacity_bytes) {
-  // A message of the smallest kind we record takes about 100 bytes, its index entry 16: a quarter
-  // more is ample.
+  // The smallest recorded message has about 100 bytes and its index entry 16: one quarter more is
+  // sufficient.
   buffer_.reserve(kChunkHeadSize + capacity_bytes + capacity_bytes / 4);
   clear();
 }
 
 void ChunkBuilder::clear() noexcept {
-  buffer_.resize(kChunkHeadSize);  // within the capacity: cannot throw
+  buffer_.resize(kChunkHeadSize);  // does not exceed the capacity, so it cannot throw
   for (ChannelEntries& channel : channels_) channel.entries.clear();
   shares_.clear();
   message_count_ = 0;
@@ -76,7 +76,7 @@ ClosedChunk ChunkBuilder::close() {
                closed.records_size};
   Buffer front;
   front.reserve(kChunkHeadSize);
-  append(front, head);  // says 0 bytes of records: the two lengths are corrected below
+  append(front, head);  // with 0 bytes of records; the two lengths are corrected below
   const std::uint64_t content_size = closed.chunk_length - kRecordHeadSize;
   std::memcpy(&front[1], &content_size, sizeof content_size);
   std::memcpy(&front[kChunkHeadSize - 8], &closed.records_size, sizeof closed.records_size);
@@ -92,7 +92,8 @@ ClosedChunk ChunkBuilder::close() {
 void ChunkBuilder::append_indexes() {
   for (ChannelEntries& channel : channels_) {
     if (channel.entries.empty()) continue;
-    // Bursts of one device are in order, but nothing promises it: readers may search by time.
+    // The messages of a device are usually in order, but this is not guaranteed. Readers may search
+    // by time.
     std::ranges::stable_sort(channel.entries, {}, &IndexEntry::log_time_ns);
     shares_.push_back({channel.channel_id, channel.entries.size(), buffer_.size()});
     append(buffer_, MessageIndex{channel.channel_id, decltype(MessageIndex::entries){std::as_bytes(
@@ -112,7 +113,7 @@ void SummaryBuilder::add(const Channel& channel) {
 
 void SummaryBuilder::add(const ClosedChunk& chunk, std::uint64_t offset) {
   Buffer index_offsets;
-  if (!chunk.shares.empty()) {  // a chunk of schemas alone has no times
+  if (!chunk.shares.empty()) {  // a chunk without messages has no times
     const bool first = statistics_.message_count == 0;
     statistics_.first_time_ns =
         first ? chunk.first_time_ns : std::min(statistics_.first_time_ns, chunk.first_time_ns);

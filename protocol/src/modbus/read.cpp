@@ -7,7 +7,7 @@ namespace {
 
 using Outcome = std::optional<tl::expected<Answer, DecodeError>>;
 
-// transaction, protocol, length; the unit is counted by `length`
+// transaction, protocol, length; `length` includes the unit
 constexpr std::size_t kMbapSize = 6;
 constexpr std::size_t kCrcSize = 2;
 constexpr std::size_t kRequestSize = 6;     // unit, function, address, count
@@ -32,7 +32,7 @@ bool crc_agrees(std::span<const std::byte> frame) ABBE_RT {
   return ByteReader{frame.last(kCrcSize)}.little<std::uint16_t>() == crc16(body);
 }
 
-/// Unit, function and what follows, of either transport. Nothing: more must come.
+/// Unit, function and the data after them, for either transport. nullopt: more bytes are needed.
 Outcome decode_body(std::span<const std::byte> body, const ReadRequest& request) ABBE_RT {
   if (!body.empty() && u8(body[0]) != request.unit) return fail(DecodeError::Unit);
   if (body.size() < 2) return std::nullopt;
@@ -77,7 +77,7 @@ Outcome decode_rtu(std::span<const std::byte> bytes, const ReadRequest& request)
 
 }  // namespace
 
-/// Polynomial A001h, begun with FFFFh [Modbus over Serial Line V1.02, 6.2.2].
+/// Polynomial A001h, initial value FFFFh [Modbus over Serial Line V1.02, 6.2.2].
 std::uint16_t crc16(std::span<const std::byte> bytes) ABBE_RT {
   std::uint16_t crc = 0xFFFF;
   for (const std::byte b : bytes) {
@@ -135,13 +135,13 @@ std::optional<tl::expected<Answer, DecodeError>> decode_answer(std::span<const s
 std::string_view name_of(DecodeError error) noexcept {
   switch (error) {
     case DecodeError::Length:
-      return "its length is not that of the answer";
+      return "wrong length of the answer";
     case DecodeError::Protocol:
-      return "not the head of a Modbus TCP answer";
+      return "not a Modbus TCP header";
     case DecodeError::Unit:
-      return "another unit answers";
+      return "answer of another unit";
     case DecodeError::Function:
-      return "the answer to another function";
+      return "answer to another function";
     case DecodeError::Crc:
       return "wrong CRC";
     case DecodeError::TrailingBytes:

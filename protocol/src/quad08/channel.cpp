@@ -50,6 +50,7 @@ std::optional<CounterSetup> decode_counter_setup(std::uint16_t word) ABBE_RT {
       mode > static_cast<unsigned>(CounterMode::Encoder)) {
     return std::nullopt;
   }
+
   CounterSetup setup;
   setup.mode = static_cast<CounterMode>(mode);
   if (setup.mode == CounterMode::Encoder) {
@@ -57,6 +58,7 @@ std::optional<CounterSetup> decode_counter_setup(std::uint16_t word) ABBE_RT {
                        : (word & kX2) != 0 ? Quadrature::X2
                                            : Quadrature::X1;
   }
+
   setup.latch_on_index = (word & kLatchOnIndex) != 0;
   setup.register_reading = (word & kRegisterReading) != 0;
   return setup;

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint16_t kCounterWord = 0x3;  // digital, internal
 constexpr std::uint16_t kLastOfScan = 0x4;
-// read at the instant of the first: "sample and hold"
+// read at the instant of the first word ("sample and hold")
 constexpr std::uint16_t kNotFirstOfScan = 0x8;
 constexpr unsigned kChannelShift = 4;
 constexpr std::uint16_t kFirstWord = 2 * static_cast<std::uint16_t>(Register::CounterWord0);
@@ -53,13 +53,15 @@ std::optional<ScanLayout> decode_scan_list(std::span<const ScanListEntry> entrie
   if (entries.empty()) return std::nullopt;
   const auto first = place_of(entries[0]);
   if (!first) return std::nullopt;
-  // The width is how many words of the first counter follow one another.
+
+  // The number of consecutive words of the first counter gives the width.
   std::size_t words = 1;
   while (words < entries.size() && entries[words].word1 >> kChannelShift == first->channel) ++words;
   if (words != words_of(CountWidth::Bits32) && words != words_of(CountWidth::Bits48))
     return std::nullopt;
   layout.width = words == words_of(CountWidth::Bits32) ? CountWidth::Bits32 : CountWidth::Bits48;
   if (entries.size() % words != 0 || entries.size() / words > kChannels) return std::nullopt;
+
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto place = place_of(entries[i]);
     if (!place || place->word != i % words || !marked(entries[i], i == 0, i + 1 == entries.size()))

@@ -7,7 +7,7 @@ constexpr std::uint16_t kDacPacerOff = 0x10;
 constexpr std::uint16_t kDacResetFifo = 0x04;
 constexpr int kMarkBits = 8;
 
-/// On the first pass the analog outputs have no names yet.
+/// The first pass writes 0 instead of the numbers of the analog outputs.
 void disarm_dac(Sequence& out, bool first_pass) ABBE_RT {
   out.add(Register::DacControl, kDacPacerOff);
   out.add(Register::DmaControl, dma::kChannel0Off);
@@ -25,7 +25,7 @@ void disarm(Sequence& out) ABBE_RT {
   out.add(Register::DmaControl, dma::kChannel1Off);
 }
 
-/// A walking bit, inverted every other time.
+/// A walking bit; every second value is inverted.
 void test_registers(Sequence& out) ABBE_RT {
   for (int i = 0; i < kMarkBits; ++i) {
     const unsigned bit = 1u << i;
@@ -51,7 +51,7 @@ bool fulfilled(const Step& step, std::uint16_t answer) ABBE_RT {
 
 Sequence open_sequence() ABBE_RT {
   Sequence out;
-  // Twice: the maker's library does on loading and on opening.
+  // Twice, because the manufacturer's library does it on loading and on opening.
   for (const bool first_pass : {true, false}) {
     out.add(Step{read_firmware_version(), Expect::AtLeast, kOldestFirmware});
     test_registers(out);
@@ -91,7 +91,7 @@ Sequence stop_sequence() ABBE_RT {
 Sequence load_sequence(const ScanLayout& layout, std::uint64_t divisor) ABBE_RT {
   Sequence out;
   const auto list = encode(layout);
-  // Twice, as the maker's library does.
+  // Twice, as in the manufacturer's library.
   for (int pass = 0; pass < 2; ++pass) {
     out.add(Register::Acquisition, acquisition::kResetScanList);
     for (const auto& entry : list.used()) {

@@ -44,6 +44,7 @@ std::optional<DeviceDescriptor> decode_device_descriptor(std::span<const std::by
   ByteReader in{bytes};
   const auto length = in.little<std::uint8_t>();
   const auto type = in.little<std::uint8_t>();
+
   DeviceDescriptor d;
   d.usb_version = in.little<std::uint16_t>();
   d.device_class = in.little<std::uint8_t>();
@@ -57,6 +58,7 @@ std::optional<DeviceDescriptor> decode_device_descriptor(std::span<const std::by
   d.product_string = in.little<std::uint8_t>();
   d.serial_string = in.little<std::uint8_t>();
   d.configurations = in.little<std::uint8_t>();
+
   if (!in.ok() || length < kDeviceDescriptorSize || type != kDevice) return std::nullopt;
   return d;
 }

@@ -88,11 +88,11 @@ std::size_t bytes_in(const ByteWriter& out) ABBE_RT {
 const char* to_text(OpError error) noexcept {
   switch (error) {
     case OpError::Truncated:
-      return "a message cut short";
+      return "a truncated message";
     case OpError::BadVersion:
       return "no USB/IP 1.1.1";
     case OpError::UnknownCode:
-      return "another message than the one asked for";
+      return "not the expected message";
   }
   return "?";
 }
@@ -184,7 +184,7 @@ tl::expected<DeviceListView, OpError> DeviceListView::parse(
   const auto count = in.big<std::uint32_t>();
   if (!in.ok()) return tl::unexpected{OpError::Truncated};
   const auto devices = bytes.subspan(in.position());
-  // Each device takes 312 bytes: a count beyond the bytes ends the loop early.
+  // Each device has 312 bytes. If the count exceeds the bytes, the loop ends early.
   for (std::uint32_t i = 0; i < count && in.ok(); ++i)
     in.skip(kExportedInterfaceSize * take_device(in).interfaces);
   if (!in.ok()) return tl::unexpected{OpError::Truncated};

@@ -8,7 +8,7 @@
 namespace abbe::protocol::usbip {
 namespace {
 
-/// Not isochronous: Linux sends either.
+/// Values of a transfer that is not isochronous: Linux sends either of them.
 constexpr std::uint32_t kNoPackets = 0;
 constexpr std::uint32_t kNotIsochronous = 0xFFFFFFFF;
 
@@ -81,7 +81,7 @@ const char* to_text(UrbError error) noexcept {
     case UrbError::UnknownCommand:
       return "an unknown USB/IP command";
     case UrbError::BadDirection:
-      return "a USB/IP direction that is neither in nor out";
+      return "an invalid USB/IP direction (neither in nor out)";
     case UrbError::Isochronous:
       return "an isochronous transfer";
   }

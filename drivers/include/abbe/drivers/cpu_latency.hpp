@@ -1,7 +1,8 @@
 #pragma once
-/// A bound on how long an idle processor may take to wake, kept by the kernel for all processors
-/// while a file is open (Linux PM QoS). Deep sleep saves power and costs hundreds of microseconds,
-/// by which a device's interrupt, and so its kernel time stamp, is late. Ordinary world.
+/// Limits the time that an idle processor needs to wake up. The kernel keeps the limit for all
+/// processors while a file is open (Linux PM QoS). Without it a processor in deep sleep delays a
+/// device's interrupt, and so its kernel time stamp, by hundreds of microseconds. Not for the
+/// real-time path.
 
 #include <chrono>
 #include <cstdio>
@@ -14,10 +15,10 @@ namespace abbe::drivers {
 
 inline constexpr const char* kCpuLatencyFile = "/dev/cpu_dma_latency";
 
-/// As long as it lives; no child inherits it.
+/// The limit applies during the lifetime of this object. Child processes do not inherit it.
 class CpuLatencyBound {
  public:
-  /// 0: processors without work spin instead of sleeping. Error: the file and what refused it.
+  /// With 0, idle processors spin instead of sleeping. The error names the file and the reason.
   [[nodiscard]] static Result<CpuLatencyBound> request(
       std::chrono::microseconds at_most, const std::filesystem::path& file = kCpuLatencyFile);
 
@@ -28,7 +29,7 @@ class CpuLatencyBound {
   using File = std::unique_ptr<std::FILE, Close>;
   explicit CpuLatencyBound(File held) : held_(std::move(held)) {}
 
-  File held_;  ///< closed: the bound is gone
+  File held_;  ///< closing it removes the limit
 };
 
 }  // namespace abbe::drivers

@@ -1,8 +1,8 @@
 #pragma once
-/// The seam: what the rest of the house knows of a device. The one place with inheritance. One turn
-/// of a device is wait(), in the ordinary world, then receive(), in real time; both are called by
-/// the one device thread. Samples leave through the device's own SampleRing, raw bytes through its
-/// RawRing.
+/// The interface of a device to the rest of the project, and the only place with inheritance. One
+/// cycle of a device is wait(), which may block and allocate, then receive(), which is real-time
+/// code. The device thread calls both. Samples leave through the device's own SampleRing, raw bytes
+/// through its RawRing.
 
 #include <chrono>
 #include <cstdint>
@@ -14,30 +14,31 @@
 
 namespace abbe::drivers {
 
-/// How well a device's own clock is known; see ClockModel. All zero for a device without a clock.
+/// State of the model of a device's own clock; see ClockModel. All zero for a device without a
+/// clock.
 struct ClockStatus {
   bool settled = false;
   double skew = 0.0;                    ///< device clock rate - 1, relative to the host
   std::chrono::nanoseconds residual{};  ///< median lateness of arrivals over the lower envelope
   std::chrono::nanoseconds u_time{};    ///< standard uncertainty of the latest mapping
-  std::uint64_t restarts = 0;           ///< times the device clock jumped or began anew
+  std::uint64_t restarts = 0;           ///< times the device clock jumped or restarted
 };
 
-/// A copy, taken at one moment; counters are since construction and never go back.
+/// A copy of the device's status. Counters start at construction and never decrease.
 struct DeviceStatus {
   std::string name;
   std::string_view state;  ///< a literal of the driver: "connecting", "streaming", "beam lost", ...
   bool connected = false;  ///< the transport is up and the device has answered
-  std::uint64_t samples = 0;      ///< decoded, whether or not they found room
+  std::uint64_t samples = 0;      ///< decoded samples, including those dropped
   std::uint64_t dropped = 0;      ///< samples lost because the sample ring was full
   std::uint64_t raw_dropped = 0;  ///< blocks lost because the raw ring was full
-  /// places in the stream where the device or the transport lost something
-  std::uint64_t gaps = 0;
-  std::uint64_t faults = 0;  ///< torn, garbage, refused, timed out, disconnected: each counts once
+  std::uint64_t gaps = 0;         ///< places where the device or the transport lost data
+  /// incomplete or malformed input, refusals, time-outs, disconnections: each counts once
+  std::uint64_t faults = 0;
   std::uint64_t time_widened = 0;  ///< receives whose kernel stamp could not be used
   ClockStatus clock;
-  protocol::HostTime last_sample{};  ///< the instant the latest sample describes; epoch if none yet
-  std::string condition;   ///< what is wrong at this moment: "X missing (node 1)"; empty: nothing
+  protocol::HostTime last_sample{};  ///< instant of the latest sample; epoch if none yet
+  std::string condition;   ///< what is wrong now: "X missing (node 1)"; empty if nothing is
   std::string last_fault;  ///< "what was tried: what was seen"; empty if none yet
   protocol::HostTime last_fault_at{};
 };
@@ -49,16 +50,16 @@ class Device {
   Device& operator=(const Device&) = delete;
   virtual ~Device() = default;
 
-  /// Device thread, ordinary world: connect, send what is due, block until bytes come or `at_most`
-  /// (host time) has passed, read them into the device's own buffer. Faults are status, not
-  /// exceptions; a defect may throw and ends the thread with the cause kept.
+  /// Device thread, not real-time. Connects, sends what is due, blocks until bytes arrive or
+  /// `at_most` (host time) has passed, and reads the bytes into the device's own buffer. Faults are
+  /// reported in the status, not thrown. An internal error may throw: see DeviceThread.
   virtual void wait(std::chrono::nanoseconds at_most) = 0;
 
-  /// Device thread, real time: everything wait() read becomes samples in the ring. Nothing read:
-  /// nothing happens.
+  /// Device thread, real time. Decodes all bytes that wait() read and puts the samples into the
+  /// ring. Does nothing if wait() read no bytes.
   virtual void receive() ABBE_RT = 0;
 
-  /// Any thread, ordinary world.
+  /// Any thread, not real-time.
   [[nodiscard]] virtual DeviceStatus status() const = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// What a shop floor does to a driver (cable out, port taken, no permission), as a value. Ordinary
-/// world only: the real-time path has counters and flags instead.
+/// Errors that a driver meets on the shop floor (cable unplugged, port in use, no permission), as
+/// values. Not for the real-time path, which has counters and flags instead.
 
 #include <string>
 #include <tl/expected.hpp>
@@ -9,11 +9,11 @@ namespace abbe::drivers {
 
 enum class ErrorCode {
   BadConfiguration,  ///< an option outside its range, an address that cannot be parsed
-  SystemRefused,     ///< the operating system said no: permission, limit, missing interface
-  Unreachable,       ///< nobody answers at that address
-  Timeout,           ///< somebody is there and stays silent
-  Protocol,          ///< the device says what it must not say
-  DeviceRefused,     ///< the device understood and declined
+  SystemRefused,     ///< the operating system refused: permission, limit, missing interface
+  Unreachable,       ///< no device answers at that address, or the connection is lost
+  Timeout,           ///< a connection or an answer did not come in time
+  Protocol,          ///< the device violates its protocol
+  DeviceRefused,     ///< the device understood the request and refused it
 };
 
 /// `text` is "what was tried: what was seen", e.g. "tracker 10.0.0.7:700: no reply in 3 s (3

@@ -1,14 +1,18 @@
 #pragma once
-/// From the kernel's receive stamp to host time. SO_TIMESTAMPING stamps are wall-clock time, which
-/// people and NTP may step, so a stamp serves only as an age, taken against the wall clock of the
-/// same moment:
+/// Converts the kernel's receive time stamp to host time. SO_TIMESTAMPING stamps are wall-clock
+/// time, which an operator or NTP may step. So a stamp is used only as an age, relative to the wall
+/// clock at the same moment:
 ///   age = realtime now - stamp,  arrival = host now - age.
-/// Accepted when 0 <= age <= time since the queue was last known to be empty, and when the wall clock went on
-/// since then as the monotonic clock did (else one of them was stepped, and the age may be wrong by that
-/// step). The bound moves only with nothing_older_than(), so every stamp of one batch is held against the
-/// same. A stamp that is not accepted leaves the user-space time, widened, and is counted. A wall-clock step
-/// therefore changes no arrival. The kernel begins to stamp a moment after the first socket asked (one of its
-/// workers switches it on): what comes before has none. Pure: every time is handed in. One thread.
+/// A stamp is accepted on two conditions:
+///   0 <= age <= time since the receive queue was last known to be empty,
+///   since then the wall clock has advanced by the same amount as the monotonic clock.
+/// Otherwise one of the clocks was stepped, and the age may be wrong by that step. The reference of
+/// both conditions moves only with nothing_older_than(), so all stamps of one batch are checked
+/// against the same one. If a stamp is rejected, the user-space time with a larger uncertainty is
+/// used, and the event is counted. A wall-clock step therefore changes no arrival.
+/// The kernel starts stamping shortly after the first socket requests it (a kernel worker switches
+/// it on): packets before that have no stamp. This class reads no clock: every time is an argument.
+/// One thread.
 
 #include <chrono>
 #include <cstdint>
@@ -19,11 +23,11 @@
 
 namespace abbe::drivers {
 
-/// When bytes came. `u_time` is a standard uncertainty (k = 1).
+/// When bytes arrived. `u_time` is a standard uncertainty (k = 1).
 struct Arrival {
   protocol::HostTime time{};
   std::chrono::nanoseconds u_time{};
-  bool widened = false;  ///< the kernel stamp was missing or not believed
+  bool widened = false;  ///< larger u_time: the kernel stamp was missing or rejected
 };
 
 /// Both clocks, read one right after the other around a receive.
@@ -32,17 +36,18 @@ struct ClockPair {
   std::chrono::nanoseconds realtime{};   ///< CLOCK_REALTIME
 };
 
-/// Reads both clocks at one instant, again if the thread was interrupted in between; ordinary world
-/// (vDSO).
+/// Reads both clocks together; repeats the reading if the thread was interrupted in between. Not
+/// real-time (vDSO).
 [[nodiscard]] ClockPair read_clock_pair() noexcept;
 
 struct KernelStampOptions {
-  std::chrono::nanoseconds u_kernel =
-      std::chrono::microseconds{10};  ///< interrupt to stamp on an idle shop-floor PC
-  /// Waking up the device thread: what an arrival may be late by when only user space saw it.
+  /// From the interrupt to the stamp on an idle shop-floor PC.
+  std::chrono::nanoseconds u_kernel = std::chrono::microseconds{10};
+  /// Delay of waking up the device thread; applies if only the user-space time is known.
   std::chrono::nanoseconds u_user_space = std::chrono::milliseconds{1};
-  /// Two readings of two clocks with a preemption between them, or a stamp on its way into the
-  /// queue; below it a step is not seen and does no harm.
+  /// Smallest clock step that is detected. Smaller differences are caused by a preemption between
+  /// the two readings or by the time from stamp to queue; an undetected step below it is
+  /// negligible.
   std::chrono::nanoseconds step = std::chrono::microseconds{200};
 };
 
@@ -52,17 +57,17 @@ class KernelStampMap {
   explicit KernelStampMap(double speed = 1.0, const KernelStampOptions& options = {}) noexcept
       : speed_(speed), options_(options) {}
 
-  /// `stamp`: the kernel's, wall-clock; none if the socket gave none. `now`: both clocks after the
-  /// receive; `host_now`: host time of that moment.
+  /// `stamp`: wall-clock stamp of the kernel, nullopt if the socket gave none. `now`: both clocks
+  /// after the receive; `host_now`: host time at that moment.
   Arrival arrival(std::optional<std::chrono::nanoseconds> stamp, const ClockPair& now,
                   protocol::HostTime host_now) ABBE_RT;
 
-  /// Both clocks just before a read that left nothing in the queue, or before the socket began to
-  /// listen: what is read from now on has not come earlier. Until the first call no stamp is
-  /// believed.
+  /// `begun`: both clocks just before a read that emptied the queue, or before the socket was
+  /// opened. Bytes that are read from now on did not arrive earlier than that. Before the first
+  /// call every stamp is rejected.
   void nothing_older_than(const ClockPair& begun) ABBE_RT { empty_at_ = begun; }
 
-  /// Arrivals whose stamp was missing or not believed; the caller's own thread.
+  /// Number of arrivals whose stamp was missing or rejected. Same thread as arrival().
   [[nodiscard]] std::uint64_t widened() const ABBE_RT { return widened_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// Durations in four equal buckets per octave (so each is known to 12-25 %), 1 ns to 17 s. Filled
-/// by the real-time loop itself, read by any thread at any time: a report, never a lock.
+/// Histogram of durations with four equal buckets per octave (resolution 12 to 25 %), 1 ns to 17 s.
+/// The real-time loop fills it, any thread may read it at any time. Lock-free.
 
 #include <array>
 #include <atomic>
@@ -17,7 +17,7 @@ class LatencyHistogram {
   static constexpr std::size_t kBucketsPerOctave = 4;
   static constexpr std::size_t kBuckets = 34 * kBucketsPerOctave;
 
-  /// A copy to compute with.
+  /// A copy of the counts, for evaluation.
   struct Counts {
     std::array<std::uint64_t, kBuckets> of_bucket{};
     std::uint64_t total = 0;
@@ -37,7 +37,7 @@ class LatencyHistogram {
   [[nodiscard]] static std::chrono::nanoseconds upper_bound(std::size_t bucket) noexcept;
 
  private:
-  // relaxed throughout, stored by one thread: counts for people, they order nothing
+  // Stored by one thread. relaxed: counts for display only, they order no other access.
   std::array<std::atomic<std::uint64_t>, kBuckets> counts_{};
   std::atomic<std::int64_t> largest_ns_{0};
 };

@@ -1,7 +1,6 @@
 #pragma once
-/// Hand-over of values between threads without a lock: a thread that is preempted in it delays no
-/// other. Allocates; for the ordinary world. Values come out in the order in which they were put
-/// in.
+/// Lock-free queue of values between threads: a thread that is preempted inside it delays no other
+/// thread. Allocates; not for the real-time path. First in, first out.
 
 #include <algorithm>
 #include <atomic>
@@ -27,7 +26,7 @@ class Mailbox {
     }
   }
 
-  /// Any thread: everything that was put in since the last call, the oldest first.
+  /// Any thread: all values put in since the last call, the oldest first.
   [[nodiscard]] std::vector<T> take() {
     std::vector<T> values;
     if (newest_.load(std::memory_order_relaxed) == nullptr) return values;

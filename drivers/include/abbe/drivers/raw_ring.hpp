@@ -1,8 +1,9 @@
 #pragma once
-/// Raw bytes from the real-time side to the recorder, in blocks of fixed size, so that every
-/// recording can be decoded again. One writer, one reader, wait-free. A read longer than one block
-/// is cut into several with `continued`; a read whose blocks do not all fit is dropped whole,
-/// counted in blocks, and marked by `lost_before` on the next one.
+/// Ring of raw bytes from the device thread to the recorder, in blocks of fixed size, so that every
+/// recording can be decoded again. One writer, one reader, wait-free. Bytes of one read that exceed
+/// a block are split over several blocks with `continued`. If not all blocks of a read fit, the
+/// whole read is dropped and its blocks are counted; `lost_before` of the next block holds that
+/// number.
 
 #include <atomic>
 #include <cstddef>
@@ -17,32 +18,32 @@ namespace abbe::drivers {
 
 class RawRing {
  public:
-  /// Blocks of RawBlock::kCapacity bytes, rounded up to a power of two. Allocates and touches the
-  /// memory.
+  /// `capacity_blocks`: blocks of RawBlock::kCapacity bytes each, rounded up to a power of two.
+  /// Allocates and touches the memory.
   explicit RawRing(std::size_t capacity_blocks);
 
-  /// Writer thread. False: dropped whole. Zero bytes are one empty block (a device may say nothing,
-  /// at a time).
+  /// Writer thread. False: all bytes were dropped. A call without bytes writes one empty block: it
+  /// records an event at `time`.
   bool push_bytes(protocol::HostTime time, protocol::RawBlock::Direction direction,
                   std::span<const std::byte> bytes) ABBE_RT;
 
-  /// Reader thread. Oldest blocks first; only `length` bytes of each are copied. Returns how many
-  /// blocks.
+  /// Reader thread. Oldest blocks first; only `length` bytes of each are copied. Returns the number
+  /// of blocks.
   std::size_t pop(std::span<protocol::RawBlock> out) ABBE_RT;
 
   [[nodiscard]] std::size_t capacity() const noexcept { return indices_.capacity(); }
-  /// Any thread; blocks since construction.
+  /// Any thread; blocks written since construction.
   [[nodiscard]] std::uint64_t pushed() const noexcept { return indices_.published(); }
-  /// Any thread; blocks since construction.
+  /// Any thread; blocks dropped since construction.
   [[nodiscard]] std::uint64_t dropped() const noexcept {
-    return dropped_.load(std::memory_order_relaxed);  // relaxed: a count for people, orders nothing
+    return dropped_.load(std::memory_order_relaxed);  // relaxed: a count for display only
   }
 
  private:
   RingIndices indices_;
   RingSlots<protocol::RawBlock> blocks_;
-  /// Writer only: blocks dropped since the last read that fitted. Apart from blocks_, which the
-  /// reader reads.
+  /// Writer only: blocks dropped since the last read that fitted. On a cache line apart from
+  /// blocks_, which the reader reads.
   alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };

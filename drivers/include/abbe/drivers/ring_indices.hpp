@@ -1,9 +1,9 @@
 #pragma once
-/// The two counters every ring of the house turns on: one writer, one reader, wait-free.
-/// [Lamport 1983], with each side keeping a private copy of the other's counter so that the shared
-/// cache line moves only when it must. Counters never wrap in practice (64 bit); slot = counter &
-/// mask. Writer-side functions belong to the one writer thread, reader-side functions to the one
-/// reader thread, `published()` to anyone.
+/// The two counters of a ring buffer with one writer and one reader, wait-free [Lamport 1983]. Each
+/// side keeps a private copy of the other side's counter, so that the shared cache line is read
+/// only when necessary. The counters have 64 bits and never overflow in practice; slot = counter &
+/// mask. Only the writer thread may call writer functions, only the reader thread reader functions;
+/// any thread may call `published()`.
 
 #include <algorithm>
 #include <atomic>
@@ -15,7 +15,8 @@
 
 namespace abbe::drivers {
 
-/// Two neighbouring 64-byte lines: x86 prefetches them in pairs, so half of that still shares.
+/// Alignment against false sharing: two cache lines of 64 bytes, because x86 prefetches them in
+/// pairs.
 inline constexpr std::size_t kNoSharing = 128;
 
 class RingIndices {
@@ -58,7 +59,7 @@ class RingIndices {
   [[nodiscard]] std::uint64_t read_counter() const ABBE_RT {
     return read_.load(std::memory_order_relaxed);
   }
-  /// Reader: gives `n` read slots back to the writer.
+  /// Reader: releases `n` slots that have been read, for the writer to fill again.
   void consume(std::size_t n) ABBE_RT {
     // release: pairs with the acquire in free_slots(); the slots are read before they may be
     // overwritten.
@@ -67,7 +68,7 @@ class RingIndices {
 
   /// Any thread: slots published since construction.
   [[nodiscard]] std::uint64_t published() const noexcept {
-    return written_.load(std::memory_order_relaxed);  // relaxed: a count for people, orders nothing
+    return written_.load(std::memory_order_relaxed);  // relaxed: a count for display only
   }
 
  private:

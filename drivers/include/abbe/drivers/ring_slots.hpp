@@ -1,7 +1,6 @@
 #pragma once
-/// The memory of a ring: `count` values, the first on a cache line of its own, all touched before
-/// use. Aligned because a sample of 64 bytes that lies across two lines halves what the ring
-/// carries.
+/// The memory of a ring buffer: `count` values, all touched before use. The memory is aligned to
+/// cache lines: a sample of 64 bytes that crosses two lines halves the throughput of the ring.
 
 #include <cstddef>
 #include <memory>
@@ -20,8 +19,8 @@ class RingSlots {
   /// Allocates.
   explicit RingSlots(std::size_t count)
       : values_(static_cast<T*>(::operator new (count * sizeof(T), std::align_val_t{kNoSharing}))) {
-    std::uninitialized_value_construct_n(values_.get(),
-                                         count);  // zeroes, and so touches, every byte
+    // Writes zero to every byte, and thereby touches every page.
+    std::uninitialized_value_construct_n(values_.get(), count);
   }
   [[nodiscard]] T& operator[](std::size_t slot) const noexcept { return values_.get()[slot]; }
 

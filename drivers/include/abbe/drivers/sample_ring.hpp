@@ -1,8 +1,8 @@
 #pragma once
-/// The border between the two worlds: decoded samples from the real-time side to the ordinary side.
-/// One writer, one reader, wait-free on both sides: boost::lockfree::spsc_queue behind the rule of
-/// the house. Full means: drop, count, and mark the next sample that fits with GapBefore and
-/// `lost_before`. All memory is taken and touched by the constructor.
+/// Ring of decoded samples from the real-time device thread to the hub. One writer, one reader,
+/// wait-free on both sides (boost::lockfree::spsc_queue). If the ring is full, a new sample is
+/// dropped and counted, and the next sample that fits carries GapBefore and `lost_before`. The
+/// constructor allocates and touches all memory.
 
 #include <algorithm>
 #include <atomic>
@@ -22,7 +22,7 @@ namespace abbe::drivers {
 
 template <class T>
 class SampleRing {
-  static_assert(std::is_trivially_copyable_v<T>, "a sample is copied as bytes across the border");
+  static_assert(std::is_trivially_copyable_v<T>, "a sample is copied as bytes between the threads");
 
  public:
   /// Capacity is rounded up to a power of two. Allocates.
@@ -33,7 +33,7 @@ class SampleRing {
     queue_.reset();
   }
 
-  /// Writer thread. False: full, the sample is dropped and counted.
+  /// Writer thread. False: the ring is full; the sample was dropped and counted.
   bool try_push(const T& sample) ABBE_RT {
     if (lost_ != 0) [[unlikely]]
       return push_marked(sample);
@@ -44,8 +44,9 @@ class SampleRing {
     return true;
   }
 
-  /// Writer thread. Pushes the first ones that fit, drops the rest; returns how many were pushed.
-  /// One publication for all: cheaper than try_push in a loop when a device delivers bursts.
+  /// Writer thread. Pushes the first samples that fit and drops the rest; returns the number
+  /// pushed. The counter is published once for all, which is cheaper than try_push() in a loop when
+  /// a device delivers bursts.
   std::size_t push(std::span<const T> samples) ABBE_RT {
     std::size_t n = 0;
     if (lost_ != 0 && !samples.empty()) [[unlikely]] {
@@ -66,16 +67,16 @@ class SampleRing {
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   /// Any thread.
   [[nodiscard]] std::uint64_t dropped() const noexcept {
-    return dropped_.load(std::memory_order_relaxed);  // relaxed: a count for people, orders nothing
+    return dropped_.load(std::memory_order_relaxed);  // relaxed: a count for display only
   }
 
  private:
-  /// The writer is the only one who stores: no read-modify-write.
+  /// Only the writer stores, so no atomic read-modify-write is needed.
   [[gnu::cold, gnu::noinline]] void drop(std::size_t n) ABBE_RT {
     lost_ += n;
     dropped_.store(dropped_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
   }
-  /// The first sample after a loss says so.
+  /// The first sample after a loss carries GapBefore and the number of lost samples.
   [[gnu::cold, gnu::noinline]] bool push_marked(T sample) ABBE_RT {
     const std::uint64_t lost = lost_ + sample.head.lost_before;
     sample.head.lost_before = static_cast<std::uint32_t>(
@@ -89,14 +90,14 @@ class SampleRing {
     return true;
   }
 
-  /// Aligned because a sample of 64 bytes that lies across two cache lines halves what the ring
-  /// carries.
+  /// Aligned to cache lines: a sample of 64 bytes that crosses two lines halves the throughput of
+  /// the ring.
   using Memory = boost::lockfree::allocator<boost::alignment::aligned_allocator<T, kNoSharing>>;
 
   std::size_t capacity_;
   boost::lockfree::spsc_queue<T, Memory> queue_;
-  /// Writer only: dropped since the last sample that fitted. Apart from the queue, which the reader
-  /// reads.
+  /// Writer only: samples dropped since the last one that fitted. On a cache line apart from the
+  /// queue, which the reader reads.
   alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };

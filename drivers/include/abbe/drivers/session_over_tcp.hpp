@@ -1,13 +1,15 @@
 #pragma once
-/// What every device does alike that is a session over one TCP connection: the actions of the
-/// sans-I/O session carried out, its ticks kept, bytes read for receive(), and what receive()
-/// understood told to the session in the next turn. One device thread.
+/// The part that is common to all devices with a session over one TCP connection. It carries out
+/// the actions of the sans-I/O session, sends it a tick at its deadline, reads bytes for receive(),
+/// and passes the messages decoded by receive() to the session in the next cycle. One device
+/// thread.
 ///
-/// `Words` names the session's vocabulary: Session, Input, Action, Open, Send, Close, Connected,
-/// ConnectionLost; Message, the variant that receive() posts; kInbox messages and kMostRead bytes
-/// of room for one turn. `Driver` derives from this and gives: std::span<const std::byte>
-/// encode(const Send&), valid until its next call and already recorded; void connected(), before
-/// the session hears of it; void disconnected(); RawRing& raw().
+/// `Words` declares the types of the session: Session, Input, Action, Open, Send, Close, Connected,
+/// ConnectionLost; Message, the variant that receive() posts; and the capacity of one cycle: kInbox
+/// messages and kMostRead bytes.
+/// `Driver` derives from this class and defines: std::span<const std::byte> encode(const Send&),
+/// which records the bytes and whose result is valid until its next call; void connected(), called
+/// before the session gets Connected; void disconnected(); RawRing& raw().
 
 #include <algorithm>
 #include <array>
@@ -26,13 +28,13 @@
 namespace abbe::drivers {
 
 struct TcpPeer {
-  std::string name;  ///< how messages name it: "tracker 10.0.0.7:700"
+  std::string name;  ///< its name in messages: "tracker 10.0.0.7:700"
   std::string host;
   std::uint16_t port = 0;
 };
 [[nodiscard]] TcpPeer tcp_peer(const std::string& device, const std::string& host,
                                std::uint16_t port);
-/// BadConfiguration.
+/// BadConfiguration: host or port is missing.
 [[nodiscard]] Result<void> check(const TcpPeer& peer);
 
 template <class Driver, class Words>
@@ -45,29 +47,33 @@ class SessionOverTcp {
       : peer_(std::move(peer)), time_(time), session_(std::move(session)) {}
   ~SessionOverTcp() = default;
 
-  /// What receive() understood, in order; the rest of it is void once the connection is closed.
-  void read_mail() {
+  /// Passes the messages posted by receive() to the session, in order. Once the connection is
+  /// closed, the remaining ones are discarded.
+  void handle_posted_messages() {
     for (std::size_t i = 0; i < inbox_count_; ++i) {
       board_.set_connected(tcp_.established());
-      std::visit([this](const auto& m) { tell(m); }, inbox_[i]);
+      std::visit([this](const auto& m) { handle(m); }, inbox_[i]);
     }
     inbox_count_ = 0;
     if (std::exchange(inbox_lost_, 0) != 0) {
-      board_.fault(time_.now(), peer_.name + ": more messages in one read than there is room for");
+      board_.fault(time_.now(), peer_.name +
+                                    ": one read contained more messages than the inbox "
+                                    "holds; the rest was discarded");
     }
   }
 
-  /// An action may fail at once, which is the next input.
-  void tell(const Input& input) {
+  /// Passes an input to the session and carries out the resulting action. If the action fails at
+  /// once, the failure is the next input.
+  void handle(const Input& input) {
     Input next = input;
     while (act(session_.on(next, time_.now()), next)) {
     }
   }
 
-  /// A time-out is judged only when nothing is left to read of what came before it: a thread that
-  /// was held up finds its deadlines passed and the answers in the socket. True: something was read
-  /// (or connected), which receive() takes first. A peer that sends without end is judged after
-  /// kMostLateReads.
+  /// A time-out is evaluated only after all bytes in the socket have been read: when the thread was
+  /// delayed, its deadline has passed although the answer is already in the socket. True: bytes
+  /// were read, or the connection was established; receive() must handle that first. For a peer
+  /// that sends continuously the time-out is evaluated after kMostLateReads reads.
   [[nodiscard]] bool reads_before_due() {
     const bool overdue = !tcp_.closed() && session_.deadline() <= time_.now();
     late_reads_ = overdue && late_reads_ < kMostLateReads && take_ready(std::chrono::nanoseconds{0})
@@ -76,7 +82,8 @@ class SessionOverTcp {
     return late_reads_ != 0;
   }
 
-  /// Waits, and reads what came into received().
+  /// Waits for bytes until the session's deadline, at most `at_most`, and reads them for
+  /// received().
   void poll(std::chrono::nanoseconds at_most) {
     const auto until_due = session_.deadline() - time_.now();
     static_cast<void>(
@@ -93,17 +100,17 @@ class SessionOverTcp {
     board_.fault(time_.now(), session_.fault().text);
   }
 
-  /// Says goodbye without waiting for an answer.
-  void leave(const Input& goodbye) {
-    tell(goodbye);
+  /// Passes the last input to the session, sends what it requests, and does not wait for an answer.
+  void leave(const Input& last) {
+    handle(last);
     tcp_.finish();
   }
 
-  /// Real time: the bytes of this turn, once.
+  /// Real time: the bytes read in this cycle; empty on a second call.
   [[nodiscard]] std::span<const std::byte> received() ABBE_RT {
     return std::span<const std::byte>{buffer_}.first(std::exchange(filled_, 0));
   }
-  /// Real time: for the session in the next turn.
+  /// Real time: stores a message for the session; it is handled in the next cycle.
   void post(const Message& message) ABBE_RT {
     if (inbox_count_ < Words::kInbox) {
       inbox_[inbox_count_++] = message;
@@ -111,7 +118,7 @@ class SessionOverTcp {
       ++inbox_lost_;
     }
   }
-  /// Real time: the message posted last in this turn, or none.
+  /// Real time: the message posted last in this cycle, or nullptr.
   [[nodiscard]] Message* last_posted() ABBE_RT {
     return inbox_count_ == 0 ? nullptr : &inbox_[inbox_count_ - 1];
   }
@@ -122,10 +129,10 @@ class SessionOverTcp {
   protocol::HostTime arrival_{};  ///< of received(), or of the connection
 
  private:
-  /// 8 MB: more than the kernel's default keeps for one connection.
+  /// 8 MB for kMostRead of 64 kB: more than the kernel buffers for one connection by default.
   static constexpr std::size_t kMostLateReads = 128;
 
-  /// False if nothing came in `wall`.
+  /// False if nothing happened on the connection within `wall`.
   [[nodiscard]] bool take_ready(std::chrono::nanoseconds wall) {
     const auto ready = tcp_.wait(wall);
     if (!ready) {
@@ -133,7 +140,7 @@ class SessionOverTcp {
     } else if (*ready == TcpClient::Ready::Established) {
       arrival_ = time_.now();
       driver().connected();
-      tell(typename Words::Connected{});
+      handle(typename Words::Connected{});
     } else if (*ready == TcpClient::Ready::Readable) {
       read();
     } else {
@@ -172,7 +179,7 @@ class SessionOverTcp {
     filled_ = *count;
   }
 
-  /// Not by us: nothing sent, into a connection that was there.
+  /// Records that the peer or the network ended an established connection: an empty block ToDevice.
   void record_loss() {
     if (tcp_.established())
       driver().raw().push_bytes(time_.now(), protocol::RawBlock::Direction::ToDevice, {});
@@ -181,7 +188,7 @@ class SessionOverTcp {
   void lose(const std::string& why) {
     record_loss();
     close();
-    tell(typename Words::ConnectionLost{why});
+    handle(typename Words::ConnectionLost{why});
   }
 
   void close() {
@@ -196,7 +203,7 @@ class SessionOverTcp {
   TcpClient tcp_;
   std::uint64_t faults_seen_ = 0;
   std::size_t filled_ = 0;
-  std::size_t late_reads_ = 0;  ///< in a row, after the deadline
+  std::size_t late_reads_ = 0;  ///< consecutive reads after the deadline
   std::array<std::byte, Words::kMostRead> buffer_{};
   std::array<Message, Words::kInbox> inbox_{};  ///< from receive() to the next wait(), same thread
   std::size_t inbox_count_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
-/// What a device knows of itself, written by its one thread (also in real time: no lock, no
-/// allocation), read by any. A member of every driver; `read()` is its Device::status().
+/// Status of a device, written by its device thread (also in real time: no lock, no allocation) and
+/// read by any thread. Every driver has one as a member; `read()` gives its Device::status().
 
 #include <array>
 #include <atomic>
@@ -16,12 +16,13 @@
 
 namespace abbe::drivers {
 
-/// A count with one writer: no read-modify-write, so it costs an ordinary increment.
+/// A counter with one writer. It needs no atomic read-modify-write, so it costs as much as an
+/// ordinary increment.
 class Counter {
  public:
   void add(std::uint64_t n = 1) ABBE_RT {
-    value_.store(value_.load(std::memory_order_relaxed) + n,
-                 std::memory_order_relaxed);  // a count orders nothing
+    // relaxed: the count orders no other access
+    value_.store(value_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
   }
   [[nodiscard]] std::uint64_t value() const noexcept {
     return value_.load(std::memory_order_relaxed);
@@ -31,10 +32,10 @@ class Counter {
   std::atomic<std::uint64_t> value_{0};
 };
 
-/// The latest text, cut at kCapacity, replaced without locks. There is room for two: while one is
-/// written the other can be read, so that a reader of high priority never waits for a writer that
-/// was preempted. A reader tries again only if two texts were begun while it read. The writer never
-/// waits. [Boehm 2012] for the fences of a seqlock.
+/// The latest text, truncated to kCapacity, replaced without locks. There are two buffers: one can
+/// be read while the other is written, so that a reader of high priority never waits for a
+/// preempted writer. A reader reads again only if the writer began two texts meanwhile. The writer
+/// never waits. Memory fences as in the seqlock of [Boehm 2012].
 class FaultText {
  public:
   static constexpr std::size_t kCapacity = 248;  ///< as much as a Health message carries
@@ -56,7 +57,7 @@ class FaultText {
     std::atomic<std::int64_t> at_ns{0};
     std::array<std::atomic<std::uint64_t>, kWords> words{};
   };
-  std::array<Text, 2> texts_;            ///< the n-th text lies in texts_[n % 2]
+  std::array<Text, 2> texts_;            ///< the n-th text is in texts_[n % 2]
   std::atomic<std::uint64_t> begun_{0};  ///< texts whose writing has begun
   std::atomic<std::uint64_t> complete_{0};
 };
@@ -65,36 +66,37 @@ class StatusBoard {
  public:
   Counter samples, gaps, faults, time_widened;
 
-  /// `literal` must live for ever: a string literal of the driver.
+  /// `literal` must be a string literal: only the pointer is stored.
   void set_state(const char* literal) ABBE_RT {
     state_.store(literal, std::memory_order_release);  // release: pairs with the acquire in read()
   }
-  /// What keeps the device from measuring though it is no fault ("no beam"): the text alone, not
-  /// counted.
+  /// Sets the text of last_fault without counting a fault. For a condition that prevents measuring
+  /// but is not a fault ("no beam").
   void note(protocol::HostTime at, std::string_view text) ABBE_RT { fault_text_.set(at, text); }
   void set_connected(bool yes) ABBE_RT { connected_.store(yes, std::memory_order_relaxed); }
   void set_last_sample(protocol::HostTime t) ABBE_RT {
     last_sample_ns_.store(t.time_since_epoch().count(), std::memory_order_relaxed);
   }
   void set_clock(const ClockStatus& clock) ABBE_RT;
-  /// Counts the fault and keeps its text. For the rare: text is composed by the caller, without
-  /// allocating if in RT.
+  /// Counts a fault and stores its text. For rare events. The caller composes the text; in real
+  /// time it must not allocate for that.
   void fault(protocol::HostTime at, std::string_view text) ABBE_RT {
     faults.add();
     fault_text_.set(at, text);
   }
 
-  /// What is wrong from now on; empty: nothing.
+  /// Sets what is wrong from now on; empty: nothing is wrong.
   void set_condition(protocol::HostTime now, std::string_view text) ABBE_RT {
     condition_.set(now, text);
   }
 
-  /// Any thread; allocates. The rings' own counts are handed in, so that they are kept once.
+  /// Any thread; allocates. The rings keep the counts of dropped samples and blocks; the caller
+  /// passes them in.
   [[nodiscard]] DeviceStatus read(std::string name, std::uint64_t dropped,
                                   std::uint64_t raw_dropped) const;
 
  private:
-  // Each is an independent figure for people: relaxed, nothing is ordered by them.
+  // relaxed: independent values for display, they order no other access.
   std::atomic<const char*> state_{"idle"};
   std::atomic<bool> connected_{false};
   std::atomic<std::int64_t> last_sample_ns_{0};

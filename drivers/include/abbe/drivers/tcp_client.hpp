@@ -1,7 +1,7 @@
 #pragma once
-/// A TCP connection that never blocks but in wait(): opened, read and written by one thread, in the
-/// ordinary world. Errors are sentences without the peer's name; the driver knows it. TCP_NODELAY:
-/// commands are small and due at once.
+/// A TCP connection that blocks only in wait() and for name resolution in open(). One thread opens,
+/// reads and writes it; not real-time. Error texts do not contain the peer's name; the driver adds
+/// it. TCP_NODELAY is set: commands are small and must be sent at once.
 
 #include <chrono>
 #include <cstddef>
@@ -21,8 +21,9 @@ class TcpClient {
   TcpClient& operator=(const TcpClient&) = delete;
   ~TcpClient() { close(); }
 
-  /// Begins to connect; wait() says when it is done. A name is resolved here and may take its time;
-  /// of several addresses the next call tries the next. Unreachable, SystemRefused.
+  /// Begins to connect; wait() returns Established when the connection exists. Resolves the host
+  /// name, which may block. If the name has several addresses, each call tries the next one.
+  /// Unreachable, SystemRefused.
   [[nodiscard]] Result<void> open(const std::string& host, std::uint16_t port);
   void close() noexcept;
 
@@ -30,15 +31,16 @@ class TcpClient {
   [[nodiscard]] bool established() const noexcept { return fd_ >= 0 && !opening_; }
 
   enum class Ready { Nothing, Established, Readable };
-  /// Waits for at most `wall` of the operating system's time, also when closed; sends on what is
-  /// still unsent. Unreachable: refused, no route, reset.
+  /// Waits for at most `wall` of the operating system's time, also when closed. Sends bytes that
+  /// write() could not send. Unreachable: refused, no route, reset.
   [[nodiscard]] Result<Ready> wait(std::chrono::nanoseconds wall);
 
-  /// Bytes read, 0 if there are none yet. Unreachable: closed by the peer, reset.
+  /// Number of bytes read, 0 if there are none yet. Unreachable: closed by the peer, reset.
   [[nodiscard]] Result<std::size_t> read(std::span<std::byte> into);
-  /// What does not fit into the socket now follows in wait().
+  /// Bytes that do not fit into the socket's buffer now are sent by later calls of wait().
   [[nodiscard]] Result<void> write(std::span<const std::byte> bytes);
-  /// Says goodbye: no more writing; what the peer still says is thrown away. Then close().
+  /// Ends the connection in an orderly way: shuts down writing and discards incoming bytes. Call
+  /// close() afterwards.
   void finish() noexcept;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
-/// Where drivers get their time: nothing reads a clock directly. Host time is speed x
-/// CLOCK_MONOTONIC, so that processes that were given the same `speed` share it without sharing an
-/// origin. Thread-safe, every function.
+/// The clock of the drivers: a driver never reads a system clock directly. Host time is speed x
+/// CLOCK_MONOTONIC. Processes with the same `speed` therefore have the same host time without
+/// exchanging an origin. All functions are thread-safe.
 
 #include <atomic>
 #include <chrono>
@@ -18,7 +18,7 @@ class TimeSource {
   virtual ~TimeSource() = default;
 
   [[nodiscard]] virtual protocol::HostTime now() const noexcept = 0;
-  /// How long to let the operating system wait (poll, nanosleep) for `host` to pass.
+  /// The time to pass to the operating system (poll, nanosleep) in order to wait for `host`.
   [[nodiscard]] virtual std::chrono::nanoseconds wall(
       std::chrono::nanoseconds host) const noexcept = 0;
   /// Host duration that passes in `wall` of the operating system's time.
@@ -41,9 +41,9 @@ class MonotonicTime final : public TimeSource {
   double speed_;
 };
 
-/// Moves only when told to. The operating system's time is nothing to it: host() is zero, and
-/// wall() is `poll_wait`, zero unless the peer runs in another thread and must be given the
-/// processor.
+/// Advances only by advance(), independently of the operating system's time: host() is zero, and
+/// wall() is `poll_wait`. `poll_wait` is zero unless the peer runs in another thread and needs
+/// processor time.
 class SteppedTime final : public TimeSource {
  public:
   explicit SteppedTime(protocol::HostTime start = protocol::HostTime{std::chrono::hours{1}},
@@ -61,8 +61,8 @@ class SteppedTime final : public TimeSource {
   }
 
   void advance(std::chrono::nanoseconds by) noexcept {
-    now_ns_.fetch_add(by.count(),
-                      std::memory_order_acq_rel);  // acq_rel: pairs with the acquire in now()
+    // acq_rel: pairs with the acquire in now()
+    now_ns_.fetch_add(by.count(), std::memory_order_acq_rel);
   }
 
  private:

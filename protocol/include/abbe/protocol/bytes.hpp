@@ -1,8 +1,8 @@
 #pragma once
-/// Bounds-checked cursors over bytes: what every wire format here reads and writes with. Total and
-/// sticky: past the end a reader gives zeros and a writer writes nothing, and ok() stays false, so
-/// that a decoder may read all its fields and ask once. No alignment needed. Not thread-safe;
-/// allocation-free, usable on the real-time path.
+/// Bounds-checked reader and writer of bytes, used by all wire formats of this module. Past the end
+/// a reader returns zeros and a writer writes nothing, and ok() stays false. So a decoder may read
+/// all its fields and check ok() once. No alignment needed. Not thread-safe; allocation-free,
+/// usable on the real-time path.
 
 #include <algorithm>
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace abbe::protocol {
 
-/// What has one fixed width on a wire. bool has not: say how wide it is there.
+/// Types with a fixed width on the wire. bool has none: use an integer type of the right width.
 template <class T>
 concept WireScalar =
     (std::integral<T> && !std::same_as<T, bool>) || std::floating_point<T> || std::is_enum_v<T>;
@@ -26,8 +26,8 @@ concept WireScalar =
 namespace detail {
 template <WireScalar T, std::endian kOrder>
 [[nodiscard]] T load(const std::byte* from) ABBE_RT {
-  std::array<std::byte, sizeof(T)>
-      raw;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled on the next line
+  // Not initialised: memcpy() fills it.
+  std::array<std::byte, sizeof(T)> raw;  // NOLINT(cppcoreguidelines-pro-type-member-init)
   std::memcpy(raw.data(), from, sizeof(T));
   if constexpr (kOrder != std::endian::native) std::reverse(raw.begin(), raw.end());
   return std::bit_cast<T>(raw);
@@ -103,7 +103,7 @@ class ByteWriter {
     if (claim(count) && count != 0) std::memset(end() - count, 0, count);
   }
 
-  /// False once anything did not fit; what did fit before is written.
+  /// False once a value did not fit. The values before it are written.
   [[nodiscard]] bool ok() const ABBE_RT { return ok_; }
   [[nodiscard]] std::size_t size() const ABBE_RT { return position_; }
   [[nodiscard]] std::span<const std::byte> written() const ABBE_RT {

@@ -1,7 +1,7 @@
 #pragma once
-/// Marks a function of the real-time path (bytes in our buffer -> sample in the ring): no
-/// allocation, lock, system call, log, exception or unbounded loop. Proven for every driver by the
-/// tests labelled `rt`.
+/// Marks a function of the real-time path (from the bytes in the driver's buffer to the sample in
+/// the ring). It must not allocate, lock, make a system call, log, throw or loop without bound. The
+/// tests labelled `rt` verify this for every driver.
 
 #if defined(__has_cpp_attribute) && defined(__clang__)
 #if __has_cpp_attribute(clang::nonblocking)

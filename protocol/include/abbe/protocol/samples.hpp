@@ -1,7 +1,7 @@
 #pragma once
-/// The plain vocabulary: what devices say, once decoded. SI (m, rad, s, K, Pa); trivially copyable,
-/// fixed size, so that a sample can live in a ring. `time` is the host time of the instant the
-/// sample describes, never of its arrival. Pure data; safe to copy between threads.
+/// Decoded data of all devices. SI units (m, rad, s, K, Pa). Trivially copyable and of fixed size,
+/// so that a sample can be stored in a ring. `time` is the host time of the measurement, not of the
+/// arrival of the data. Pure data; safe to copy between threads.
 
 #include <array>
 #include <cstddef>
@@ -20,15 +20,15 @@ inline constexpr std::size_t kMaxTemperatures = 8;
 enum class SampleFlag : std::uint32_t {
   None = 0,
   GapBefore = 1u << 0,       ///< samples were lost before this one: see `lost_before`
-  TimeWidened = 1u << 1,     ///< a kernel stamp it depends on was unusable, u_time was widened
+  TimeWidened = 1u << 1,     ///< the kernel time stamp was unusable; u_time is larger
   ClockUnsettled = 1u << 2,  ///< the device clock model has not converged yet
-  AxisMissing = 1u << 3,     ///< at least one axis is not known in this cycle: see `missing_mask`
+  AxisMissing = 1u << 3,     ///< at least one axis has no value in this cycle: see `missing_mask`
   BusError = 1u << 4,        ///< the bus reported errors since the previous sample
   BusOff = 1u << 5,          ///< the CAN controller is bus-off: positions are the last known ones
   DeviceError = 1u << 6,     ///< the device itself reports an error (EMCY, alarm, bad status)
-  SpeedWarning = 1u << 7,    ///< tracker: target nearly too fast
-  SpeedExceeded = 1u << 8,   ///< tracker: target too fast, the point is not to be used
-  /// tracker: prism error or trigger violation, the point is not to be used
+  SpeedWarning = 1u << 7,    ///< tracker: the target speed is close to its limit
+  SpeedExceeded = 1u << 8,   ///< tracker: target too fast; do not use the point
+  /// tracker: prism error or trigger violation; do not use the point
   PointInvalid = 1u << 9,
   BeamReturned = 1u << 10,  ///< first point after the beam was lost
   Restarted = 1u << 11,     ///< first sample after a reconnection or a restart of the device
@@ -48,7 +48,8 @@ constexpr SampleFlags& operator|=(SampleFlags& a, SampleFlag b) noexcept {
   return (flags & static_cast<SampleFlags>(f)) != 0;
 }
 
-/// What every sample in a ring begins with. `u_time` is a standard uncertainty (k = 1) of `time`.
+/// Common first member of all samples in a ring. `u_time` is the standard uncertainty (k = 1) of
+/// `time`.
 struct SampleHead {
   HostTime time{};
   std::chrono::nanoseconds u_time{};
@@ -70,25 +71,25 @@ struct AxisSample {
   SampleHead head;
   std::uint32_t cycle = 0;  ///< SYNC or scan number since start, wraps
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;               ///< bit i: axis i did not answer, or not believably
+  std::uint8_t missing_mask = 0;               ///< bit i: axis i gave no valid answer
   std::array<std::int64_t, kMaxAxes> count{};  ///< raw device counts
   std::array<double, kMaxAxes> position{};     ///< scale reading, m (linear) or rad (rotary)
 };
 
-/// How the instant of a touch was learned.
+/// How the instant of a touch was determined.
 enum class TouchLatch : std::uint8_t {
-  Clock = 0,     ///< a counter of the card was latched by the edge
-  Scan = 1,      ///< only known to lie between two scans
+  Clock = 0,     ///< the edge latched a counter of the card
+  Scan = 1,      ///< between two scans, not known more precisely
   Reported = 2,  ///< the measuring machine latched and reports the position
 };
 
-/// What is to be known about one touch; a bit set. None: a touch as it should be.
+/// Quality of a touch; a bit set. None: a valid touch without restrictions.
 enum class TouchFlag : std::uint32_t {
   None = 0,
-  Chattered = 1u << 0,     ///< more edges followed within the chatter limit; the first one counts
-  SpeedTooLow = 1u << 1,   ///< approach slower than the probe was qualified for
-  SpeedTooHigh = 1u << 2,  ///< approach faster than that
-  /// the approach was speeding up or slowing down: pre-travel is not as qualified
+  Chattered = 1u << 0,     ///< more edges followed within the chatter limit; the first one is used
+  SpeedTooLow = 1u << 1,   ///< approach speed below the qualified range of the probe
+  SpeedTooHigh = 1u << 2,  ///< approach speed above the qualified range of the probe
+  /// the approach speed was not constant: the pre-travel may differ from the qualified one
   SpeedUnsteady = 1u << 3,
   LatchRefused = 1u << 4,  ///< the latched clock contradicts the scans; the scans were used
   NoPosition = 1u << 5,    ///< scans around the touch were lost: there is no position
@@ -109,27 +110,26 @@ constexpr TouchFlags& operator|=(TouchFlags& a, TouchFlag b) noexcept {
   return (flags & static_cast<TouchFlags>(f)) != 0;
 }
 
-/// One touch of a probe. `head.time` is the instant of contact: that of the first edge less the
-/// probe's delay. The position is that of the scales, not of the stylus tip; with `axis_count` 0
-/// whoever has axis samples finds it at `head.time`.
+/// One touch of a probe. `head.time` is the instant of contact: the instant of the first edge minus
+/// the probe's delay. The position is the scale reading, not the position of the stylus tip. If
+/// `axis_count` is 0, the receiver of the touch must interpolate axis samples at `head.time`.
 struct ProbeTrigger {
   SampleHead head;
   std::uint32_t touch = 0;  ///< number of the touch since start
-  std::uint32_t probe = 0;  ///< which probe: its delay and qualification go by this
+  std::uint32_t probe = 0;  ///< probe number: selects delay and qualification
   TouchLatch latch = TouchLatch::Clock;
   TouchFlags touch_flags = 0;
   std::int64_t edge_clock_count = 0;  ///< the card's time base at the first edge; Reported: 0
   std::uint8_t axis_count = 0;
-  std::uint8_t missing_mask = 0;              ///< bit i: axis i is not known
-  double speed_m_s = 0.0;                     ///< of the approach, over the linear axes
-  std::array<double, kMaxAxes> position{};    ///< at contact, m or rad
-  std::array<double, kMaxAxes> velocity{};    ///< of the approach, m/s or rad/s
-  std::array<double, kMaxAxes> u_position{};  ///< standard uncertainty
-  std::array<double, kMaxAxes>
-      U95_position{};  ///< half-width of the 95 % interval; not 2 u for Scan
+  std::uint8_t missing_mask = 0;                ///< bit i: axis i is not known
+  double speed_m_s = 0.0;                       ///< approach speed of the linear axes
+  std::array<double, kMaxAxes> position{};      ///< at contact, m or rad
+  std::array<double, kMaxAxes> velocity{};      ///< of the approach, m/s or rad/s
+  std::array<double, kMaxAxes> u_position{};    ///< standard uncertainty
+  std::array<double, kMaxAxes> U95_position{};  ///< half 95 % interval; for Scan not 2 u
 };
 
-/// One scan out of the window around a touch, at the full rate of the card.
+/// One scan of the window around a touch, at the full rate of the card.
 struct TouchScan {
   SampleHead head;
   std::uint32_t touch = 0;  ///< ProbeTrigger::touch
@@ -142,8 +142,8 @@ struct TouchScan {
   std::array<double, kMaxAxes> position{};  ///< m or rad
 };
 
-/// What an EnvironmentSample measures: a bit set. A NaN whose bit is set is measured here but not
-/// available now. A number whose bit is not set is assumed: the device was set to it.
+/// Quantities that a device measures; a bit set. Bit set and NaN: measured, but not available now.
+/// Bit not set and a number: an assumed value that was set in the device.
 using EnvironmentMask = std::uint16_t;
 inline constexpr EnvironmentMask kAirTemperature = 1u << 0;
 inline constexpr EnvironmentMask kAirPressure = 1u << 1;
@@ -159,9 +159,8 @@ inline constexpr auto kNoTemperatures = [] {
   return none;
 }();
 
-/// What it is like where the measurement happens: the air, and named temperatures (scales, parts)
-/// by channel; the configuration says which channel is what. NaN where the device does not measure
-/// a quantity.
+/// Environment of the measurement: air, and temperatures (scales, parts) by channel. The
+/// configuration assigns the channels. NaN if the device does not measure a quantity.
 struct EnvironmentSample {
   SampleHead head;
   double air_temperature_K = 0.0;
@@ -171,7 +170,8 @@ struct EnvironmentSample {
   std::array<double, kMaxTemperatures> temperature_K = kNoTemperatures;
 };
 
-/// The machine at one instant: axes interpolated to `head.time`, and what was measured there.
+/// The machine at one instant: axes interpolated to `head.time`, and the measurements at that
+/// instant.
 struct Snapshot {
   SampleHead head;
   std::uint8_t axis_count = 0;
@@ -183,27 +183,26 @@ struct Snapshot {
   bool has_environment = false;
   std::array<double, kMaxAxes> position{};  ///< m or rad
   std::array<double, kMaxAxes> velocity{};  ///< m/s or rad/s
-  std::array<double, kMaxAxes>
-      u_position{};  ///< standard uncertainty of the interpolation to head.time, m or rad
+  /// Standard uncertainty of the interpolation to head.time, m or rad.
+  std::array<double, kMaxAxes> u_position{};
   TrackerPoint tracker_point;
   ProbeTrigger trigger;
   EnvironmentSample environment;
 };
 
-/// Bytes exactly as they crossed the boundary of a device, cut into blocks of fixed size. A message
-/// longer than one block goes on in the next ones, each but the last with `continued` set.
+/// Bytes exactly as sent to or received from a device, in blocks of fixed size. A message longer
+/// than one block continues in the next blocks; all but the last have `continued` set.
 struct RawBlock {
   static constexpr std::size_t kCapacity = 2048;
   enum class Direction : std::uint8_t { FromDevice = 0, ToDevice = 1 };
 
-  HostTime time{};  ///< arrival (FromDevice) or departure (ToDevice)
+  HostTime time{};  ///< of arrival (FromDevice) or sending (ToDevice)
   /// blocks dropped between the previous one in the ring and this one
   std::uint32_t lost_before = 0;
   std::uint16_t length = 0;
   bool continued = false;  ///< the next block belongs to the same read
   Direction direction = Direction::FromDevice;
-  std::array<std::byte, kCapacity>
-      bytes;  // NOLINT: left uninitialised on purpose, `length` says what counts
+  std::array<std::byte, kCapacity> bytes;  // NOLINT: not initialised; the first `length` are valid
 };
 
 static_assert(std::is_trivially_copyable_v<TrackerPoint>);

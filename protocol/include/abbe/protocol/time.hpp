@@ -1,7 +1,7 @@
 #pragma once
-/// The clocks of the house, as types: subtracting instants of two clocks does not compile, only a
-/// ClockModel converts. None has a now(): reading a clock is for drivers and daemon; everything
-/// here is handed its time.
+/// The clocks of the project, as types. Subtracting instants of two different clocks does not
+/// compile; only a ClockModel converts between them. No clock has a now(): drivers and daemon read
+/// the system clocks, and the functions of this module get every time as an argument.
 
 #include <chrono>
 #include <cstdint>
@@ -19,8 +19,8 @@ struct HostClock {
 };
 using HostTime = HostClock::time_point;
 
-/// A device's own free-running clock of arbitrary epoch (tracker seconds and microseconds, encoder
-/// ticks).
+/// A device's own free-running clock with arbitrary epoch (tracker seconds and microseconds,
+/// encoder ticks).
 struct DeviceClock {
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;
@@ -30,11 +30,11 @@ struct DeviceClock {
 };
 using DeviceTime = DeviceClock::time_point;
 
-/// Wall-clock time; appears only in the one constant that maps HostTime to UTC for people and file
-/// dates.
+/// Wall-clock time. Used only in UtcOffset, for display and file dates.
 using UtcTime = std::chrono::sys_time<std::chrono::nanoseconds>;
 
-/// UTC = host + offset. Taken once at start, recorded and published, never baked into samples.
+/// UTC = host + offset. Determined once at start, recorded and published. Samples contain host time
+/// only.
 struct UtcOffset {
   std::chrono::nanoseconds value{};
   [[nodiscard]] constexpr UtcTime to_utc(HostTime t) const noexcept {

@@ -1,7 +1,7 @@
 #pragma once
-/// std::visit for variants of trivially copyable alternatives. These are never valueless, so
-/// nothing can be thrown, and neither the object file nor a checker has to take that on trust.
-/// Usable on the real-time path if the visitor is.
+/// Replacement of std::visit for variants of trivially copyable alternatives. Such variants are
+/// never valueless, so no exception is possible, and the object code contains no throw. Usable on
+/// the real-time path if the visitor is.
 
 #include <cstddef>
 #include <type_traits>
@@ -12,7 +12,7 @@
 
 namespace abbe::protocol {
 
-/// Calls visitor(alternative); all alternatives must give the same type.
+/// Calls visitor(alternative). The visitor must return the same type for all alternatives.
 template <std::size_t kFrom = 0, class Visitor, class... Alternatives>
 constexpr auto visit_trivial(const Visitor& visitor,
                              const std::variant<Alternatives...>& variant) ABBE_RT {

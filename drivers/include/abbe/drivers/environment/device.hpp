@@ -1,10 +1,12 @@
 #pragma once
-/// A Modbus device that measures the environment, as a Device: EnvironmentReceiver around one
-/// ModbusLine. wait(): opens, asks one question, blocks for its answer. receive(): bytes to samples
-/// and raw blocks. Whatever goes wrong ends the connection (one that others use as well, see
-/// EnvironmentLine, when none of them has answered meanwhile); the device then begins with the
-/// proving registers, so that one that was exchanged is found. States: "closed", "proving",
-/// "reading", "refused" (wrong device or map: tried again every `refused_retry`).
+/// A Modbus device that measures the environment, as a Device: EnvironmentReceiver and one
+/// ModbusLine. wait() opens the connection, sends one request and blocks for its answer. receive()
+/// converts bytes to samples and raw blocks.
+/// Every fault closes the connection. A connection shared with other devices (see EnvironmentLine)
+/// is closed only if none of them has answered meanwhile. After a fault the device reads the
+/// proving registers again, so that an exchanged device is detected.
+/// States: "closed", "proving", "reading", "refused" (wrong device or map; retried every
+/// `refused_retry`).
 
 #include <array>
 #include <cstddef>
@@ -27,7 +29,7 @@ struct EnvironmentDeviceOptions {
   std::string name = "environment";
   ModbusAddress address;
   RegisterMap map;
-  std::chrono::nanoseconds period = std::chrono::seconds{1};  ///< of the rounds, on a grid
+  std::chrono::nanoseconds period = std::chrono::seconds{1};  ///< between starts of rounds
   std::chrono::nanoseconds answer_timeout = std::chrono::milliseconds{500};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{1};  ///< wall time
   std::chrono::nanoseconds retry = std::chrono::milliseconds{250};     ///< after a fault
@@ -38,32 +40,32 @@ struct EnvironmentDeviceOptions {
 
 class EnvironmentDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(RegisterMap), or without host or
-  /// path. The line is opened by the first wait().
+  /// `time` must outlive the device. BadConfiguration as check(RegisterMap), for a missing host or
+  /// path, or for a period not above 0. The first wait() opens the line.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time);
-  /// Over a connection that others use as well; it must outlive the device.
+  /// As above, over a connection shared with other devices; `link` must outlive the device.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link);
 
-  /// Device thread: an answer is under way, or there and not looked at.
+  /// Device thread: an answer is outstanding, or has arrived and is not yet handled.
   [[nodiscard]] bool busy() const noexcept;
-  /// Device thread: has begun on the connection as it is now.
+  /// Device thread: the line is open, and this device has begun reading on the current connection.
   [[nodiscard]] bool on_line() const noexcept {
     return link_.line.is_open() && opening_ == link_.openings;
   }
-  /// Device thread: the connection has gone, and not by us.
+  /// Device thread: handles a connection that was lost; `what` is the reason.
   void lose(std::string_view what);
-  /// Device thread: somebody else found that the connection has gone, and reports it.
+  /// Device thread: another device of the line closed the connection and reports the fault.
   void line_closed() noexcept;
-  /// Device thread: when it next asks or opens.
+  /// Device thread: when this device next sends a request or opens the line.
   [[nodiscard]] protocol::HostTime due() const noexcept;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// One reader each.
+  /// One reader thread for each ring.
   [[nodiscard]] SampleRing<protocol::EnvironmentSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
 
@@ -73,15 +75,15 @@ class EnvironmentDevice final : public Device {
   EnvironmentDevice(const EnvironmentDeviceOptions& options, const TimeSource& time,
                     EnvironmentLink& link);
 
-  void heed_progress(protocol::HostTime now);
+  void handle_progress(protocol::HostTime now);
   [[nodiscard]] bool ensure_open(std::chrono::nanoseconds at_most);
-  void ask();
-  void listen(std::chrono::nanoseconds at_most);
+  void send_request();
+  void read_answer(std::chrono::nanoseconds at_most);
   void plan_next_round(protocol::HostTime now);
   [[nodiscard]] bool open_line();
   [[nodiscard]] bool others_answered() noexcept;
   void leave_line(std::chrono::nanoseconds retry, std::chrono::nanoseconds quiet);
-  /// `quiet`: how long an answer to what was asked may still come.
+  /// `quiet`: how long a late answer to the last request may still arrive.
   void fail(std::string_view what, std::chrono::nanoseconds retry, const char* state = "closed",
             std::chrono::nanoseconds quiet = std::chrono::milliseconds{50});
 
@@ -91,11 +93,11 @@ class EnvironmentDevice final : public Device {
   RawRing raw_;
   StatusBoard board_;
   EnvironmentReceiver receiver_;
-  std::unique_ptr<EnvironmentLink> own_link_;  ///< empty: shared
+  std::unique_ptr<EnvironmentLink> own_link_;  ///< null if the link is shared
   EnvironmentLink& link_;
-  std::uint64_t opening_ = 0;  ///< of the link; 0: not begun on it
+  std::uint64_t opening_ = 0;  ///< link_.openings when this device began on it; 0: not begun
   std::uint64_t answers_ = 0;
-  std::uint64_t others_at_fault_ = 0;  ///< answers of the others at the latest fault
+  std::uint64_t others_at_fault_ = 0;  ///< answers of the other devices until the latest fault
 
   protocol::HostTime open_at_{};
   protocol::HostTime next_round_{};

@@ -1,9 +1,10 @@
 #pragma once
-/// The Modbus devices of one serial line, or behind one gateway, as one Device with one thread:
-/// requests go out one after the other over one connection, the device that has waited longest
-/// first. Each has its own rounds, time-outs, faults and status. A device that does not answer
-/// costs the others its answer_timeout, and as long again for an answer that comes too late, once
-/// in its period; the connection is closed only when no other device has answered on it meanwhile.
+/// The Modbus devices of one serial line, or behind one gateway, as one Device with one thread.
+/// Requests are sent one at a time over one connection; the device that has waited longest is next.
+/// Each device has its own rounds, time-outs, faults and status.
+/// A device that does not answer delays the others once per period, by its answer_timeout and by
+/// the same time again in which a late answer is discarded. The connection is closed only if no
+/// other device has answered on it meanwhile.
 
 #include <memory>
 #include <vector>
@@ -15,14 +16,14 @@ namespace abbe::drivers {
 
 class EnvironmentLine final : public Device {
  public:
-  /// `time` must outlive the line. BadConfiguration as EnvironmentDevice::create(), for no device,
-  /// and for devices that are not on one line with the same settings.
+  /// `time` must outlive the line. BadConfiguration as EnvironmentDevice::create(), if `options` is
+  /// empty, and if the devices have different addresses or line settings.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentLine>> create(
       const std::vector<EnvironmentDeviceOptions>& options, const TimeSource& time);
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
-  /// Of the first device; each has its own.
+  /// Status of the first device. For the others use device(i).status().
   [[nodiscard]] DeviceStatus status() const override { return devices_.front()->status(); }
 
   /// In the order of the options.
@@ -34,14 +35,14 @@ class EnvironmentLine final : public Device {
 
   [[nodiscard]] EnvironmentDevice& next();
   [[nodiscard]] bool must_be_quiet();
-  void throw_away(EnvironmentDevice& device, std::chrono::nanoseconds at_most);
+  void discard_late_answer(EnvironmentDevice& device, std::chrono::nanoseconds at_most);
 
   std::chrono::nanoseconds silence_;
   const TimeSource& time_;
   EnvironmentLink link_;
   std::vector<std::unique_ptr<EnvironmentDevice>> devices_;
-  EnvironmentDevice* active_ = nullptr;  ///< from wait() to the next one, same thread
-  std::size_t last_ = 0;                 ///< index of the device that was chosen last
+  EnvironmentDevice* active_ = nullptr;  ///< device of the latest wait(), for receive()
+  std::size_t last_ = 0;                 ///< index of the device chosen last
   std::uint64_t answers_seen_ = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The connection that the Modbus devices of one serial line, or behind one gateway, have in
-/// common: one request at a time. Device thread, ordinary world.
+/// The connection shared by the Modbus devices of one serial line or behind one gateway: one
+/// request at a time. Device thread, not real-time.
 
 #include <chrono>
 #include <cstdint>
@@ -12,18 +12,18 @@ namespace abbe::drivers {
 
 struct EnvironmentLink {
   ModbusLine line;
-  std::uint64_t openings = 0;    ///< a device that knows an earlier number begins anew
-  std::uint64_t answers = 0;     ///< of all devices
-  protocol::HostTime open_at{};  ///< not opened again before
-  protocol::HostTime
-      quiet_until{};  ///< what comes until then is an answer that is too late: thrown away
+  std::uint64_t openings = 0;        ///< a device that stored another number restarts
+  std::uint64_t answers = 0;         ///< of all devices
+  protocol::HostTime open_at{};      ///< earliest time to open the line again
+  protocol::HostTime quiet_until{};  ///< bytes until then are a late answer and are discarded
 };
 
-/// One serial device (by any of its names) or one host and port.
+/// True for the same serial device (under any of its paths), or the same host and port.
 [[nodiscard]] bool same_line(const ModbusAddress& a, const ModbusAddress& b);
-/// Baud rate, parity and stop bits; TCP has none.
+/// True for the same baud rate, parity and stop bits; always true for two TCP addresses.
 [[nodiscard]] bool same_settings(const ModbusAddress& a, const ModbusAddress& b);
-/// 3.5 characters between two telegrams [Modbus over Serial Line V1.02, 2.5.1.1]; 0 over TCP.
+/// Silent interval between two telegrams: 3.5 characters [Modbus over Serial Line V1.02, 2.5.1.1];
+/// 0 over TCP.
 [[nodiscard]] std::chrono::nanoseconds silence_between(const ModbusAddress& address);
 
 }  // namespace abbe::drivers

@@ -1,7 +1,7 @@
 #pragma once
-/// One Modbus connection, over TCP or a serial line: libmodbus opens, sets up and sends. Reading is
-/// done here, because libmodbus blocks in the middle of an answer and hides the bytes that it
-/// refuses, and a recording must hold them. Ordinary world. One thread.
+/// One Modbus connection, over TCP or a serial line. libmodbus opens and configures the connection
+/// and sends. Reading is implemented here, because libmodbus blocks in the middle of an answer and
+/// does not return rejected bytes, which a recording must contain. Not real-time. One thread.
 
 #include <chrono>
 #include <cstddef>
@@ -22,14 +22,13 @@ namespace abbe::drivers {
 namespace modbus = protocol::modbus;
 
 struct ModbusTcp {
-  std::string
-      host;  ///< a name is looked up at every opening, which may take as long as the name server
+  std::string host;  ///< address or name; a name is resolved at every opening, which may block
   std::uint16_t port = modbus::kTcpPort;
 };
 
 enum class Parity : char { None = 'N', Even = 'E', Odd = 'O' };
 
-/// A path that survives re-plugging is best: /dev/serial/by-id/...
+/// Use a path that does not change when the adapter is plugged in again: /dev/serial/by-id/...
 struct ModbusSerial {
   std::string path;
   int baud = 19200;
@@ -42,18 +41,18 @@ using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 /// "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1"
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
 
-/// A serial line for one connection only. Two names of a line whose device is not plugged in at the
-/// start are not known to be one: whoever opens it second is told. So is a program that locks in
-/// this way (flock). TIOCEXCL would keep out others, too, but not root, and is not given back by a
-/// process that is killed while another one has the line open.
+/// Exclusive lock of a serial line (flock). If the adapter is not plugged in at the start, two
+/// paths of the same line cannot be recognised as such; the lock then makes the second opening
+/// fail. It also excludes other programs that use flock. TIOCEXCL would exclude all programs except
+/// those of root, but it stays set after a process is killed while another one has the line open.
 class SerialLock {
  public:
   SerialLock() = default;
   SerialLock(SerialLock&& other) noexcept { *this = std::move(other); }
   SerialLock& operator=(SerialLock&& other) noexcept;
-  ~SerialLock();  ///< gives it back
+  ~SerialLock();  ///< releases the lock
 
-  /// Unreachable: no such path, or somebody has it. Called once.
+  /// Unreachable: no such path, or the line is locked. Call once.
   [[nodiscard]] Result<void> take(const std::string& path);
 
  private:
@@ -67,22 +66,23 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Blocks for `wall` at most (and a name server). Unreachable: refused, no route, no such path, a
-  /// serial line that is in use; Timeout.
+  /// Blocks for at most `wall`, plus the time of name resolution. Unreachable: refused, no route,
+  /// no such path, serial line in use; Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
   void close() noexcept;
 
-  /// Unreachable: closed by the device, cable out.
+  /// Unreachable: closed by the device, cable unplugged.
   [[nodiscard]] Result<void> send(const modbus::ReadRequest& request);
-  /// Waits for at most `wall`; 0: nothing came. Unreachable: closed by the device, cable out.
+  /// Waits for at most `wall`. Returns the number of bytes read, 0 if none arrived. Unreachable:
+  /// closed by the device, cable unplugged.
   [[nodiscard]] Result<std::size_t> read(std::span<std::byte> into, std::chrono::nanoseconds wall);
 
  private:
   struct Free {
     void operator()(_modbus* context) const noexcept;
   };
-  SerialLock lock_;  ///< given back after the line is closed
+  SerialLock lock_;  ///< declared first: released after the line is closed
   std::unique_ptr<_modbus, Free> context_;
 };
 

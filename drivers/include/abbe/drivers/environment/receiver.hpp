@@ -1,14 +1,15 @@
 #pragma once
-/// What is to be asked of a Modbus device and what its answers mean. Sans-I/O and deterministic:
-/// the same bytes with the same times give the same samples, live or replayed. A connection begins
-/// with the proving registers; then round after round of reads, each of which makes one sample.
-/// Real time: allocation-free, no system call. One thread.
+/// Selects the requests to a Modbus device and decodes its answers. Sans-I/O and deterministic: the
+/// same bytes with the same times give the same samples, live or replayed. On a new connection the
+/// proving registers are read first. Then each round of reads gives one sample. Real time:
+/// allocation-free, no system call. One thread.
 ///
-/// A sample describes the middle between the first question of its round and the last answer,
-/// rectangular in between ([GUM] 4.3.7); how old a value is inside the device is not known.
+/// The time of a sample is the middle between the first request and the last answer of its round;
+/// the uncertainty is rectangular over that interval ([GUM] 4.3.7). The age of a value inside the
+/// device is not known and not included.
 ///
-/// Raw blocks: ToDevice, one whole request, an empty one is a connection that was lost; FromDevice,
-/// bytes as read, an empty one is a new connection.
+/// Raw blocks: a block ToDevice is one complete request; an empty one records a lost connection. A
+/// block FromDevice holds bytes as read; an empty one records a new connection.
 
 #include <array>
 #include <cstdint>
@@ -23,15 +24,15 @@
 
 namespace abbe::drivers {
 
-/// Why the device is not believed; text_of() says it with the names of the map.
+/// Why the answers of the device are rejected; text_of() gives the text with the names of the map.
 struct EnvironmentFailure {
   enum class Kind : std::uint8_t {
     None,
-    Unasked,      ///< bytes although nothing was asked
-    Malformed,    ///< no answer to what was asked: `error`
-    Exception,    ///< the device declined: `exception`
-    Unproven,     ///< proving register `index` holds `value`: wrong device or wrong map
-    Implausible,  ///< measured register `index` reads `value` on the first round: wrong map
+    Unasked,      ///< bytes without an outstanding request
+    Malformed,    ///< not a valid answer to the request: `error`
+    Exception,    ///< the device answered with the Modbus exception code `exception`
+    Unproven,     ///< proving register `index` contains `value`: wrong device or wrong map
+    Implausible,  ///< measured register `index` reads `value` in the first round: wrong map
   };
   Kind kind = Kind::None;
   modbus::DecodeError error{};
@@ -40,33 +41,34 @@ struct EnvironmentFailure {
   double value = 0.0;  ///< Unproven: the register; Implausible: SI
   modbus::ReadRequest request{};
 };
-/// True if asking again cannot help: the device or the map must be changed.
+/// True if a retry cannot succeed: the device or the map must be changed.
 [[nodiscard]] bool is_refusal(const EnvironmentFailure& failure) noexcept;
 [[nodiscard]] std::string text_of(const EnvironmentFailure& failure, const RegisterMap& map);
 
 struct EnvironmentCounters {
   std::uint64_t samples = 0;
-  std::uint64_t unavailable = 0;  ///< values that the device did not have
-  std::uint64_t implausible = 0;  ///< values beyond plausible_range(), given as not available
+  std::uint64_t unavailable = 0;  ///< values that the device marked as not available
+  std::uint64_t implausible = 0;  ///< values outside plausible_range(), treated as not available
 };
 
 class EnvironmentReceiver {
  public:
   enum class Progress : std::uint8_t {
-    Waiting,   ///< for more bytes, or for nothing
-    Answered,  ///< the next request may go out
+    Waiting,   ///< the answer is incomplete, or no request is outstanding
+    Answered,  ///< the answer is complete; the next request may be sent
     Sample,    ///< sample() is new; the next round may begin when it is due
-    Failed,    ///< failure(); nothing more until begin()
+    Failed,    ///< see failure(); no further request or sample until begin()
   };
 
   /// The map must satisfy check(). Allocates.
   EnvironmentReceiver(RegisterMap map, modbus::Transport transport);
 
-  /// A new connection (or a line on which everything is to begin anew).
+  /// Call for each new connection, and to restart on an existing one: begins with the proving
+  /// registers.
   void begin() ABBE_RT;
-  /// What to ask now; nothing while an answer is under way or after a failure.
+  /// The request to send now; nullopt while an answer is outstanding or after a failure.
   [[nodiscard]] std::optional<modbus::ReadRequest> next_request() const ABBE_RT;
-  /// The next request begins a new round of measuring.
+  /// True if the next request begins a new round of measuring.
   [[nodiscard]] bool between_rounds() const ABBE_RT { return proven_ && read_ == 0 && !pending_; }
   [[nodiscard]] bool proven() const ABBE_RT { return proven_; }
   [[nodiscard]] bool awaiting() const ABBE_RT { return pending_.has_value(); }
@@ -82,7 +84,7 @@ class EnvironmentReceiver {
   bool on_raw(const protocol::RawBlock& block) ABBE_RT;
 
  private:
-  /// Where a register lies in the answers: which read, which byte of it.
+  /// Position of a register in the answers: index of the read, index of the byte in its answer.
   struct Spot {
     std::size_t read = 0;
     std::size_t byte = 0;
@@ -112,8 +114,8 @@ class EnvironmentReceiver {
   std::optional<modbus::ReadRequest> pending_;
   std::array<std::byte, 2 * modbus::kMaxAduSize> bytes_{};
   std::size_t filled_ = 0;
-  protocol::HostTime asked_{};     ///< the first question of the round
-  protocol::HostTime answered_{};  ///< the latest answer
+  protocol::HostTime asked_{};     ///< time of the first request of the round
+  protocol::HostTime answered_{};  ///< time of the latest answer
   protocol::EnvironmentSample building_;
   protocol::EnvironmentSample sample_;
   EnvironmentFailure failure_;

@@ -1,7 +1,7 @@
 #pragma once
-/// Which registers of a Modbus device hold what: data, not code. A map has registers that are
-/// measured, and registers that prove that the right device answers with the right map (serial
-/// number, status word): they are read first on every connection. Pure data.
+/// Describes the registers of a Modbus device as data. A map has measured registers, and proving
+/// registers (serial number, status word), which show that the intended device answers and that the
+/// map fits. Proving registers are read first on every connection.
 
 #include <cstdint>
 #include <optional>
@@ -28,8 +28,8 @@ struct RegisterPlace {
 
 enum class Quantity : std::uint8_t { AirTemperature, AirPressure, RelativeHumidity, Temperature };
 
-/// What no shop floor has: a value outside is no measurement, and on the first round no right map.
-/// SI.
+/// Limits of plausible values, SI. A value outside is treated as not available; in the first round
+/// it means that the map does not fit the device.
 struct PlausibleRange {
   double min;
   double max;
@@ -45,15 +45,15 @@ struct MeasuredRegister {
   RegisterPlace place;
   double scale = 1.0;
   double offset = 0.0;
-  std::vector<double>
-      unavailable;  ///< register values that mean "not available" (broken sensor, no probe)
+  /// Register values that mean "not available" (broken sensor, no probe).
+  std::vector<double> unavailable;
 };
 [[nodiscard]] protocol::EnvironmentMask mask_of(const MeasuredRegister& measured) noexcept;
 
 struct ProvingRegister {
   std::string name;  ///< "serial number"
   RegisterPlace place;
-  double expected = 0.0;  ///< before any scaling
+  double expected = 0.0;  ///< register value, unscaled
 };
 
 struct RegisterMap {
@@ -63,12 +63,12 @@ struct RegisterMap {
   std::vector<ProvingRegister> proving;
 };
 
-/// BadConfiguration: nothing is measured, a quantity twice, a channel beyond kMaxTemperatures, a
-/// scale of 0, an address outside 0 to FFFFh, more reads than kMaxReads.
+/// BadConfiguration: no measured register, a quantity twice, a channel not below kMaxTemperatures,
+/// a scale of 0, an address outside 0 to FFFFh, more reads than kMaxReads.
 [[nodiscard]] Result<void> check(const RegisterMap& map);
 
-/// The fewest reads that cover all of `places`: registers of one unit and function that touch share
-/// one.
+/// The smallest number of reads that cover all `places`: one read covers adjacent registers of the
+/// same unit and function.
 [[nodiscard]] std::vector<modbus::ReadRequest> reads_for(const std::vector<RegisterPlace>& places,
                                                          int base_offset);
 

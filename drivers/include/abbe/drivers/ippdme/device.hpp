@@ -1,8 +1,7 @@
 #pragma once
-/// A measuring machine behind an I++ DME server, as a Device: IppReceiver and IppSession around one
-/// TCP connection. A second source of touches behind the same vocabulary as the counter card's:
-/// each measured point is a ProbeTrigger, a failed one a ProbeTrigger without position. States:
-/// those of IppState.
+/// A measuring machine with an I++ DME server, as a Device: IppReceiver and IppSession over one TCP
+/// connection. Its touches have the same type as those of the counter card: each measured point is
+/// a ProbeTrigger, a failed one a ProbeTrigger without position. States: those of IppState.
 
 #include <array>
 #include <atomic>
@@ -25,10 +24,10 @@
 
 namespace abbe::drivers {
 
-/// What the next run must know.
+/// State of the machine that must be kept over a restart of the daemon.
 struct IppMachine {
-  std::string held;     ///< why the machine awaits a release; empty: it does not
-  bool moving = false;  ///< a motion is under way, or was when the connection was lost
+  std::string held;     ///< why the machine awaits a release; empty if it does not
+  bool moving = false;  ///< the machine is moving, or was when the connection was lost
   friend bool operator==(const IppMachine&, const IppMachine&) = default;
 };
 
@@ -38,16 +37,16 @@ struct IppDeviceOptions {
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
-  /// Device thread: what must be kept over a restart, and handed back in session.held and
-  /// session.moving. Called with each change: before the first command of a motion is sent, when
-  /// the machine has stopped, when a hold begins or ends.
+  /// Called on the device thread with each change: before the first command of a motion is sent,
+  /// when the machine has stopped, when a hold begins or ends. Store the value, and pass it in
+  /// session.held and session.moving after a restart.
   std::function<void(const IppMachine&)> machine_changed;
   std::size_t touch_capacity = 256;
-  std::size_t position_capacity = 256;  ///< 25 s at 10 a second
+  std::size_t position_capacity = 256;  ///< 25 s at 10 positions per second
   std::size_t raw_capacity_blocks = 256;
 };
 
-/// For SessionOverTcp.
+/// Parameter `Words` of SessionOverTcp.
 struct IppWords {
   using Session = IppSession;
   using Input = IppInput;
@@ -64,51 +63,52 @@ struct IppWords {
 
 class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the
-  /// first wait().
+  /// `time` must outlive the device. BadConfiguration as check(). The first wait() opens the
+  /// connection.
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);
-  /// Stops a motion that is under way, waits for the answer to AbortE (at most command_timeout),
-  /// and ends the session without waiting for the answer.
+  /// Stops a motion in progress, waits for the answer to AbortE (at most command_timeout), and ends
+  /// the session without waiting for the answer to EndSession.
   ~IppDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// Any thread: moves the machine and touches, in the order of the calls; one ProbeTrigger each,
-  /// numbered from 1 in that order. Points not yet begun are forgotten when the connection is lost,
-  /// and so are all that come before the session is ready: a fault each time.
+  /// Any thread. Moves the machine and touches, in the order of the calls; gives one ProbeTrigger
+  /// per touch, numbered from 1 in that order. Points that are not begun when the connection is
+  /// lost, and points requested before the session is ready, are discarded; each case is a fault.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
-  /// All of them or, when the connection is lost in between, nothing of the rest: half a way to a
-  /// touch leads through whatever stands there.
+  /// As above, for a path. If the connection is lost, all remaining points are discarded: driving
+  /// only a part of the path could lead to a collision.
   void measure(std::span<const ProbePoint> points);
-  /// Any thread: stops a motion that is under way (AbortE) and forgets all points. The session
-  /// awaits release(), whether or not the machine moved.
+  /// Any thread. Stops a motion in progress (AbortE) and discards all points. The session then
+  /// awaits release(), whether or not the machine was moving.
   void abort();
-  /// Any thread: a person has looked at the machine: errors are cleared, the session begins anew.
-  /// Nothing happens unless releasable().
+  /// Any thread. Call after an operator has inspected the machine: clears the errors and restarts
+  /// the session. No effect unless releasable().
   void release();
-  /// Any thread: the machine awaits a release, whatever the state: also while its server is away,
-  /// or its motion is still being stopped.
+  /// Any thread. True if the machine awaits a release, in every state: also while its server is not
+  /// reachable, or while its motion is still being stopped.
   [[nodiscard]] bool held() const noexcept { return held_.load(std::memory_order_relaxed); }
-  /// Any thread: held(), and its motion is not still being stopped.
+  /// Any thread. True if held() and no motion is still being stopped.
   [[nodiscard]] bool releasable() const noexcept {
     return releasable_.load(std::memory_order_relaxed);
   }
-  /// Any thread, takes no lock: a motion that is under way is stopped and the session ends, as when
-  /// this is destroyed; nothing is begun any more, and no release is awaited. For a program that
-  /// ends and cannot tell whether it will come to destroy this.
+  /// Any thread; takes no lock. Stops a motion in progress and ends the session, as the destructor
+  /// does. No further motion is begun, and no release is awaited. For a program that is ending and
+  /// may not reach the destructor.
   void end();
-  /// Any thread: how many of them are neither done nor given up. 0: the touches of all that were
-  /// begun are in the ring.
+  /// Any thread. Number of requested points that are neither finished nor discarded. 0: the touches
+  /// of all begun points are in the ring.
   [[nodiscard]] std::size_t points_left() const noexcept {
-    // acquire: pairs with the release in count_points(). In this order: never less than there are.
+    // acquire: pairs with the release in count_points(). finished_ is read first, so that the
+    // result is never too small.
     const auto finished = finished_.load(std::memory_order_acquire);
     return asked_.load(std::memory_order_relaxed) - finished;
   }
 
-  /// One reader each.
+  /// One reader thread for each ring.
   [[nodiscard]] SampleRing<protocol::ProbeTrigger>& touches() noexcept { return touches_; }
   [[nodiscard]] SampleRing<protocol::AxisSample>& positions() noexcept { return positions_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
@@ -122,7 +122,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void connected();
   void disconnected() {}
   void read_requests();
-  void ask_for(const std::vector<ProbePoint>& points);
+  void request_points(const std::vector<ProbePoint>& points);
   void await_standstill();
   void count_points();
   void report_machine();
@@ -143,14 +143,14 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested,
                                IppStopRequested>;
-  Mailbox<Request> requests_;  ///< the hub asks and takes no lock
-  std::size_t taken_ = 0;      ///< points out of it, by the device thread
+  Mailbox<Request> requests_;  ///< written by the hub without a lock
+  std::size_t taken_ = 0;      ///< points that the device thread took from requests_
   std::atomic<std::size_t> asked_{0};
   std::atomic<std::size_t> finished_{0};
-  // relaxed: each stands for itself
+  // relaxed: independent values
   std::atomic<bool> held_{false};
   std::atomic<bool> releasable_{false};
-  IppMachine machine_;  ///< as reported
+  IppMachine machine_;  ///< last value passed to machine_changed
 };
 
 }  // namespace abbe::drivers

@@ -1,13 +1,14 @@
 #pragma once
-/// From the lines of an I++ DME server to touches and positions, in SI and in host time. Sans-I/O
-/// and deterministic: the same bytes both ways with the same times give the same samples, live or
-/// replayed. What a response means is known from the command with its tag, so the sent lines are
-/// needed, too. Real time: allocation-free, no system call. One thread. About 130 kB: keep it on
-/// the heap.
+/// Decodes the lines of an I++ DME server into touches and positions, in SI units and host time.
+/// Sans-I/O and deterministic: the same bytes in both directions with the same times give the same
+/// samples, live or replayed. The meaning of a response depends on the command with the same tag,
+/// so the sent lines are an input, too. Real time: allocation-free, no system call. One thread.
+/// About 130 kB: keep it on the heap.
 ///
-/// The protocol carries no time. A position lies somewhere between its command and its answer, a
-/// touch likewise: the middle, with half of the whole as a rectangular half-width. For a touch that
-/// is seconds; what counts is the position that the machine latched itself.
+/// The protocol has no time stamps. The instant of a position or a touch lies between its command
+/// and its answer. Its time is the middle of that interval, with a rectangular distribution over
+/// the interval. For a touch this is several seconds; the relevant result is the position that the
+/// machine latched.
 
 #include <array>
 #include <chrono>
@@ -27,12 +28,12 @@ namespace ippdme = protocol::ippdme;
 
 struct IppReceiverOptions {
   std::uint32_t probe = 1;
-  double u_position_m = 1e-6;  ///< of the machine, what its acceptance test says (MPE / 2)
-  /// Between a position and the line that reports it by itself (OnMoveReportE).
+  double u_position_m = 1e-6;  ///< of the machine, from its acceptance test (MPE / 2)
+  /// Largest delay from a position to the unsolicited line that reports it (OnMoveReportE).
   std::chrono::nanoseconds max_report_delay = std::chrono::milliseconds{100};
 };
 
-/// Text out of a line, cut at its capacity.
+/// Text from a line, truncated to its capacity.
 struct IppText {
   std::array<char, 96> characters{};
   std::uint8_t length = 0;
@@ -45,7 +46,7 @@ struct IppAck {
 struct IppComplete {
   ippdme::Tag tag;
 };
-/// Data of a command that is not about a place.
+/// Data of a response that is neither a position nor a touch.
 struct IppData {
   ippdme::Tag tag;
   IppText text;
@@ -56,7 +57,7 @@ struct IppError {
   int code = 0;
   IppText text;
 };
-/// A line that no I++ DME server sends. After it only the answers to AbortE come, until a new
+/// A line that violates I++ DME. After it only the answers to AbortE are evaluated, until a new
 /// connection.
 struct IppProtocolError {
   ippdme::LineError error{};
@@ -72,10 +73,10 @@ class IppReceiver {
   IppReceiver(const IppReceiver&) = delete;
   IppReceiver& operator=(const IppReceiver&) = delete;
 
-  /// A command line as it was sent, with its CR LF.
+  /// Registers a command line that was sent, with its CR LF.
   void sent(std::span<const std::byte> line, protocol::HostTime time) ABBE_RT;
-  /// Bytes of one read and when they arrived; no bytes: a new connection. next() until it gives
-  /// nothing before the next push().
+  /// Adds the bytes of one read and their arrival time; no bytes: a new connection. Call next()
+  /// until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> next() ABBE_RT;
 
@@ -89,7 +90,8 @@ class IppReceiver {
     bool known = false;
     bool warned = false;
   };
-  static constexpr std::size_t kMostAsked = 16;  ///< one at a time is asked, and one report goes on
+  /// Entry 0 is the event that reports motion continuously; the others are the latest commands.
+  static constexpr std::size_t kMostAsked = 16;
 
   [[nodiscard]] Asked* find(ippdme::Tag tag) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> understand(std::string_view line) ABBE_RT;
@@ -109,14 +111,14 @@ class IppReceiver {
   IppReceiverOptions options_;
   protocol::HostTime arrival_{};
   bool aborting_ = false;            ///< AbortE was sent on this connection
-  bool silenced_ = false;            ///< but for the answers to AbortE
-  bool position_restarted_ = false;  ///< for the first sample of each kind after a new connection
+  bool silenced_ = false;            ///< only the answers to AbortE are evaluated
+  bool position_restarted_ = false;  ///< flag for the first sample of a kind on a new connection
   bool touch_restarted_ = false;
   std::uint32_t cycle_ = 0;
   std::uint32_t touches_ = 0;
   std::array<Asked, kMostAsked> asked_{};
   std::size_t next_asked_ = 0;
-  std::optional<IppError> error_due_;  ///< leaves after the touch it failed
+  std::optional<IppError> error_due_;  ///< returned by next() after its failed touch
   ippdme::LineFramer framer_;
 };
 

@@ -1,26 +1,31 @@
 #pragma once
-/// What to ask an I++ DME server, and when: the state machine without its socket. Sans-I/O: one
-/// input and the host time in, at most one action out. One command at a time, the next when the one
-/// before is complete. Ordinary world: allocates. One thread.
+/// State machine of a client of an I++ DME server, without its socket. Sans-I/O: one input and the
+/// host time in, at most one action out. One command at a time; the next is sent when the previous
+/// one is complete. Not real-time: allocates. One thread. [I++ DME 1.4.3]
 ///
 ///   Disconnected -> Connecting -> Opening (StartSession, GetDMEVersion)
-///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE) -> Ready <-> Measuring
-///   any with an unfinished motion -> Aborting (AbortE) -> AwaitingRelease, whatever the cause
-///   any -> AwaitingRelease after an error of severity 2 or more
-///   AwaitingRelease -> Clearing (ClearAllErrors) -> Opening, or Connecting, only by IppReleaseRequested
-///   any -> Stopping -> Disconnected;   any without a motion -> Faulted -> Connecting (after a while)
+///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE)
+///     -> Ready <-> Measuring
 ///
-/// No connection with an unfinished motion is closed before AbortE is answered or command_timeout
-/// has passed. When such a connection is lost, the next one begins with AbortE, before
-/// StartSession: servers queue commands behind a motion, and StartSession clears errors. A session
-/// starts only after a release. Only for a server that refuses AbortE outside a session, or does
-/// not answer it, a session is started first. While AwaitingRelease nothing is sent that moves the
-/// machine or clears an error. Home is sent in the first session and after a release, never after a
-/// mere loss of the connection.
+///   any with an unfinished motion -> Aborting (AbortE) -> AwaitingRelease   (for every cause)
+///   any -> AwaitingRelease                     (after an error of severity 2 or more)
+///   AwaitingRelease -> Clearing (ClearAllErrors) -> Opening, or -> Connecting
+///                                              (only by IppReleaseRequested)
+///   any -> Stopping -> Disconnected
+///   any without a motion -> Faulted -> Connecting   (after a pause)
 ///
-/// While nothing is measured the position is asked for every poll period, which also shows that the
-/// server lives. Points are taken while Ready or Measuring; in any other state they are forgotten,
-/// which is a fault. [I++ DME 1.4.3]
+/// A connection with an unfinished motion is closed only after AbortE was answered or
+/// command_timeout has passed. If such a connection is lost, the next one begins with AbortE,
+/// before StartSession, because servers queue commands behind a motion and StartSession clears
+/// errors. A session is then started only after a release. Exception: if the server refuses AbortE
+/// outside a session, or does not answer it there, a session is started first.
+///
+/// While AwaitingRelease, no command is sent that moves the machine or clears an error. Home is
+/// sent in the first session and after a release, but not after a mere loss of the connection.
+///
+/// While no point is measured, the position is requested once per poll period; this also checks
+/// that the server still answers. Points are accepted in Ready and Measuring. In any other state
+/// they are discarded, which is a fault.
 
 #include <array>
 #include <chrono>
@@ -50,13 +55,14 @@ enum class IppState {
   Stopping,
   Faulted,
 };
-/// A literal: "ready", "measuring", ...
+/// Text for messages: "ready", "measuring", ...
 [[nodiscard]] const char* name_of(IppState) noexcept;
 
-/// One touch: the nominal place and the outward normal there, of the centre of the tip. The machine
-/// moves to the place plus its approach distance along the normal and probes against it. Or a place
-/// on the way there: it only moves, straight, and when that is refused nothing that was asked after
-/// it is begun.
+/// A target of the machine. touch: nominal position of the centre of the stylus tip at contact, and
+/// the outward surface normal there. The machine moves to this position plus its approach distance
+/// along the normal, and probes against the normal.
+/// Not touch: an intermediate position. The machine moves there in a straight line without probing.
+/// If the server refuses the motion, no later target is begun.
 struct ProbePoint {
   std::array<double, 3> position_m{};
   std::array<double, 3> normal = {0.0, 0.0, 1.0};
@@ -64,22 +70,22 @@ struct ProbePoint {
 };
 
 struct IppSessionOptions {
-  std::string peer = "measuring machine";  ///< how messages name it: "cmm 10.0.0.9:1294"
-  bool home = false;    ///< may send a machine home that is not; else that is a fault
+  std::string peer = "measuring machine";  ///< its name in messages: "cmm 10.0.0.9:1294"
+  bool home = false;    ///< true: Home is sent to a machine that is not homed; false: a fault
   std::string held;     ///< not empty: awaits a release from the start, for this reason
-  bool moving = false;  ///< with held: a motion may be under way, is aborted first
-  std::string tool;     ///< set before measuring; empty: the one that is set
-  /// ask for positions while moving; a refusal of severity 1 is no fault
+  bool moving = false;  ///< with held: the machine may be moving; its motion is aborted first
+  std::string tool;     ///< tool to set before measuring; empty: keep the current tool
+  /// Request positions during motions; a refusal of severity 1 is no fault.
   bool move_reports = true;
   std::chrono::nanoseconds poll_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
-  std::chrono::nanoseconds motion_timeout = std::chrono::seconds{120};  ///< Home and PtMeas
-  /// before connecting again, doubled
+  std::chrono::nanoseconds motion_timeout = std::chrono::seconds{120};  ///< Home, GoTo, PtMeas
+  /// Pause before connecting again; it doubles with each attempt up to longest_pause.
   std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
-  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};  ///< ... up to this
+  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
 };
-/// BadConfiguration says which option is out of its range.
+/// BadConfiguration; the text names the option that is out of range.
 [[nodiscard]] Result<void> check(const IppSessionOptions& options);
 
 struct IppTick {};
@@ -88,16 +94,16 @@ struct IppConnectionLost {
   std::string what;
 };
 struct IppStopRequested {};  ///< ends the session
-struct IppAbortRequested {
-};  ///< stops a motion and forgets all points; awaits a release, moving or not
-struct IppReleaseRequested {};  ///< by a person who has looked at the machine
+/// Stops a motion, discards all points, and awaits a release whether or not the machine moved.
+struct IppAbortRequested {};
+struct IppReleaseRequested {};  ///< an operator has inspected the machine
 using IppInput = std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested,
                               IppAbortRequested, IppReleaseRequested, ProbePoint, IppAck,
                               IppComplete, IppData, IppError, IppProtocolError>;
 
 struct IppNothing {};
-struct IppOpen {};   ///< open a connection, then say IppConnected or IppConnectionLost
-struct IppClose {};  ///< close it; no IppConnectionLost is expected
+struct IppOpen {};   ///< open a connection; the input IppConnected or IppConnectionLost follows
+struct IppClose {};  ///< close the connection; no IppConnectionLost follows
 struct IppSend {
   std::string line;  ///< with its CR LF
 };
@@ -109,19 +115,19 @@ class IppSession {
   explicit IppSession(IppSessionOptions options);
 
   [[nodiscard]] IppAction on(const IppInput& input, protocol::HostTime now);
-  /// When to say IppTick.
+  /// When the next IppTick is due.
   [[nodiscard]] protocol::HostTime deadline() const noexcept;
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
-  /// Until a person releases the machine; also while its motion is still being stopped.
+  /// True until the machine is released; also while its motion is still being stopped.
   [[nodiscard]] bool held() const noexcept { return held_; }
-  /// Whether IppReleaseRequested has an effect: held, and its motion is not still being stopped.
+  /// True if IppReleaseRequested has an effect: held, and no motion is still being stopped.
   [[nodiscard]] bool releasable() const noexcept;
-  /// Why; empty if it is not held. What is refused while it is held does not change it.
+  /// Why the machine is held; empty if it is not. Later faults do not change the reason.
   [[nodiscard]] const std::string& hold_reason() const noexcept { return hold_reason_; }
-  /// A motion was sent and its end not reported, on this connection or an earlier one.
+  /// True if a motion was sent, on this connection or an earlier one, and its end was not reported.
   [[nodiscard]] bool moving() const noexcept { return moving_; }
-  /// Asked for and neither done nor given up.
+  /// Number of requested points that are neither finished nor discarded.
   [[nodiscard]] std::size_t points_left() const noexcept {
     const bool one = state_ == IppState::Measuring || state_ == IppState::Aborting;
     return points_.size() + (one ? 1 : 0);
@@ -139,7 +145,7 @@ class IppSession {
     std::string method;  ///< with its arguments
     Purpose purpose = Purpose::Other;
     bool moves = false;
-    std::optional<ippdme::Tag> event = {};  ///< its tag; is done when acknowledged
+    std::optional<ippdme::Tag> event = {};  ///< tag of an event; done when acknowledged
   };
   struct Pending {
     Step step;
@@ -163,20 +169,20 @@ class IppSession {
   [[nodiscard]] IppAction take(const IppData& data);
   [[nodiscard]] IppAction take(const IppError& error);
   [[nodiscard]] IppAction take_foreign(const IppError& error);
-  [[nodiscard]] IppAction take(const IppProtocolError& nonsense);
+  [[nodiscard]] IppAction take(const IppProtocolError& malformed);
 
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
-  [[nodiscard]] IppAction strange(std::string_view what, ippdme::Tag tag);
+  [[nodiscard]] IppAction unexpected_response(std::string_view what, ippdme::Tag tag);
   [[nodiscard]] IppAction send(const Step& step);
   [[nodiscard]] IppAction connect();
   [[nodiscard]] IppAction next_step();
   [[nodiscard]] IppAction done();
   [[nodiscard]] IppAction failed(const Pending& was);
   [[nodiscard]] IppAction ready();
-  [[nodiscard]] IppAction judge_home(const std::string& data);
+  [[nodiscard]] IppAction check_homed(const std::string& data);
   [[nodiscard]] IppAction give_up(IppState into, const std::string& what);
   [[nodiscard]] IppAction close(IppState into);
-  [[nodiscard]] IppAction goodbye();
+  [[nodiscard]] IppAction end_session();
   [[nodiscard]] IppAction hold(const std::string& what);
   [[nodiscard]] IppAction await_release();
   [[nodiscard]] IppAction stop_motion(bool close_then);
@@ -199,17 +205,18 @@ class IppSession {
   std::optional<Pending> pending_;
   std::deque<ProbePoint> points_;
   bool stopped_ = false;
-  bool open_ = false;        ///< the connection
-  bool in_session_ = false;  ///< StartSession was accepted on it
-  /// a motion was asked for and its end not reported, also on a lost connection
+  bool open_ = false;        ///< the connection is established
+  bool in_session_ = false;  ///< StartSession was accepted on this connection
+  /// A motion was sent, also on a lost connection, and its end was not reported.
   bool moving_ = false;
-  /// when the motion has stopped: what comes on this connection is not trusted
+  /// Close the connection when the motion has stopped: after a malformed, unexpected or missing
+  /// response its content is not reliable.
   bool close_then_ = false;
-  bool held_ = false;  ///< until a person releases the machine
+  bool held_ = false;  ///< until the machine is released
   std::string hold_reason_;
-  std::string last_note_;       ///< without the peer and the reason of a hold
+  std::string last_note_;       ///< latest fault without the peer and the reason of a hold
   std::string stop_reason_;     ///< last_note_ when AbortE was sent
-  bool session_first_ = false;  ///< the server does not abort outside a session
+  bool session_first_ = false;  ///< start a session before AbortE: the server requires one
   bool may_home_;
   Fault fault_;
 };

@@ -1,8 +1,9 @@
 #pragma once
-/// A laser tracker that speaks emScon, as a Device: TrackerReceiver and TrackerSession around one
-/// TCP connection. wait(): connects, sends what the session asks for, reads. receive(): bytes to
-/// points, weather and raw blocks. An arrival is when the read returned, in user space: what a
-/// kernel stamp could add is far below the delay of a burst. States: those of TrackerState.
+/// A laser tracker with an emScon controller, as a Device: TrackerReceiver and TrackerSession over
+/// one TCP connection. wait() connects, sends the commands of the session, and reads bytes.
+/// receive() converts bytes to points, weather and raw blocks. The arrival time is the user-space
+/// time at which the read returned; a kernel stamp would improve it by far less than the delay of a
+/// burst. States: those of TrackerState.
 
 #include <array>
 #include <cstddef>
@@ -26,7 +27,7 @@ namespace abbe::drivers {
 
 struct TrackerDeviceOptions {
   std::string name = "tracker";
-  std::string host = "192.168.0.1";  ///< as delivered by the manufacturer
+  std::string host = "192.168.0.1";  ///< factory setting of the manufacturer
   std::uint16_t port = emscon::kPort;
   TrackerSessionOptions session;  ///< `peer` is made from name, host and port
   ClockModelOptions clock;
@@ -35,10 +36,10 @@ struct TrackerDeviceOptions {
   std::size_t raw_capacity_blocks = 4096;
 };
 
-/// What the receiver of this device is made with; replay needs the same.
+/// Options of the receiver of this device; a replay needs the same ones.
 [[nodiscard]] TrackerReceiverOptions receiver_options(const TrackerDeviceOptions& options);
 
-/// For SessionOverTcp.
+/// Parameter `Words` of SessionOverTcp.
 struct TrackerWords {
   using Session = TrackerSession;
   using Input = TrackerInput;
@@ -56,27 +57,27 @@ struct TrackerWords {
 
 class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice, TrackerWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The connection is opened by the
-  /// first wait().
+  /// `time` must outlive the device. BadConfiguration as check(). The first wait() opens the
+  /// connection.
   [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(
       const TrackerDeviceOptions& options, const TimeSource& time);
-  /// Stops the measurement and puts back the settings that abbe changed: at most
+  /// Stops the measurement and restores the settings that abbe changed; takes at most
   /// TrackerSessionOptions::leave_within.
   ~TrackerDevice() override;
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
-  /// Stops the measurement and puts back the settings that abbe changed.
-  /// Device thread. True once nothing is left to say; until then wait() and receive() go on.
+  /// Device thread. Stops the measurement and restores the settings that abbe changed. True when
+  /// that is complete; until then call wait(), receive() and finish() again.
   [[nodiscard]] bool finish();
 
-  /// Any thread. One at a time; what cannot be done is refused in its report.
+  /// Any thread. One order at a time; an order that cannot be carried out gets the report Refused.
   void order(TrackerOrder order) { orders_.put(std::move(order)); }
-  /// Any thread: of each order one, when it ended.
+  /// Any thread. One report per order, when the order has ended.
   [[nodiscard]] std::vector<TrackerOrderReport> reports() { return reports_.take(); }
 
-  /// One reader each.
+  /// One reader thread for each ring.
   [[nodiscard]] SampleRing<protocol::TrackerPoint>& points() noexcept { return points_; }
   [[nodiscard]] SampleRing<protocol::EnvironmentSample>& environment() noexcept {
     return environment_;
@@ -91,9 +92,9 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   [[nodiscard]] std::span<const std::byte> encode(const TrackerSend& command);
   void connected() { began_ = true; }
   void disconnected() { began_ = false; }
-  void carry_orders();
+  void handle_orders();
   void keep_report();
-  void put_back_settings();
+  void restore_settings();
   void report_clock();
   void report_cause();
 
@@ -116,7 +117,7 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   bool clock_reported_ = false;
   std::string cause_reported_;
   std::uint64_t gaps_seen_ = 0;
-  bool began_ = false;  ///< a new connection, not yet told to the receiver
+  bool began_ = false;  ///< new connection; the receiver is not yet reset for it
   std::array<std::byte, emscon::kMaxRequestSize> command_{};
 };
 

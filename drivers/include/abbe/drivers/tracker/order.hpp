@@ -1,6 +1,7 @@
 #pragma once
-/// What a person asks of a tracker while abbe uses it. All but ListReflectors move the beam or end
-/// the distance it holds, so the measurement is stopped before and started after. Ordinary world.
+/// Orders of an operator to a tracker that abbe uses. All except ListReflectors move the beam or
+/// interrupt the distance measurement, so abbe stops the measurement before the order and starts it
+/// again afterwards. Not real-time.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,26 +10,26 @@
 
 namespace abbe::drivers {
 
-/// emScon has room for 32 UTF-16 units, each at most 3 bytes of UTF-8.
+/// An emScon name has at most 32 UTF-16 code units, each at most 3 bytes in UTF-8.
 inline constexpr std::size_t kLongestReflectorName = 96;
-/// Beyond the reach of every tracker: a distance in the wrong unit is refused, not searched for.
+/// Above the range of every tracker. A larger distance is refused: its unit is probably wrong.
 inline constexpr double kLongestSearch_m = 200.0;
 
 struct TrackerOrder {
   enum class What {
-    Initialize,      ///< drives the motors and drops the beam
-    ListReflectors,  ///< of the controller's list
+    Initialize,      ///< moves the tracker head and loses the beam
+    ListReflectors,  ///< gets the list of the controller
     SetReflector,
-    GoHome,         ///< to the bird bath: the home position of the reflector
-    FindReflector,  ///< searches around where the beam points
+    GoHome,         ///< points the beam to the bird bath, the home position of the reflector
+    FindReflector,  ///< searches around the current direction of the beam
   };
   What what = What::ListReflectors;
-  std::uint64_t number = 0;  ///< comes back in the report
+  std::uint64_t number = 0;  ///< identifies the order in its report
   std::string reflector;     ///< SetReflector: name or id
-  /// FindReflector: about how far away the reflector is; 0 to kLongestSearch_m
+  /// FindReflector: approximate distance of the reflector, 0 to kLongestSearch_m.
   double distance_m = 0.0;
 };
-/// A literal: "initialize", "find", ...
+/// Text for messages: "initialize", "find", ...
 [[nodiscard]] const char* name_of(TrackerOrder::What) noexcept;
 
 struct TrackerReflector {
@@ -37,16 +38,16 @@ struct TrackerReflector {
   bool in_use = false;
 };
 
-/// One for each order.
+/// Result of an order.
 struct TrackerOrderReport {
   enum class Outcome {
     Done,
-    Refused,  ///< by the controller, or because of the state the session is in
-    Failed,   ///< no answer, or the connection was lost: what came of it is not known
+    Refused,  ///< by the controller, or because of the session's state
+    Failed,   ///< no answer, or the connection was lost: the result is unknown
   };
   std::uint64_t number = 0;
   Outcome outcome = Outcome::Failed;
-  std::string text;                          ///< what came of it
+  std::string text;                          ///< the result in words
   std::vector<TrackerReflector> reflectors;  ///< ListReflectors
   [[nodiscard]] bool done() const noexcept { return outcome == Outcome::Done; }
 };

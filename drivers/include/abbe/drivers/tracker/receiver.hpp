@@ -1,17 +1,18 @@
 #pragma once
-/// From the bytes of an emScon laser tracker to points and weather, in SI and in host time.
+/// Decodes the bytes of an emScon laser tracker into points and weather, in SI units and host time.
 /// Sans-I/O and deterministic: the same bytes with the same arrival times give the same samples,
-/// live or replayed. Expects the units the session asks for: mm, rad, Celsius, mbar, percent,
+/// live or replayed. Expects the units that the session sets: mm, rad, Celsius, mbar, percent,
 /// right-handed Cartesian coordinates. Real time: allocation-free, no system call. One thread.
 /// About 300 kB: keep it on the heap.
 ///
-/// Raw blocks of a tracker: FromDevice, as received; an empty one is a new connection. ToDevice, as
-/// sent, an empty one is a connection that was lost (for people and for serving a recording back;
-/// not needed to decode it).
+/// Raw blocks: a block FromDevice holds bytes as received; an empty one records a new connection. A
+/// block ToDevice holds bytes as sent; an empty one records a lost connection. Decoding does not
+/// need the blocks ToDevice; they serve for inspection and for the playback of a recording.
 ///
-/// A recording may begin anywhere: until the first new connection the receiver seeks a packet head
-/// and takes points at once. On a new connection it takes none before the controller has accepted
-/// StartMeasurement: what an earlier client left running would come in unknown units.
+/// A recording may begin in the middle of a packet: until the first new connection the receiver
+/// searches for a packet header and accepts points at once. On a new connection it accepts points
+/// only after the controller has accepted StartMeasurement: points of a measurement that an earlier
+/// client started would have unknown units.
 
 #include <array>
 #include <chrono>
@@ -33,42 +34,44 @@ namespace emscon = protocol::emscon;
 
 struct TrackerReceiverOptions {
   ClockModelOptions clock;
-  /// Between two points of a continuous time measurement; a longer hole is marked GapBefore. 0:
-  /// points come when they come (continuous distance, or not known), holes cannot be told.
+  /// Interval between two points of a continuous time measurement; a longer gap is marked
+  /// GapBefore. 0: the points have no fixed interval (continuous distance), or it is not known;
+  /// gaps are not detected.
   std::chrono::nanoseconds time_separation = std::chrono::milliseconds{2};
-  /// How long a stationary measurement takes; its result says nothing of its own time.
+  /// Duration of a stationary measurement; its result contains no time.
   std::chrono::nanoseconds stationary_time = std::chrono::milliseconds{500};
-  /// The controller reads its weather station. False: the air it reports is what it was set to; the
-  /// samples carry these values, and `measured` is 0.
+  /// True: the controller reads its weather station. False: it reports the values that were set;
+  /// the samples contain these values, and `measured` is 0.
   bool air_measured = true;
 };
 
-/// Points of one packet, valid until the next call to push() or next().
+/// The points of one packet, valid until the next call to push() or next().
 struct TrackerBurst {
   std::span<const protocol::TrackerPoint> points;
 };
 
-/// Bytes that no emScon controller sends. Nothing more comes after it until a new connection.
+/// Bytes that violate the emScon protocol. After it the receiver ignores all bytes until a new
+/// connection.
 struct TrackerProtocolError {
-  std::optional<emscon::DecodeError> error;  ///< none: a packet size that cannot be
+  std::optional<emscon::DecodeError> error;  ///< nullopt: invalid packet size
   std::array<std::byte, 24> first_bytes{};
   std::size_t length = 0;
 };
 
-/// What push()ed bytes meant, in their order.
+/// Result of decoding, in the order of the bytes.
 using TrackerMessage =
     std::variant<TrackerBurst, protocol::EnvironmentSample, emscon::Answer, emscon::ErrorResponse,
                  emscon::StatusChange, TrackerProtocolError>;
 
-/// Since construction.
+/// Counts since construction.
 struct TrackerCounters {
   std::uint64_t packets = 0;
   std::uint64_t points = 0;
-  std::uint64_t gaps = 0;  ///< holes in the point stream that no lost beam explains
+  std::uint64_t gaps = 0;  ///< gaps in the point stream that were not caused by a lost beam
   std::uint64_t beam_losses = 0;
   std::uint64_t time_disorder = 0;   ///< points not later than the one before
-  std::uint64_t points_refused = 0;  ///< that came before StartMeasurement was accepted
-  std::uint64_t nonsense = 0;
+  std::uint64_t points_refused = 0;  ///< points before StartMeasurement was accepted
+  std::uint64_t nonsense = 0;        ///< protocol errors
 };
 
 class TrackerReceiver {
@@ -77,13 +80,13 @@ class TrackerReceiver {
   TrackerReceiver(const TrackerReceiver&) = delete;
   TrackerReceiver& operator=(const TrackerReceiver&) = delete;
 
-  /// Bytes of one read and when they arrived; no bytes: a new connection. At most kMaxPacketSize at
-  /// once, and next() until it gives nothing before the next push().
+  /// Adds the bytes of one read, at most kMaxPacketSize, and their arrival time; no bytes: a new
+  /// connection. Call next() until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
-  /// A hole in a recording: seeks the next packet, marks the next sample.
+  /// Call for a gap in a recording: searches for the next packet and marks the next sample.
   void bytes_lost() ABBE_RT;
 
-  /// The next message, or nothing: push more bytes.
+  /// The next message; nullopt if more bytes are needed.
   [[nodiscard]] std::optional<TrackerMessage> next() ABBE_RT;
 
   [[nodiscard]] const TrackerCounters& counters() const ABBE_RT { return counters_; }
@@ -125,14 +128,14 @@ class TrackerReceiver {
   ClockModel clock_;
   TrackerCounters counters_;
   protocol::HostTime arrival_{};
-  bool accepting_ = true;  ///< points are in our units
-  bool silenced_ = false;  ///< nonsense was seen on this connection
+  bool accepting_ = true;  ///< points have the units that the session set
+  bool silenced_ = false;  ///< a protocol error occurred on this connection
   bool beam_lost_ = false;
   protocol::SampleFlags pending_flags_ = 0;  ///< for the next point
   LastPoint last_;
   emscon::Environment environment_{};
   bool environment_known_ = false;
-  std::optional<protocol::EnvironmentSample> weather_due_;  ///< leaves after the burst it came with
+  std::optional<protocol::EnvironmentSample> weather_due_;  ///< returned after its burst
   emscon::PacketFramer framer_;
   std::array<protocol::TrackerPoint, emscon::kMaxMultiPoints> points_{};
 };

@@ -1,23 +1,26 @@
 #pragma once
-/// What to ask an emScon controller, and when: the command state machine of a tracker, without its
-/// socket. Sans-I/O: one input and the host time in, at most one action out. The order of commands
-/// is the one of the manufacturer's manual: status, units, settings, environment, Initialize,
-/// reflector, bird bath, coordinates, mode, StartMeasurement. One command at a time. Ordinary
-/// world: allocates. One thread.
+/// Command state machine of a client of an emScon controller, without its socket. Sans-I/O: one
+/// input and the host time in, at most one action out. The order of commands is that of the
+/// manufacturer's manual: status, units, settings, environment, Initialize, reflector, bird bath,
+/// coordinates, mode, StartMeasurement. One command at a time. Not real-time: allocates. One
+/// thread.
 ///
 ///   Disconnected -> Connecting -> Querying [-> WaitWarm] -> Configuring [-> Initialising] -> Ready
-///     -> Streaming <-> BeamLost;   Ready -> WaitBeam -> Streaming (no beam yet);   Streaming, BeamLost,
-///     WaitBeam -> Moving -> Ready (an order);   any -> Stopping -> Disconnected;   any -> [Restoring ->]
-///     Faulted -> Connecting (after a while)
+///     -> Streaming <-> BeamLost
 ///
-/// Disconnected: the connection failed or ended. Faulted: the peer answered, but wrongly, late or
-/// with a refusal that waiting does not mend. Both try again, after a pause that doubles from try
-/// to try until points come.
+///   Ready -> WaitBeam -> Streaming                       (there is no beam yet)
+///   Streaming, BeamLost, WaitBeam -> Moving -> Ready     (an order)
+///   any -> Stopping -> Disconnected
+///   any -> [Restoring ->] Faulted -> Connecting          (after a pause)
 ///
-/// Initialize drops the beam and moves the head: it is sent only to a controller that reports
-/// itself not initialised, or on order. A beam that is not there is waited for: who carries the
-/// reflector needs an undisturbed tracker. What is set is read before, and put back when abbe
-/// leaves.
+/// Disconnected: the connection failed or ended. Faulted: the controller's answer was malformed,
+/// missing, or a refusal that is not temporary. In both states the session connects again after a
+/// pause, which doubles with each attempt until points arrive.
+///
+/// Initialize loses the beam and moves the head. It is sent only to a controller that reports that
+/// it is not initialised, or by order. While there is no beam the session waits and sends no
+/// command that moves the tracker, so as not to disturb the operator with the reflector. Each
+/// setting is read before it is set, and restored when the session ends.
 
 #include <chrono>
 #include <initializer_list>
@@ -52,64 +55,65 @@ enum class TrackerState {
   Stopping,
   Faulted,
 };
-/// A literal: "streaming", "beam lost", ...
+/// Text for messages: "streaming", "beam lost", ...
 [[nodiscard]] const char* name_of(TrackerState) noexcept;
 
 enum class TrackerMode {
   ContinuousTime,      ///< a point every `time_separation_ms`
   ContinuousDistance,  ///< a point every `spatial_distance_mm`
-  Stationary,          ///< one mean of `stationary_time_ms` after the other
+  Stationary,          ///< consecutive means over `stationary_time_ms`
 };
 
 struct TrackerSessionOptions {
-  std::string peer = "tracker";  ///< how messages name it: "tracker 10.0.0.7:700"
+  std::string peer = "tracker";  ///< its name in messages: "tracker 10.0.0.7:700"
   TrackerMode mode = TrackerMode::ContinuousTime;
   std::int32_t time_separation_ms = 2;  ///< 500 points per second
   double spatial_distance_mm = 1.0;
   std::int32_t stationary_time_ms = 500;
-  std::int32_t packets_per_second =
-      10;                 ///< 3 to 10, what the controller offers; a refusal is no fault
-  std::string reflector;  ///< name or id; empty: the one that is set in the controller
-  bool home_after_initialize = false;  ///< GoBirdBath, when abbe had to initialise the tracker
-  std::optional<emscon::SetSearchParams> search;  ///< radius in mm; none: as set in the controller
+  std::int32_t packets_per_second = 10;  ///< 3 to 10; a refusal by the controller is no fault
+  std::string reflector;               ///< name or id; empty: the one that is set in the controller
+  bool home_after_initialize = false;  ///< send GoBirdBath after Initialize
+  /// Search radius in mm and time-out; nullopt: as set in the controller.
+  std::optional<emscon::SetSearchParams> search;
   emscon::WeatherMonitor weather = emscon::WeatherMonitor::ReadAndCompute;
-  emscon::Environment
-      environment;  ///< Celsius, mbar, percent; told to the controller if `weather` is None
+  /// Celsius, mbar, percent; sent to the controller if `weather` is None.
+  emscon::Environment environment;
 
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
-  /// The first question of a connection is repeated: who was away hears it as soon as he is back.
+  /// The first query of a connection is repeated at this interval: a controller that was not
+  /// reachable answers as soon as it is reachable again.
   std::chrono::nanoseconds ask_again = std::chrono::milliseconds{250};
-  /// Initialize and GoBirdBath
+  /// Time-out of Initialize and GoBirdBath, and of FindReflector without `search`.
   std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};
-  /// no packet while streaming
+  /// Longest time without a packet while streaming.
   std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};
-  /// after "busy" or "not ready"
+  /// Pause before repeating a command after "busy" or "not ready".
   std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};
-  /// "busy" for longer is a fault
+  /// A controller that reports "busy" for longer is a fault.
   std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};
-  /// how often a heating laser is asked
+  /// Interval of status queries while the laser is heating.
   std::chrono::nanoseconds warm_poll = std::chrono::seconds{5};
-  /// beam back: then StartMeasurement again
+  /// StartMeasurement is sent again if no point arrives within this time after the beam is back.
   std::chrono::nanoseconds resume_within = std::chrono::seconds{1};
-  /// how often a quiet controller is asked
+  /// Interval of status queries to a controller that sends nothing.
   std::chrono::nanoseconds keep_alive = std::chrono::seconds{5};
-  /// before connecting again, doubled ...
+  /// Pause before connecting again; it doubles with each attempt up to longest_pause.
   std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
-  /// ... up to this: whoever is back streams within a second
+  /// Short enough that a tracker that is reachable again streams within a second.
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
-  /// after a refusal of a command
+  /// Pause before connecting again after a refused command.
   std::chrono::nanoseconds refused_pause = std::chrono::seconds{5};
-  /// stop and put back the settings
+  /// Longest time for stopping the measurement and restoring the settings.
   std::chrono::nanoseconds leave_within = std::chrono::seconds{5};
 };
-/// BadConfiguration says which option is out of its range.
+/// BadConfiguration; the text names the option that is out of range.
 [[nodiscard]] Result<void> check(const TrackerSessionOptions& options);
-/// After which an order has been reported; longer only where the controller is busy before several
-/// commands.
+/// Time within which an order is reported. It may take longer only if the controller is busy before
+/// several commands.
 [[nodiscard]] std::chrono::nanoseconds longest_order(const TrackerSessionOptions& options) noexcept;
 
-// Inputs. Answers, errors, status changes and nonsense come from the receiver as they are.
+// Inputs. Answers, errors, status changes and protocol errors of the receiver are passed unchanged.
 struct TrackerConnected {};
 struct TrackerConnectionLost {
   std::string what;  ///< "connection refused", "closed by peer"
@@ -118,7 +122,7 @@ struct TrackerPointsArrived {
   std::size_t count = 0;
 };
 struct TrackerTick {};           ///< time has passed; send one at deadline()
-struct TrackerStopRequested {};  ///< end politely and stay away
+struct TrackerStopRequested {};  ///< restore the settings, disconnect, do not connect again
 using TrackerInput =
     std::variant<TrackerTick, TrackerConnected, TrackerConnectionLost, TrackerPointsArrived,
                  emscon::Answer, emscon::ErrorResponse, emscon::StatusChange, TrackerProtocolError,
@@ -126,8 +130,10 @@ using TrackerInput =
 
 // Actions.
 struct TrackerNothing {};
-struct TrackerOpen {};   ///< open a connection, then say TrackerConnected or TrackerConnectionLost
-struct TrackerClose {};  ///< close it; no TrackerConnectionLost is expected
+/// Open a connection; the input TrackerConnected or TrackerConnectionLost follows.
+struct TrackerOpen {};
+/// Close the connection; no TrackerConnectionLost follows.
+struct TrackerClose {};
 struct TrackerSend {
   emscon::Request request;
 };
@@ -149,13 +155,13 @@ class TrackerSession {
     std::string text;         ///< the latest: "tracker 10.0.0.7:700: no answer to SetUnits in 3 s"
   };
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
-  /// Why no points come, with what to do about it; empty while they come.
+  /// Why no points arrive, and what to do; empty while points arrive.
   [[nodiscard]] const std::string& cause() const noexcept { return cause_; }
-  /// Of the latest order, once.
+  /// The report of the latest order; nullopt if there is none, or if it was already taken.
   [[nodiscard]] std::optional<TrackerOrderReport> take_report() {
     return std::exchange(report_, std::nullopt);
   }
-  /// Stopped, and nothing is left to say to the controller.
+  /// True if the session was stopped and is disconnected.
   [[nodiscard]] bool has_left() const noexcept { return stopped_ && !online(); }
 
  private:
@@ -163,18 +169,18 @@ class TrackerSession {
   struct Step {
     TrackerState state{};
     emscon::Request request;
-    bool optional = false;  ///< a refusal is taken as done
+    bool optional = false;  ///< a refusal counts as done
     bool of_order = false;  ///< a refusal ends the order, not the session
   };
-  /// What follows the last step of a plan.
+  /// The action after the last step of a plan.
   enum class Goal { SetUp, Stream, Stay, Leave, GiveUp };
   struct Pending {
     Step step;
     bool scripted = false;
     bool waiting_to_resend = false;
-    protocol::HostTime due{};       ///< of the answer, or of sending it again
-    protocol::HostTime overdue{};   ///< no answer until here is a fault
-    protocol::HostTime patience{};  ///< "busy" until here is borne
+    protocol::HostTime due{};       ///< of the answer, or of repeating the command
+    protocol::HostTime overdue{};   ///< without an answer by then: a fault
+    protocol::HostTime patience{};  ///< "busy" is tolerated until then
   };
 
   TrackerAction take(const TrackerTick&);
@@ -184,7 +190,7 @@ class TrackerSession {
   TrackerAction take(const emscon::Answer& answer);
   TrackerAction take(const emscon::ErrorResponse& error);
   TrackerAction take(const emscon::StatusChange& change);
-  TrackerAction take(const TrackerProtocolError& nonsense);
+  TrackerAction take(const TrackerProtocolError& malformed);
   TrackerAction take(const TrackerStopRequested&);
   TrackerAction take(const TrackerOrder& order);
 
@@ -221,13 +227,13 @@ class TrackerSession {
   void note_fault(const std::string& what);
   TrackerAction done(const emscon::Answer& answer);
   TrackerAction done_without_beam(const emscon::Answer& answer);
-  TrackerAction judge(const emscon::SystemStatusAnswer& status);
+  TrackerAction evaluate(const emscon::SystemStatusAnswer& status);
   void await_answer();
   TrackerAction overdue();
   TrackerAction tick_streaming();
   TrackerAction measure_again();
   TrackerAction start_again();
-  TrackerAction ask_alive();
+  TrackerAction query_status();
   TrackerAction beam_lost(const std::string& why);
   void streaming();
   TrackerAction give_up(TrackerState into, const std::string& what);
@@ -244,18 +250,17 @@ class TrackerSession {
   protocol::HostTime now_{};
   std::size_t step_ = 0;
   std::optional<Pending> pending_;
-  protocol::HostTime
-      /// of what the state waits for: reconnecting, connection, warm-up, points, keep-alive
-      due_{};
+  /// Deadline of the state: reconnecting, connection, warm-up, points, keep-alive.
+  protocol::HostTime due_{};
   std::chrono::nanoseconds pause_{};
   protocol::HostTime beam_lost_at_{};
-  std::optional<protocol::HostTime>
-      restart_at_;            ///< the beam is back: StartMeasurement, should no point come before
-  bool result_came_ = false;  ///< Stationary: the one of the latest StartMeasurement
+  /// The beam is back: StartMeasurement is sent then, unless a point arrives before.
+  std::optional<protocol::HostTime> restart_at_;
+  bool result_came_ = false;  ///< Stationary: the latest StartMeasurement gave its result
   bool stopped_ = false;
   Fault fault_;
   std::string cause_;
-  std::vector<TrackerReflector> reflectors_;  ///< of the controller, as far as listed
+  std::vector<TrackerReflector> reflectors_;  ///< list of the controller, as far as received
   std::optional<std::int32_t> reflector_in_use_;
   std::optional<std::int32_t> reflector_before_;  ///< before the configured one was set
   std::optional<TrackerOrder> order_;             ///< accepted, not yet reported
@@ -264,6 +269,6 @@ class TrackerSession {
 };
 
 /// "expected emScon answer, got 48 54 54 50 \"HTTP...\"".
-[[nodiscard]] std::string describe(const TrackerProtocolError& nonsense);
+[[nodiscard]] std::string describe(const TrackerProtocolError& malformed);
 
 }  // namespace abbe::drivers

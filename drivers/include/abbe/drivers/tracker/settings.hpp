@@ -1,9 +1,11 @@
 #pragma once
-/// What abbe sets in a controller, and what stood there before: other programs use the same
-/// controller, so abbe asks before it sets and puts back what it changed. Ordinary world.
+/// The settings that abbe makes in a controller, and their previous values. Other programs use the
+/// same controller, so abbe reads each setting before it sets it, and restores what it changed. Not
+/// real-time.
 ///
-/// The transformation and the station orientation keep their values: abbe switches their use off in
-/// the system settings, and on again at the end. Nivel and camera stay as they are.
+/// abbe does not change the values of the transformation and the station orientation. It disables
+/// their use in the system settings and restores that at the end. The settings of Nivel and camera
+/// are not changed.
 
 #include <optional>
 #include <vector>
@@ -21,24 +23,25 @@ class TrackerSettings {
  public:
   explicit TrackerSettings(const TrackerSessionOptions& options);
 
-  /// Questions that are still to be asked before anything is set, none once they were.
+  /// Queries to send before anything is set; empty when all were answered.
   [[nodiscard]] std::vector<emscon::Request> questions() const;
-  /// An answer to one of them. What the controller does not tell is not put back.
+  /// Stores the answer to a query. A setting that the controller does not report is not restored.
   void found(const emscon::Answer& answer);
-  /// The controller may have forgotten what was set: asks anew. A value that abbe itself set is not
-  /// taken for what stood there before.
+  /// Queries all settings again: call when the controller may have lost them. A value that abbe
+  /// itself set does not replace the stored previous value.
   void ask_again() noexcept;
 
-  /// What abbe sets with this command, given what was found; none if it does not use it.
+  /// The request that abbe sends with this command, based on the previous value; nullopt if abbe
+  /// does not use the command.
   [[nodiscard]] std::optional<emscon::Request> wanted(emscon::Command command) const;
-  /// Puts back whatever was found otherwise than wanted, units first.
+  /// Requests that restore every previous value that differs from the one abbe set, units first.
   [[nodiscard]] std::vector<emscon::Request> restoring() const;
 
  private:
   struct Setting {
     emscon::Request question;
     emscon::Request wanted;
-    std::optional<emscon::Request> before{};  ///< as found, in the units found
+    std::optional<emscon::Request> before{};  ///< previous value, in the previous units
     bool asked = false;
   };
   [[nodiscard]] static emscon::Request adapted(const Setting& setting);

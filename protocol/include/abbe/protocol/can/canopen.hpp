@@ -1,6 +1,6 @@
 #pragma once
-/// CANopen communication objects that are one frame each: NMT, SYNC, heartbeat, EMCY [CiA 301].
-/// Every decoder is total: a frame that is not exactly such an object gives nullopt. Pure, no
+/// CANopen communication objects of one frame each: NMT, SYNC, heartbeat, EMCY [CiA 301]. The
+/// decoders accept any frame; they return nullopt if it is not exactly such an object. Pure, no
 /// allocation.
 
 #include <array>
@@ -34,7 +34,7 @@ inline constexpr std::uint32_t kHeartbeat = 0x700;    ///< + node
 }
 /// TPDO 1 to 4 of any node.
 [[nodiscard]] constexpr bool is_tpdo(const CanFrame& frame) noexcept {
-  constexpr std::uint32_t kFromNode = 0x80;  // else an RPDO
+  constexpr std::uint32_t kFromNode = 0x80;  // bit of a TPDO; 0 in an RPDO
   return frame.is_standard_data() && frame.id > kTpdo1 && frame.id < kSdoResponse &&
          (frame.id & kFromNode) != 0;
 }
@@ -54,14 +54,14 @@ struct NmtMessage {
 [[nodiscard]] CanFrame encode_nmt(NmtCommand command, NodeId node) ABBE_RT;
 [[nodiscard]] std::optional<NmtMessage> decode_nmt(const CanFrame& frame) ABBE_RT;
 
-/// SYNC: no data, or a counter that runs 1..overflow value (1019h).
+/// SYNC: no data, or a counter from 1 to the overflow value (1019h).
 struct Sync {
   std::optional<std::uint8_t> counter;
 };
 [[nodiscard]] CanFrame encode_sync(std::optional<std::uint8_t> counter = std::nullopt) ABBE_RT;
 [[nodiscard]] std::optional<Sync> decode_sync(const CanFrame& frame) ABBE_RT;
 
-/// NMT state as the heartbeat carries it; 0 is the boot-up message, sent once after a reset.
+/// NMT state in the heartbeat; 0 is the boot-up message, sent once after a reset.
 enum class NodeState : std::uint8_t {
   BootUp = 0,
   Stopped = 4,
@@ -75,7 +75,7 @@ struct Heartbeat {
 [[nodiscard]] CanFrame encode_heartbeat(NodeId node, NodeState state) ABBE_RT;
 [[nodiscard]] std::optional<Heartbeat> decode_heartbeat(const CanFrame& frame) ABBE_RT;
 
-/// Emergency error codes [CiA 301]; a device may send others of the same hundreds.
+/// Emergency error codes [CiA 301]. A device may send other codes of the same class (first digit).
 enum class EmergencyCode : std::uint16_t {
   Reset = 0x0000,
   Generic = 0x1000,
@@ -106,7 +106,7 @@ enum class ErrorRegister : std::uint8_t {
 };
 struct Emergency {
   NodeId node = 0;
-  std::uint16_t code = 0;  ///< 0: all errors gone
+  std::uint16_t code = 0;  ///< 0: error reset, no error is left
   std::uint8_t error_register = 0;
   std::array<std::byte, 5> manufacturer{};
 };

@@ -1,16 +1,22 @@
 #pragma once
-/// Brings one encoder from any state to "sends its position at every SYNC"
-/// [CiA 301: PDO configuration order]. Sans-I/O like the SdoClient it drives: frames and a time in,
-/// frames out. No allocation. Not thread-safe.
+/// Configures one encoder, from any state, so that it sends its position at every SYNC
+/// [CiA 301: PDO configuration order]. Sans-I/O like the SdoClient that it uses: frames and a time
+/// in, frames out. No allocation. Not thread-safe.
 ///
-/// Order: NMT pre-operational; read 1000h and 1018h and check them; read the step and check it
-/// (6005h:01, else 6501h; rotary: 6001h where 6000h says that scaling is on, else 6501h); disable
-/// the TPDO; clear its mapping; map the position; set the count; transmission type, inhibit time,
-/// event timer; enable it; heartbeat; disable the other default TPDO; NMT start.
+/// Order of the steps:
+/// - NMT pre-operational
+/// - read and check 1000h and 1018h
+/// - read and check the measuring step (6005h:01, else 6501h; rotary: 6001h if scaling is on in
+///   6000h, else 6501h)
+/// - disable the TPDO, clear its mapping, map the position, set the number of entries
+/// - set transmission type, inhibit time and event timer
+/// - enable the TPDO
+/// - set the heartbeat, disable the other default TPDO
+/// - NMT start
 ///
-/// An encoder that refuses a write is read: one with a fixed mapping, transmission type or
-/// identifier is as good if that is what is needed, and one without a settable heartbeat is watched
-/// by its positions.
+/// If an encoder refuses a write, the object is read instead. A fixed mapping, transmission type or
+/// identifier is accepted if it is the required one. Without a configurable heartbeat, the encoder
+/// is monitored by its positions.
 
 #include <array>
 #include <cstddef>
@@ -25,21 +31,22 @@
 
 namespace abbe::protocol::can {
 
-/// What the encoder shall do, and what it must be.
+/// Required behaviour and identity of the encoder.
 struct EncoderPlan {
   NodeId node = 1;
   PositionType position = PositionType::Signed32;
   std::uint8_t tpdo = 1;        ///< 1 or 2
-  std::uint8_t sync_every = 1;  ///< 1..240: transmission type
+  std::uint8_t sync_every = 1;  ///< 1..240: send at every n-th SYNC (transmission type)
   std::uint16_t heartbeat_ms = 100;
-  std::optional<std::uint32_t> vendor{};  ///< checked against 1018h when given
+  std::optional<std::uint32_t> vendor{};  ///< checked against 1018h if given
   std::optional<std::uint32_t> product{};
   std::optional<std::uint32_t> serial{};
-  std::optional<bool> linear{};  ///< checked against 1000h when given
-  bool needs_scale = false;      ///< a node that does not know its step, or says 0, is refused
-  std::optional<double>
-      step_nm{};  ///< linear: what it must be, if the node says it, within half a nm
-  std::optional<double> units_per_revolution{};  ///< rotary: the same, within 1e-5
+  std::optional<bool> linear{};  ///< checked against 1000h if given
+  bool needs_scale = false;      ///< a node that reports no step, or 0, is refused
+  /// Linear: required step, within 0.5 nm; checked if the node reports its step.
+  std::optional<double> step_nm{};
+  /// Rotary: required units per revolution, within 1e-5; checked if the node reports them.
+  std::optional<double> units_per_revolution{};
 };
 
 /// One SDO write of the procedure.
@@ -47,43 +54,43 @@ struct SdoWrite {
   ObjectId object;
   std::uint32_t value = 0;
   std::uint8_t size = 0;
-  bool optional = false;  ///< a node without this object is as good
+  bool optional = false;  ///< a node without this object is accepted
 };
-/// Steps 2 to 8 as a list.
+/// All writes of the procedure, from disabling the TPDO to disabling the other one.
 using PdoConfiguration = std::array<SdoWrite, 10>;
 [[nodiscard]] PdoConfiguration pdo_configuration(const EncoderPlan& plan) noexcept;
 
-/// What the encoder said about itself.
+/// Data read from the encoder.
 struct EncoderDescription {
   std::uint32_t device_type = 0;
   std::uint32_t vendor = 0;
   std::uint32_t product = 0;
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
-  std::optional<std::uint32_t> step_nm;  ///< linear, as read: 0 is for the caller to refuse
+  std::optional<std::uint32_t> step_nm;  ///< linear, as read; the caller must check for 0
   std::optional<std::uint32_t> operating_parameters;  ///< rotary: 6000h
   std::optional<std::uint32_t> units_per_revolution;  ///< rotary
   std::optional<std::uint32_t> total_range;  ///< rotary: counts after which the position wraps
   std::optional<std::uint32_t> revolutions;  ///< rotary without scaling: 6502h
-  bool fixed_mapping = false;      ///< its TPDO could not be mapped, and holds the position
-  std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
+  bool fixed_mapping = false;                ///< the mapping is fixed and contains the position
+  std::uint8_t position_byte = 0;            ///< offset of the position in the TPDO
 };
 
 enum class ConfigurationFault : std::uint8_t {
   None,
   Silent,          ///< no answer, all retries used
   Refused,         ///< SDO abort by the node: `abort_code`
-  NotAnEncoder,    ///< 1000h does not say profile 406: `seen`
+  NotAnEncoder,    ///< the profile in 1000h is not 406: `seen`
   WrongVendor,     ///< `seen`
   WrongProduct,    ///< `seen`
   WrongSerial,     ///< `seen`
-  WrongKind,       ///< linear instead of rotary or the other way round: `seen`
+  WrongKind,       ///< linear instead of rotary, or rotary instead of linear: `seen`
   NoScale,         ///< the step is 0 or unknown, and needed
-  WrongStep,       ///< not the step that is configured: `seen`
-  FixedMapping,    ///< its TPDO cannot be mapped and does not hold the position
-  FixedType,       ///< its TPDO cannot be made to come at every SYNC: `seen`, the transmission type
-  NotOperational,  ///< it left that state by itself, after it was configured
-  BadAnswer,       ///< an answer that is no number, or a protocol error
+  WrongStep,       ///< differs from the configured step: `seen`
+  FixedMapping,    ///< the mapping is fixed and does not contain the position
+  FixedType,       ///< the transmission type is fixed and not at every SYNC: `seen`
+  NotOperational,  ///< left the state Operational after it was configured
+  BadAnswer,       ///< an answer that is not a number, or a protocol error
 };
 struct ConfigurationError {
   ConfigurationFault fault = ConfigurationFault::None;
@@ -125,7 +132,7 @@ class EncoderConfigurator {
     Range,
     Revolutions,
     Write,
-    MappingCount,  ///< from here on: what a write was refused for is read
+    MappingCount,  ///< this and the following: read an object whose write was refused
     MappingEntry,
     FirstEntry,
     Type,
@@ -159,11 +166,11 @@ class EncoderConfigurator {
   State state_ = State::Idle;
   Step step_ = Step::DeviceType;
   std::size_t write_index_ = 0;
-  ConfigurationError refusal_;   ///< of the write whose object is read instead
-  std::uint8_t mapped_ = 0;      ///< entries of the fixed mapping
-  std::uint8_t entry_ = 0;       ///< the one being read
-  unsigned bits_before_ = 0;     ///< the position
-  std::optional<CanFrame> nmt_;  ///< goes out before anything of the SDO client
+  ConfigurationError refusal_;   ///< refused write whose object is read instead
+  std::uint8_t mapped_ = 0;      ///< number of entries of the fixed mapping
+  std::uint8_t entry_ = 0;       ///< entry being read
+  unsigned bits_before_ = 0;     ///< bits of the entries before the position
+  std::optional<CanFrame> nmt_;  ///< sent before the frames of the SDO client
 };
 
 }  // namespace abbe::protocol::can

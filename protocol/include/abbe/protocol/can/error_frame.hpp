@@ -1,6 +1,6 @@
 #pragma once
-/// What the CAN controller says about the bus, from Linux error frames (class bits in the
-/// identifier) [linux/can/error.h]. Pure, total, no allocation.
+/// Bus conditions that the CAN controller reports in Linux error frames (class bits in the
+/// identifier) [linux/can/error.h]. Pure, accepts any frame, no allocation.
 
 #include <cstdint>
 #include <optional>
@@ -21,10 +21,10 @@ enum class BusCondition : std::uint32_t {
   Active = 1u << 6,   ///< back to error-active
   Protocol = 1u << 7,
   Transceiver = 1u << 8,
-  NoAcknowledge = 1u << 9,  ///< nobody else on the bus hears us
+  NoAcknowledge = 1u << 9,  ///< no other node on the bus acknowledged a frame
   BusOff = 1u << 10,        ///< the controller left the bus
   BusError = 1u << 11,
-  Restarted = 1u << 12,  ///< the controller is back
+  Restarted = 1u << 12,  ///< the controller restarted after bus-off
 };
 using BusConditions = std::uint32_t;
 [[nodiscard]] constexpr bool has(BusConditions set, BusCondition c) noexcept {

@@ -1,6 +1,6 @@
 #pragma once
-/// One CAN frame, classic or FD, as plain data: what every bus transport hands up and every codec
-/// of this folder reads. Pure; safe to copy between threads.
+/// One CAN frame, classic or FD, as plain data. Bus transports deliver it, and the decoders of this
+/// folder read it. Pure data; safe to copy between threads.
 
 #include <algorithm>
 #include <array>
@@ -14,14 +14,13 @@
 
 namespace abbe::protocol::can {
 
-/// What kind of frame it is; a bit set.
+/// Properties of a frame; a bit set.
 enum class FrameFlag : std::uint8_t {
   Extended = 1u << 0,  ///< 29-bit identifier
   Remote = 1u << 1,    ///< remote request: `length` is the requested length, there are no data
-  Error = 1u
-          /// made by the local controller, `id` holds Linux error class bits (see error_frame.hpp)
-          << 2,
-  Fd = 1u << 3,  ///< CAN FD format: up to 64 bytes, `fd_flags` hold BRS (1) and ESI (2)
+  /// from the local controller; `id` contains Linux error class bits (see error_frame.hpp)
+  Error = 1u << 2,
+  Fd = 1u << 3,  ///< CAN FD format: up to 64 bytes, `fd_flags` contains BRS (1) and ESI (2)
 };
 
 struct CanFrame {
@@ -33,8 +32,8 @@ struct CanFrame {
   std::uint32_t id = 0;  ///< 11 or 29 bits, no flag bits
   std::uint8_t flags = 0;
   std::uint8_t fd_flags = 0;
-  std::uint8_t length = 0;    ///< bytes of `data` that count (of a remote frame: bytes asked for)
-  std::uint8_t reserved = 0;  ///< always 0, so that equal frames are equal bytes
+  std::uint8_t length = 0;    ///< valid bytes of `data`; in a remote frame: requested bytes
+  std::uint8_t reserved = 0;  ///< always 0, so that equal frames have equal bytes
   std::array<std::byte, kMaxData> data{};
 
   [[nodiscard]] constexpr bool is(FrameFlag f) const ABBE_RT {
@@ -43,11 +42,11 @@ struct CanFrame {
   constexpr void set(FrameFlag f) ABBE_RT {
     flags = static_cast<std::uint8_t>(flags | static_cast<std::uint8_t>(f));
   }
-  /// A data frame with an 11-bit identifier: all that CANopen uses.
+  /// True for a data frame with an 11-bit identifier, the only kind that CANopen uses.
   [[nodiscard]] constexpr bool is_standard_data() const ABBE_RT {
     return !is(FrameFlag::Extended) && !is(FrameFlag::Remote) && !is(FrameFlag::Error);
   }
-  /// The payload; empty for remote frames, never more than the array whatever `length` says.
+  /// The payload; empty for remote frames, at most kMaxData bytes for any `length`.
   [[nodiscard]] constexpr std::span<const std::byte> payload() const ABBE_RT {
     return {data.data(), is(FrameFlag::Remote) ? 0 : std::min<std::size_t>(length, kMaxData)};
   }
@@ -60,7 +59,7 @@ struct CanFrame {
 static_assert(std::is_trivially_copyable_v<CanFrame>);
 static_assert(sizeof(CanFrame) == 72);
 
-/// A classic data frame with an 11-bit identifier; bytes past the eighth are not taken.
+/// A classic data frame with an 11-bit identifier; bytes after the eighth are ignored.
 [[nodiscard]] constexpr CanFrame standard_frame(std::uint32_t id,
                                                 std::span<const std::byte> payload) ABBE_RT {
   CanFrame frame;

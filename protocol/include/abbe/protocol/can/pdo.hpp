@@ -1,6 +1,6 @@
 #pragma once
-/// Process data: mapping entries [CiA 301, object 1A00h] and the position inside a TPDO
-/// [CiA 406, objects 6004h, 6008h]. Pure, no allocation, total.
+/// Process data: mapping entries [CiA 301, object 1A00h] and the position in a TPDO
+/// [CiA 406, objects 6004h, 6008h]. Pure, no allocation, accepts any bytes.
 
 #include <array>
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace abbe::protocol::can {
 
-/// One line of a mapping: object and how many bits of it, as 1A00h holds it: index << 16 | sub << 8
-/// | bits.
+/// One mapping entry: an object and its number of bits. Value in 1A00h:
+///   index << 16 | sub << 8 | bits
 struct MappedObject {
   std::uint16_t index = 0;
   std::uint8_t sub = 0;
@@ -29,11 +29,12 @@ struct MappedObject {
           static_cast<std::uint8_t>(entry)};
 }
 
-/// How an encoder writes its position.
+/// Data type of the position of an encoder.
 enum class PositionType : std::uint8_t {
   Signed32,    ///< 6004h of linear encoders
   Unsigned32,  ///< 6004h of rotary encoders
-  /// 6008h; CiA 406 v3.1 leaves the signedness open, a scale that crosses zero needs the sign
+  /// 6008h; CiA 406 v3.1 does not define the signedness; a scale with negative positions needs a
+  /// sign
   Signed64,
 };
 [[nodiscard]] constexpr std::size_t size_of(PositionType type) noexcept {
@@ -44,13 +45,13 @@ enum class PositionType : std::uint8_t {
   return type == PositionType::Signed64 ? MappedObject{0x6008, 0, 64} : MappedObject{0x6004, 0, 32};
 }
 
-/// A position in device counts from the payload of a TPDO, `offset` bytes into it; nullopt when it
+/// The position in device counts at byte `offset` of the payload of a TPDO; nullopt if the payload
 /// is too short.
 [[nodiscard]] std::optional<std::int64_t> decode_position(std::span<const std::byte> payload,
                                                           PositionType type,
                                                           std::size_t offset = 0) ABBE_RT;
-/// A TPDO that holds just one position; counts that do not fit 32 bits wrap, as a device's counter
-/// does.
+/// A TPDO that contains only a position. Counts that do not fit into 32 bits wrap, as in a device's
+/// counter.
 [[nodiscard]] CanFrame encode_position(std::uint32_t cob_id, PositionType type,
                                        std::int64_t count) ABBE_RT;
 

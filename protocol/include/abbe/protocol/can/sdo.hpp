@@ -1,5 +1,6 @@
 #pragma once
-/// What SDO client and server share: object address, abort codes, size limit [CiA 301]. Pure data.
+/// Common definitions of SDO client and server: object address, abort codes, size limit [CiA 301].
+/// Pure data.
 
 #include <compare>
 #include <cstddef>
@@ -14,8 +15,8 @@ struct ObjectId {
   friend constexpr auto operator<=>(const ObjectId&, const ObjectId&) = default;
 };
 
-/// The longest object this stack carries; longer ones are refused with OutOfMemory. Encoders'
-/// objects are numbers and names.
+/// Size limit of an object; longer ones are refused with OutOfMemory. Objects of encoders are
+/// numbers and names.
 inline constexpr std::size_t kMaxSdoBytes = 128;
 
 enum class AbortCode : std::uint32_t {
@@ -47,8 +48,8 @@ enum class AbortCode : std::uint32_t {
   LocalControl = 0x08000021,
   DeviceState = 0x08000022,
 };
-/// What the object is, not what the node is at the moment (booting, storing, a hardware fault):
-/// asking again does not change it.
+/// True if the abort is caused by the object itself, so that a retry gives the same result. False
+/// for temporary states of the node (booting, storing, a hardware fault).
 [[nodiscard]] constexpr bool is_lasting(AbortCode code) noexcept {
   const auto value = static_cast<std::uint32_t>(code);
   return value >> 24 == 0x06 && code != AbortCode::Hardware;

@@ -3,9 +3,9 @@
 /// Sans-I/O: frames and a time in, frames out. No allocation. Not thread-safe; not for the
 /// real-time path.
 ///
-/// Use: start_*(), then send whatever take_frame() gives after every start_*(), on_frame() and
-/// on_time(). A server that stays silent for `timeout` is sent an abort (05040000h) and the
-/// transfer begins again, `retries` times.
+/// Use: call start_*(). After every start_*(), on_frame() and on_time(), send the frames of
+/// take_frame(). If the server does not answer within `timeout`, the client sends an abort
+/// (05040000h) and repeats the transfer, up to `retries` times.
 
 #include <array>
 #include <chrono>
@@ -33,12 +33,12 @@ class SdoClient {
   explicit SdoClient(NodeId node, SdoClientOptions options = {}) noexcept
       : node_(node), options_(options) {}
 
-  /// Reads an object. A transfer that is under way is forgotten.
+  /// Reads an object. A transfer in progress is discarded.
   void start_upload(ObjectId object, HostTime now) noexcept;
   /// Writes an object of 1 to kMaxSdoBytes bytes; other sizes fail at once with LengthMismatch.
   void start_download(ObjectId object, std::span<const std::byte> value, HostTime now) noexcept;
 
-  /// Any frame of the bus; those that are not this transfer's answers are ignored.
+  /// Any frame of the bus; all but the answers of this transfer are ignored.
   void on_frame(const CanFrame& frame, HostTime now) noexcept;
   void on_time(HostTime now) noexcept;
   /// The next frame to send, until nullopt.
@@ -46,20 +46,20 @@ class SdoClient {
 
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] ObjectId object() const noexcept { return object_; }
-  /// When on_time() has something to do; HostTime::max() when idle.
+  /// When on_time() must be called; HostTime::max() if no transfer is in progress.
   [[nodiscard]] HostTime deadline() const noexcept {
     return state_ == State::Busy ? deadline_ : HostTime::max();
   }
-  /// Why it Failed; None otherwise.
+  /// The reason in state Failed; None otherwise.
   [[nodiscard]] AbortCode abort_code() const noexcept { return abort_code_; }
-  /// The code came from the server, not from here.
+  /// True if the server sent the abort, false if this client did.
   [[nodiscard]] bool aborted_by_server() const noexcept { return aborted_by_server_; }
-  /// What an upload read, once Done; what is being written during a download. Valid until the next
-  /// start.
+  /// The value read by an upload in state Done, or the value of a download. Valid until the next
+  /// start_*().
   [[nodiscard]] std::span<const std::byte> value() const noexcept {
     return {buffer_.data(), size_};
   }
-  /// value() as a little-endian number; nullopt when it is not 1 to 8 bytes.
+  /// value() as a little-endian number; nullopt unless it has 1 to 8 bytes.
   [[nodiscard]] std::optional<std::uint64_t> number() const noexcept;
 
  private:
@@ -88,7 +88,7 @@ class SdoClient {
   ObjectId object_;
   HostTime deadline_{};
   unsigned attempts_left_ = 0;
-  std::size_t size_ = 0;                    ///< bytes of `buffer_` that count
+  std::size_t size_ = 0;                    ///< number of valid bytes of `buffer_`
   std::size_t sent_ = 0;                    ///< of a segmented download
   std::optional<std::uint32_t> announced_;  ///< size the server announced for a segmented upload
   std::array<std::byte, kMaxSdoBytes> buffer_{};

@@ -1,7 +1,6 @@
 #pragma once
-/// The other end of the SdoClient: answers for one node out of its object dictionary [CiA 301].
-/// Sans-I/O, no allocation, total: any request gets an answer or an abort. Not thread-safe. For
-/// simulators and tests.
+/// SDO server of one node: answers requests from its object dictionary [CiA 301]. Sans-I/O, no
+/// allocation. Every request gets an answer or an abort. Not thread-safe. For simulators and tests.
 
 #include <array>
 #include <chrono>
@@ -27,7 +26,7 @@ class SdoServer {
 
   /// The answer to send, if the frame is a request to this node.
   [[nodiscard]] std::optional<CanFrame> on_frame(const CanFrame& frame, HostTime now) noexcept;
-  /// An abort to send when a client left a segmented transfer unfinished for `timeout`.
+  /// The abort to send if a client has not continued a segmented transfer for `timeout`.
   [[nodiscard]] std::optional<CanFrame> on_time(HostTime now) noexcept;
 
  private:

@@ -1,9 +1,11 @@
 #pragma once
-/// CAN frames in UDP datagrams, the cannelloni framing: u8 version 2, u8 opcode 0, u8 sequence, u16
-/// BE count, then per frame u32 BE id with Linux's flag bits (80000000h EFF, 40000000h RTR,
-/// 20000000h error), u8 length (bit 7: CAN FD, then one more byte of FD flags), data (none for
-/// RTR). Pure, no allocation; the decoder is total and checks the whole datagram before it gives
-/// the first frame.
+/// CAN frames in UDP datagrams, in the cannelloni framing (BE: big-endian):
+///   header:    u8 version 2 | u8 opcode 0 | u8 sequence | u16 BE count
+///   per frame: u32 BE id with Linux's flag bits (80000000h EFF, 40000000h RTR, 20000000h error)
+///              | u8 length (bit 7: CAN FD, one more byte of FD flags follows)
+///              | data (none for RTR)
+/// Pure, no allocation. The decoder accepts any bytes and checks the whole datagram before it
+/// returns the first frame.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,8 +22,8 @@ inline constexpr std::size_t kDatagramHeader = 5;
 /// Bytes of an encoded frame.
 [[nodiscard]] std::size_t encoded_size(const CanFrame& frame) ABBE_RT;
 
-/// Writes frames into a caller's buffer. add() is false when the next frame does not fit: send
-/// finish(), start anew.
+/// Writes frames into the caller's buffer. add() returns false if the frame does not fit: send
+/// finish() and use a new writer.
 class DatagramWriter {
  public:
   /// `buffer` holds at least kDatagramHeader bytes and outlives the writer.
@@ -38,24 +40,24 @@ class DatagramWriter {
 };
 
 enum class DatagramError : std::uint8_t {
-  TooShort,  ///< no room for the header
+  TooShort,  ///< shorter than the header
   BadVersion,
   BadOpcode,
   Truncated,      ///< fewer frames than announced
   TrailingBytes,  ///< more bytes than the announced frames need
-  BadLength,      ///< a frame longer than its format allows
-  BadId,          ///< an 11-bit frame with a longer identifier
+  BadLength,      ///< a frame is longer than its format allows
+  BadId,          ///< an 11-bit frame has a longer identifier
 };
 [[nodiscard]] const char* to_text(DatagramError error) noexcept;
 
-/// A checked datagram; walks its frames. The bytes must outlive the view.
+/// A valid datagram; returns its frames one by one. The bytes must outlive the view.
 class DatagramView {
  public:
   [[nodiscard]] static tl::expected<DatagramView, DatagramError> parse(
       std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] std::uint8_t sequence() const ABBE_RT { return sequence_; }
   [[nodiscard]] std::size_t count() const ABBE_RT { return count_; }
-  /// The next frame into `frame`; false after the last.
+  /// Stores the next frame in `frame`; false after the last one.
   [[nodiscard]] bool next(CanFrame& frame) ABBE_RT;
 
  private:
@@ -70,14 +72,14 @@ class DatagramView {
   std::uint16_t left_;
 };
 
-/// Lost datagrams by their sequence number, which wraps at 256. A number from the half before the
-/// expected one is an old datagram that comes late: counted as such, it does not move the
-/// expectation.
+/// Counts lost datagrams by their sequence number, which wraps at 256. A number up to 128 before
+/// the expected one is a late datagram: it is counted as late and does not change the expected
+/// number.
 class SequenceGaps {
  public:
-  /// How many datagrams are missing between the last one and this one.
+  /// Returns the number of datagrams missing between the last one and this one.
   unsigned on_sequence(std::uint8_t sequence) ABBE_RT;
-  /// The peer began anew: the next number is taken as it comes.
+  /// Call when the peer restarted: the next number is accepted without a check.
   void restart() ABBE_RT { started_ = false; }
   [[nodiscard]] std::uint64_t lost() const ABBE_RT { return lost_; }
   [[nodiscard]] std::uint64_t late() const ABBE_RT { return late_; }

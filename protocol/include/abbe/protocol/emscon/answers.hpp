@@ -1,7 +1,7 @@
 #pragma once
-/// What an emScon controller answers (packet type 0, controller to client): one answer per request,
-/// with the number of its command, but for GetReflectors, which gets one per reflector. Units as in
-/// requests.hpp. Pure, allocation-free, total.
+/// Answers of an emScon controller (packet type 0, controller to client): one answer per request,
+/// with the command number of the request. GetReflectors gets one answer per reflector. Units as in
+/// requests.hpp. Pure, allocation-free, accepts any bytes.
 
 #include <array>
 #include <cstddef>
@@ -17,8 +17,7 @@ namespace abbe::protocol::emscon {
 
 using Name = std::array<char16_t, 32>;  ///< UTF-16, ends at the first zero
 
-/// The answer to every command that has nothing to tell but its outcome, and to any command that
-/// was refused.
+/// The answer to a command whose only result is its status, and to any refused command.
 struct Acknowledge {
   Command command{};
   Status status = Status::Ok;
@@ -66,7 +65,7 @@ struct ReflectorAnswer {
 struct ReflectorsAnswer {
   static constexpr Command kCommand = Command::GetReflectors;
   Status status = Status::Ok;
-  std::int32_t total = 0;  ///< how many such answers there are in all
+  std::int32_t total = 0;  ///< total number of these answers
   std::int32_t internal_id = 0;
   TargetType target_type = TargetType::CornerCube;
   double surface_offset = 0.0;
@@ -102,7 +101,7 @@ struct TriggerBoardInfoAnswer {
   std::int32_t max_trigger_frequency_hz = 0;
   std::int32_t error = 0;
 };
-/// 164 bytes, of which only these fields are used; the others keep their raw bytes.
+/// 164 bytes. Only the named fields are used; `other` and `more` are raw bytes.
 struct TrackerInfoAnswer {
   static constexpr Command kCommand = Command::GetTrackerInfo;
   Status status = Status::Ok;
@@ -114,7 +113,7 @@ struct TrackerInfoAnswer {
   std::array<std::byte, 32> more{};
 };
 
-/// The answers that hold what a setting's own request sets, in its layout.
+/// Answers that contain a setting in the layout of the request that sets it.
 template <class Set, Command kId>
 struct SettingAnswer {
   static constexpr Command kCommand = kId;
@@ -151,12 +150,13 @@ inline constexpr std::size_t kMaxAnswerSize = 164;
 [[nodiscard]] Command command_of(const Answer&) ABBE_RT;
 [[nodiscard]] Status status_of(const Answer&) ABBE_RT;
 
-/// Bytes written to `out`, 0 if it is too small; kMaxAnswerSize always suffices.
+/// Returns the number of bytes written to `out`, 0 if it is too small; kMaxAnswerSize is always
+/// sufficient.
 [[nodiscard]] std::size_t encode(const Answer&, std::span<std::byte> out) ABBE_RT;
 
-/// `packet` is one whole packet. 16 bytes are an Acknowledge whatever the command (that is how a
-/// query is refused); a longer packet of a command with an answer of its own is that answer, and
-/// may have more bytes at its end than known here (later firmware appends), which are ignored.
+/// `packet` is one complete packet. A packet of 16 bytes is an Acknowledge for every command (a
+/// refused query has this form). A longer packet is the specific answer of its command. Additional
+/// bytes at its end (from later firmware) are ignored.
 [[nodiscard]] tl::expected<Answer, DecodeError> decode_answer(
     std::span<const std::byte> packet) ABBE_RT;
 

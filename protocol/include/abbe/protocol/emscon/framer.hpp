@@ -1,9 +1,9 @@
 #pragma once
-/// Cuts a TCP byte stream into emScon packets, whichever way they run. A size below 8 or above
-/// 65536 is refused. Policy then: TCP loses nothing, so a bad size means that the peer does not
-/// speak emScon or that we are out of step; the framer gives nothing more until reset() (a new
-/// connection) or resync() (a recording with a hole in it). Fixed buffer, allocation-free; one
-/// thread.
+/// Splits a TCP byte stream into emScon packets, in either direction. A size below 8 or above 65536
+/// is refused. TCP loses no bytes, so an invalid size means that the peer does not use emScon, or
+/// that the framer does not start at a packet boundary. After that the framer returns no packet
+/// until reset() (a new connection) or resync() (a recording with a gap). Fixed buffer,
+/// allocation-free; one thread.
 
 #include <array>
 #include <cstddef>
@@ -16,28 +16,27 @@ namespace abbe::protocol::emscon {
 
 class PacketFramer {
  public:
-  /// Room for one whole packet beside an unfinished one.
+  /// One complete packet and one incomplete packet.
   static constexpr std::size_t kCapacity = 2 * kMaxPacketSize;
 
-  /// Takes as many bytes as there is room for and says how many; all of them whenever next() was
-  /// called until it gave nothing and no more than kMaxPacketSize come at once.
+  /// Takes as many bytes as fit and returns their number. All bytes fit if next() was called until
+  /// it returned nullopt and there are at most kMaxPacketSize bytes.
   std::size_t push(std::span<const std::byte> bytes) ABBE_RT;
 
-  /// The next whole packet, valid until the next push(), reset() or resync(); nothing if none is
-  /// complete.
+  /// The next complete packet, valid until the next push(), reset() or resync(); nullopt if there
+  /// is none.
   [[nodiscard]] std::optional<std::span<const std::byte>> next() ABBE_RT;
 
-  /// True from a refused size on.
+  /// True after a size was refused.
   [[nodiscard]] bool broken() const ABBE_RT { return broken_; }
-  /// The refused bytes, for a message that tells people what does answer there. Empty unless
-  /// broken().
+  /// The refused bytes, for a message that shows what the peer sent. Empty unless broken().
   [[nodiscard]] std::span<const std::byte> refused() const ABBE_RT;
 
-  /// Forgets everything: a new connection.
+  /// Discards all bytes: for a new connection.
   void reset() ABBE_RT;
-  /// Goes on at the next place that looks like the head of a packet from a controller (type 0 to
-  /// 11, a size that type can have). A guess, good enough for a recording with lost blocks, never
-  /// used on a live connection.
+  /// Continues at the next bytes that have the form of a packet header from a controller (type 0 to
+  /// 11, and a size that is possible for the type). This may find a wrong position. It is
+  /// sufficient for a recording with lost blocks and is not used on a live connection.
   void resync() ABBE_RT;
 
  private:

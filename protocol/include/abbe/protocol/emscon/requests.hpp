@@ -1,8 +1,8 @@
 #pragma once
-/// What a client asks of an emScon controller (packet type 0, client to controller). Lengths,
-/// angles, temperatures, pressures and humidity are in the units that SetUnits chose, hence no unit
-/// in their names; the driver always chooses mm, rad, Celsius, mbar and percent. Pure,
-/// allocation-free, total.
+/// Requests of a client to an emScon controller (packet type 0, client to controller). Lengths,
+/// angles, temperatures, pressures and humidity have the units set by SetUnits, so their names
+/// contain no unit. The driver always sets mm, rad, Celsius, mbar and percent. Pure,
+/// allocation-free, accepts any bytes.
 
 #include <array>
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace abbe::protocol::emscon {
 
-/// A request that is nothing but its number.
+/// A request without parameters.
 template <Command kId>
 struct BareRequest {
   static constexpr Command kCommand = kId;
@@ -161,7 +161,7 @@ struct SetExternTriggerParams {
   ClockTransition clock_transition = ClockTransition::Positive;
   ExternTriggerMode mode = ExternTriggerMode::Event;
   StartSignal start_signal = StartSignal::High;
-  std::int32_t minimal_time_delay = 0;  ///< unit not known to any public source
+  std::int32_t minimal_time_delay = 0;  ///< unit: not given by any public source
 };
 struct SetLongSystemParameter {
   static constexpr Command kCommand = Command::SetLongSystemParameter;
@@ -190,11 +190,11 @@ inline constexpr std::size_t kMaxRequestSize = 68;
 
 [[nodiscard]] Command command_of(const Request&) ABBE_RT;
 
-/// Bytes written to `out`, 0 if it is too small; kMaxRequestSize always suffices.
+/// Returns the number of bytes written to `out`, 0 if it is too small; kMaxRequestSize is always
+/// sufficient.
 [[nodiscard]] std::size_t encode(const Request&, std::span<std::byte> out) ABBE_RT;
 
-/// `packet` is one whole packet, as the framer gives it. The size must be the one of the layout,
-/// exactly.
+/// `packet` is one complete packet from the framer. Its size must be exactly that of the layout.
 [[nodiscard]] tl::expected<Request, DecodeError> decode_request(
     std::span<const std::byte> packet) ABBE_RT;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// What an emScon controller sends unasked: measurements, errors, changes of state; and `decode`,
-/// for whatever it sends. Values are in the units of SetUnits and the coordinates of
-/// SetCoordinateSystemType. Pure, allocation-free, total.
+/// Unsolicited packets of an emScon controller: measurements, errors, status changes; and decode()
+/// for all packets of a controller. Values are in the units of SetUnits and the coordinates of
+/// SetCoordinateSystemType. Pure, allocation-free, accepts any bytes.
 
 #include <array>
 #include <cassert>
@@ -16,7 +16,7 @@
 
 namespace abbe::protocol::emscon {
 
-/// Type 1. The status of a broken beam is not known to any public source.
+/// Type 1. The status for a broken beam is not given by any public source.
 struct ErrorResponse {
   Command command{};
   Status status = Status::Unknown;
@@ -27,7 +27,7 @@ struct StatusChange {
   Event event{};
 };
 
-/// Type 2: the mean of a stationary measurement. It carries no time of its own.
+/// Type 2: the mean of a stationary measurement. It contains no time.
 struct SingleResult {
   Status status = Status::Ok;
   MeasurementMode mode = MeasurementMode::Stationary;
@@ -41,7 +41,7 @@ struct SingleResult {
   Environment environment;
 };
 
-/// Type 7: where the reflector is, at most 10 times a second while the beam is locked.
+/// Type 7: position of the reflector, at most 10 times a second while the beam is locked.
 struct ReflectorPosition {
   Status status = Status::Ok;
   std::array<double, 3> value{};
@@ -58,7 +58,7 @@ struct MultiPoint {
   TrackerClockReading time;
   std::array<double, 3> value{};
 };
-/// What a point of type 10 has beside.
+/// Additional data of a point of type 10.
 struct MultiPointStatistics {
   std::array<double, 3> apriori_std{};
   double apriori_total = 0.0;
@@ -77,10 +77,10 @@ inline constexpr std::size_t kMaxExtendedMultiPoints =
     (kMaxPacketSize - kMultiHeadSize) / kExtendedMultiPointSize;
 
 /// Types 3 and 10: a burst of points of a continuous measurement. A view of the packet's bytes,
-/// which must outlive it; points are read where they lie.
+/// which must outlive it; each call of point() decodes one point.
 class MultiResult {
  public:
-  /// Total: `packet` of any bytes gives a result or an error.
+  /// Any bytes in `packet` give a result or an error.
   [[nodiscard]] static tl::expected<MultiResult, DecodeError> from(
       std::span<const std::byte> packet) ABBE_RT;
 
@@ -111,11 +111,12 @@ struct OtherPacket {
 using ControllerPacket = std::variant<Answer, ErrorResponse, StatusChange, SingleResult,
                                       ReflectorPosition, MultiResult, OtherPacket>;
 
-/// Whatever a controller sends. `packet` is one whole packet, as the framer gives it.
+/// Decodes any packet of a controller. `packet` is one complete packet from the framer.
 [[nodiscard]] tl::expected<ControllerPacket, DecodeError> decode(
     std::span<const std::byte> packet) ABBE_RT;
 
-/// Bytes written to `out`, 0 if it is too small (or the points are more than one packet holds).
+/// Each returns the number of bytes written to `out`, 0 if it is too small or if the points do not
+/// fit into one packet.
 [[nodiscard]] std::size_t encode(const ErrorResponse&, std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] std::size_t encode(const StatusChange&, std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] std::size_t encode(const SingleResult&, std::span<std::byte> out) ABBE_RT;

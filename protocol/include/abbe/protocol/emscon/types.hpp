@@ -1,8 +1,8 @@
 #pragma once
-/// The numbers of the Leica emScon TPI (the TCP interface of LTD and AT901 tracker controllers, and
-/// of AT40x in part). Source: the numeric facts of the emScon TPI 3.6 interface as public clients
-/// use them. On the wire every enum is a little-endian int32, so that a value unknown here is kept
-/// as it is and never refused.
+/// Constants of the Leica emScon TPI (the TCP interface of LTD and AT901 tracker controllers, and
+/// in part of AT40x). Source: the numeric values of the emScon TPI 3.6 interface as used by public
+/// clients. On the wire every enum is a little-endian int32; a value that is not listed here is
+/// kept and not refused.
 
 #include <chrono>
 #include <cstddef>
@@ -15,11 +15,11 @@ namespace abbe::protocol::emscon {
 
 inline constexpr std::uint16_t kPort = 700;
 inline constexpr std::size_t kHeaderSize = 8;  ///< int32 size (of the whole packet), int32 type
-/// what public clients reserve; larger is refused
+/// Buffer size of public clients; a larger packet is refused.
 inline constexpr std::size_t kMaxPacketSize = 65536;
 
 enum class PacketType : std::int32_t {
-  Command = 0,  ///< request and answer alike
+  Command = 0,  ///< request or answer
   Error = 1,
   SingleResult = 2,
   MultiResult = 3,
@@ -86,9 +86,9 @@ enum class Status : std::int32_t {
   ServerBusy = 1,
   NotImplemented = 2,
   WrongParameter = 3,
-  WrongParameter1 = 4,  ///< up to 10 = parameter 7
+  WrongParameter1 = 4,  ///< 5 to 10: parameters 2 to 7
   Parameter1OutOfRangeOk = 11,
-  Parameter1OutOfRangeNok = 12,  ///< and so on to 22: odd values were accepted all the same
+  Parameter1OutOfRangeNok = 12,  ///< 13 to 22: parameters 2 to 6; odd values mean accepted
   WrongCurrentReflector = 23,
   NoTrackerProcessorFound = 26,
   NoWeatherMonitor = 27,
@@ -114,13 +114,13 @@ enum class Status : std::int32_t {
   SensorCommunicationFailed = 10015,
 };
 
-/// Done, if with a parameter that was out of range and accepted.
+/// True if the command was carried out, also with a parameter out of range that was accepted.
 [[nodiscard]] constexpr bool accepted(Status s) ABBE_RT {
   const auto value = static_cast<std::int32_t>(s);
   return value == 0 || (value >= 11 && value <= 22 && value % 2 == 1);
 }
 
-/// A name for people; "status" for a number that has none here. Never null.
+/// Text for messages; "status" or "command" for a number that is not listed here. Never null.
 [[nodiscard]] const char* name_of(Status) ABBE_RT;
 [[nodiscard]] const char* name_of(Command) ABBE_RT;
 
@@ -206,10 +206,9 @@ enum class MeasurementMode : std::int32_t {
   ContinuousDistance = 2,
   Grid = 3,
   SphereCentre = 4,
-  CircleCentre = 5,  ///< 6 to 11 are the same with a six-degree-of-freedom probe
+  CircleCentre = 5,  ///< 6 to 11: the same modes with a six-degree-of-freedom probe
 };
-/// Order and signs of the spherical values are not confirmed by any public source: ask for
-/// RightHanded.
+/// Order and signs of the spherical values are not confirmed by any public source: use RightHanded.
 enum class CoordinateSystem : std::int32_t {
   RightHanded = 0,
   LeftHandedX = 1,
@@ -229,10 +228,8 @@ enum class PointStatus : std::int32_t {
 };
 enum class RegionType : std::int32_t { Sphere = 0, Box = 1 };
 enum class TargetType : std::int32_t { CornerCube = 1, CatEye = 2, GlassPrism = 3, Rfi = 4 };
-enum class StatisticMode : std::int32_t {
-  Standard = 0,
-  Extended = 1
-};  ///< results of type 2 and 3, or 9 and 10
+/// Standard: results of type 2 and 3. Extended: results of type 9 and 10.
+enum class StatisticMode : std::int32_t { Standard = 0, Extended = 1 };
 enum class TriggerSource : std::int32_t { Internal = 1, External = 2, ExternalEventMessage = 3 };
 enum class ClockTransition : std::int32_t { Negative = 0, Positive = 1 };
 enum class ExternTriggerMode : std::int32_t { Event = 0, ExternalClock = 1, InternalClock = 2 };
@@ -256,17 +253,17 @@ enum class MeasurementStatusBit : std::int32_t {
   Initialised = 65536,
 };
 
-/// The tracker's own clock as it stands in every point: seconds and microseconds of an arbitrary
-/// epoch.
+/// Reading of the tracker's own clock, contained in every point: seconds and microseconds since an
+/// arbitrary epoch.
 struct TrackerClockReading {
   std::int32_t seconds = 0;
   std::int32_t microseconds = 0;
 
-  /// Total: any two numbers give an instant, normalised or not.
+  /// Any two numbers give an instant, also if they are not normalised.
   [[nodiscard]] constexpr DeviceTime to_device_time() const ABBE_RT {
     return DeviceTime{std::chrono::seconds{seconds} + std::chrono::microseconds{microseconds}};
   }
-  /// Rounds down to the microsecond. Instants beyond +-2^31 s are outside what the wire can say.
+  /// Rounds down to the microsecond. Instants beyond +-2^31 s cannot be represented.
   [[nodiscard]] static constexpr TrackerClockReading from(DeviceTime t) ABBE_RT {
     const auto since_epoch = t.time_since_epoch();
     const auto whole = std::chrono::floor<std::chrono::seconds>(since_epoch);
@@ -275,14 +272,14 @@ struct TrackerClockReading {
   }
 };
 
-/// Why bytes are not a packet.
+/// Why bytes are not a valid packet.
 enum class DecodeError {
-  Truncated = 1,  ///< fewer bytes than the header, the size field or the packet's layout ask for
-  SizeMismatch,  ///< the size field is not the number of bytes handed in, or not this packet's size
-  NotACommand,   ///< to a controller: the type is not 0
+  Truncated = 1,   ///< fewer bytes than the header, the size field or the packet's layout requires
+  SizeMismatch,    ///< the size field is not the number of bytes, or not the size of this packet
+  NotACommand,     ///< to a controller: the type is not 0
   UnknownCommand,  ///< type 0 with a command that is not part of this interface
-  UnknownType,     ///< from a controller: the type is none of 0 to 11
-  CountMismatch,   ///< a multi-result whose number of points does not fit its size
+  UnknownType,     ///< from a controller: the type is not in 0 to 11
+  CountMismatch,   ///< the number of points of a multi-result does not fit its size
 };
 [[nodiscard]] const char* name_of(DecodeError) ABBE_RT;
 

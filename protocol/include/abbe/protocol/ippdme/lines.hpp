@@ -1,13 +1,13 @@
 #pragma once
 /// I++ DME: text lines between a client and the server of a measuring machine [I++ DME 1.4.3].
-/// Printable ASCII (between quotes any byte but CR LF: servers write their texts in the user's
-/// language), CR LF at the end, at most 65536 characters. LineFramer cuts a TCP stream into lines;
-/// the parsers are total, give views into the line and take no memory. Units on the wire: mm, s,
-/// degrees, Celsius, N.
+/// Lines consist of printable ASCII (between quotes any byte except CR LF: servers write texts in
+/// the user's language), end with CR LF, and have at most 65536 characters. LineFramer splits a TCP
+/// stream into lines. The parsers accept any bytes, return views into the line, and do not
+/// allocate. Units on the wire: mm, s, degrees, Celsius, N.
 ///
 ///   CommandLine = (Tag | ETag) SP Name "(" [Argument {"," Argument}] ")"
 ///   Response    = (Tag | ETag) SP ( "&" | "%" | "#" SP Data | "!" SP Error(F1,F2,F3,"text") )
-///   Tag = 5 digits 00001 to 99999; ETag = "E" 4 digits; E0000 is what nobody asked for
+///   Tag = 5 digits 00001 to 99999; ETag = "E" 4 digits; E0000: unsolicited
 
 #include <array>
 #include <cstddef>
@@ -26,17 +26,17 @@ inline constexpr std::uint16_t kPort = 1294;
 inline constexpr std::size_t kMaxLine = 65536;
 
 enum class LineError : std::uint8_t {
-  IllegalCharacter,  ///< outside of 32 to 126, and not between quotes
+  IllegalCharacter,  ///< code outside 32 to 126, and not between quotes
   TooLong,
   BadTag,       ///< not 5 digits, not E and 4 digits, or 00000
-  NoSpace,      ///< position 6 is no space
-  BadMarker,    ///< position 7 is none of & % # !
+  NoSpace,      ///< character 6 is not a space
+  BadMarker,    ///< character 7 is none of & % # !
   BadError,     ///< not Error(severity, code, origin, "text")
-  BadMethod,    ///< no name, no parentheses, or something behind them
-  BadArgument,  ///< neither number, string, name, tag nor property
+  BadMethod,    ///< no name, no parentheses, or characters after them
+  BadArgument,  ///< not a number, string, name, tag or property
   BadNumber,    ///< more than 16 digits, an exponent of more than 3, no digits
 };
-/// A literal.
+/// Text for messages.
 [[nodiscard]] const char* name_of(LineError error) ABBE_RT;
 
 struct Tag {
@@ -45,11 +45,11 @@ struct Tag {
   friend bool operator==(const Tag&, const Tag&) = default;
 };
 inline constexpr Tag kUnsolicited{true, 0};
-inline constexpr Tag kAbort{true, 2};  ///< of our AbortE
+inline constexpr Tag kAbort{true, 2};  ///< used for AbortE
 [[nodiscard]] std::string to_string(Tag tag);
 
 struct ErrorReport {
-  int severity = 0;  ///< 0 info, 1 warning, 2 the client can mend it, 3 the user must, 9 fatal
+  int severity = 0;  ///< 0 info, 1 warning, 2 client can repair, 3 user must repair, 9 fatal
   int code = 0;      ///< 0 to 9999
   std::string_view origin;
   std::string_view text;
@@ -59,7 +59,7 @@ struct Response {
   enum class Kind : std::uint8_t { Ack, Complete, Data, Error };
   Tag tag;
   Kind kind = Kind::Ack;
-  std::string_view data;  ///< Data: what follows "# "
+  std::string_view data;  ///< Data: the text after "# "
   ErrorReport error;      ///< Error
 };
 /// `line` without its CR LF.
@@ -77,17 +77,16 @@ struct Argument {
   enum class Kind : std::uint8_t { Number, String, Name, Property };
   static constexpr std::size_t kMostNumbers = 8;
   Kind kind = Kind::Name;
-  std::string_view
-      text;  ///< of a name (also a tag) or property its name, of a string what is in it
-  std::array<double, kMostNumbers> numbers{};  ///< of a number or a property
+  std::string_view text;  ///< name of a name, tag or property; content of a string
+  std::array<double, kMostNumbers> numbers{};  ///< value of a number; values of a property
   std::size_t count = 0;
 };
 
-/// Walks "X(1.5),Y(2),IJK(0,0,1),"text",7".
+/// Reads a list of arguments such as X(1.5),Y(2),IJK(0,0,1),"text",7 one by one.
 class ArgumentReader {
  public:
   explicit ArgumentReader(std::string_view text) ABBE_RT : rest_(text) {}
-  /// Nothing at the end; after an error nothing more.
+  /// nullopt at the end, and after an error was returned.
   [[nodiscard]] std::optional<tl::expected<Argument, LineError>> next() ABBE_RT;
 
  private:
@@ -95,31 +94,31 @@ class ArgumentReader {
   bool first_ = true;
 };
 
-/// What a machine reports of a place: Get, PtMeas, OnMoveReportE. In mm, as on the wire.
+/// A position reported by a machine: Get, PtMeas, OnMoveReportE. In mm, as on the wire.
 struct PointReport {
   std::array<double, 3> p_mm{};
-  std::uint8_t known = 0;  ///< bit i: X, Y, Z was there
+  std::uint8_t known = 0;  ///< bit 0, 1, 2: X, Y, Z was reported
   std::array<double, 3> ijk{};
   bool has_ijk = false;
 };
-/// Properties that are not of a place are passed over.
+/// Ignores properties other than X, Y, Z and IJK.
 [[nodiscard]] tl::expected<PointReport, LineError> parse_point(std::string_view data) ABBE_RT;
 
-/// A number as the grammar writes it, at most 16 digits. NaN and infinity are written as 0.
+/// A number in the grammar of I++ DME, with at most 16 digits. NaN and infinity become 0.
 [[nodiscard]] std::string number_text(double value);
 
 class LineFramer {
  public:
   static constexpr std::size_t kCapacity = 2 * (kMaxLine + 2);
 
-  /// Takes as many bytes as there is room for and says how many; all, whenever next() was called
-  /// until it gave nothing and no more than kMaxLine come at once.
+  /// Takes as many bytes as fit and returns their number. All bytes fit if next() was called until
+  /// it returned nullopt and there are at most kMaxLine bytes.
   std::size_t push(std::span<const std::byte> bytes) ABBE_RT;
-  /// The next line without its end, valid until the next push() or reset(). An error once; then
-  /// nothing until reset() or resume(): the peer speaks something else.
+  /// The next line without CR LF, valid until the next push() or reset(). An error is returned
+  /// once, then nullopt until reset() or resume(): the peer violates the protocol.
   [[nodiscard]] std::optional<tl::expected<std::string_view, LineError>> next() ABBE_RT;
-  /// After an error: continues behind the next end of a line. Called before next(), what came with
-  /// the illegal byte is not lost.
+  /// After an error: continues after the next end of a line. If called before the next call of
+  /// next(), no later line of the same bytes is lost.
   void resume() ABBE_RT;
   void reset() ABBE_RT;
 
@@ -128,11 +127,11 @@ class LineFramer {
 
   std::array<char, kCapacity> buffer_{};
   std::size_t begin_ = 0;
-  std::size_t looked_ = 0;  ///< before this is neither an end of line nor an illegal character
+  std::size_t looked_ = 0;  ///< bytes before it contain no end of line and no illegal character
   std::size_t end_ = 0;
   bool broken_ = false;
-  bool skipping_ = false;  ///< to the next end of a line
-  bool quoted_ = false;    ///< at looked_
+  bool skipping_ = false;  ///< skips bytes up to the next end of a line
+  bool quoted_ = false;    ///< looked_ is between quotes
 };
 
 }  // namespace abbe::protocol::ippdme

@@ -1,6 +1,6 @@
 #pragma once
-/// CRC-32 as MCAP wants it: IEEE 802.3, polynomial 0x04C11DB7 reflected, start and final XOR all
-/// ones (the one of zlib, PNG and Ethernet). Eight bytes a step by eight tables
+/// CRC-32 of MCAP: IEEE 802.3, polynomial 0x04C11DB7 reflected, initial value and final XOR all
+/// ones (as in zlib, PNG and Ethernet). Processes eight bytes per step with eight tables
 /// [Kounavis, Berry 2008, "slicing-by-8"]. Pure; noexcept.
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace abbe::protocol::mcap {
 
-/// A checksum that grows: update() with the pieces of a stream in order gives the checksum of the
-/// whole.
+/// Incremental checksum: calling update() with all pieces of a stream in order gives the checksum
+/// of the whole stream.
 class Crc32 {
  public:
   void update(std::span<const std::byte> bytes) noexcept;

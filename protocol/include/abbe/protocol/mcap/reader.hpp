@@ -1,8 +1,9 @@
 #pragma once
-/// Reading MCAP, whole or broken, from bytes someone else owns (usually a mapped file): record by
-/// record, by linear scan of a file cut anywhere, or through its summary. Total for any bytes. Only
-/// read_summary() allocates. No compression: a compressed chunk is yielded and said to be one, its
-/// records are not opened. Thread-safe: pure, or state of its own only.
+/// Reads MCAP files, complete or damaged, from bytes owned by the caller (usually a mapped file):
+/// record by record, by a linear scan of a truncated file, or by the summary. Accepts any bytes.
+/// Only read_summary() allocates. No compression: a compressed chunk is returned with
+/// State::Compressed, its records are not decoded. Thread-safe: functions are pure, each object has
+/// only its own state.
 
 #include <optional>
 #include <vector>
@@ -11,9 +12,9 @@
 
 namespace abbe::protocol::mcap {
 
-/// One framed record: where it stands in the bytes given to the reader, and its content.
+/// One record: its offset in the bytes given to the reader, and its content.
 struct Record {
-  Opcode opcode = Opcode::Header;  ///< may be one this program does not know: skip it
+  Opcode opcode = Opcode::Header;  ///< may be an unknown opcode: skip the record
   std::size_t offset = 0;          ///< of the opcode
   Bytes content;
   [[nodiscard]] std::size_t end() const noexcept {
@@ -21,23 +22,23 @@ struct Record {
   }
 };
 
-/// Yields framed records until the bytes end. Works on a data section, on a chunk's records, on a
-/// summary.
+/// Returns the records one by one until the bytes end. For a data section, the records of a chunk,
+/// or a summary.
 class RecordReader {
  public:
   enum class State : std::uint8_t {
     Reading,
-    End,        ///< the bytes ended with a record
-    Truncated,  ///< the record at position() passes the end of the bytes
-    Garbage,    ///< no record starts at position(): opcode 0 (what a power cut leaves behind)
+    End,        ///< the bytes end at the end of a record
+    Truncated,  ///< the record at position() extends beyond the end of the bytes
+    Garbage,    ///< no record at position(): opcode 0 (zeros after a power failure)
   };
 
   explicit RecordReader(Bytes bytes, std::size_t position = 0) noexcept
       : bytes_(bytes), position_(position) {}
-  /// The next record; nothing once state() is no longer Reading.
+  /// The next record; nullopt if state() is not Reading.
   [[nodiscard]] std::optional<Record> next() noexcept;
   [[nodiscard]] State state() const noexcept { return state_; }
-  /// Just after the last record yielded.
+  /// Offset of the end of the last returned record.
   [[nodiscard]] std::size_t position() const noexcept { return position_; }
 
  private:
@@ -46,7 +47,8 @@ class RecordReader {
   State state_ = State::Reading;
 };
 
-/// Yields the messages of a chunk's records, in file order; other and torn records are passed over.
+/// Returns the messages among the records of a chunk, in file order; other and damaged records are
+/// skipped.
 class MessageReader {
  public:
   explicit MessageReader(Bytes records) noexcept : records_(records) {}
@@ -59,37 +61,39 @@ class MessageReader {
 [[nodiscard]] bool starts_with_magic(Bytes file) noexcept;
 [[nodiscard]] bool ends_with_magic(Bytes file) noexcept;
 
-/// A chunk as the scan found it.
+/// A chunk found by a scan, and its state.
 struct ScannedChunk {
   enum class State : std::uint8_t {
-    Whole,  ///< complete, checksum right or not given
-    /// the file ends inside: `chunk.records` holds what is there, its last record may be torn
+    Whole,  ///< complete; the checksum is correct or absent
+    /// the file ends in the chunk: `chunk.records` has the existing bytes, its last record may be
+    /// cut
     Cut,
-    BadCrc,      ///< complete in length, but not what was written
-    Compressed,  ///< cannot be opened here
-    Malformed,   ///< the record is there, but it is not a Chunk
+    BadCrc,      ///< complete in length, but the checksum is wrong
+    Compressed,  ///< compressed chunks are not supported
+    Malformed,   ///< the content of the record is not a valid Chunk
   };
   State state = State::Whole;
   std::size_t offset = 0;  ///< of the Chunk's opcode in the file
   Chunk chunk;
 };
 
-/// Walks a file from its start, needing neither footer nor summary. Whole chunks survive whatever
-/// happened behind them; a cut chunk is handed out with those of its bytes that exist.
+/// Reads a file from its start, without footer or summary. All complete chunks before a damaged
+/// part are returned; a truncated chunk is returned with its existing bytes.
 class LinearScan {
  public:
   struct Item {
-    Record record;  ///< the top-level record (content short if it is a cut chunk)
+    Record record;  ///< the top-level record; the content of a cut chunk is shortened
     std::optional<ScannedChunk> chunk;  ///< set if it is a Chunk
   };
 
   explicit LinearScan(Bytes file) noexcept;
-  /// The next record of the data section; nothing at DataEnd, at the file's end or where it is
-  /// broken.
+  /// The next record of the data section; nullopt at DataEnd, at the end of the file, or at damaged
+  /// bytes.
   [[nodiscard]] std::optional<Item> next() noexcept;
-  /// True once DataEnd was reached: nothing of the data section is missing.
+  /// True once DataEnd was reached: the data section is complete.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
-  /// Where the whole records end: from here on bytes are cut off or garbage unless complete().
+  /// Offset of the end of the complete records. Unless complete(), the bytes after it are damaged
+  /// or missing.
   [[nodiscard]] std::size_t whole_until() const noexcept { return records_.position(); }
 
  private:
@@ -102,14 +106,14 @@ class LinearScan {
 };
 
 enum class SummaryError : std::uint8_t {
-  NoMagic,    ///< the file does not begin and end as one that was closed
-  NoFooter,   ///< no Footer before the last magic, or one that points outside the file
+  NoMagic,    ///< the file does not begin and end with the magic bytes: it was not closed
+  NoFooter,   ///< no Footer before the last magic, or a Footer that points outside the file
   NoSummary,  ///< closed, but without a summary
-  BadCrc,     ///< the summary is not what was written
+  BadCrc,     ///< the checksum of the summary is wrong
   BadRecord,  ///< a record of the summary cannot be decoded, or points outside the data section
 };
 
-/// The indexes of a cleanly closed file. Views into the file's bytes.
+/// The indexes of a correctly closed file. Views into the bytes of the file.
 struct Summary {
   std::vector<Schema> schemas;
   std::vector<Channel> channels;
@@ -121,10 +125,10 @@ struct Summary {
 
 [[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes file);
 
-/// The record an index points to; nothing if none of that kind starts there.
+/// The record at the offset of an index; nullopt if no record with opcode `expected` starts there.
 [[nodiscard]] std::optional<Record> record_at(Bytes file, std::uint64_t offset,
                                               Opcode expected) noexcept;
-/// The chunk at `offset` of a file, checked like one met by a scan.
+/// The chunk at `offset` of a file, checked as by a scan.
 [[nodiscard]] std::optional<ScannedChunk> chunk_at(Bytes file, std::uint64_t offset) noexcept;
 
 }  // namespace abbe::protocol::mcap

@@ -1,13 +1,14 @@
 #pragma once
-/// The records of an MCAP file [MCAP specification, mcap.dev/spec], one struct each, and their
-/// bytes.
+/// The records of an MCAP file [MCAP specification, mcap.dev/spec] as structs, with encoding and
+/// decoding.
 ///
-/// Decoding: structs are views into the bytes they were decoded from; total (any bytes give a
-/// record or a DecodeError), no allocation, trailing fields a newer writer may have added are
-/// skipped. Encoding: append(buffer, record) adds opcode, length and content to a buffer the caller
-/// owns, without allocation while its capacity lasts; all integers little-endian. A string of 4 GiB
-/// or more cannot be written (lengths are u32) and must not be asked for. Times are nanoseconds
-/// since the Unix epoch, UTC. Pure; thread-safe.
+/// Decoding: the structs are views into the decoded bytes. Any bytes give a record or a
+/// DecodeError. No allocation. Additional fields at the end, from a newer writer, are skipped.
+///
+/// Encoding: append(buffer, record) adds opcode, length and content to the caller's buffer. It
+/// allocates only if the capacity is exceeded. All integers are little-endian. Precondition:
+/// strings are shorter than 4 GiB (lengths are u32). Times are nanoseconds since the Unix epoch,
+/// UTC. Pure; thread-safe.
 
 #include <array>
 #include <cstddef>
@@ -31,9 +32,9 @@ inline constexpr std::array<std::byte, 8> kMagic{std::byte{0x89}, std::byte{'M'}
                                                  std::byte{'A'},  std::byte{'P'}, std::byte{'0'},
                                                  std::byte{0x0D}, std::byte{0x0A}};
 
-/// Opcode and content length before every record's content.
+/// Size of opcode and content length, which precede the content of every record.
 inline constexpr std::size_t kRecordHeadSize = 1 + 8;
-/// Opcode to last field of a Footer.
+/// Size of a complete Footer record.
 inline constexpr std::size_t kFooterRecordSize = kRecordHeadSize + 8 + 8 + 4;
 
 enum class Opcode : std::uint8_t {
@@ -55,23 +56,23 @@ enum class Opcode : std::uint8_t {
 };
 
 enum class DecodeError : std::uint8_t {
-  Truncated,  ///< a field passes the end of the content
-  BadMap,     ///< a map or array whose byte length is not a whole number of entries
-  BadCrc,     ///< an attachment that does not match its checksum
+  Truncated,  ///< a field extends beyond the end of the content
+  BadMap,     ///< the byte length of a map or array is not a whole number of entries
+  BadCrc,     ///< the checksum of an attachment is wrong
 };
 
 template <class T>
 using Decoded = tl::expected<T, DecodeError>;
 
-/// The packed entries of an array or map of two integers, as they lie in the file (so the bytes
-/// need no alignment).
+/// The packed entries of an array or map of two integers, as in the file. The bytes need no
+/// alignment.
 template <class First, class Second>
 class PackedPairs {
  public:
   static constexpr std::size_t kEntrySize = sizeof(First) + sizeof(Second);
 
   PackedPairs() = default;
-  /// Views whole entries; a remainder of less than one entry is not seen.
+  /// Views complete entries; a remainder shorter than one entry is ignored.
   explicit PackedPairs(Bytes bytes) noexcept
       : bytes_(bytes.first(bytes.size() / kEntrySize * kEntrySize)) {}
 
@@ -89,19 +90,19 @@ class PackedPairs {
   Bytes bytes_;
 };
 
-/// A map<string, string> as it lies in the file.
+/// A map<string, string> as in the file.
 class StringMap {
  public:
   using Entry = std::pair<std::string_view, std::string_view>;
 
   StringMap() = default;
-  /// Views packed entries (without the length of the whole map), as pack() writes them.
+  /// Views packed entries as written by pack(), without the length of the whole map.
   explicit StringMap(Bytes packed) noexcept : bytes_(packed) {}
   [[nodiscard]] Bytes bytes() const noexcept { return bytes_; }
-  /// Takes the first entry off the front; none left or a torn entry: nothing.
+  /// Removes and returns the first entry; nullopt if there is none or if it is incomplete.
   [[nodiscard]] std::optional<Entry> take() noexcept;
   [[nodiscard]] std::optional<std::string_view> find(std::string_view key) const noexcept;
-  /// Appends the packed entry to `buffer`, over which a StringMap can then be laid.
+  /// Appends the packed entry to `buffer`. A StringMap can then view the buffer.
   static void pack(Buffer& buffer, std::string_view key, std::string_view value);
 
  private:
@@ -116,7 +117,7 @@ struct Header {
 struct Footer {
   std::uint64_t summary_start = 0;         ///< 0: no summary
   std::uint64_t summary_offset_start = 0;  ///< 0: no summary offsets
-  /// from summary_start to summary_offset_start's last byte; 0: none
+  /// checksum from summary_start to the last byte of the field summary_offset_start; 0: none
   std::uint32_t summary_crc = 0;
 };
 
@@ -143,14 +144,14 @@ struct Message {
   Bytes data;
 };
 
-/// Everything of a Chunk record before its records.
+/// The fields of a Chunk record before its records.
 struct ChunkHead {
   std::uint64_t first_time_ns = 0;
   std::uint64_t last_time_ns = 0;
   std::uint64_t uncompressed_size = 0;
   std::uint32_t uncompressed_crc = 0;  ///< 0: none
-  std::string_view compression;        ///< empty: none, the only one this room reads or writes
-  /// bytes of records that follow, as the record says (a cut file has fewer)
+  std::string_view compression;        ///< empty: none, the only one supported here
+  /// number of bytes of the records that follow; a truncated file has fewer
   std::uint64_t records_size = 0;
 };
 
@@ -161,8 +162,8 @@ struct Chunk {
 
 struct MessageIndex {
   std::uint16_t channel_id = 0;
-  PackedPairs<std::uint64_t, std::uint64_t>
-      entries;  ///< log time, offset in the uncompressed records
+  /// Log time, offset in the uncompressed records.
+  PackedPairs<std::uint64_t, std::uint64_t> entries;
 };
 
 struct ChunkIndex {
@@ -170,9 +171,9 @@ struct ChunkIndex {
   std::uint64_t last_time_ns = 0;
   std::uint64_t chunk_start = 0;   ///< offset of the Chunk's opcode in the file
   std::uint64_t chunk_length = 0;  ///< of the whole Chunk record
-  PackedPairs<std::uint16_t, std::uint64_t>
-      index_offsets;               ///< channel, offset of its MessageIndex in the file
-  std::uint64_t index_length = 0;  ///< of all the MessageIndex records together
+  /// Channel, offset of its MessageIndex in the file.
+  PackedPairs<std::uint16_t, std::uint64_t> index_offsets;
+  std::uint64_t index_length = 0;  ///< total length of the MessageIndex records
   std::string_view compression;
   std::uint64_t compressed_size = 0;
   std::uint64_t uncompressed_size = 0;
@@ -229,9 +230,9 @@ struct DataEnd {
   std::uint32_t data_section_crc = 0;  ///< 0: none
 };
 
-/// The content of a record (without opcode and length) as a T; defined for every struct above but
-/// ChunkHead. decode<Chunk> wants all of the chunk's records to be there and does not check their
-/// checksum.
+/// Decodes the content of a record (without opcode and length) as a T; defined for every struct
+/// above except ChunkHead. decode<Chunk> requires all bytes of the chunk's records and does not
+/// check their checksum.
 template <class T>
 [[nodiscard]] Decoded<T> decode(Bytes content) noexcept = delete;
 
@@ -266,7 +267,7 @@ template <>
 template <>
 [[nodiscard]] Decoded<DataEnd> decode<DataEnd>(Bytes content) noexcept;
 
-/// A chunk whose records may be cut short: `records` holds those bytes that are there.
+/// Decodes a chunk whose records may be truncated: `records` contains the existing bytes.
 [[nodiscard]] Decoded<Chunk> decode_cut_chunk(Bytes content) noexcept;
 
 void append_magic(Buffer& buffer);
@@ -275,7 +276,7 @@ void append(Buffer& buffer, const Footer& record);
 void append(Buffer& buffer, const Schema& record);
 void append(Buffer& buffer, const Channel& record);
 void append(Buffer& buffer, const Message& record);
-/// Size and number of records are taken from `records`; the checksum from the head.
+/// The size of the records is taken from `records`, the checksum from the head.
 void append(Buffer& buffer, const Chunk& record);
 void append(Buffer& buffer, const MessageIndex& record);
 void append(Buffer& buffer, const ChunkIndex& record);

@@ -1,8 +1,8 @@
 #pragma once
-/// Building the bytes of an MCAP file: chunks with their message indexes, and the summary of a
-/// clean close. Sans-I/O: whoever owns the file writes the bytes and says where they went. No
-/// compression: a recorder must be readable to the last whole record after a power cut. Not
-/// thread-safe; allocates only when a buffer outgrows its capacity.
+/// Builds the bytes of an MCAP file: chunks with their message indexes, and the summary at the end
+/// of the file. Sans-I/O: the caller writes the bytes to the file and passes their offsets. No
+/// compression, so that a recording is readable up to the last complete record after a power
+/// failure. Not thread-safe; allocates only if a buffer exceeds its capacity.
 ///
 /// File: magic, Header, { Chunk, MessageIndex... | Metadata | Attachment }..., DataEnd, summary,
 /// Footer, magic.
@@ -21,29 +21,30 @@ struct IndexEntry {
   std::uint64_t offset = 0;  ///< of the Message record in the chunk's records
 };
 
-/// The messages one channel has in a closed chunk.
+/// The messages of one channel in a closed chunk.
 struct ChannelShare {
   std::uint16_t channel_id = 0;
   std::uint64_t messages = 0;
-  std::uint64_t index_offset = 0;  ///< of its MessageIndex record, from the Chunk's opcode
+  std::uint64_t index_offset = 0;  ///< of its MessageIndex record, relative to the Chunk's opcode
 };
 
-/// A chunk with its indexes, ready to be written in one piece. Views into the builder until its
+/// A chunk with its indexes, to be written in one piece. Views into the builder, valid until its
 /// clear().
 struct ClosedChunk {
   Bytes bytes;                     ///< Chunk, then one MessageIndex per channel
   std::uint64_t length = 0;        ///< of these bytes
   std::uint64_t chunk_length = 0;  ///< of the Chunk record alone
   std::uint64_t records_size = 0;
-  std::uint64_t first_time_ns = 0;  ///< 0 if there are no messages
+  std::uint64_t first_time_ns = 0;  ///< 0 without messages
   std::uint64_t last_time_ns = 0;
   std::span<const ChannelShare> shares;
 };
 
-/// Collects records until they are closed into a chunk: add..., close(), write its bytes, clear().
+/// Collects the records of a chunk. Call add() for each record, then close(), write the bytes to
+/// the file, and call clear().
 class ChunkBuilder {
  public:
-  /// Takes the memory for `capacity_bytes` of records now.
+  /// Allocates the memory for `capacity_bytes` of records.
   explicit ChunkBuilder(std::size_t capacity_bytes);
 
   void add(const Schema& schema);
@@ -54,8 +55,7 @@ class ChunkBuilder {
   [[nodiscard]] std::size_t records_size() const noexcept;
   [[nodiscard]] std::uint64_t message_count() const noexcept { return message_count_; }
 
-  /// Writes head, checksum and indexes around the collected records. Nothing may be added before
-  /// clear().
+  /// Completes the chunk with head, checksum and indexes. Do not call add() again before clear().
   [[nodiscard]] ClosedChunk close();
   void clear() noexcept;
 
@@ -67,7 +67,7 @@ class ChunkBuilder {
   [[nodiscard]] std::vector<IndexEntry>& entries_of(std::uint16_t channel_id);
   void append_indexes();
 
-  Buffer buffer_;  ///< room for the chunk's head, the records, later the indexes
+  Buffer buffer_;  ///< head of the chunk, records, and after close() the indexes
   std::vector<ChannelEntries> channels_;
   std::vector<ChannelShare> shares_;
   std::uint64_t message_count_ = 0;
@@ -75,21 +75,21 @@ class ChunkBuilder {
   std::uint64_t last_time_ns_ = 0;
 };
 
-/// Remembers what was written where, and ends the file with it. Holds about 100 bytes + 10 per
-/// channel for each chunk.
+/// Collects the offsets of the written records and builds the end of the file from them. Memory:
+/// about 100 bytes plus 10 per channel, for each chunk.
 class SummaryBuilder {
  public:
   void add(const Schema& schema);
   void add(const Channel& channel);
-  /// `chunk` was written at `offset` of the file.
+  /// `offset`: where `chunk` was written in the file.
   void add(const ClosedChunk& chunk, std::uint64_t offset);
   void add(const AttachmentIndex& attachment);
   void add(const MetadataIndex& metadata);
 
   [[nodiscard]] std::uint64_t message_count() const noexcept { return statistics_.message_count; }
 
-  /// Appends DataEnd (its checksum not given), summary, summary offsets, Footer and magic.
-  /// `data_end_offset` is where in the file the first appended byte will stand.
+  /// Appends DataEnd (without checksum), summary, summary offsets, Footer and magic.
+  /// `data_end_offset` is the offset in the file of the first appended byte.
   void finish(std::uint64_t data_end_offset, Buffer& out) const;
 
  private:

@@ -1,9 +1,8 @@
 #pragma once
-/// The one thing asked of Modbus here: read registers, functions 3 and 4 [Modbus Application
-/// Protocol V1.1b3, 6.3, 6.4], over TCP (MBAP header) or RTU (CRC)
-/// [Modbus over Serial Line V1.02, 2.5.1]. Sans-I/O, pure, allocation-free; usable on the real-time
-/// path. The transaction number is always 0, as libmodbus sends it with a raw request: one request
-/// is under way at a time, and a connection that missed an answer is closed.
+/// Reading registers by Modbus, functions 3 and 4 [Modbus Application Protocol V1.1b3, 6.3, 6.4],
+/// over TCP (MBAP header) or RTU (CRC) [Modbus over Serial Line V1.02, 2.5.1]. Sans-I/O, pure,
+/// allocation-free; usable on the real-time path. The transaction number is always 0, as libmodbus
+/// sends it with a raw request. Only one request is outstanding at a time.
 
 #include <array>
 #include <cstddef>
@@ -21,7 +20,7 @@ enum class Transport : std::uint8_t { Tcp, Rtu };
 
 enum class Function : std::uint8_t { ReadHoldingRegisters = 3, ReadInputRegisters = 4 };
 
-inline constexpr std::size_t kMaxRegisters = 125;  ///< of one read
+inline constexpr std::size_t kMaxRegisters = 125;  ///< in one read
 inline constexpr std::size_t kMaxAduSize = 260;    ///< TCP; RTU: 256
 inline constexpr std::uint16_t kTcpPort = 502;
 
@@ -34,32 +33,31 @@ struct ReadRequest {
 };
 
 enum class DecodeError : std::uint8_t {
-  Length,         ///< impossible, or not that of the answer to this request
+  Length,         ///< invalid, or not the length of the answer to this request
   Protocol,       ///< TCP: protocol number or transaction number is not 0
-  Unit,           ///< another unit answers
-  Function,       ///< another function, or one that is not known here
+  Unit,           ///< the answer is from another unit
+  Function,       ///< another function than requested, or an unsupported one
   Crc,            ///< RTU
   TrailingBytes,  ///< more than one answer
 };
 [[nodiscard]] std::string_view name_of(DecodeError error) noexcept;
 
-/// The answer to a read: its registers as they came (big-endian pairs), or the code of an
-/// exception.
+/// The answer to a read: its registers as received (big-endian), or the code of an exception.
 struct Answer {
   std::span<const std::byte> registers;  ///< 2 * count bytes; empty with an exception
   std::optional<std::uint8_t> exception;
 };
-/// "illegal data address" and so on; "exception" for a code that the standard does not name.
+/// "illegal data address" and so on; "exception" for a code that is not in the standard.
 [[nodiscard]] std::string_view name_of_exception(std::uint8_t code) noexcept;
 
-/// Bytes written, 0 if `out` is too small. [Modbus V1.1b3] 6.3
+/// Returns the number of bytes written, 0 if `out` is too small. [Modbus V1.1b3] 6.3
 std::size_t encode(const ReadRequest& request, Transport transport,
                    std::span<std::byte> out) ABBE_RT;
-/// The request of a whole frame, as recorded or as a server receives it.
+/// Decodes a complete request frame, as recorded or as received by a server.
 [[nodiscard]] tl::expected<ReadRequest, DecodeError> decode_request(
     std::span<const std::byte> frame, Transport transport) ABBE_RT;
-/// Nothing: `bytes` are the beginning of a right answer, more must come. An error is said as soon
-/// as it shows.
+/// nullopt: `bytes` are the beginning of a valid answer, more bytes are needed. An error is
+/// returned as soon as it is detected.
 [[nodiscard]] std::optional<tl::expected<Answer, DecodeError>> decode_answer(
     std::span<const std::byte> bytes, Transport transport, const ReadRequest& request) ABBE_RT;
 [[nodiscard]] std::uint16_t crc16(std::span<const std::byte> bytes) ABBE_RT;

@@ -1,7 +1,6 @@
 #pragma once
-/// What lies in registers: one or two of them as a number. Registers are big-endian; the order of
-/// two registers is a habit of the manufacturer. Pure, allocation-free; usable on the real-time
-/// path.
+/// Decodes one or two Modbus registers as a number. Registers are big-endian; the order of two
+/// registers depends on the manufacturer. Pure, allocation-free; usable on the real-time path.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,8 +19,8 @@ enum class WordOrder : std::uint8_t { HighFirst, LowFirst };
              : 2;
 }
 
-/// NaN for a Float32 that is not finite and for BCD digits above 9. `bytes`:
-/// 2 * register_count(type).
+/// `bytes` has 2 * register_count(type) bytes. NaN for a Float32 that is not finite and for BCD
+/// digits above 9.
 [[nodiscard]] double decode_register(std::span<const std::byte> bytes, RegisterType type,
                                      WordOrder order) ABBE_RT;
 

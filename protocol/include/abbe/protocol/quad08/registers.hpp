@@ -32,7 +32,7 @@ enum class Register : std::uint16_t {
   SetpointFifo = 0x09,
   ConversionRate = 0x0F,
   DacControl = 0x10,
-  CounterSetup = 0x28,  ///< of the selected bank: setup word of a counter, or a word of its modulus
+  CounterSetup = 0x28,  ///< in the selected bank: setup word or modulus word of a counter
   DebouncePhases = 0x2C,
   DebounceIndex = 0x2D,
   CounterBank = 0x2E,
@@ -42,7 +42,7 @@ enum class Register : std::uint16_t {
   Timer1Divisor = 0x51,
   DmaControl = 0x58,
   TriggerControl = 0x59,
-  Mark = 0x5D,  ///< keeps what is written: the self-test
+  Mark = 0x5D,  ///< reads back the value written; used for the self-test
 };
 
 /// Values written to Register::Acquisition.
@@ -79,7 +79,7 @@ inline constexpr std::uint16_t kStop1 = 0x10;
 inline constexpr std::uint16_t kStart1 = 0x11;
 }  // namespace timer
 
-/// What Register::Acquisition reads.
+/// Value read from Register::Acquisition.
 struct Status {
   std::uint16_t bits = 0;
   static constexpr std::uint16_t kMoreSamples = 0x001;
@@ -98,7 +98,7 @@ struct Status {
   [[nodiscard]] constexpr bool hardware_error() const noexcept {
     return (bits & kHardwareError) != 0;
   }
-  /// The scan list is loaded and no scan is under way: the pacer may be started.
+  /// True if the scan list is loaded and no scan is in progress: the pacer may be started.
   [[nodiscard]] constexpr bool ready() const noexcept {
     return (bits & (kPipeFull | kScanning)) == kPipeFull;
   }
@@ -118,14 +118,14 @@ struct Status {
 [[nodiscard]] constexpr usb::Setup reset_scan_endpoint() noexcept {
   return {0x40, static_cast<std::uint8_t>(Request::EndpointReset), 1, kScanEndpoint & 0x0F, 0};
 }
-/// Is it a write to this register?
+/// True for a write to this register.
 [[nodiscard]] constexpr bool is_write(const usb::Setup& setup, Register where) noexcept {
   return setup.request_type == 0x40 &&
          setup.request == static_cast<std::uint8_t>(Request::Register) &&
          setup.index == static_cast<std::uint16_t>(where);
 }
 
-/// The answer to a read; nothing unless it is two bytes.
+/// The answer to a read; nullopt unless it has two bytes.
 [[nodiscard]] std::optional<std::uint16_t> decode_word(std::span<const std::byte> bytes) ABBE_RT;
 
 }  // namespace abbe::protocol::quad08

@@ -1,6 +1,7 @@
 #pragma once
-/// Which counters a scan reads, how wide, and how often [MCC uldaq, CtrUsbQuad08, MIT]. A scan on
-/// the wire is the words of the list in its order, little-endian, without header, time or number.
+/// Scan list of the card: the counters in a scan, their width, and the scan rate
+/// [MCC uldaq, CtrUsbQuad08, MIT]. On the wire a scan consists of the words in the order of the
+/// list, little-endian, without header, time or number.
 
 #include <array>
 #include <cstddef>
@@ -14,7 +15,7 @@ namespace abbe::protocol::quad08 {
 
 enum class CountWidth : std::uint8_t { Bits32, Bits48 };
 
-/// 48 bits travel as 64: the fourth word of a counter is read too.
+/// 48 bits are transferred as 64: the fourth word of a counter is read, too.
 [[nodiscard]] constexpr std::size_t words_of(CountWidth width) noexcept {
   return width == CountWidth::Bits32 ? 2 : 4;
 }
@@ -33,7 +34,7 @@ struct ScanLayout {
   [[nodiscard]] constexpr std::span<const std::uint8_t> used() const noexcept {
     return std::span{channels}.first(count);
   }
-  /// Where a channel stands in a scan.
+  /// Position of a channel in a scan.
   [[nodiscard]] constexpr std::optional<std::size_t> place_of(std::uint8_t channel) const noexcept {
     for (std::size_t i = 0; i < count; ++i)
       if (channels[i] == channel) return i;
@@ -55,15 +56,16 @@ struct ScanListEntries {
   }
 };
 [[nodiscard]] ScanListEntries encode(const ScanLayout& layout) ABBE_RT;
-/// What a card makes of a list; nothing if it is none: no first or last entry, words of a counter
-/// torn apart, mixed widths.
+/// The layout that results from a list; nullopt for an invalid list: no first or last entry, words
+/// of a counter not adjacent, mixed widths.
 [[nodiscard]] std::optional<ScanLayout> decode_scan_list(
     std::span<const ScanListEntry> entries) ABBE_RT;
 
-/// Pacer divisor for the highest rate that is not above `rate_hz`... as the maker's library rounds:
-/// down. Nothing for a rate the card cannot pace (not positive, above 8 MHz, below once a day).
+/// Pacer divisor for `rate_hz`, rounded down as in the manufacturer's library; see pacer_rate_hz()
+/// for the resulting rate. nullopt for a rate that the card does not support (not positive, above 8
+/// MHz, below once per day).
 [[nodiscard]] std::optional<std::uint64_t> pacer_divisor(double rate_hz) ABBE_RT;
-/// The rate a divisor really gives.
+/// The actual rate of a divisor.
 [[nodiscard]] constexpr double pacer_rate_hz(std::uint64_t divisor) noexcept {
   return kPacerClock_hz / (static_cast<double>(divisor) + 1.0);
 }

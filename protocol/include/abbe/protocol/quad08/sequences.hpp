@@ -1,6 +1,6 @@
 #pragma once
-/// The register writes and reads of each thing one does with the card, in the order of the maker's
-/// library [MCC uldaq, MIT], as lists a driver sends one by one. No allocation.
+/// Sequences of register writes and reads for each operation of the card, in the order of the
+/// manufacturer's library [MCC uldaq, MIT]. A driver sends the steps one by one. No allocation.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace abbe::protocol::quad08 {
 
-/// What the answer of a read must be.
+/// Required answer of a read.
 enum class Expect : std::uint8_t {
   Nothing,
   LowByte,  ///< the low byte equals `value`
@@ -26,7 +26,7 @@ struct Step {
 };
 [[nodiscard]] bool fulfilled(const Step& step, std::uint16_t answer) ABBE_RT;
 
-/// A list with room for the longest sequence.
+/// A list of steps; its capacity is sufficient for the longest sequence.
 class Sequence {
  public:
   static constexpr std::size_t kCapacity = 256;
@@ -44,23 +44,23 @@ class Sequence {
   std::size_t size_ = 0;
 };
 
-/// Firmware version, self-test of the registers, everything disarmed.
+/// Reads the firmware version, tests the registers, and disarms all functions.
 [[nodiscard]] Sequence open_sequence() ABBE_RT;
 
 enum class Timer : std::uint8_t { Timer0, Timer1 };
-/// The card's own timer output as a clock: `divisor` periods of 48 MHz per period, half of them
-/// high.
+/// The timer output of the card as a clock: one period is `divisor` periods of 48 MHz, with a duty
+/// cycle of 50 %.
 [[nodiscard]] Sequence timer_stop(Timer timer) ABBE_RT;
 [[nodiscard]] Sequence timer_start(Timer timer, std::uint32_t divisor) ABBE_RT;
 
-/// Pacer, scan list and data transfer stopped; counters go on.
+/// Stops pacer, scan list and data transfer; the counters continue.
 [[nodiscard]] Sequence stop_sequence() ABBE_RT;
-/// Loads the list and the divisor; ends with the endpoint reset. Then the bulk transfers are
-/// started.
+/// Loads the scan list and the divisor; the last step resets the endpoint. Start the bulk transfers
+/// afterwards.
 [[nodiscard]] Sequence load_sequence(const ScanLayout& layout, std::uint64_t divisor) ABBE_RT;
-/// Data transfer on, list started. Then Status::ready() is waited for.
+/// Enables the data transfer and starts the list. Wait for Status::ready() afterwards.
 [[nodiscard]] Sequence arm_sequence() ABBE_RT;
-/// The pacer runs: scans come.
+/// Starts the pacer, and thereby the scans.
 [[nodiscard]] constexpr usb::Setup start_pacer() noexcept {
   return write(Register::Acquisition, acquisition::kPacerInternal);
 }

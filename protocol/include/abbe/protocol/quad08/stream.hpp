@@ -1,7 +1,8 @@
 #pragma once
-/// The stream of scans: counts in the order of the list, over packets cut anywhere. Nothing in it
-/// says where a scan begins: whoever starts it counts bytes from its first, or seeks by a counter
-/// whose step is known. Deterministic, no allocation, total.
+/// The stream of scans: counts in the order of the scan list, in packets that may end anywhere in a
+/// scan. The stream does not mark the beginning of a scan. It is found by counting bytes from the
+/// start of the stream, or with a counter whose step per scan is known. Deterministic, no
+/// allocation, accepts any bytes.
 
 #include <array>
 #include <cstddef>
@@ -14,14 +15,14 @@
 
 namespace abbe::protocol::quad08 {
 
-/// The counts of one scan as the card sent them: 32 bit, or 48 bit without its sign extended.
+/// The counts of one scan as sent by the card: 32 bits, or 48 bits without sign extension.
 using RawScan = std::array<std::uint64_t, kChannels>;
 
 /// Modulus 2^32 or 2^48.
 [[nodiscard]] constexpr std::uint64_t modulus_of(CountWidth width) noexcept {
   return std::uint64_t{1} << (width == CountWidth::Bits32 ? 32 : 48);
 }
-/// The smallest signed step between two readings of a counter that wraps.
+/// The signed step of smallest magnitude between two readings of a counter that wraps.
 [[nodiscard]] constexpr std::int64_t signed_step(std::uint64_t from, std::uint64_t to,
                                                  CountWidth width) noexcept {
   const std::uint64_t modulus = modulus_of(width);
@@ -29,7 +30,7 @@ using RawScan = std::array<std::uint64_t, kChannels>;
   return ahead < modulus / 2 ? static_cast<std::int64_t>(ahead)
                              : -static_cast<std::int64_t>(modulus - ahead);
 }
-/// The same for a counter that never counts down.
+/// The step of a counter that wraps and never counts down.
 [[nodiscard]] constexpr std::uint64_t upward_step(std::uint64_t from, std::uint64_t to,
                                                   CountWidth width) noexcept {
   return (to - from) & (modulus_of(width) - 1);
@@ -39,14 +40,14 @@ class ScanDecoder {
  public:
   explicit ScanDecoder(const ScanLayout& layout) ABBE_RT : layout_(layout) {}
 
-  /// The stream begins anew with the next byte pushed.
+  /// The next pushed byte is the first byte of a scan.
   void reset() ABBE_RT {
     carried_ = 0;
     bytes_ = {};
   }
-  /// The bytes are borrowed until next() gives nothing.
+  /// The bytes must remain valid until next() returns nullopt.
   void push(std::span<const std::byte> bytes) ABBE_RT { bytes_ = bytes; }
-  /// The next whole scan; nothing: the rest is kept, push more.
+  /// The next complete scan; nullopt if more bytes are needed. An incomplete scan is stored.
   [[nodiscard]] std::optional<RawScan> next() ABBE_RT;
 
   [[nodiscard]] const ScanLayout& layout() const ABBE_RT { return layout_; }
@@ -63,14 +64,15 @@ class ScanDecoder {
 
 /// A counter that advances by a known step from scan to scan.
 struct Metronome {
-  std::size_t place = 0;   ///< in the scan
+  std::size_t place = 0;   ///< position in the scan
   double step = 0.0;       ///< counts per scan
-  double tolerance = 2.0;  ///< counts, of one step
+  double tolerance = 2.0;  ///< counts per step
   [[nodiscard]] bool beats(std::uint64_t from, std::uint64_t to, CountWidth width) const ABBE_RT;
 };
 
-/// Where a scan begins in bytes taken out of a stream: the first offset at which the metronome
-/// beats twice. Needs seek_window(layout) bytes to be sure to find one.
+/// Finds the beginning of a scan in bytes from the middle of a stream: the first offset at which
+/// the counter of `metronome` makes two consecutive valid steps. With seek_window(layout) bytes it
+/// is always found.
 [[nodiscard]] std::optional<std::size_t> seek_scan(std::span<const std::byte> bytes,
                                                    const ScanLayout& layout,
                                                    const Metronome& metronome) ABBE_RT;

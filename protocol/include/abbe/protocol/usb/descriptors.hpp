@@ -1,6 +1,6 @@
 #pragma once
-/// What a USB device says of itself: device descriptor, strings, and where its endpoints are.
-/// [USB 2.0] 9.6. Decoders are total. Pure, no allocation.
+/// Descriptors of a USB device: device descriptor, strings, and endpoints [USB 2.0] 9.6. The
+/// decoders accept any bytes. Pure, no allocation.
 
 #include <array>
 #include <cstddef>
@@ -31,13 +31,13 @@ struct DeviceDescriptor {
 inline constexpr std::size_t kDeviceDescriptorSize = 18;
 [[nodiscard]] std::array<std::byte, kDeviceDescriptorSize> encode(
     const DeviceDescriptor& descriptor) ABBE_RT;
-/// Nothing if too short or no device descriptor.
+/// nullopt if too short or not a device descriptor.
 [[nodiscard]] std::optional<DeviceDescriptor> decode_device_descriptor(
     std::span<const std::byte> bytes) ABBE_RT;
 
-/// A string descriptor as text; what is not printable ASCII becomes '?'.
+/// A string descriptor as text; a character that is not printable ASCII becomes '?'.
 struct DescriptorText {
-  /// a descriptor has at most 255 bytes, two a character
+  /// A descriptor has at most 255 bytes, two of them per character.
   static constexpr std::size_t kCapacity = 126;
   std::array<char, kCapacity> characters{};
   std::size_t length = 0;
@@ -45,12 +45,12 @@ struct DescriptorText {
 };
 [[nodiscard]] std::optional<DescriptorText> decode_string(std::span<const std::byte> bytes) ABBE_RT;
 inline constexpr std::size_t kMaxDescriptor = 255;
-/// Writes ASCII as a string descriptor; returns its size. Text beyond the longest descriptor is
-/// cut.
+/// Writes ASCII as a string descriptor and returns its size. Text that exceeds the longest
+/// descriptor is truncated.
 std::size_t encode_string(std::string_view ascii, std::span<std::byte, kMaxDescriptor> out) ABBE_RT;
 
-/// Walks the descriptors of a configuration for an endpoint of this address; its largest packet, in
-/// bytes.
+/// Finds the endpoint with this address in the descriptors of a configuration; returns its largest
+/// packet size in bytes.
 [[nodiscard]] std::optional<std::uint16_t> find_endpoint(std::span<const std::byte> configuration,
                                                          std::uint8_t address) ABBE_RT;
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The eight bytes that begin a control transfer, and the standard requests needed here. [USB 2.0]
-/// 9.3, 9.4. Little-endian on the wire. Pure, no allocation.
+/// The setup packet (eight bytes) of a control transfer, and the standard requests used here.
+/// [USB 2.0] 9.3, 9.4. Little-endian on the wire. Pure, no allocation.
 
 #include <array>
 #include <cstddef>
@@ -60,7 +60,7 @@ inline constexpr std::uint16_t kEnglish = 0x0409;
 [[nodiscard]] constexpr Setup set_configuration(std::uint8_t value) noexcept {
   return {0x00, static_cast<std::uint8_t>(StandardRequest::SetConfiguration), value, 0, 0};
 }
-/// Clears the halt of an endpoint; the host's own data toggle must be reset with it.
+/// Clears the halt of an endpoint; the host must also reset its data toggle.
 [[nodiscard]] constexpr Setup clear_halt(std::uint8_t endpoint) noexcept {
   return {0x02, static_cast<std::uint8_t>(StandardRequest::ClearFeature), 0, endpoint, 0};
 }

@@ -1,8 +1,8 @@
 #pragma once
-/// USB/IP before the transfers: which devices a server exports, and importing one of them.
-/// Big-endian, TCP port 3240, version 1.1.1 [Linux Documentation/usb/usbip_protocol.rst]. An import
-/// that is granted turns the connection into a stream of transfers (urb.hpp). Decoders are total
-/// and need the whole message; message_size() says how much that is. Pure, no allocation.
+/// USB/IP operations before the transfers: listing the exported devices of a server, and importing
+/// one. Big-endian, TCP port 3240, version 1.1.1 [Linux Documentation/usb/usbip_protocol.rst].
+/// After a successful import the connection carries a stream of transfers (urb.hpp). The decoders
+/// accept any bytes and need the whole message. Pure, no allocation.
 
 #include <array>
 #include <cstddef>
@@ -36,8 +36,8 @@ enum class OpStatus : std::uint32_t {
 
 enum class OpError : std::uint8_t {
   Truncated,    ///< fewer bytes than the message needs
-  BadVersion,   ///< no USB/IP 1.1.1
-  UnknownCode,  ///< not the message that was asked for
+  BadVersion,   ///< not USB/IP 1.1.1
+  UnknownCode,  ///< not the expected message
 };
 [[nodiscard]] const char* to_text(OpError error) noexcept;
 
@@ -50,7 +50,7 @@ enum class Speed : std::uint32_t {
   Super = 5
 };
 
-/// Text of fixed width on the wire, padded with zeros; longer text is cut.
+/// Text of fixed width on the wire, padded with zeros; longer text is truncated.
 template <std::size_t N>
 struct FixedText {
   std::array<char, N> characters{};
@@ -84,7 +84,7 @@ struct ExportedDevice {
   friend bool operator==(const ExportedDevice&, const ExportedDevice&) = default;
 };
 
-/// "devid" of the transfers.
+/// Field "devid" of the transfers.
 [[nodiscard]] constexpr std::uint32_t device_id(const ExportedDevice& device) noexcept {
   return device.bus << 16 | (device.number & 0xFFFFu);
 }
@@ -109,14 +109,14 @@ inline constexpr std::size_t kExportedInterfaceSize = 4;
 inline constexpr std::size_t kImportRequestSize = kOpHeadSize + 32;
 inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSize;
 
-/// The head of any operation; UnknownCode for a code that is none of ours.
+/// The head of any operation; UnknownCode for a code that is not in OpCode.
 [[nodiscard]] tl::expected<OpHead, OpError> decode_op_head(
     std::span<const std::byte> bytes) ABBE_RT;
 
-// Each writer returns the bytes written, 0 if `out` is too small.
+// Each encoder returns the number of bytes written, 0 if `out` is too small.
 std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT;
 std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out) ABBE_RT;
-/// A refusal (`device` empty) is the head alone.
+/// A refusal (`device` null) consists of the head only.
 std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
                                 std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] tl::expected<BusId, OpError> decode_import_request(
@@ -130,11 +130,11 @@ struct ImportReply {
 [[nodiscard]] tl::expected<ImportReply, OpError> decode_import_reply(
     std::span<const std::byte> bytes) ABBE_RT;
 
-/// Writes a device list: the head, then device by device with as many interfaces as it says.
+/// Writes a device list: the head, then each device with its interfaces.
 class DeviceListWriter {
  public:
   DeviceListWriter(std::span<std::byte> out, std::uint32_t devices) ABBE_RT;
-  /// False when it does not fit.
+  /// False if it does not fit.
   bool add(const ExportedDevice& device, std::span<const ExportedInterface> interfaces) ABBE_RT;
   [[nodiscard]] std::span<const std::byte> written() const ABBE_RT { return out_.first(size_); }
 
@@ -143,14 +143,14 @@ class DeviceListWriter {
   std::size_t size_ = 0;
 };
 
-/// Walks a device list that has come as a whole. The bytes must outlive the view.
+/// Reads the devices of a complete device list one by one. The bytes must outlive the view.
 class DeviceListView {
  public:
-  /// Truncated as long as the announced devices have not all come.
+  /// Truncated until all announced devices have arrived.
   [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(
       std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] std::uint32_t count() const ABBE_RT { return count_; }
-  /// The next device; nothing after the last. Its interfaces are left out: nobody here needs them.
+  /// The next device without its interfaces; nullopt after the last one.
   [[nodiscard]] std::optional<ExportedDevice> next() ABBE_RT;
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
-/// USB/IP transfers: each message is a header of 48 bytes, big-endian, then the data of an OUT
+/// USB/IP transfers. Each message is a header of 48 bytes, big-endian, then the data of an OUT
 /// request or of an answer to an IN request [Linux Documentation/usb/usbip_protocol.rst]. A reply
-/// says neither its direction nor its endpoint in general (Linux leaves them 0): who asked knows
-/// from the sequence number, and so knows whether data follow. No isochronous transfers. Pure, no
-/// allocation, total.
+/// usually does not contain direction and endpoint (Linux leaves them 0). The client must look up
+/// its request by the sequence number to know whether data follow. No isochronous transfers. Pure,
+/// no allocation, accepts any bytes.
 
 #include <array>
 #include <cstddef>
@@ -25,9 +25,9 @@ enum class UrbStatus : std::int32_t {
   Ok = 0,
   NoDevice = -19,   ///< ENODEV
   Stalled = -32,    ///< EPIPE
-  Overflow = -75,   ///< EOVERFLOW: more data than asked for
+  Overflow = -75,   ///< EOVERFLOW: more data than requested
   Unlinked = -104,  ///< ECONNRESET
-  Shutdown = -108,  ///< ESHUTDOWN: the device is going
+  Shutdown = -108,  ///< ESHUTDOWN: the device is shutting down
 };
 
 struct UrbHead {
@@ -41,7 +41,7 @@ struct UrbHead {
 struct Submit {
   UrbHead head;
   std::uint32_t flags = 0;
-  std::uint32_t length = 0;  ///< bytes that follow (OUT) or that are wanted (IN)
+  std::uint32_t length = 0;  ///< bytes that follow (OUT) or are requested (IN)
   std::uint32_t start_frame = 0;
   std::uint32_t interval = 0;
   usb::SetupBytes setup{};  ///< endpoint 0 only
@@ -50,14 +50,14 @@ struct Submit {
 
 struct Unlink {
   UrbHead head;
-  std::uint32_t victim = 0;  ///< sequence number of the request to take back
+  std::uint32_t victim = 0;  ///< sequence number of the request to cancel
   friend bool operator==(const Unlink&, const Unlink&) = default;
 };
 
 struct SubmitReply {
   UrbHead head;
   UrbStatus status = UrbStatus::Ok;
-  std::uint32_t length = 0;  ///< bytes that follow (IN) or that were taken (OUT)
+  std::uint32_t length = 0;  ///< bytes that follow (IN) or were accepted (OUT)
   std::uint32_t start_frame = 0;
   std::uint32_t errors = 0;
   friend bool operator==(const SubmitReply&, const SubmitReply&) = default;
@@ -65,7 +65,7 @@ struct SubmitReply {
 
 struct UnlinkReply {
   UrbHead head;
-  /// Unlinked: it will not be answered any more; Ok: it had been
+  /// Unlinked: the request will not be answered. Ok: it was already answered.
   UrbStatus status = UrbStatus::Ok;
   friend bool operator==(const UnlinkReply&, const UnlinkReply&) = default;
 };

@@ -74,7 +74,8 @@ std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
   return found;
 }
 
-std::string inside_travel_with(std::span<const Vector3> points_m, const MachineNodes& travel) {
+std::string corrections_inside_travel(std::span<const Vector3> points_m,
+                                      const MachineNodes& travel) {
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {
     if (all_inside(points_m, mistake.M, travel)) {
@@ -91,10 +92,10 @@ std::string inside_travel_with(std::span<const Vector3> points_m, const MachineN
     }
   }
 
-  return texts.empty() ? "" : "; all are inside with " + joined_with_or(texts);
+  return texts.empty() ? "" : "; all are inside with " + or_list(texts);
 }
 
-std::string joined_with_or(std::span<const std::string> texts) {
+std::string or_list(std::span<const std::string> texts) {
   std::string out;
   for (const std::string& text : texts) {
     out += message(out.empty() ? "" : ", or with ", text);

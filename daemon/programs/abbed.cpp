@@ -92,7 +92,7 @@ int run(Abbed& abbed, const sigset_t& stop) {
     }
 
     if (const auto now = std::chrono::steady_clock::now(); feed_period && now >= next_feed) {
-      tell_alive();
+      notify_alive();
       next_feed = now + *feed_period;
     }
   }
@@ -136,10 +136,10 @@ int abbed_main(int argc, char** argv) {
   for (const auto& warning : (*abbed)->warnings())
     fmt::print(stderr, "abbed: warning: {}\n", warning);
   fmt::print(stderr, "abbed: running, configuration {}\n", file);
-  tell_ready("running");
+  notify_ready("running");
 
   const int code = run(**abbed, stop);
-  tell_stopping();
+  notify_stopping();
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
 

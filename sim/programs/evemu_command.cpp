@@ -161,7 +161,7 @@ void print_progress(const Simulation& simulation, HostTime now, double speed, in
 int run(const EvemuOptions& options) {
   auto setup = load(options);
   if (!setup) return report(setup.error());
-  const BallArray array = as_it_is(reference_ball_array(), setup->array);
+  const BallArray array = true_array(reference_ball_array(), setup->array);
   if (const auto written = write_files(options, *setup, array); !written)
     return report(written.error());
   const TruthMachine& truth = setup->simulation.truth;

@@ -79,7 +79,7 @@ std::vector<Eigen::Isometry3d> reference_positions() {
   return positions;
 }
 
-BallArray as_it_is(const BallArray& stated, const ArrayState& state) {
+BallArray true_array(const BallArray& stated, const ArrayState& state) {
   ArrayErrors errors(state.seed);
   BallArray array = stated;
   for (ArrayBall& ball : array.balls) ball.centre_m += errors.vector(state.u_ball_m);

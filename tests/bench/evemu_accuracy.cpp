@@ -122,9 +122,9 @@ void touch_chain(unsigned seeds) {
       const Solution s = *solve(o, way.options);
       const std::vector<Vector3> grid = evaluation_grid(s.model.validity(), layout);
       const Field model = field_of(s);
-      const Remaining as_it_is = remaining(V, model, grid);
-      way.R += as_it_is.mean_R / seeds;
-      way.rms_m += as_it_is.rms_m / seeds;
+      const Remaining true_array = remaining(V, model, grid);
+      way.R += true_array.mean_R / seeds;
+      way.rms_m += true_array.rms_m / seeds;
       way.free_rms_m += remaining(V, turned_to(V, model, grid), grid).rms_m / seeds;
 
       if (seed == 1) {

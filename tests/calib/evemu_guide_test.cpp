@@ -169,7 +169,7 @@ TEST(TouchGuide, ATouchFarFromAnyBallIsSaidWithTheNearestAndTheExpected) {
   t.touch_all(4, Feature::Block, 1);
   t.touch_all(4, Feature::Block, 2);
   const Vector3 p = t.points(4, Feature::Ball, 2)[0] + Vector3(0, 0, 0.05);
-  EXPECT_EQ(t.touch(p).fate, TouchFate::Astray);
+  EXPECT_EQ(t.touch(p).fate, TouchFate::NotOnFeature);
   EXPECT_THAT(t.notes_.back(), HasSubstr("is on no ball or block; nearest is ball 2, "));
   EXPECT_THAT(t.notes_.back(), HasSubstr("expected: ball 2"));
   t.touch_position(4, 2);
@@ -223,7 +223,7 @@ TEST(TouchGuide, KnowsTheSidesOfTheFacesAtLaterPositions) {
   t.touch_all(8, Feature::Ball, 1);
   t.touch_all(8, Feature::Block, 1);
   t.touch_all(8, Feature::Block, 2);
-  EXPECT_EQ(t.touch(stray_at_mirrored(t, 8, 2)).fate, TouchFate::Astray);
+  EXPECT_EQ(t.touch(stray_at_mirrored(t, 8, 2)).fate, TouchFate::NotOnFeature);
   t.touch_position(8, 2);
   EXPECT_EQ(t.guide_.next().position, 3);
 }
@@ -239,7 +239,7 @@ TEST(TouchGuide, FacesSetAsideWhenSomebodyWentOnAreTouchedAgain) {
   const auto plane = *fit::fit_plane(face, Vector3::UnitX());
   const Eigen::AngleAxisd lean(0.1, n1.cross(plane.normal).normalized());
   for (std::size_t i = 0; i < 24; ++i) t.touch(plane.point + lean * (face[i] - plane.point));
-  EXPECT_EQ(t.touch(t.points(4, Feature::Ball, 2)[0]).fate, TouchFate::Astray);
+  EXPECT_EQ(t.touch(t.points(4, Feature::Ball, 2)[0]).fate, TouchFate::NotOnFeature);
   EXPECT_THAT(t.notes_.back(), HasSubstr("mrad off the calibrator's angle"));
   EXPECT_EQ(name(t.guide_.next().on), "block 1");
   t.touch_all(4, Feature::Block, 1);

@@ -193,8 +193,9 @@ TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
   const Field V = table3_machine();
   const Solution s = *solve(o);
   const auto grid = evaluation_grid(s.model.validity());
-  const Remaining as_it_is = remaining(V, field_of(s), grid);
-  EXPECT_GT(as_it_is.mean_R, 0.5);  // the blocks' rotation is not V's: nothing in the touches tells
+  const Remaining true_array = remaining(V, field_of(s), grid);
+  EXPECT_GT(true_array.mean_R,
+            0.5);  // the blocks' rotation is not V's: nothing in the touches tells
   EXPECT_LE(remaining(V, turned_to(V, field_of(s), grid), grid).rms_m, 0.07e-3);
 
   // ... and the stated uncertainty knows.
@@ -521,10 +522,10 @@ TEST(EvemuJudge, ComparesWithTheActiveModelWhateverItsRotation) {
   const VolumetricModel other = *VolumetricModel::from_polynomials(
       *EvemuModel::of(m.design(), m.ball1_m(), turned, m.covariance_m2()), Gauge::Ball1,
       Vector3::Zero(), s.model.validity());
-  const auto as_it_is = held_out(o, s.statistics.s_m, &s.model),
+  const auto true_array = held_out(o, s.statistics.s_m, &s.model),
              as_turned = held_out(o, s.statistics.s_m, &other);
-  ASSERT_TRUE(as_it_is && as_turned);
-  EXPECT_NEAR(as_it_is->active.value(), as_turned->active.value(), 1e-6);
+  ASSERT_TRUE(true_array && as_turned);
+  EXPECT_NEAR(true_array->active.value(), as_turned->active.value(), 1e-6);
 }
 
 }  // namespace

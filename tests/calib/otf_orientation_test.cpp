@@ -45,20 +45,20 @@ Matrix3 half_turn(double x, double y, double z) {
 }
 
 TEST(PathOrientation, HalfTurnsThatStayInTheTravelArePossible) {
-  EXPECT_THAT(possible_turns(kPath, travels(-0.1, 0.1)),
+  EXPECT_THAT(possible_rotations(kPath, travels(-0.1, 0.1)),
               ElementsAre(half_turn(1, -1, -1), half_turn(-1, 1, -1), half_turn(-1, -1, 1)));
 }
 
 TEST(PathOrientation, ATravelOnOneSideOfZeroShowsReversedSigns) {
   Path path = kPath;
   for (Vector3& q : path.vertices_m) q.z() -= 0.2;
-  EXPECT_THAT(possible_turns(path, travels(-0.4, 0.0)), ElementsAre(half_turn(-1, -1, 1)));
+  EXPECT_THAT(possible_rotations(path, travels(-0.4, 0.0)), ElementsAre(half_turn(-1, -1, 1)));
 }
 
 /// Three equal travels about zero: every proper rotation of a cube but the identity.
 TEST(PathOrientation, ACubeOfTravelsAllowsAll23Rotations) {
   const AxisNodes axis = *equidistant_nodes(-0.3, 0.3, 0.1);
-  const auto turns = possible_turns(kPath, {axis, axis, axis});
+  const auto turns = possible_rotations(kPath, {axis, axis, axis});
   EXPECT_EQ(turns.size(), 23u);
   for (const Matrix3& R : turns) {
     EXPECT_NEAR(R.determinant(), 1.0, 1e-12);
@@ -126,10 +126,10 @@ TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
 }
 
 TEST(PathOrientation, APlaceThatFitsAfterAHalfTurnNamesIt) {
-  EXPECT_THAT(verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
-              ElementsAre(AllOf(HasSubstr("from the given position"),
-                                HasSubstr("by 180 degrees about Z"),
-                                HasSubstr("signs of the other two axes are reversed"))));
+  EXPECT_THAT(
+      verdict_with({.tracker_m = kTracker.t_m}, about_z(kTracker)).reasons,
+      ElementsAre(AllOf(HasSubstr("from the given position"), HasSubstr("by 180 degrees about Z"),
+                        HasSubstr("signs of the other two axes are reversed"))));
 }
 
 TEST(PathOrientation, ALevelledTrackerUpsideDownNamesTheFirstTurnThatHelps) {

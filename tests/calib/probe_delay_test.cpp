@@ -108,7 +108,7 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
 }
 
 /// Every feed has an error of its own (the surface was warmer, the control overshot): the touches
-/// at a feed know nothing of it, the misfit does.
+/// at a feed know nothing of it, the lack_of_fit does.
 TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
   std::mt19937 random(7);
   auto some = touches({.jitter_s = 0.0}, {1e-3, 3e-3, 5e-3, 8e-3}, 20, random);
@@ -117,13 +117,13 @@ TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
     some[i].along_m += i / 20 % 2 == 0 ? 0.2e-6 : -0.2e-6;
   const auto after = fit_delay(some).value();
 
-  ASSERT_GT(after.misfit, 4.0);
-  ASSERT_LT(before.misfit, 1.0);
+  ASSERT_GT(after.lack_of_fit, 4.0);
+  ASSERT_LT(before.lack_of_fit, 1.0);
   EXPECT_EQ(before.dof, 76.0);
   EXPECT_EQ(after.dof, 2.0);
   constexpr double kStudent2Over76 = 4.3027 / 1.9917;
-  EXPECT_NEAR(after.u_delay_s / before.u_delay_s, kStudent2Over76 * std::sqrt(after.misfit),
-              0.05 * kStudent2Over76 * std::sqrt(after.misfit));
+  EXPECT_NEAR(after.u_delay_s / before.u_delay_s, kStudent2Over76 * std::sqrt(after.lack_of_fit),
+              0.05 * kStudent2Over76 * std::sqrt(after.lack_of_fit));
 }
 
 TEST(ProbeDelay, ShowsPlacesThatLieOnNoLine) {
@@ -133,8 +133,8 @@ TEST(ProbeDelay, ShowsPlacesThatLieOnNoLine) {
   for (FeedTouch& t : bent) t.along_m += 0.05 * t.speed_m_s * t.speed_m_s;  // 3 um at 8 mm/s
   const auto fit = fit_delay(bent);
   ASSERT_TRUE(straight && fit);
-  EXPECT_LT(straight->misfit, 5.0);
-  EXPECT_GT(fit->misfit, 20.0);
+  EXPECT_LT(straight->lack_of_fit, 5.0);
+  EXPECT_GT(fit->lack_of_fit, 20.0);
 }
 
 TEST(ProbeDelay, WantsThreeFeedsFarEnoughApart) {

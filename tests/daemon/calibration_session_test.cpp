@@ -324,8 +324,8 @@ TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
 TEST(CalibrationSession, WaitsInWallTimeForASimulatorThatIsFasterThanTime) {
   Config config;
   config.daemon.speed = 20.0;
-  EXPECT_EQ(acquisition_options(config).arrival_patience,
-            20 * AcquisitionOptions{}.arrival_patience);
+  EXPECT_EQ(acquisition_options(config).arrival_time_out,
+            20 * AcquisitionOptions{}.arrival_time_out);
 }
 
 TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {

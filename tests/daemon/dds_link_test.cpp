@@ -281,7 +281,7 @@ TEST_F(DdsLinkTest, OnlyTheSupervisedProcessMayConnect) {
   link->poll();
   ASSERT_TRUE(link->connected());
   const OtherProcess other(socket);
-  while (link->counters().strangers == 0) link->poll();
+  while (link->counters().foreign_connections == 0) link->poll();
   EXPECT_EQ(link->counters().connections, 1u);
   link->publish(Topic::Snapshot, snapshot_payload(1));
   EXPECT_EQ(far.take().size(), 1u);

@@ -80,7 +80,7 @@ class WarmArray : public ::testing::Test {
   }
   void write_array(const sim::ArrayState& state) const {
     const auto stated = sim::reference_ball_array();
-    write("touches.csv", touches_of_a_perfect_machine(sim::as_it_is(stated, state)));
+    write("touches.csv", touches_of_a_perfect_machine(sim::true_array(stated, state)));
     write("calibrator.toml", sim::format_calibrator_toml(stated, state));
   }
   /// The file as of somebody who does not know how the array grows.
@@ -247,10 +247,9 @@ TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
   write("machine.toml", config_text("artefact_sensor = \"plate\"\nu_artefact_K = 0.3\n"));
   const auto refused = identify();
   EXPECT_EQ(refused.exit, 3);
-  EXPECT_THAT(refused.err,
-              AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
-                    HasSubstr("artefact_sensor \"plate\" is in no file of touches"),
-                    HasSubstr("give --artefact-C and --u-artefact-K")));
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("calibrator.toml has alpha_um_per_m_K"),
+                                 HasSubstr("artefact_sensor \"plate\" is in no file of touches"),
+                                 HasSubstr("give --artefact-C and --u-artefact-K")));
 
   const auto notes_of = [](const Ran& ran) {
     EXPECT_EQ(ran.exit, kRefusedByTheGate) << ran.err;

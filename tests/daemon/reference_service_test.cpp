@@ -195,7 +195,7 @@ void stand(ReferenceService& service, std::int64_t count) {
   }
 }
 
-StandHere z_at(HostTime now) {
+SetDatumHere z_at(HostTime now) {
   return {.axes = {"Z"}, .now = now};
 }
 
@@ -203,13 +203,13 @@ TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStan
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
 
-  EXPECT_EQ(service.stand_at_offset({}).error().code, ErrorCode::Refused);
+  EXPECT_EQ(service.set_datum_here({}).error().code, ErrorCode::Refused);
   stand(service, 400);
   EXPECT_THAT(service.without_zero(), ::testing::ElementsAre("X", "Y", "Z"));
   Batch batch = counts(HostTime{2s}, 400);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b111);
-  ASSERT_TRUE(service.stand_at_offset(z_at(HostTime{2s})));
+  ASSERT_TRUE(service.set_datum_here(z_at(HostTime{2s})));
   batch = counts(HostTime{3s}, 404);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b011);
@@ -224,23 +224,23 @@ TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
   stand(service, 400);
   Batch batch = counts(HostTime{2s}, 440);
   give(service, batch);
-  const auto moving = service.stand_at_offset(z_at(HostTime{2s}));
+  const auto moving = service.set_datum_here(z_at(HostTime{2s}));
 
   ASSERT_FALSE(moving);
   EXPECT_EQ(moving.error().code, ErrorCode::Refused);
   EXPECT_THAT(moving.error().text, HasSubstr("Z moves"));
   EXPECT_THAT(service.without_zero(), Contains("Z"));
-  EXPECT_TRUE(service.stand_at_offset({.axes = {"X"}, .now = HostTime{2s}}));
+  EXPECT_TRUE(service.set_datum_here({.axes = {"X"}, .now = HostTime{2s}}));
   batch = counts(HostTime{2500ms}, 441);  // a count to and fro is no motion
   give(service, batch);
-  EXPECT_TRUE(service.stand_at_offset(z_at(HostTime{2500ms})));
+  EXPECT_TRUE(service.set_datum_here(z_at(HostTime{2500ms})));
 }
 
 TEST(ReferenceService, ASilentCardDoesNotSayWhereAxesAre) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
-  const auto silent = service.stand_at_offset(z_at(HostTime{2600ms}));
+  const auto silent = service.set_datum_here(z_at(HostTime{2600ms}));
   ASSERT_FALSE(silent);
   EXPECT_EQ(silent.error().code, ErrorCode::Refused);
   EXPECT_THAT(silent.error().text, HasSubstr("silent for 0.6 s"));
@@ -252,9 +252,9 @@ TEST(ReferenceService, NoZeroChangesUnderACalibration) {
   stand(service, 400);
   auto here = z_at(HostTime{2s});
   here.acquiring = true;
-  EXPECT_EQ(service.stand_at_offset(here).error().code, ErrorCode::Refused);
+  EXPECT_EQ(service.set_datum_here(here).error().code, ErrorCode::Refused);
   here.acquiring = false;
-  EXPECT_TRUE(service.stand_at_offset(here));
+  EXPECT_TRUE(service.set_datum_here(here));
 }
 
 TEST(ReferenceService, NobodyKnowsAZeroExactly) {
@@ -264,7 +264,7 @@ TEST(ReferenceService, NobodyKnowsAZeroExactly) {
   auto here = z_at(HostTime{2s});
   EXPECT_GT(here.u, 0.0);
   here.u = 0.0;
-  EXPECT_EQ(service.stand_at_offset(here).error().code, ErrorCode::Usage);
+  EXPECT_EQ(service.set_datum_here(here).error().code, ErrorCode::Usage);
 }
 
 TEST(ReferenceService, ZeroHereHoldsForTheFirstSetUpOnly) {
@@ -292,7 +292,7 @@ TEST(ReferenceService, ItIsDecidedForEachAxis) {
   Batch batch = counts(HostTime{1s}, 0, true);
   give(service, batch);
   EXPECT_EQ(batch.axes[0].missing_mask, 0b100);
-  EXPECT_EQ(service.stand_at_offset(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
+  EXPECT_EQ(service.set_datum_here(z_at(HostTime{1s})).error().code, ErrorCode::Usage);
 }
 
 TEST(Datum, IsTheSameFromTheRecording) {

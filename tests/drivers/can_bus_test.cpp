@@ -222,8 +222,8 @@ TEST(UdpCanBus, HearsNobodyButItsPeer) {
   line.peer.send(std::array{can::standard_frame(0x181, {1})});
   EXPECT_EQ(line.bus.read(line.frames, 1s).value_or(CanRead{}).frames, 1u);
   EXPECT_EQ(line.bus.counters().refused, 0u);
-  EXPECT_EQ(line.bus.counters().strangers, 1u);
-  EXPECT_EQ(line.bus.stranger(), "127.0.0.1:" + std::to_string(ntohs(from.sin_port)));
+  EXPECT_EQ(line.bus.counters().foreign_datagrams, 1u);
+  EXPECT_EQ(line.bus.foreign_sender(), "127.0.0.1:" + std::to_string(ntohs(from.sin_port)));
 }
 
 TEST(UdpCanBus, TakesNoRoomFromItsPeerForAFloodOfStrangers) {
@@ -235,7 +235,7 @@ TEST(UdpCanBus, TakesNoRoomFromItsPeerForAFloodOfStrangers) {
   ::close(stranger);
   line.peer.send(std::array{can::standard_frame(0x181, {1})});
   EXPECT_EQ(line.bus.read(line.frames, 1s).value_or(CanRead{}).frames, 1u);
-  EXPECT_GT(line.bus.counters().strangers, 0u);
+  EXPECT_GT(line.bus.counters().foreign_datagrams, 0u);
   EXPECT_EQ(line.bus.counters().lost, 0u);
 }
 

@@ -49,7 +49,7 @@ class CardThatStays : public ::testing::Test {
   /// As a daemon that kept `from` and starts again.
   void run_on(const CounterCardProgress& from) {
     auto options = slow_options();
-    options.receiver.goes_on_from = from;
+    options.receiver.resume_from = from;
     options.session.set_up_serial = std::string{from.serial_number()};
     run(options);
   }
@@ -165,7 +165,7 @@ TEST_F(CardThatStays, TheBytesGiveTheSameScans) {
   ASSERT_TRUE(bench_.streams());
   cycles_for(100ms);
   auto options = slow_options().receiver;
-  options.goes_on_from = before;
+  options.resume_from = before;
   const auto replayed = std::make_unique<drivers::CounterCardReceiver>(options);
   std::vector<drivers::CounterScan> scans;
   std::array<protocol::RawBlock, 64> blocks{};

@@ -57,7 +57,7 @@ TEST(DoubleTouch, WantsAFindFirst) {
   DoubleTouch both{DoubleTouchRules{}};
   const auto point = both.on_touch(touch_at(0.3, 0.001));
   ASSERT_TRUE(point);
-  EXPECT_EQ(point->error(), TouchRejection::NoFind);
+  EXPECT_EQ(point->error(), TouchRejection::NoFastTouch);
 }
 
 TEST(DoubleTouch, RefusesASlowTouchElsewhere) {

@@ -33,7 +33,7 @@ class FailingBus final : public CanBus {
   Result<void> send(std::span<const can::CanFrame> frames) override { return udp_.send(frames); }
   [[nodiscard]] CanBusCounters counters() const noexcept override { return udp_.counters(); }
   [[nodiscard]] std::string name() const override { return udp_.name(); }
-  [[nodiscard]] std::string stranger() const override { return udp_.stranger(); }
+  [[nodiscard]] std::string foreign_sender() const override { return udp_.foreign_sender(); }
 
  private:
   UdpCanBus udp_;

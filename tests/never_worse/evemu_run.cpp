@@ -390,7 +390,7 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
                                                        state.temperature_C - 20.0 +
                                                        u_temperature_K * normal(random),
                                       .u_temperature_K = u_temperature_K};
-  run.array = sim::as_it_is(stated, state);
+  run.array = sim::true_array(stated, state);
   run.observe.positions = static_cast<int>(positions);
   run.machine = {*calib::KinematicChain::parse(chain), Vector3::Zero()};
   run.judge.accept_shape_only = true;

@@ -93,7 +93,7 @@ TEST(BallArray, HasItsFirstBallAtTheSamePointInEveryPosition) {
 }
 
 TEST(BallArray, EqualsTheStatedArrayByDefault) {
-  const BallArray stated = reference_ball_array(), actual = as_it_is(stated, {});
+  const BallArray stated = reference_ball_array(), actual = true_array(stated, {});
   for (std::size_t i = 0; i < stated.balls.size(); ++i) {
     EXPECT_EQ(actual.balls[i].centre_m, stated.balls[i].centre_m);
     EXPECT_EQ(actual.balls[i].radius_m, stated.balls[i].radius_m);
@@ -107,7 +107,7 @@ TEST(BallArray, EqualsTheStatedArrayByDefault) {
 
 TEST(BallArray, ExpandsWithItsTemperature) {
   const BallArray stated = reference_ball_array();
-  const BallArray warm = as_it_is(stated, {.temperature_C = 24.0, .alpha_per_K = 11.5e-6});
+  const BallArray warm = true_array(stated, {.temperature_C = 24.0, .alpha_per_K = 11.5e-6});
   EXPECT_NEAR(warm.balls[5].centre_m.x() - stated.balls[5].centre_m.x(), 0.65 * 46e-6, 1e-15);
   EXPECT_NEAR(warm.balls[5].radius_m / stated.balls[5].radius_m, 1.000046, 1e-15);
   EXPECT_EQ(warm.faces[1].normal, stated.faces[1].normal);
@@ -121,7 +121,7 @@ TEST(BallArray, DiffersFromTheStatedArrayByTheStatedUncertainty) {
 
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const BallArray actual =
-        as_it_is(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
+        true_array(stated, {.u_ball_m = kBall_m, .u_block_rad = kBlock_rad, .seed = seed});
     for (std::size_t i = 0; i < stated.balls.size(); ++i)
       ball_m2 += (actual.balls[i].centre_m - stated.balls[i].centre_m).squaredNorm() /
                  (3.0 * 9.0 * kSeeds);

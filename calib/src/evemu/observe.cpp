@@ -134,8 +134,9 @@ std::size_t Observations::positions() const {
   return count;
 }
 
-std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni, std::span<const Matrix3> before,
-                                        double least_turn_rad) {
+std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,
+                                               std::span<const Matrix3> before,
+                                               double least_turn_rad) {
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (Eigen::AngleAxisd(before[i].transpose() * R_self_uni).angle() < least_turn_rad) {
       return i;
@@ -192,7 +193,8 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
       const Vector3 V_m = i == 0 ? Vector3(Vector3::Zero()) : Vector3(seen->ideal_m[i] - reading_m);
       o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
     }
-    if (const auto before = stands_as_at(seen->T_self_uni.R, turned, options.least_turn_rad)) {
+    if (const auto before =
+            same_orientation_as(seen->T_self_uni.R, turned, options.least_turn_rad)) {
       return at_position(
           position, ErrorCode::BadInput,
           message("the artefact has the same orientation as at position ", o.seen[*before].position,

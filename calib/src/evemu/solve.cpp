@@ -245,7 +245,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
     if (!slow) {
       return tl::unexpected(slow.error());
     }
-    if (slow->log_likelihood > kWorthSlowNoise) {
+    if (slow->log_likelihood > kLeastSlowNoiseGain) {
       return solve(with_slow_noise(o, slow->per_s), options);
     }
   }

@@ -137,7 +137,7 @@ void TouchGuide::begin_position() {
 GuidedTouch TouchGuide::take(const Vector3& p_m) {
   GuidedTouch out;
   if (complete() || failure_) {
-    out.fate = TouchFate::Astray;
+    out.fate = TouchFate::NotOnFeature;
     return out;
   }
 
@@ -162,7 +162,7 @@ GuidedTouch TouchGuide::take(const Vector3& p_m) {
 }
 
 void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
-  out.fate = TouchFate::Astray;
+  out.fate = TouchFate::NotOnFeature;
   std::string text = where() + message("the touch at ", place_text(p_m), " is on no ball or block");
   std::size_t ball = 0;
   if (const double off_m = site_->nearest_ball_m(p_m, ball); std::isfinite(off_m))
@@ -175,7 +175,7 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
   }
 
   out.notes.push_back(text + "; expected: " + name(feature_at(feature_)));
-  if (++astray_in_a_row_ < setup_->options.most_astray) return;
+  if (++astray_in_a_row_ < setup_->options.most_off_feature) return;
   fail(ErrorCode::BadInput,
        message(astray_in_a_row_,
                " touches one after the other are on no ball or block of calibrator \"",
@@ -205,7 +205,7 @@ void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, Gu
 
 void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
   if (feature > feature_ && !skip_to(feature, out)) {
-    out.fate = TouchFate::Astray;  // the discarded feature was needed to assign this touch
+    out.fate = TouchFate::NotOnFeature;  // the discarded feature was needed to assign this touch
     return;
   }
   feature_ = feature;
@@ -314,7 +314,7 @@ void TouchGuide::end_position(GuidedTouch& out) {
 
   if (!seen) return discard_position(seen.error().text, out);
   if (const auto before =
-          stands_as_at(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
+          same_orientation_as(seen->T_self_uni.R, seen_, setup_->options.observe.least_turn_rad))
     return discard_position(
         where() + message("the artefact has the same orientation as at position ",
                           plan().positions[*before], ": turn it"),

@@ -220,7 +220,7 @@ std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const 
     }
   }
 
-  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
 /// Transformation from calibration to machine coordinates, from the balls alone.

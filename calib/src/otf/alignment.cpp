@@ -105,10 +105,10 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
 
 Result<void> check_length(double measured_m, double nominal_m, double allowed) {
   if (std::abs(measured_m / nominal_m - 1.0) > allowed) {
-    return failure(ErrorCode::AlignmentFailed,
-                   message("alignment: the tracker measured ", measured_m,
-                           " m of travel, the path is ", nominal_m,
-                           " m long: another run, or an incomplete one"));
+    return failure(
+        ErrorCode::AlignmentFailed,
+        message("alignment: the tracker measured ", measured_m, " m of travel, the path is ",
+                nominal_m, " m long: another run, or an incomplete one"));
   }
   return {};
 }
@@ -254,7 +254,7 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
     }
   }
   return texts.empty() ? "one axis of the path or of the tracker's frame reversed, or two swapped"
-                       : joined_with_or(texts) + ", or with the tracker frame reflected";
+                       : or_list(texts) + ", or with the tracker frame reflected";
 }
 
 /// Names the mistakes whose correction makes the points fit: "; they fit with the path driven
@@ -287,7 +287,7 @@ std::string fits_with(const BlockSeries& series, const Machine& machine, const P
     }
   }
 
-  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
 }  // namespace

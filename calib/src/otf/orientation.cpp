@@ -128,8 +128,8 @@ std::string correction_text(const Vector3& found, const Vector3& given, double a
 bool agrees(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found,
             const Vector3& given, double at_most, const std::string& what) {
   if (!((found - given).norm() <= at_most)) {
-    verdict.refuse("orientation", message("path orientation: ", what,
-                                          correction_text(found, given, at_most)));
+    verdict.refuse("orientation",
+                   message("path orientation: ", what, correction_text(found, given, at_most)));
     return false;
   }
   const auto excluded = [&](const Matrix3& R) {
@@ -161,7 +161,7 @@ bool agrees_with_place(Verdict& verdict, std::vector<Matrix3>& open, const Vecto
 
 }  // namespace
 
-std::vector<Matrix3> possible_turns(const Path& path, const MachineNodes& nodes) {
+std::vector<Matrix3> possible_rotations(const Path& path, const MachineNodes& nodes) {
   std::vector<Matrix3> possible;
   for (const Matrix3& R : axis_rotations()) {
     std::vector<Vector3> turned = path.vertices_m;
@@ -174,7 +174,7 @@ std::vector<Matrix3> possible_turns(const Path& path, const MachineNodes& nodes)
 void require_orientation(Verdict& verdict, const Path& path, const MachineNodes& nodes,
                          const Vector3& target_offset_m, const RigidTransform& T_machine_tracker,
                          const OrientationEvidence& evidence) {
-  std::vector<Matrix3> open = possible_turns(path, nodes);
+  std::vector<Matrix3> open = possible_rotations(path, nodes);
   if (evidence.scales_agree) open.clear();
   if (evidence.up && !agrees_with_up(verdict, open, T_machine_tracker, *evidence.up)) return;
   if (evidence.tracker_m && !agrees_with_place(verdict, open, T_machine_tracker.t_m,

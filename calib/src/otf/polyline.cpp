@@ -98,7 +98,7 @@ Result<void> check(const Path& path, const MachineNodes& travel) {
         message("path: vertex ", vertex, " at ", "XYZ"[axis], " ",
                 1e3 * path.vertices_m[vertex][static_cast<Eigen::Index>(axis)],
                 " mm, the axis travels ", 1e3 * nodes_m.front(), " to ", 1e3 * nodes_m.back(),
-                " mm", inside_travel_with(path.vertices_m, travel)));
+                " mm", corrections_inside_travel(path.vertices_m, travel)));
   }
   return check(path);
 }

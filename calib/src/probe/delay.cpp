@@ -180,12 +180,12 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
 
   for (const Feed& f : *feeds) {
     const double residual = f.along_m - fit.origin_m - fit.delay_s * f.speed_m_s;
-    fit.misfit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
+    fit.lack_of_fit += weight(f) * residual * residual / static_cast<double>(feeds->size() - 2);
   }
 
   // With a lack of fit, u_delay_s is estimated from the feeds' mean residuals, which are few.
-  fit.dof = static_cast<double>(fit.misfit > 1.0 ? fit.feeds - 2 : fit.touches - fit.feeds);
-  fit.u_delay_s *= std::sqrt(std::max(1.0, fit.misfit)) * student_over_normal(fit.dof);
+  fit.dof = static_cast<double>(fit.lack_of_fit > 1.0 ? fit.feeds - 2 : fit.touches - fit.feeds);
+  fit.u_delay_s *= std::sqrt(std::max(1.0, fit.lack_of_fit)) * student_over_normal(fit.dof);
   double squares = 0.0;
 
   for (const FeedTouch& t : touches) {

@@ -65,10 +65,10 @@ Result<void> compare_at_points(const Observations& o, const VolumetricModel& mod
     return tl::make_unexpected(before ? after.error() : before.error());
   }
 
-  out.left_before_m = std::move(*before);
-  out.left_after_m = std::move(*after);
-  out.before = vector_statistics(out.left_before_m);
-  out.after = vector_statistics(out.left_after_m);
+  out.residual_before_m = std::move(*before);
+  out.residual_after_m = std::move(*after);
+  out.before = vector_statistics(out.residual_before_m);
+  out.after = vector_statistics(out.residual_after_m);
 
   return {};
 }
@@ -326,10 +326,11 @@ RatioStatistics ratio_statistics(std::vector<double> ratios) {
 }
 
 Effect effect_at_points(const Comparison& c) noexcept {
-  const auto n = static_cast<double>(c.left_before_m.size());
+  const auto n = static_cast<double>(c.residual_before_m.size());
   double sum = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < c.left_before_m.size(); ++i) {
-    const double gained = c.left_before_m[i].squaredNorm() - c.left_after_m[i].squaredNorm();
+  for (std::size_t i = 0; i < c.residual_before_m.size(); ++i) {
+    const double gained =
+        c.residual_before_m[i].squaredNorm() - c.residual_after_m[i].squaredNorm();
     sum += gained;
     squares += gained * gained;
   }

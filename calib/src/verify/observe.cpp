@@ -61,7 +61,7 @@ std::string fits_with(const Observations& o, double most_rms_m) {
     }
   }
 
-  return texts.empty() ? "" : "; they fit with " + joined_with_or(texts);
+  return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
 Result<void> check_lack_of_fit(const Observations& o, const Extent& extent) {

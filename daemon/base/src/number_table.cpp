@@ -166,7 +166,7 @@ class RowReader {
     if (count != target_.size())
       faults_.add(number, line.size() + 1, "",
                   fmt::format("{} values, expected {}", count, target_.size()));
-    if (faults_.count() != faults_before) table.mark_unsound();
+    if (faults_.count() != faults_before) table.mark_invalid();
   }
 
  private:

@@ -17,12 +17,12 @@ std::string text_of(const nlohmann::json& answer, const char* member) {
 
 }  // namespace
 
-std::string_view word_of(ErrorCode code) noexcept {
+std::string_view code_name(ErrorCode code) noexcept {
   return kCodes[static_cast<std::size_t>(code)];
 }
 
 nlohmann::json refusal(const Error& error) {
-  return {{"ok", false}, {"code", word_of(error.code)}, {"error", error.text}};
+  return {{"ok", false}, {"code", code_name(error.code)}, {"error", error.text}};
 }
 
 Error error_of_refusal(const nlohmann::json& answer) {

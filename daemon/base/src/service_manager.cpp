@@ -7,13 +7,13 @@
 
 namespace abbe::daemon {
 
-void tell_ready(std::string_view status) {
+void notify_ready(std::string_view status) {
   sd_notify(0, fmt::format("READY=1\nSTATUS={}", status).c_str());
 }
-void tell_stopping() {
+void notify_stopping() {
   sd_notify(0, "STOPPING=1");
 }
-void tell_alive() {
+void notify_alive() {
   sd_notify(0, "WATCHDOG=1");
 }
 

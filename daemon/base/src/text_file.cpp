@@ -122,7 +122,7 @@ FileDescriptor create_fresh(const std::filesystem::path& file) {
 
 }  // namespace
 
-void take_after_folder(int fd, const std::filesystem::path& folder) noexcept {
+void inherit_ownership(int fd, const std::filesystem::path& folder) noexcept {
   if (const auto ownership = ownership_in_folder(folder)) set_ownership(fd, *ownership);
 }
 

@@ -66,14 +66,14 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
 std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
   constexpr double kMostLackOfFit = 10.8;
   constexpr double kRepeats_m = 0.1e-6;
-  if (fit.misfit <= kMostLackOfFit || fit.residual_rms_m <= kRepeats_m) return std::nullopt;
+  if (fit.lack_of_fit <= kMostLackOfFit || fit.residual_rms_m <= kRepeats_m) return std::nullopt;
   return Error{
       ErrorCode::DataInsufficient,
       fmt::format(
           "probe delay: the positions are not linear in the feed (lack of fit {:.1f}, residuals "
           "{:.3f} um): more than one place was touched, something moved, or the latch was not yet "
           "synchronised with its clock; record the touches again",
-          fit.misfit, 1e6 * fit.residual_rms_m),
+          fit.lack_of_fit, 1e6 * fit.residual_rms_m),
       {}};
 }
 
@@ -87,7 +87,7 @@ int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
                             {"u_delay_us", 1e6 * fit.u_delay_s},
                             {"jitter_us", 1e6 * fit.u_jitter_s},
                             {"scatter_um", 1e6 * fit.u_scatter_m},
-                            {"misfit", fit.misfit},
+                            {"misfit", fit.lack_of_fit},
                             {"dof", fit.dof},
                             {"feeds", fit.feeds},
                             {"touches", fit.touches}}
@@ -98,7 +98,7 @@ int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
   fmt::print(
       "# {} touches at {} feeds; lack of fit {:.2f} (about 1: the positions are linear in the "
       "feed), included in u_delay_us with the {:.0f} degrees of freedom\n",
-      fit.touches, fit.feeds, fit.misfit, fit.dof);
+      fit.touches, fit.feeds, fit.lack_of_fit, fit.dof);
   fmt::print("# add this delay_us to the delay_us of the recording; scatter {:.3f} um\n",
              1e6 * fit.u_scatter_m);
   fmt::print("delay_us = {:.3f}\nu_delay_us = {:.3f}\njitter_us = {:.3f}\n", 1e6 * fit.delay_s,

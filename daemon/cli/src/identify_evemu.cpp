@@ -92,7 +92,7 @@ std::string missing_sensor(const IdentifyEvemuArguments& arguments, const Config
 Result<void> check_artefact(const IdentifyEvemuArguments& arguments,
                             const evemu::Calibrator& calibrator, bool temperature_known,
                             const std::string& missing) {
-  const auto fault = warmth_fault(
+  const auto fault = artefact_temperature_fault(
       calibrator, arguments.calibrator,
       !temperature_known     ? ""
       : arguments.artefact_C ? "--artefact-C"
@@ -457,16 +457,15 @@ int run(const IdentifyEvemuArguments& arguments) {
 }
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
-  auto* machine = command.add_option("--machine", arguments.machine,
-                                     "machine.toml or the daemon's abbed.toml");
+  auto* machine =
+      command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml");
   auto* touches =
       command.add_option("--touches", arguments.touches,
                          "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
   auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
-  auto* errors =
-      command.add_option("--errors", arguments.errors,
-                         "instead of touches, errors.csv: "
-                         "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
+  auto* errors = command.add_option("--errors", arguments.errors,
+                                    "instead of touches, errors.csv: "
+                                    "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
   auto* recording = command.add_option("--recording", arguments.recording,
                                        "instead of files, a recording of the daemon (.mcap): its "
                                        "last complete run with a ball array,\n"
@@ -501,9 +500,8 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
                   "order of the polynomials; default: that of [evemu], or 3")
       ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
   command
-      .add_option(
-          "--positions", arguments.positions,
-          "required number of artefact positions; default: the requested ones, or 8")
+      .add_option("--positions", arguments.positions,
+                  "required number of artefact positions; default: the requested ones, or 8")
       ->check(CLI::Range(2, 1000));
   command
       .add_flag("--rotation-known", arguments.rotation_known,

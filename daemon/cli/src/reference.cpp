@@ -29,7 +29,7 @@ struct ReferenceArguments {
   bool cancel = false;
   bool here = false;
   std::vector<std::string> axes;
-  double u_um = 1e6 * StandHere::kByEye;
+  double u_um = 1e6 * SetDatumHere::kByEye;
   bool json = false;
 };
 

@@ -49,7 +49,7 @@ const char* words(verify::Effect effect) {
 std::size_t points_improved(const verify::Comparison& c) {
   std::size_t improved = 0;
   for (std::size_t i = 0; i < c.inside.size(); ++i)
-    improved += c.left_after_m[i].norm() < c.left_before_m[i].norm() ? 1 : 0;
+    improved += c.residual_after_m[i].norm() < c.residual_before_m[i].norm() ? 1 : 0;
   return improved;
 }
 
@@ -75,8 +75,8 @@ void add_left(HtmlReport& page, const Verification& v) {
              {row("without compensation", c.before), row("with the model", c.after)});
   page.chart(Histogram{"residuals at the measured points",
                        "um",
-                       {{"without compensation", lengths_um(c.left_before_m)},
-                        {"with the model", lengths_um(c.left_after_m)}}});
+                       {{"without compensation", lengths_um(c.residual_before_m)},
+                        {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
 /// The points with the largest residuals: a single wrong row, for example after a jump of the beam,
@@ -90,7 +90,7 @@ void add_farthest(HtmlReport& page, const Verification& v) {
 
   std::partial_sort(order.begin(), order.begin() + shown, order.end(),
                     [&](std::size_t a, std::size_t b) {
-                      return c.left_after_m[a].norm() > c.left_after_m[b].norm();
+                      return c.residual_after_m[a].norm() > c.residual_after_m[b].norm();
                     });
 
   std::vector<std::vector<std::string>> rows;
@@ -99,7 +99,7 @@ void add_farthest(HtmlReport& page, const Verification& v) {
     rows.push_back({v.lines.empty() ? fmt::format("point {}", point + 1)
                                     : fmt::format("line {}", v.lines[point]),
                     mm(v.observations.readings_m[point]),
-                    um_text(c.left_after_m[order[i]].norm())});
+                    um_text(c.residual_after_m[order[i]].norm())});
   }
 
   page.table({"largest residuals", "reading", "residual"}, rows);

@@ -101,11 +101,11 @@ class ServiceManager {
   explicit ServiceManager(const Options& options) {
     if (options.parent != 0) return;
     period_ = abbe::daemon::watchdog_period();
-    abbe::daemon::tell_ready("publishing");
+    abbe::daemon::notify_ready("publishing");
   }
   void cycle(Instant now) {
     if (!period_ || now < next_) return;
-    abbe::daemon::tell_alive();
+    abbe::daemon::notify_alive();
     next_ = now + *period_;
   }
 
@@ -167,8 +167,8 @@ int main(int argc, char** argv) {
   app.footer(kExitCodes);
   Options options;
   options.participant.role = abbe::daemon::DdsRole::Daemon;
-  auto* const socket = app.add_option("--socket", options.socket,
-                                      "Unix socket of abbed; waits until it exists");
+  auto* const socket =
+      app.add_option("--socket", options.socket, "Unix socket of abbed; waits until it exists");
   auto* const domain =
       app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
           ->capture_default_str();

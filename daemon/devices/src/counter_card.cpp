@@ -70,7 +70,7 @@ Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& st
   if (!config.counter_card) return nullptr;
   auto options = device_options(*config.counter_card, config.daemon.speed);
   if (start.left) {
-    options.receiver.goes_on_from = start.left;
+    options.receiver.resume_from = start.left;
     options.session.set_up_serial = std::string{start.left->serial_number()};
   }
 
@@ -92,7 +92,7 @@ class CardDecoder final : public RawDecoders {
         decimation_(config.counter_card->sample_every),
         touch_detector_(touch_detector_of(config)) {
     auto options = device_options(*config.counter_card, config.daemon.speed).receiver;
-    options.goes_on_from = left;
+    options.resume_from = left;
     receiver_ = std::make_unique<drivers::CounterCardReceiver>(options);
   }
 

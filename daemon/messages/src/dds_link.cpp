@@ -85,7 +85,7 @@ void DdsLink::State::accept_newest() {
         ::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
     if (!may_connect(accepted.get(), process)) {
-      ++counters.strangers;
+      ++counters.foreign_connections;
       continue;
     }
 

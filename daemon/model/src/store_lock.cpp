@@ -41,7 +41,7 @@ FileDescriptor open_lock(const fs::path& file) {
   if (!lock && errno == ENOENT) {
     lock = FileDescriptor{::open(file.c_str(), kLockFlags | O_CREAT | O_EXCL, 0600)};
     // Owner as the folder: if root creates the lock file, the daemon can still lock it.
-    if (lock) take_after_folder(lock.get(), folder);
+    if (lock) inherit_ownership(lock.get(), folder);
     // Another process created it in the meantime.
     else if (errno == EEXIST)
       lock = FileDescriptor{::open(file.c_str(), kLockFlags)};

@@ -78,7 +78,7 @@ void ModelStore::remove_leftovers() const {
   }
 }
 
-Result<void> ModelStore::set_aside_damaged_state(protocol::UtcTime now) {
+Result<void> ModelStore::rename_damaged_state(protocol::UtcTime now) {
   if (!is_damaged(state_file_)) return {};
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());

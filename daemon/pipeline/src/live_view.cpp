@@ -31,7 +31,7 @@ LiveView::LiveView(const AssemblerOptions& options, const drivers::TimeSource& t
       use_(options.environment),
       environment_(use_, {}),
       current_for_(time.host(kCurrentFor)),
-      axes_patience_(time.host(kAxesPatience)) {
+      axes_patience_(time.host(kAxesTimeout)) {
   view_.axes_compensated = options.axes_compensated;
 }
 

@@ -49,9 +49,9 @@ using WallTime = std::chrono::steady_clock::time_point;
 
 constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
 constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
-constexpr auto kHubPatience = 1s;   // thousands of turns; a hub silent for this long hangs
+constexpr auto kHubTimeout = 1s;    // thousands of turns; a hub silent for this long hangs
 // for the control socket (3 s at most), the journal and the hub to end
-constexpr auto kEndPatience = 5s;
+constexpr auto kEndTimeout = 5s;
 constexpr int kHubHangs = 70;  // exit code
 
 /// UTC less host time, both read now; the one constant that ever mentions the wall clock.
@@ -185,10 +185,10 @@ struct Abbed::State {
 
   void end_hub() {
     const ExitDeadline deadline{
-        kEndPatience, kHubHangs,
+        kEndTimeout, kHubHangs,
         fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
                     "recorded stays readable in {}.mcap.part\n",
-                    std::chrono::seconds{kEndPatience}.count(), kHubHangs, recording)};
+                    std::chrono::seconds{kEndTimeout}.count(), kHubHangs, recording)};
     control.reset();
     journal.reset();  // these ask the hub once more
 
@@ -370,7 +370,7 @@ struct Abbed::State {
 
     // acquire: pairs with the release in end_hub(); nothing else uses what the hub had any more
     auto seen = hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()}
-                                                              : hub->call(look, kHubPatience);
+                                                              : hub->call(look, kHubTimeout);
     if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
 
     if (left_counting.state) {
@@ -394,7 +394,7 @@ struct Abbed::State {
                                     .id = standing.model != nullptr ? standing.model->id : "",
                                     .reason = standing.reason}};
         },
-        kHubPatience);
+        kHubTimeout);
     Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
     const std::lock_guard lock{participant_mutex};
     now.participant = participant;
@@ -505,7 +505,7 @@ void Abbed::cycle() {
 
 bool Abbed::alive() const {
   return WallTime::clock::now() - std::max(state_->hub->last_cycle(), state_->running_since) <
-         kHubPatience;
+         kHubTimeout;
 }
 
 std::vector<std::string> Abbed::warnings() const {

@@ -35,12 +35,12 @@ std::string verdict_text(const calib::Verdict& verdict) {
 // A full disk or a lock takes a person or a clean-up; what it costs to ask is one small file.
 constexpr auto kKeepAgain = std::chrono::seconds{5};
 // Longer than a disk needs that is only slow: a model does not wait for its recording.
-constexpr auto kDigestPatience = std::chrono::seconds{10};
+constexpr auto kDigestTimeout = std::chrono::seconds{10};
 
 /// What the recorder has of the run. Never fails: without a recording the digest says so.
 RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomic<bool>& stopped) {
   try {
-    for (auto waited = kLookForStop; !stopped && waited < kDigestPatience; waited += kLookForStop)
+    for (auto waited = kLookForStop; !stopped && waited < kDigestTimeout; waited += kLookForStop)
       if (wanted.wait_for(kLookForStop) == std::future_status::ready) return wanted.get();
     return {.gap = "the recorder did not answer: its disk stalls"};
   } catch (const std::exception&) {  // a broken promise
@@ -75,7 +75,7 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
       session_(Methods::options(config)) {}
 
 CalibrationService::~CalibrationService() {
-  const WallTime until = WallTime::clock::now() + kStopPatience;
+  const WallTime until = WallTime::clock::now() + kStopTimeout;
   watch_->stopped = true;
   stop_identification(until - kLastTry);
   if (!to_keep_) return;
@@ -100,7 +100,7 @@ Result<void> CalibrationService::try_once_more(WallTime until) {
   }
 
   ModelKeeper keeper = authority_.keeper();
-  keeper.set_lock_patience(kLastTry);
+  keeper.set_lock_timeout(kLastTry);
   keeping_ = run_abandonable([keeper = std::move(keeper), model = to_keep_]() mutable {
     return keeper.keep(model->document, model->verdict, model->actor, {});
   });
@@ -177,13 +177,13 @@ Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
 }
 
 bool CalibrationService::store_stalls(HostTime now) const {
-  return keeping_.valid() && now - keeping_from_ > ModelAuthority::kStorePatience;
+  return keeping_.valid() && now - keeping_from_ > ModelAuthority::kStoreTimeout;
 }
 
 void CalibrationService::report_stalled_store(HostTime now) {
   if (!store_stalls(now) || !not_stored_.empty()) return;
   not_stored_ = fmt::format("model {} is not stored: the store has not answered for {} s",
-                            to_keep_->id, ModelAuthority::kStorePatience.count());
+                            to_keep_->id, ModelAuthority::kStoreTimeout.count());
   session_.not_stored(not_stored_ + "; cancel discards it", now);
 }
 

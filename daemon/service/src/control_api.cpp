@@ -102,8 +102,8 @@ Result<OnHub> cancel(const HubParts&, const json& request) {
   };
 }
 
-StandHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
-  StandHere here{.axes = axes, .u = u, .now = parts.time.now()};
+SetDatumHere stand_here(const HubParts& parts, const std::vector<std::string>& axes, double u) {
+  SetDatumHere here{.axes = axes, .u = u, .now = parts.time.now()};
   here.patience = parts.time.host(here.patience);
   here.acquiring = takes_readings(parts.calibration.status().state);
   return here;
@@ -119,9 +119,9 @@ OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubPart
 
 Result<OnHub> reference_here(const HubParts&, const json& request) {
   return with_reference([axes = request.value("axes", std::vector<std::string>{}),
-                         u = request.value("u", StandHere::kByEye)](ReferenceService& service,
-                                                                    const HubParts& parts) {
-    return service.stand_at_offset(stand_here(parts, axes, u));
+                         u = request.value("u", SetDatumHere::kByEye)](ReferenceService& service,
+                                                                       const HubParts& parts) {
+    return service.set_datum_here(stand_here(parts, axes, u));
   });
 }
 

@@ -67,7 +67,7 @@ CountingStateThread::~CountingStateThread() {
   }
 
   work_->wake.notify_all();
-  if (work_->ended.wait_for(kEndPatience)) {
+  if (work_->ended.wait_for(kEndTimeout)) {
     thread_.join();
     return;
   }
@@ -77,7 +77,7 @@ CountingStateThread::~CountingStateThread() {
   work_->report(
       fmt::format("{}: not written at the end: its disk has not answered for {} s; after a restart "
                   "the axes of the counter card may not be referenced",
-                  work_->file.string(), kEndPatience.count()));
+                  work_->file.string(), kEndTimeout.count()));
   thread_.detach();
 }
 

@@ -120,7 +120,7 @@ Hub::WallTime Hub::last_cycle() const noexcept {
 
 ModelStanding Hub::standing() const {
   return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(),
-                                   parts_.time.host(kAxesPatience));
+                                   parts_.time.host(kAxesTimeout));
 }
 
 void Hub::cycle(WallTime wall) {

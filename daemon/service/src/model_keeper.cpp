@@ -32,7 +32,7 @@ ModelKeeper::ModelKeeper(const std::filesystem::path& store_folder, const Config
 
 void ModelKeeper::tidy_store(protocol::HostTime now) {
   store_.remove_leftovers();
-  (void)store_.set_aside_damaged_state(utc_.to_utc(now));
+  (void)store_.rename_damaged_state(utc_.to_utc(now));
 }
 
 Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
@@ -68,8 +68,8 @@ Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor&
 Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now) {
   auto active = read_active(now);
   if (active) return active;
-  store_.set_lock_patience(kAsidePatience);
-  if (const auto aside = store_.set_aside_damaged_state(utc_.to_utc(now)); !aside)
+  store_.set_lock_timeout(kRenameTimeout);
+  if (const auto aside = store_.rename_damaged_state(utc_.to_utc(now)); !aside)
     return fail(active.error().code,
                 fmt::format("{}; {}", active.error().text, aside.error().text));
   return read_active(now);

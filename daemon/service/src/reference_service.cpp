@@ -156,7 +156,7 @@ Result<void> ReferenceService::check_standing(std::size_t axis) const {
   return {};
 }
 
-Result<void> ReferenceService::stand_at_offset(const StandHere& here) {
+Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
   const auto possible = without_marks();
   for (const auto& name : here.axes)
     if (std::ranges::find(possible, name) == possible.end())

@@ -60,7 +60,7 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
            {"model_id", s.model_id},
            {"notes", s.notes},
            {"noted", s.noted}};
-  if (s.state == SessionState::Refused) out["code"] = word_of(s.refused_as);
+  if (s.state == SessionState::Refused) out["code"] = code_name(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
 
   if (held_out) {
@@ -182,7 +182,7 @@ json dds_json(const SeenLink& link) {
            {"sent", link.counters.sent},
            {"dropped_live", link.counters.dropped_live},
            {"connections", link.counters.connections},
-           {"refused_connections", link.counters.strangers},
+           {"refused_connections", link.counters.foreign_connections},
            {"security", link.security}};
 
   if (link.process != nullptr) {
@@ -220,7 +220,7 @@ SeenStatus look_at_status(const Hub& hub) {
       .held_out = parts.calibration.held_out(),
       .ended = parts.calibration.ended(),
       .live = hub.live().view(),
-      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesPatience),
+      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesTimeout),
       .reference = {},
       .without_zero = {},
       .release_awaited = parts.devices.release_awaited(),

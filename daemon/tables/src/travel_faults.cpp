@@ -20,7 +20,7 @@ Result<void> check_travel(const std::filesystem::path& file,
   const auto outside = calib::outside_travel(positions_m, travel);
   if (outside.empty()) return {};
   constexpr std::array kColumns{"x_mm", "y_mm", "z_mm"};
-  const std::string fits = calib::inside_travel_with(positions_m, travel);
+  const std::string fits = calib::corrections_inside_travel(positions_m, travel);
   Faults faults(file.string());
 
   for (const auto& [point, axis] : outside) {

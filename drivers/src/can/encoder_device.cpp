@@ -44,7 +44,7 @@ EncoderDevice::EncoderDevice(const EncoderDeviceOptions& options, std::unique_pt
       raw_(options.raw_capacity_blocks),
       receiver_(options.receiver),
       supervisor_(options.receiver.axes, options.supervisor),
-      sync_under_way_(options.receiver),
+      pending_sync_(options.receiver),
       presence_(options.receiver.axes.size(), options.receiver.sync_period),
       emergencies_(options.receiver.axes) {
   board_.set_state("closed");
@@ -137,7 +137,7 @@ void EncoderDevice::stop_sending() {
   if (kernel_sync_) bus_->stop_sync();
   kernel_sync_ = false;
   next_sync_.reset();
-  sync_under_way_.forget();
+  pending_sync_.forget();
 }
 
 bool EncoderDevice::ensure_open(std::chrono::nanoseconds at_most) {
@@ -187,7 +187,7 @@ void EncoderDevice::follow_bus_off(HostTime now) {
   if (bus_off() == bus_was_off_) return;
   bus_was_off_ = bus_off();
   next_sync_.reset();
-  sync_under_way_.forget();
+  pending_sync_.forget();
 
   if (bus_was_off_) {
     off_since_ = now;
@@ -229,7 +229,7 @@ void EncoderDevice::send_sync() {
   *next_sync_ += period * (late / period + 1);  // the receiver counts skipped periods
   if (late >= period) return;  // the next SYNC could follow before the answers have arrived
 
-  if (sync_under_way_.waits(now)) {
+  if (pending_sync_.waits(now)) {
     ++withheld_syncs_;
     return;
   }
@@ -258,7 +258,7 @@ bool EncoderDevice::send(const can::CanFrame& frame) {
   }
 
   if (bus_->echoes_sync() && can::decode_sync(frame)) {
-    sync_under_way_.sent(at);
+    pending_sync_.sent(at);
     return true;
   }
 
@@ -268,7 +268,7 @@ bool EncoderDevice::send(const can::CanFrame& frame) {
 }
 
 void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
-  auto until = std::min({now + at_most, receiver_.deadline(), sync_under_way_.deadline()});
+  auto until = std::min({now + at_most, receiver_.deadline(), pending_sync_.deadline()});
   if (!external()) until = std::min(until, foreign_.deadline());
   until = std::min(until, next_sync_.value_or(until));
   if (sending_ && !bus_off()) until = std::min(until, supervisor_.deadline());
@@ -286,7 +286,7 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   const auto came = std::span{came_}.first(read->frames);
   all_read_ = read->all;
   if (options_.sync == SyncSource::Thread) {
-    batch_count_ = sync_under_way_.settle(came, batch_, cycle_end_, all_read_);
+    batch_count_ = pending_sync_.settle(came, batch_, cycle_end_, all_read_);
   } else {
     std::ranges::copy(came, batch_.begin());
     batch_count_ = came.size();

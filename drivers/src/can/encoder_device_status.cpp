@@ -39,10 +39,11 @@ void EncoderDevice::account(HostTime now) {
                "than a SYNC period",
                now);
 
-  if (bus.strangers != strangers_reported_.count)
-    report_count(bus.strangers, strangers_reported_,
-                 fmt::format("datagrams from {}, which is not the peer: refused", bus_->stranger()),
-                 now);
+  if (bus.foreign_datagrams != strangers_reported_.count)
+    report_count(
+        bus.foreign_datagrams, strangers_reported_,
+        fmt::format("datagrams from {}, which is not the peer: refused", bus_->foreign_sender()),
+        now);
   report_count(receiver_.counters().short_frames, shorts_reported_,
                "frames too short for a position", now);
   report_late_answers(now);

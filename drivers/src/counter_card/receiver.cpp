@@ -32,7 +32,7 @@ CounterCardReceiver::CounterCardReceiver(const CounterCardReceiverOptions& optio
     current_.index_latched_mask = static_cast<std::uint8_t>(current_.index_latched_mask | bit);
     current_.axes.missing_mask = current_.index_latched_mask;
   }
-  if (options.goes_on_from) seed(*options.goes_on_from);
+  if (options.resume_from) seed(*options.resume_from);
 }
 
 /// A set-up zeroes the counters: a raw reading is the count modulo the counter's range.

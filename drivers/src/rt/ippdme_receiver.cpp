@@ -106,7 +106,7 @@ std::optional<IppMessage> IppReceiver::next() ABBE_RT {
       if (!*line) continue;
       if (auto message = of_the_abort(**line)) return message;
     } else if (!*line) {
-      return nonsense(line->error(), {});
+      return protocol_error(line->error(), {});
     } else if (auto message = understand(**line)) {
       return message;
     }
@@ -126,7 +126,7 @@ std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_
   return IppMessage{IppComplete{response->tag}};
 }
 
-IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line) ABBE_RT {
+IppMessage IppReceiver::protocol_error(ippdme::LineError error, std::string_view line) ABBE_RT {
   silenced_ = true;
   if (aborting_) framer_.resume();  // the answer to the abort may follow
   return IppProtocolError{error, text_of(line)};
@@ -134,7 +134,7 @@ IppMessage IppReceiver::nonsense(ippdme::LineError error, std::string_view line)
 
 std::optional<IppMessage> IppReceiver::understand(std::string_view line) ABBE_RT {
   const auto response = ippdme::parse_response(line);
-  if (!response) return nonsense(response.error(), line);
+  if (!response) return protocol_error(response.error(), line);
   switch (response->kind) {
     case ippdme::Response::Kind::Ack:
       return IppMessage{IppAck{response->tag}};
@@ -167,7 +167,7 @@ std::optional<IppMessage> IppReceiver::data(const ippdme::Response& response,
     return IppMessage{IppData{response.tag, text_of(response.data)}};
   }
   const auto point = ippdme::parse_point(unsolicited ? by_hand : response.data);
-  if (!point) return nonsense(point.error(), line);
+  if (!point) return protocol_error(point.error(), line);
   if (unsolicited)
     return touch(*point, between(arrival_ - options_.max_report_delay), ++touches_, false);
 

@@ -92,7 +92,7 @@ std::optional<TrackerMessage> TrackerReceiver::next() ABBE_RT {
   }
   while (!silenced_) {
     const auto packet = framer_.next();
-    if (!packet && framer_.broken()) return nonsense(std::nullopt, framer_.refused());
+    if (!packet && framer_.broken()) return protocol_error(std::nullopt, framer_.refused());
     if (!packet) return std::nullopt;
     if (const auto message = understand(*packet)) return message;
   }
@@ -102,15 +102,15 @@ std::optional<TrackerMessage> TrackerReceiver::next() ABBE_RT {
 std::optional<TrackerMessage> TrackerReceiver::understand(
     std::span<const std::byte> packet) ABBE_RT {
   const auto decoded = emscon::decode(packet);
-  if (!decoded) return nonsense(decoded.error(), packet);
+  if (!decoded) return protocol_error(decoded.error(), packet);
   ++counters_.packets;
   return protocol::visit_trivial([this](const auto& p) { return take(p); }, *decoded);
 }
 
-TrackerMessage TrackerReceiver::nonsense(std::optional<emscon::DecodeError> error,
-                                         std::span<const std::byte> bytes) ABBE_RT {
+TrackerMessage TrackerReceiver::protocol_error(std::optional<emscon::DecodeError> error,
+                                               std::span<const std::byte> bytes) ABBE_RT {
   silenced_ = true;
-  ++counters_.nonsense;
+  ++counters_.protocol_errors;
   TrackerProtocolError n;
   n.error = error;
   n.length = std::min(bytes.size(), n.first_bytes.size());

@@ -29,7 +29,7 @@ std::string_view name(TouchRejection rejection) noexcept {
   switch (rejection) {
     case TouchRejection::NotUsable:
       return "a touch is not usable";
-    case TouchRejection::NoFind:
+    case TouchRejection::NoFastTouch:
       return "no fast touch before the slow one";
     case TouchRejection::OtherPlace:
       return "slow touch far from the fast one";
@@ -76,7 +76,7 @@ DoubleTouch::Outcome DoubleTouch::on_touch(const ProbeTrigger& touch) noexcept {
     return std::nullopt;
   }
 
-  if (!found_) return reject(TouchRejection::NoFind);
+  if (!found_) return reject(TouchRejection::NoFastTouch);
   if (!usable(touch)) return reject(TouchRejection::NotUsable);
   if (!(distance_m(touch, find_) <= rules_.same_place_m)) return reject(TouchRejection::OtherPlace);
   if (count_ > 0 && !(cosine(touch, slow_[0]) >= kSameSide))

@@ -90,7 +90,7 @@ void SdoClient::on_frame(const CanFrame& frame, HostTime now) noexcept {
   if (frame.id != cob::kSdoResponse + node_ || frame.length != sdo::kFrameBytes) return;
   if (sdo::specifier(frame) == sdo::kAbort) {
     // An abort contains its object. An abort for another object belongs to an earlier transfer.
-    if (sdo::object_of(frame) == object_) fail(AbortCode{sdo::word_of(frame)}, true);
+    if (sdo::object_of(frame) == object_) fail(AbortCode{sdo::code_name(frame)}, true);
     return;
   }
 
@@ -125,7 +125,7 @@ void SdoClient::on_upload_initiated(const CanFrame& frame) noexcept {
     state_ = State::Done;
     return;
   }
-  if ((frame.byte(0) & sdo::kSizeGiven) != 0) announced_ = sdo::word_of(frame);
+  if ((frame.byte(0) & sdo::kSizeGiven) != 0) announced_ = sdo::code_name(frame);
   if (announced_ && *announced_ > kMaxSdoBytes) return abort(AbortCode::OutOfMemory);
   phase_ = Phase::Segments;
   request_segment();

@@ -42,7 +42,7 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
 [[nodiscard]] inline ObjectId object_of(const CanFrame& f) noexcept {
   return {load_le<std::uint16_t>(f.data, 1), f.byte(3)};
 }
-[[nodiscard]] inline std::uint32_t word_of(const CanFrame& f) noexcept {
+[[nodiscard]] inline std::uint32_t code_name(const CanFrame& f) noexcept {
   return load_le<std::uint32_t>(f.data, 4);
 }
 

@@ -82,7 +82,7 @@ CanFrame SdoServer::start_download(const CanFrame& frame, ObjectId object) noexc
     code = objects_.write(object, std::span{frame.data}.subspan(4, sdo::expedited_size(frame)));
     if (code != AbortCode::None) return abort(object, code);
   } else {
-    if ((frame.byte(0) & sdo::kSizeGiven) != 0) announced_ = sdo::word_of(frame);
+    if ((frame.byte(0) & sdo::kSizeGiven) != 0) announced_ = sdo::code_name(frame);
     if (announced_ && *announced_ > kMaxSdoBytes) return abort(object, AbortCode::OutOfMemory);
     transfer_ = Transfer::Download;
   }

@@ -73,7 +73,7 @@ TEST_F(TrackerRealTimePath, StandsNonsenseAndNewConnections) {
     }
     cycle(i);
   });
-  EXPECT_EQ(receiver_->counters().nonsense, 100u);
+  EXPECT_EQ(receiver_->counters().protocol_errors, 100u);
 }
 
 }  // namespace

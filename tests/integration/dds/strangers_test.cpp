@@ -173,7 +173,7 @@ class StrangersWithoutSecurity : public Strangers {
       ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
     ASSERT_TRUE(watcher.wait_for("vmc-3  publisher is alive")) << watcher.transcript();
   }
-  void expect_foreign_sync_reported() {
+  void expect_foreign_publisher_reported() {
     for (Process* subscriber : {&fast, &cyclone})
       EXPECT_TRUE(subscriber->wait_for("vmc-3: another publisher ")) << subscriber->transcript();
     const auto line = watcher.wait_for("vmc-3  another publisher ");
@@ -192,7 +192,7 @@ class StrangersWithoutSecurity : public Strangers {
 
 TEST_F(StrangersWithoutSecurity, FakesOfALaterPublisherAreIgnoredAndReported) {
   Process fake(stranger("fake"));
-  expect_foreign_sync_reported();
+  expect_foreign_publisher_reported();
   const auto reported = Clock::now();
   for (Process* subscriber : {&fast, &cyclone})
     EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", reported)) << subscriber->transcript();
@@ -202,7 +202,7 @@ TEST_F(StrangersWithoutSecurity, FakesOfALaterPublisherAreIgnoredAndReported) {
 /// The successor never sent beside the one before; the foreign did.
 TEST_F(StrangersWithoutSecurity, ARivalDoesNotTakeThePlaceOfARestartedPublisher) {
   Process fake(stranger("fake"));
-  expect_foreign_sync_reported();
+  expect_foreign_publisher_reported();
   const auto killed = Clock::now();
   ::kill(abbe_dds_pid(), SIGKILL);
 

@@ -40,10 +40,10 @@ struct OutsideTravel {
 
 /// Names the mistakes whose correction puts all points inside the travel: "; all are inside with Y
 /// reversed, or with X and Y swapped". Empty if no correction does.
-[[nodiscard]] std::string inside_travel_with(std::span<const Vector3> points_m,
-                                             const MachineNodes& travel);
+[[nodiscard]] std::string corrections_inside_travel(std::span<const Vector3> points_m,
+                                                    const MachineNodes& travel);
 
 /// "A", "A, or with B", "A, or with B, or with C"
-[[nodiscard]] std::string joined_with_or(std::span<const std::string> texts);
+[[nodiscard]] std::string or_list(std::span<const std::string> texts);
 
 }  // namespace abbe::calib

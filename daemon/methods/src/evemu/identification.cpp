@@ -30,8 +30,8 @@ evemu::JudgeOptions judge_options(const Config& config) {
 
 }  // namespace
 
-std::string warmth_fault(const evemu::Calibrator& calibrator, std::string_view named,
-                         std::string_view thermometer, std::string_view remedy) {
+std::string artefact_temperature_fault(const evemu::Calibrator& calibrator, std::string_view named,
+                                       std::string_view thermometer, std::string_view remedy) {
   if (calibrator.expansivity && thermometer.empty())
     return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named,
                        remedy);
@@ -103,12 +103,12 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (const auto machine = evemu_machine(config.machine); !machine)
     return tl::unexpected(machine.error());
   const auto& artefact = config.evemu.artefact;
-  const auto fault =
-      warmth_fault(request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
-                   !artefact          ? ""
-                   : artefact->sensor ? "[evemu] artefact_sensor"
-                                      : "[evemu] artefact_C",
-                   "add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]");
+  const auto fault = artefact_temperature_fault(
+      request.calibrator, fmt::format("calibrator \"{}\"", request.calibrator.name),
+      !artefact          ? ""
+      : artefact->sensor ? "[evemu] artefact_sensor"
+                         : "[evemu] artefact_C",
+      "add artefact_sensor or artefact_C, and u_artefact_K, to [evemu]");
   if (!fault.empty()) return fail(ErrorCode::Refused, "calibrate evemu: " + fault);
   const auto guide = evemu::TouchGuide::create(request.calibrator, request.plan);
   if (!guide) return fail(ErrorCode::BadInput, "calibrate evemu: " + guide.error().text);

@@ -136,11 +136,11 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
 }
 
 void OtfAcquisition::tick(HostTime now) {
-  if (phase_ == Phase::Running && now - last_time_ > options_.arrival_patience) {
+  if (phase_ == Phase::Running && now - last_time_ > options_.arrival_time_out) {
     fail(fmt::format("no tracker point for {:.0f} s in the middle of the run",
                      in_seconds(now - last_time_)));
   } else if (phase_ == Phase::WaitingAtStart) {
-    give_up_if_stuck(now - options_.arrival_patience);
+    give_up_if_stuck(now - options_.arrival_time_out);
   }
 }
 

@@ -90,7 +90,7 @@ calib::GateLimits gate_limits(const GateConfig& gate) {
 
 AcquisitionOptions acquisition_options(const Config& config) {
   AcquisitionOptions options;
-  options.arrival_patience = stretched(options.arrival_patience, config.daemon.speed);
+  options.arrival_time_out = stretched(options.arrival_time_out, config.daemon.speed);
   options.environment = environment_use(config);
   options.reading_tolerance_m = config.gate.path_tolerance_m;
   if (!config.tracker) return options;

@@ -44,7 +44,7 @@ struct ArrayState {
 };
 /// The true array: `stated` plus errors drawn with the uncertainties in `state`, expanded to the
 /// temperature in `state`.
-[[nodiscard]] BallArray as_it_is(const BallArray& stated, const ArrayState& state);
+[[nodiscard]] BallArray true_array(const BallArray& stated, const ArrayState& state);
 
 /// The text of calibrator.toml for the stated array.
 [[nodiscard]] std::string format_calibrator_toml(const BallArray& stated,

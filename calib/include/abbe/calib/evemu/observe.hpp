@@ -106,9 +106,9 @@ struct Observations {
                                                 const Calibrator&, const ObserveOptions& = {});
 /// Index in `before` of the first orientation from which `R_self_uni` differs by less than
 /// `least_turn_rad`; nullopt if there is none.
-[[nodiscard]] std::optional<std::size_t> stands_as_at(const Matrix3& R_self_uni,
-                                                      std::span<const Matrix3> before,
-                                                      double least_turn_rad);
+[[nodiscard]] std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,
+                                                             std::span<const Matrix3> before,
+                                                             double least_turn_rad);
 
 /// observe() for errors that were computed elsewhere; block rotations are then unknown. Also
 /// BadInput if the artefact of reading + V has another shape at every position, but the same shape

@@ -36,7 +36,7 @@ struct GuideOptions {
   /// over the length of the array, and errors of the measured faces.
   double max_off_expected_m = 5e-3;
   /// Number of successive touches on no known feature after which the guide fails.
-  std::size_t most_astray = 20;
+  std::size_t most_off_feature = 20;
 };
 
 struct TouchedFeature {
@@ -55,9 +55,9 @@ struct NextTouch {
 };
 
 /// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched
-/// before; Doubled: the feature has all its points; Astray: on no known feature, or not taken (the
+/// before; Doubled: the feature has all its points; NotOnFeature: on no known feature, or not taken (the
 /// guide is complete or has failed, or the feature before was discarded).
-enum class TouchFate { Taken, SamePlace, Doubled, Astray };
+enum class TouchFate { Taken, SamePlace, Doubled, NotOnFeature };
 struct GuidedTouch {
   TouchFate fate = TouchFate::Taken;
   std::vector<std::string> notes;  ///< one sentence each; empty: the touch was as expected

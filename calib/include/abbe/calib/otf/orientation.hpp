@@ -22,11 +22,11 @@ inline constexpr std::string_view kPathOrientation = "path-orientation";
 /// Rotations by multiples of 90 degrees about the axes, without the identity, after which the whole
 /// path is still within the travel (tolerance 1 mm). If the result is empty, the travel alone
 /// excludes a wrong orientation. Rotations by 180 degrees about X, Y, Z come first.
-[[nodiscard]] std::vector<Matrix3> possible_turns(const Path&, const MachineNodes&);
+[[nodiscard]] std::vector<Matrix3> possible_rotations(const Path&, const MachineNodes&);
 
 /// Compares the orientation of the path with the evidence. Adds a reason to the verdict if the
 /// evidence contradicts the orientation. Also adds a reason if the evidence does not exclude all of
-/// possible_turns(); this becomes a note if OrientationEvidence::accepted is set.
+/// possible_rotations(); this becomes a note if OrientationEvidence::accepted is set.
 void require_orientation(Verdict&, const Path&, const MachineNodes&, const Vector3& target_offset_m,
                          const RigidTransform& T_machine_tracker, const OrientationEvidence&);
 

@@ -33,11 +33,11 @@ struct DelayOptions {
 struct ProbeDelayFit {
   double delay_s = 0.0;  ///< to be added to the delay with which the touches were compensated
   /// Half width of the 95 % interval divided by 1.96: the standard deviation from the scatter,
-  /// times sqrt(misfit) if misfit exceeds 1 [Birge 1932], times Student's t for `dof` divided by
-  /// the normal quantile [GUM] G.3, because scatter and misfit are estimates (factor 1.25 with nine
+  /// times sqrt(lack_of_fit) if lack_of_fit exceeds 1 [Birge 1932], times Student's t for `dof` divided by
+  /// the normal quantile [GUM] G.3, because scatter and lack_of_fit are estimates (factor 1.25 with nine
   /// touches; 6.5 if three feeds do not lie on a line).
   double u_delay_s = 0.0;
-  /// degrees of freedom of u_delay_s: touches - feeds, or feeds - 2 if misfit exceeds 1
+  /// degrees of freedom of u_delay_s: touches - feeds, or feeds - 2 if lack_of_fit exceeds 1
   double dof = 0.0;
   double u_jitter_s = 0.0;   ///< standard deviation of the delay from touch to touch
   double u_scatter_m = 0.0;  ///< standard deviation that does not depend on the feed
@@ -45,7 +45,7 @@ struct ProbeDelayFit {
   double residual_rms_m = 0.0;
   /// Lack of fit: weighted sum of squares of the feeds' mean residuals divided by its degrees of
   /// freedom (feeds - 2). Far above 1: the positions are not linear in the feed.
-  double misfit = 0.0;
+  double lack_of_fit = 0.0;
   std::size_t feeds = 0;
   std::size_t touches = 0;
 };

@@ -59,7 +59,7 @@ struct Comparison {
   /// without compensation, and with the model. From each of the two, its own best-fit rigid motion
   /// is removed.
   std::vector<std::size_t> inside;
-  std::vector<Vector3> left_before_m, left_after_m;
+  std::vector<Vector3> residual_before_m, residual_after_m;
   VectorStatistics before, after;
   /// Estimate of the interpolation error of V_las: rms difference on the grid, relative to the
   /// origin, between the model and the model interpolated linearly from the measured points.

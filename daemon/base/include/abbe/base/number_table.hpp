@@ -44,7 +44,7 @@ class NumberTable {
   [[nodiscard]] std::size_t width() const noexcept { return present_.size(); }
 
   [[nodiscard]] double* append(std::size_t line);  ///< appends a row of zeros
-  void mark_unsound() { sound_.back() = false; }   ///< applies to the last row
+  void mark_invalid() { sound_.back() = false; }   ///< applies to the last row
   void reserve(std::size_t rows);
 
  private:

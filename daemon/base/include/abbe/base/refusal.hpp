@@ -9,6 +9,6 @@ namespace abbe::daemon {
 [[nodiscard]] Error error_of_refusal(const nlohmann::json& answer);
 
 /// "data_insufficient", "io" ...: the value of "code" in an answer.
-[[nodiscard]] std::string_view word_of(ErrorCode code) noexcept;
+[[nodiscard]] std::string_view code_name(ErrorCode code) noexcept;
 
 }  // namespace abbe::daemon

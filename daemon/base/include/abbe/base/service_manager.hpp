@@ -8,10 +8,10 @@
 
 namespace abbe::daemon {
 
-void tell_ready(std::string_view status);
-void tell_stopping();
-void tell_alive();  ///< resets the watchdog timer
-/// Period for tell_alive(): half of WatchdogSec. nullopt if the service has no watchdog.
+void notify_ready(std::string_view status);
+void notify_stopping();
+void notify_alive();  ///< resets the watchdog timer
+/// Period for notify_alive(): half of WatchdogSec. nullopt if the service has no watchdog.
 [[nodiscard]] std::optional<std::chrono::microseconds> watchdog_period();
 
 }  // namespace abbe::daemon

@@ -29,6 +29,6 @@ namespace abbe::daemon {
 
 /// Gives the newly created file `fd` the owner and mode of the folder that contains it. Best
 /// effort: only root may change the owner.
-void take_after_folder(int fd, const std::filesystem::path& folder) noexcept;
+void inherit_ownership(int fd, const std::filesystem::path& folder) noexcept;
 
 }  // namespace abbe::daemon

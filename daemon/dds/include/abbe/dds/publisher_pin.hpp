@@ -52,7 +52,7 @@ class PublisherPin {
   /// restarted publisher never is, because its predecessor has ended.
   static constexpr std::chrono::milliseconds kOverlap{100};
   /// A foreign participant is pinned only after the pinned one has sent nothing for this time.
-  static constexpr std::chrono::seconds kSilenceForRival{10};
+  static constexpr std::chrono::seconds kSilenceForForeign{10};
   /// At most this many other participants are remembered; the one with the oldest last sample is
   /// dropped.
   static constexpr std::size_t kMostOthers = 7;
@@ -80,7 +80,7 @@ class PublisherPin {
     Other& other = find_or_add(from, now);
     other.alone += std::min<std::chrono::nanoseconds>(now - other.last, kLongestPause);
     other.last = now;
-    const std::chrono::nanoseconds silence = other.foreign ? kSilenceForRival : kSilence;
+    const std::chrono::nanoseconds silence = other.foreign ? kSilenceForForeign : kSilence;
     if (now - pinned_heard_ >= silence && other.alone >= kAlone) return pin(from, now);
 
     return other.foreign ? Verdict::Foreign : Verdict::Waiting;

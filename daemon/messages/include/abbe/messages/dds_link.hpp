@@ -33,7 +33,8 @@ struct DdsLinkCounters {
   std::uint64_t dropped_live = 0;
   std::uint64_t refused = 0;      ///< payloads that are too long or not CDR of their topic
   std::uint64_t connections = 0;  ///< accepted connections of abbe-dds
-  std::uint64_t strangers = 0;    ///< connections of other processes or users, closed at once
+  std::uint64_t foreign_connections =
+      0;  ///< connections of other processes or users, closed at once
 };
 
 /// Which process may connect: the supervised abbe-dds; without supervision, any process of the user

@@ -7,7 +7,7 @@
 /// A write creates a temporary file, syncs it to the disk and renames it: after a power failure the
 /// store has either the old or the new state. Several processes may use a store; a lock file orders
 /// their changes. Only processes that may write to the folder can open the lock file. A change
-/// fails if it does not get the lock within kLockPatience. An object must be used by one thread
+/// fails if it does not get the lock within kLockTimeout. An object must be used by one thread
 /// only. A model file that cannot be read is listed with its fault; all other models remain usable.
 /// Only regular files are read: a pipe or a device is a fault and is not waited for.
 
@@ -71,13 +71,13 @@ class ModelStore {
   /// Creates the folder if it does not exist.
   [[nodiscard]] Result<void> create() const;
 
-  static constexpr std::chrono::seconds kLockPatience{5};  ///< a change takes milliseconds
-  /// Sets a shorter time-out than kLockPatience.
-  void set_lock_patience(std::chrono::nanoseconds time_out) noexcept { lock_patience_ = time_out; }
+  static constexpr std::chrono::seconds kLockTimeout{5};  ///< a change takes milliseconds
+  /// Sets a shorter time-out than kLockTimeout.
+  void set_lock_timeout(std::chrono::nanoseconds time_out) noexcept { lock_patience_ = time_out; }
 
   /// Renames a state.json that is damaged or not a regular file to state.json.damaged-DATE. After
   /// that no model is active and the stored models have no verdict. Takes the lock of the store.
-  [[nodiscard]] Result<void> set_aside_damaged_state(protocol::UtcTime now);
+  [[nodiscard]] Result<void> rename_damaged_state(protocol::UtcTime now);
   /// The newest name of a state.json.damaged-DATE; empty: there is none.
   [[nodiscard]] std::string damaged_state() const;
   /// Removes temporary files (NAME.PID.new) of processes that no longer exist. Best effort. Call it
@@ -120,7 +120,7 @@ class ModelStore {
  private:
   std::filesystem::path folder_;
   std::filesystem::path state_file_;
-  std::chrono::nanoseconds lock_patience_ = kLockPatience;
+  std::chrono::nanoseconds lock_patience_ = kLockTimeout;
 };
 
 }  // namespace abbe::daemon

@@ -3,7 +3,7 @@
 /// DATA_DIR/counting-state.json keeps how far its counters had come, and the datum of each axis.
 /// The datum belongs to the counters, which count on without the daemon: it goes on if the same
 /// card, with the same set-up, in the same boot of this computer, still counts its clock where it
-/// must (drivers::CounterCardReceiverOptions::goes_on_from). The file may be seconds old, because
+/// must (drivers::CounterCardReceiverOptions::resume_from). The file may be seconds old, because
 /// the datum changes only when an axis is referenced. Ordinary world.
 
 #include <filesystem>

@@ -16,7 +16,7 @@ namespace abbe::daemon {
 
 /// Without axis samples for this long (wall time, also with simulated devices) the positions are
 /// not known.
-inline constexpr std::chrono::milliseconds kAxesPatience{500};
+inline constexpr std::chrono::milliseconds kAxesTimeout{500};
 
 /// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes
 /// without a fault. Else the positions are the last known ones, however fresh the instant looks.
@@ -27,7 +27,7 @@ class LiveView {
   LiveView(const AssemblerOptions& options, const drivers::TimeSource& time);
 
   /// True if anything new came, or something shown is no longer current at `batch.taken`: after 1 s
-  /// the tracker point and the touch are forgotten, after kAxesPatience all axes are missing.
+  /// the tracker point and the touch are forgotten, after kAxesTimeout all axes are missing.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
   /// The instant of the latest axis sample, whatever was missing in it.

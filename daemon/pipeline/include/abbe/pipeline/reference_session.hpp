@@ -90,7 +90,7 @@ class ReferenceSession {
 
 /// The request to take the present place of axes without marks as the one where they read their
 /// offset.
-struct StandHere {
+struct SetDatumHere {
   static constexpr double kByEye = 100e-6;
 
   std::vector<std::string> axes;  ///< none: all that have no marks

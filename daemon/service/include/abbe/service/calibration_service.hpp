@@ -38,11 +38,11 @@ class CalibrationService {
   CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
                      protocol::UtcOffset utc);
   /// Stops a running identification, and tries once more to store a model that waits for the store.
-  /// Takes kStopPatience at most: what does not end until then is left running, with nothing of
+  /// Takes kStopTimeout at most: what does not end until then is left running, with nothing of
   /// this object; see background_tasks_running(). A model that is lost is reported on stderr.
   ~CalibrationService();
-  static constexpr std::chrono::seconds kStopPatience{4};
-  static constexpr std::chrono::seconds kLastTry{1};  ///< of kStopPatience, for the store's lock
+  static constexpr std::chrono::seconds kStopTimeout{4};
+  static constexpr std::chrono::seconds kLastTry{1};  ///< of kStopTimeout, for the store's lock
   static constexpr std::size_t kEndedKept = 4;
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
@@ -57,7 +57,7 @@ class CalibrationService {
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
   /// Refused without a session, and while the model is being put into a store that may still answer
-  /// within kStorePatience of the authority. An identification is asked to stop; until it has, no
+  /// within kStoreTimeout of the authority. An identification is asked to stop; until it has, no
   /// other session starts. Discards a model that the store does not take; of a store that does not
   /// answer the session's reason says that the model may still come into it. It is not activated
   /// then, unless that had begun.

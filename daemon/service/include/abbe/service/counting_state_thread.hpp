@@ -1,7 +1,7 @@
 #pragma once
 /// An ordinary thread that keeps DATA_DIR/counting-state.json: looks once a second, writes when the
 /// datum of an axis changed, else every 5 s, and at the end. A disk that hangs holds up nothing but
-/// this thread, and not the end: a thread that still waits for it after kEndPatience is left
+/// this thread, and not the end: a thread that still waits for it after kEndTimeout is left
 /// running, see background_tasks_running().
 
 #include <chrono>
@@ -18,7 +18,7 @@ namespace abbe::daemon {
 
 class CountingStateThread {
  public:
-  static constexpr std::chrono::seconds kEndPatience{3};
+  static constexpr std::chrono::seconds kEndTimeout{3};
 
   /// `look` runs on the new thread; nothing: the file stays as it is. `report` gets each new fault
   /// of the file once, on the new thread, too; a disk that does not answer at the end on the thread
@@ -27,7 +27,7 @@ class CountingStateThread {
                       std::function<std::optional<CountingState>()> look,
                       std::function<void(const std::string&)> report,
                       std::chrono::milliseconds period = std::chrono::seconds{1});
-  ~CountingStateThread();  ///< looks and writes once more, within kEndPatience
+  ~CountingStateThread();  ///< looks and writes once more, within kEndTimeout
   CountingStateThread(const CountingStateThread&) = delete;
   CountingStateThread& operator=(const CountingStateThread&) = delete;
 

@@ -46,9 +46,9 @@ class ModelAuthority {
   /// ordinary thread, which reads the store if its file has changed, and a later call takes the
   /// outcome. A damaged state that a second look finds as the first did is set aside; the model in
   /// force stays until one is activated. A store that cannot be read, or has not answered for
-  /// kStorePatience, is reported in standing() and fault(), and read again.
+  /// kStoreTimeout, is reported in standing() and fault(), and read again.
   Following follow_store(protocol::HostTime now);
-  static constexpr std::chrono::seconds kStorePatience{5};
+  static constexpr std::chrono::seconds kStoreTimeout{5};
   /// Why the store, or the model it says is active, could not be read the last time; empty: it
   /// could.
   [[nodiscard]] const std::string& fault() const noexcept {

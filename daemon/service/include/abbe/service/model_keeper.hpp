@@ -47,8 +47,8 @@ class ModelKeeper {
   void tidy_store(protocol::HostTime now);
 
   /// See ModelStore.
-  void set_lock_patience(std::chrono::nanoseconds patience) noexcept {
-    store_.set_lock_patience(patience);
+  void set_lock_timeout(std::chrono::nanoseconds patience) noexcept {
+    store_.set_lock_timeout(patience);
   }
   /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated
   /// with the same `actor` after an error: what the store has of it already is not entered again.
@@ -59,9 +59,9 @@ class ModelKeeper {
   /// An error only if the store itself cannot be read; a damaged model is a `fault`.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
   /// The same; a state that is damaged is set aside first. Waits for the store's lock at most
-  /// kAsidePatience.
+  /// kRenameTimeout.
   [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
-  static constexpr std::chrono::seconds kAsidePatience{1};
+  static constexpr std::chrono::seconds kRenameTimeout{1};
   /// Whether read_active() may say something else than when this was the same. One system call.
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 

@@ -39,7 +39,7 @@ class ReferenceService : public PipelineObserver {
   /// Usage for an axis that has marks or is not counted, and for an uncertainty that is not
   /// positive. Refused while a calibration takes readings, without a fresh sample, and unless the
   /// axes have stood for half a second.
-  [[nodiscard]] Result<void> stand_at_offset(const StandHere& here);
+  [[nodiscard]] Result<void> set_datum_here(const SetDatumHere& here);
   /// Searches the marks while a search is running.
   void on_delivered(const Batch& batch) override;
   /// The datum of every axis, for the pipeline.

@@ -29,10 +29,10 @@ struct ReceivedFrame {
 
 /// Losses and refusals since construction; the counters never decrease.
 struct CanBusCounters {
-  std::uint64_t lost = 0;          ///< the kernel's queue was full, or datagrams are missing
-  std::uint64_t refused = 0;       ///< datagrams that contain no valid CAN frames
-  std::uint64_t time_widened = 0;  ///< arrivals without a usable kernel timestamp
-  std::uint64_t strangers = 0;     ///< refused datagrams of senders other than the peer
+  std::uint64_t lost = 0;               ///< the kernel's queue was full, or datagrams are missing
+  std::uint64_t refused = 0;            ///< datagrams that contain no valid CAN frames
+  std::uint64_t time_widened = 0;       ///< arrivals without a usable kernel timestamp
+  std::uint64_t foreign_datagrams = 0;  ///< refused datagrams of senders other than the peer
 };
 
 /// Result of read(). The transport filters frames out: fewer frames than out.size() do not mean
@@ -77,7 +77,7 @@ class CanBus {
   [[nodiscard]] virtual bool echoes_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
   /// Sender of the latest datagram that did not come from the peer, "127.0.0.1:4711"; empty: none.
-  [[nodiscard]] virtual std::string stranger() const { return {}; }
+  [[nodiscard]] virtual std::string foreign_sender() const { return {}; }
   /// For messages: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;
 };

@@ -33,13 +33,13 @@
 #include <string_view>
 
 #include "abbe/drivers/can/axis_presence.hpp"
+#include "abbe/drivers/can/bundle_detector.hpp"
 #include "abbe/drivers/can/can_bus.hpp"
 #include "abbe/drivers/can/emergency_reports.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/drivers/can/encoder_supervisor.hpp"
 #include "abbe/drivers/can/foreign_sync.hpp"
-#include "abbe/drivers/can/sync_under_way.hpp"
-#include "abbe/drivers/can/together_arrivals.hpp"
+#include "abbe/drivers/can/pending_sync.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/raw_ring.hpp"
 #include "abbe/drivers/sample_ring.hpp"
@@ -133,7 +133,7 @@ class EncoderDevice final : public Device {
   StatusBoard board_;
   EncoderReceiver receiver_;
   EncoderSupervisor supervisor_;
-  SyncUnderWay sync_under_way_;
+  PendingSync pending_sync_;
   ForeignSync foreign_;
   AxisPresence presence_;
   EmergencyReports emergencies_;
@@ -163,7 +163,7 @@ class EncoderDevice final : public Device {
   std::uint64_t withheld_syncs_ = 0;
   Reported withheld_reported_, shorts_reported_, duplicates_reported_, strangers_reported_,
       bundled_reported_, late_reported_;
-  TogetherArrivals together_;
+  BundleDetector together_;
 
   std::array<ReceivedFrame, CanBus::kMostRead> came_{};       ///< read from the bus
   std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< for the receiver

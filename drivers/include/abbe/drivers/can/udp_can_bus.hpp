@@ -42,7 +42,7 @@ class UdpCanBus final : public CanBus {
                                      std::chrono::nanoseconds wall) override;
   [[nodiscard]] Result<void> send(std::span<const can::CanFrame> frames) override;
   [[nodiscard]] CanBusCounters counters() const noexcept override;
-  [[nodiscard]] std::string stranger() const override { return stranger_; }
+  [[nodiscard]] std::string foreign_sender() const override { return stranger_; }
   [[nodiscard]] std::string name() const override;
 
   /// Bound port; 0 while closed.

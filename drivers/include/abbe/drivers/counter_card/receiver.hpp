@@ -44,7 +44,7 @@ struct CounterCardReceiverOptions {
   /// (tolerance: 50 ms and 200 ppm of the time between); then the counts continue after a gap.
   /// Otherwise CounterCardCounters::restarted increases, and scans are withheld until the counters
   /// are set up.
-  std::optional<CounterCardProgress> goes_on_from;
+  std::optional<CounterCardProgress> resume_from;
 };
 
 /// Since construction.

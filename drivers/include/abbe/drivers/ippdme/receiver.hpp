@@ -99,7 +99,7 @@ class IppReceiver {
   [[nodiscard]] static std::optional<IppMessage> of_the_abort(std::string_view line) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> data(const ippdme::Response& response,
                                                std::string_view line) ABBE_RT;
-  [[nodiscard]] IppMessage nonsense(ippdme::LineError error, std::string_view line) ABBE_RT;
+  [[nodiscard]] IppMessage protocol_error(ippdme::LineError error, std::string_view line) ABBE_RT;
   [[nodiscard]] IppMessage error(const ippdme::Response& response) ABBE_RT;
   [[nodiscard]] protocol::AxisSample position(const ippdme::PointReport& at,
                                               const protocol::SampleHead& head) ABBE_RT;

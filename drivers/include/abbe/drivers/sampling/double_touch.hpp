@@ -47,11 +47,11 @@ struct MeasuredTouch {
 };
 
 enum class TouchRejection : std::uint8_t {
-  NotUsable,   ///< no position, speed out of range or not constant, or refused by the machine
-  NoFind,      ///< a slow touch without a fast touch before it
-  OtherPlace,  ///< a slow touch too far from the fast touch
-  OtherSide,   ///< a slow touch from another direction than the first slow touch
-  Disagree,    ///< the slow touches do not agree
+  NotUsable,    ///< no position, speed out of range or not constant, or refused by the machine
+  NoFastTouch,  ///< a slow touch without a fast touch before it
+  OtherPlace,   ///< a slow touch too far from the fast touch
+  OtherSide,    ///< a slow touch from another direction than the first slow touch
+  Disagree,     ///< the slow touches do not agree
 };
 [[nodiscard]] std::string_view name(TouchRejection rejection) noexcept;
 

@@ -69,9 +69,9 @@ struct TrackerCounters {
   std::uint64_t points = 0;
   std::uint64_t gaps = 0;  ///< gaps in the point stream that were not caused by a lost beam
   std::uint64_t beam_losses = 0;
-  std::uint64_t time_disorder = 0;   ///< points not later than the one before
-  std::uint64_t points_refused = 0;  ///< points before StartMeasurement was accepted
-  std::uint64_t nonsense = 0;        ///< protocol errors
+  std::uint64_t time_disorder = 0;    ///< points not later than the one before
+  std::uint64_t points_refused = 0;   ///< points before StartMeasurement was accepted
+  std::uint64_t protocol_errors = 0;  ///< protocol errors
 };
 
 class TrackerReceiver {
@@ -112,8 +112,8 @@ class TrackerReceiver {
   [[nodiscard]] std::optional<TrackerMessage> take(const emscon::OtherPacket&) ABBE_RT {
     return {};
   }
-  [[nodiscard]] TrackerMessage nonsense(std::optional<emscon::DecodeError> error,
-                                        std::span<const std::byte> bytes) ABBE_RT;
+  [[nodiscard]] TrackerMessage protocol_error(std::optional<emscon::DecodeError> error,
+                                              std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] TrackerMessage burst(std::size_t count) ABBE_RT;
 
   void convert(const emscon::MultiPoint& from, emscon::Status status,

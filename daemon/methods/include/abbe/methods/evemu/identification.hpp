@@ -35,9 +35,10 @@ struct EvemuCandidate {
 /// How the array grows and how warm it is: one without the other cannot be meant. What is wrong,
 /// else empty. `named`: the calibrator, for people. `thermometer`: what says how warm it is; empty:
 /// nothing does. `remedy`: how to have it said.
-[[nodiscard]] std::string warmth_fault(const calib::evemu::Calibrator& calibrator,
-                                       std::string_view named, std::string_view thermometer,
-                                       std::string_view remedy);
+[[nodiscard]] std::string artefact_temperature_fault(const calib::evemu::Calibrator& calibrator,
+                                                     std::string_view named,
+                                                     std::string_view thermometer,
+                                                     std::string_view remedy);
 [[nodiscard]] EvemuAcquisitionOptions evemu_acquisition_options(const Config& config);
 
 }  // namespace abbe::daemon

@@ -69,7 +69,7 @@ struct AcquisitionOptions {
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
   /// Host time for which no point need have arrived: `silence` and the backlog a stalled tracker
   /// delivers.
-  std::chrono::nanoseconds arrival_patience = std::chrono::seconds{40};
+  std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
   /// for the machine to stand at P0 and leave
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
   std::chrono::nanoseconds longest_stop =

@@ -1,4 +1,4 @@
-#include "abbe/drivers/can/sync_under_way.hpp"
+#include "abbe/drivers/can/pending_sync.hpp"
 
 #include <gmock/gmock.h>
 
@@ -66,7 +66,7 @@ class SyncUnderWayTest : public testing::Test {
                  kStart - 100us);
   }
 
-  SyncUnderWay under_way{[] {
+  PendingSync under_way{[] {
     EncoderReceiverOptions options = encoder_line::three_axes();
     options.sync_period = kSyncPeriod;
     options.answer_within = kAnswerWithin;
@@ -105,8 +105,8 @@ TEST_F(SyncUnderWayTest, KeepsOthersBackUntilItHasLeftAndItsAnswersHaveCome) {
 
 TEST_F(SyncUnderWayTest, IsGivenUpInTheEnd) {
   under_way.sent(kStart);
-  EXPECT_TRUE(under_way.waits(kStart + SyncUnderWay::kPatience - 1ns));
-  EXPECT_FALSE(under_way.waits(kStart + SyncUnderWay::kPatience));
+  EXPECT_TRUE(under_way.waits(kStart + PendingSync::kPatience - 1ns));
+  EXPECT_FALSE(under_way.waits(kStart + PendingSync::kPatience));
 }
 
 TEST_F(SyncUnderWayTest, CountsFromSendingWhereItsAnswerIsToldFirst) {

@@ -11,7 +11,7 @@
 
 namespace abbe::drivers {
 
-class TogetherArrivals {
+class BundleDetector {
  public:
   /// Answers in a bundle. Two can arrive together because one of them was late.
   static constexpr unsigned kBundle = 3;

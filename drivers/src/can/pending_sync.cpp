@@ -1,4 +1,4 @@
-#include "abbe/drivers/can/sync_under_way.hpp"
+#include "abbe/drivers/can/pending_sync.hpp"
 
 namespace abbe::drivers {
 
@@ -12,28 +12,28 @@ std::size_t node_of(const can::CanFrame& frame) {
 
 }  // namespace
 
-void SyncUnderWay::sent(HostTime at) {
+void PendingSync::sent(HostTime at) {
   sent_ = at;
   substituted_ = Substituted::NotYet;
 }
 
-void SyncUnderWay::forget() {
+void PendingSync::forget() {
   sent_.reset();
   answers_until_ = {};
   answered_.reset();
 }
 
-bool SyncUnderWay::waits(HostTime now) const {
+bool PendingSync::waits(HostTime now) const {
   const bool may_leave = sent_ && substituted_ != Substituted::OnAnswer && now < *sent_ + kPatience;
   return may_leave || now < answers_until_;
 }
 
-HostTime SyncUnderWay::deadline() const {
+HostTime PendingSync::deadline() const {
   return pending() ? *sent_ + answer_within_ : HostTime::max();
 }
 
-std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
-                                 HostTime now, bool all_read) {
+std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
+                                HostTime now, bool all_read) {
   std::size_t n = 0;
   for (const auto& received : came) {
     if (received.echo) {
@@ -49,7 +49,7 @@ std::size_t SyncUnderWay::settle(std::span<const ReceivedFrame> came, std::span<
 }
 
 /// The frame for the receiver; nullopt if the receiver must not see this echo.
-std::optional<ReceivedFrame> SyncUnderWay::settle_echo(const ReceivedFrame& echo) {
+std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo) {
   if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // earlier SYNC
   std::optional<ReceivedFrame> sync;
   if (substituted_ == Substituted::NotYet) sync = echo.time_widened ? as_sent() : echo;
@@ -61,19 +61,19 @@ std::optional<ReceivedFrame> SyncUnderWay::settle_echo(const ReceivedFrame& echo
 }
 
 /// The node has already answered the previous SYNC, so this answer belongs to the pending one.
-bool SyncUnderWay::proves_transmission(const ReceivedFrame& received) const {
+bool PendingSync::proves_transmission(const ReceivedFrame& received) const {
   return pending() && can::cob::is_tpdo(received.frame) && received.time >= *sent_ &&
          answered_.test(node_of(received.frame));
 }
 
-ReceivedFrame SyncUnderWay::substitute(Substituted why) {
+ReceivedFrame PendingSync::substitute(Substituted why) {
   substituted_ = why;
   answered_.reset();
   return as_sent();
 }
 
 /// The SYNC as an echo with the time of send().
-ReceivedFrame SyncUnderWay::as_sent() const {
+ReceivedFrame PendingSync::as_sent() const {
   return {.frame = can::encode_sync(), .time = *sent_, .time_widened = true, .echo = true};
 }
 

@@ -25,9 +25,9 @@
 
 namespace abbe::drivers {
 
-class SyncUnderWay {
+class PendingSync {
  public:
-  explicit SyncUnderWay(const EncoderReceiverOptions& options)
+  explicit PendingSync(const EncoderReceiverOptions& options)
       : period_(options.sync_period), answer_within_(answer_within(options)) {}
 
   void sent(protocol::HostTime at);

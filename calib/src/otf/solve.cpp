@@ -199,7 +199,6 @@ Result<Solution> solve(const Observations& o, const Options& options) {
 
   report(options, 1.0);
   return Solution{.model = *std::move(model),
-                  .estimator = Estimator::TwoStep,
                   .rigid = a->U.tail<6>(),
                   .covariance_with_rigid = a->covariance,
                   .T_machine_tracker = o.alignment.T_machine_tracker,

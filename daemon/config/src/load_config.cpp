@@ -95,8 +95,7 @@ std::vector<std::string> Config::connected_axes() const {
 
 std::string machine_hash(const Config& config) {
   const MachineConfig& machine = config.machine;
-  std::string text =
-      fmt::format("{}|{}|{}", machine.name, machine.chain, static_cast<int>(machine.basis));
+  std::string text = fmt::format("{}|{}|0", machine.name, machine.chain);
   for (const auto& axis : machine.axes)
     text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind),
                         axis.min, axis.max, axis.reference);

@@ -102,7 +102,8 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
 }
 
 void read_model(Section model, const toml::node* spacing_node, MachineConfig& out) {
-  model.get_word<BasisConfig>("basis", out.basis, {{"linear", BasisConfig::Linear}});
+  bool is_linear = true;  // no other basis is implemented: any other word is a fault
+  model.get_word<bool>("basis", is_linear, {{calib::kLinearBasis, true}});
   Section nodes = model.child("nodes_mm");
   std::optional<Section> spacing;
   if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");

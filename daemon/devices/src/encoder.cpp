@@ -117,8 +117,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
     drivers::EncoderAxis axis;
     axis.name = node.axis;
     axis.node = node.node;
-    axis.kind =
-        node.kind == AxisKind::Rotary ? drivers::AxisKind::Rotary : drivers::AxisKind::Linear;
+    axis.kind = node.kind;
     axis.scale = node.step;
     axis.offset = node.offset;
     axis.tpdo = static_cast<std::uint8_t>(node.tpdo);

@@ -9,10 +9,9 @@ Error error_of(const drivers::Error& error) {
 
 drivers::DeviceThreadOptions thread_options(const DaemonConfig& config, std::string name,
                                             int priority, std::optional<int> cpu) {
-  const bool enforce = config.realtime == RealTimeMode::Enforce;
   return {.name = std::move(name),
-          .mode = enforce ? drivers::RealTimeMode::Enforce : drivers::RealTimeMode::Ignore,
-          .lock_memory = enforce,
+          .mode = config.realtime,
+          .lock_memory = config.realtime == RealTimeMode::Enforce,
           .priority = priority,
           .cpu = cpu};
 }

@@ -58,7 +58,7 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
     out.vector(polynomials->design().box().half_width_m);
     out.vector(polynomials->ball1_m());
   } else {
-    out.text(name(calib::Basis::Linear));
+    out.text(calib::kLinearBasis);
   }
 
   out.text(name(model.gauge()));

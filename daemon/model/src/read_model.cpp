@@ -132,7 +132,7 @@ void read_basis(Reader& in, calib::ModelDescription& out) {
   if (basis == nullptr) return;
   const Json* kind = in.find(*basis, "basis", "kind");
   if (kind != nullptr && *kind == kLegendre) return read_polynomials(in, *basis, out);
-  if (kind != nullptr && *kind != name(calib::Basis::Linear))
+  if (kind != nullptr && *kind != calib::kLinearBasis)
     in.fault("basis.kind", fmt::format("must be \"linear\" or \"{}\"", kLegendre));
   const Json* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;

@@ -62,7 +62,7 @@ void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
 
 void write_axes(JsonText& out, const calib::ParameterLayout& layout) {
   out.key("basis");
-  out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", name(calib::Basis::Linear)));
+  out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", calib::kLinearBasis));
   for (const auto axis : calib::kAllAxes) {
     const auto& nodes = layout.nodes()[index(axis)];
     out.raw(fmt::format("{}\n    \"{}\": {{\"nodes_mm\": {}, \"reference_mm\": {}}}",

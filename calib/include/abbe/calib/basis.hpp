@@ -1,7 +1,7 @@
 #pragma once
-/// Interpolation of an error table between its nodes. Only linear interpolation is implemented. To
-/// add another basis (natural cubic), add an enumerator here and a case in basis_row(). Every basis
-/// must reproduce constants and straight lines exactly: the gauge conditions depend on it.
+/// Interpolation of an error table between its nodes. It is linear. Another
+/// basis (natural cubic) would have to reproduce constants and straight lines exactly, too: the
+/// gauge conditions depend on it.
 
 #include <cstddef>
 #include <span>
@@ -11,10 +11,7 @@
 
 namespace abbe::calib {
 
-enum class Basis { Linear };
-[[nodiscard]] constexpr std::string_view name(Basis) {
-  return "linear";
-}
+inline constexpr std::string_view kLinearBasis = "linear";  ///< in files and messages
 
 /// f(q) = weight[0] U[first] + weight[1] U[first + 1].
 struct BasisRow {

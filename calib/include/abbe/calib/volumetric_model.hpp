@@ -55,7 +55,6 @@ struct PolynomialForm {
 struct ModelDescription {
   KinematicChain chain;
   MachineNodes nodes;
-  Basis basis = Basis::Linear;
   Gauge gauge = Gauge::G1;
   /// Tool offsets of the measurements.
   /// - One offset: the model is valid for this tool only.

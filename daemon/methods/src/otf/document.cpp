@@ -30,14 +30,14 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .before = document_figures(s.before),
           .after = document_figures(s.after),
           .iterations = s.iterations,
-          .stop_reason = std::string{name(s.stop)}};
+          .stop_reason = std::string{calib::otf::kStopReason}};
 }
 
 }  // namespace
 
 ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
                            std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return {solution.model,       "otf",   std::string{name(solution.estimator)}, config.machine.name,
+  return {solution.model,       "otf",   std::string{calib::otf::kEstimator},   config.machine.name,
           machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
 }
 

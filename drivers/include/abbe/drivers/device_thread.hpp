@@ -14,13 +14,9 @@
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/error.hpp"
 #include "abbe/drivers/latency_histogram.hpp"
+#include "abbe/drivers/real_time_mode.hpp"
 
 namespace abbe::drivers {
-
-enum class RealTimeMode {
-  Enforce,  ///< a refused setting (memory lock, priority, affinity) is an error: do not start
-  Ignore,   ///< a refused setting is a warning: for tests and laptops
-};
 
 struct DeviceThreadOptions {
   std::string name = "device";  ///< shown by top; the kernel keeps 15 characters

@@ -36,17 +36,10 @@
 
 namespace abbe::calib::otf {
 
-/// TwoStep: the alignment first, then the adjustment. A joint estimator (alignment as a part of the
-/// adjustment) is not implemented.
-enum class Estimator { TwoStep };
-[[nodiscard]] constexpr std::string_view name(Estimator) {
-  return "two-step";
-}
-
-enum class StopReason { Direct };  ///< Direct: linear problem, solved without iteration
-[[nodiscard]] constexpr std::string_view name(StopReason) {
-  return "direct";
-}
+/// In files and messages: the alignment first, then the adjustment.
+inline constexpr std::string_view kEstimator = "two-step";
+/// In files: the adjustment is a linear problem, solved without iteration.
+inline constexpr std::string_view kStopReason = "direct";
 
 /// H = A^T W^2 A and g = A^T W^2 y for fit_size() unknowns; additive over observations. The rows
 /// are summed in their order: the same input gives bit-identical results.
@@ -112,7 +105,6 @@ struct Statistics {
   int iterations = 0;
   int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
-  StopReason stop = StopReason::Direct;
 };
 
 /// Estimated offset of all ranges; 0 if Noise::u_range_offset_m is 0.
@@ -122,8 +114,7 @@ struct RangeOffset {
 };
 
 struct Solution {
-  VolumetricModel model;  ///< gauge G1, without the rigid unknowns
-  Estimator estimator = Estimator::TwoStep;
+  VolumetricModel model;            ///< gauge G1, without the rigid unknowns
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::MatrixXd covariance_with_rigid;
   RigidTransform T_machine_tracker;

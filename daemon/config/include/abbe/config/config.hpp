@@ -18,15 +18,17 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/environment/refractive_index.hpp"
+#include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/counter_card/wiring.hpp"
 #include "abbe/drivers/environment/modbus_line.hpp"
 #include "abbe/drivers/environment/register_map.hpp"
+#include "abbe/drivers/real_time_mode.hpp"
 #include "abbe/drivers/sampling/distance_code.hpp"
 #include "abbe/drivers/sampling/probe_options.hpp"
 
 namespace abbe::daemon {
 
-enum class AxisKind { Linear, Rotary };
+using drivers::AxisKind;
 
 /// [axes.NAME]. At `reference` the tables of positioning and angular errors are zero. Default: 0 if
 /// it is within the range, else the minimum.
@@ -38,8 +40,6 @@ struct AxisConfig {
   double reference = 0.0;  ///< m or rad
   friend bool operator==(const AxisConfig&, const AxisConfig&) = default;
 };
-
-enum class BasisConfig { Linear };
 
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
@@ -54,7 +54,6 @@ struct MachineConfig {
   std::array<double, 3> target_offset_m{};
   /// [target] offset_mm is present. If false, target_offset_m is not valid; see require_target().
   bool target_given = false;
-  BasisConfig basis = BasisConfig::Linear;
   /// Nodes of every linear axis, ascending, from one end of travel to the other.
   std::map<std::string, std::vector<double>> nodes_m;
   double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
@@ -264,7 +263,7 @@ struct CmmConfig {
   std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
 };
 
-enum class RealTimeMode { Enforce, Ignore };
+using drivers::RealTimeMode;
 
 /// [daemon]
 struct DaemonConfig {

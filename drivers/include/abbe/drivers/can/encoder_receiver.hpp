@@ -46,6 +46,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/error.hpp"
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/can/frame.hpp"
@@ -58,8 +59,6 @@
 namespace abbe::drivers {
 
 namespace can = protocol::can;
-
-enum class AxisKind : std::uint8_t { Linear, Rotary };
 
 struct EncoderAxis {
   std::string name;  ///< "X"; for messages

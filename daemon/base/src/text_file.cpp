@@ -130,8 +130,12 @@ Result<void> create_folder(const std::filesystem::path& folder) {
   std::error_code error;
   if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
   if (auto above = create_folder(folder.parent_path()); !above) return above;
-  if (::mkdir(folder.c_str(), 0777) != 0)
-    return errno == EEXIST ? Result<void>{} : io_failure("create", folder);
+  if (::mkdir(folder.c_str(), 0777) != 0) {
+    const int why = errno;
+    if (why == EEXIST && std::filesystem::is_directory(folder, error)) return {};
+    errno = why;
+    return io_failure("create", folder);
+  }
 
   struct stat above {};
   const auto parent = folder.parent_path();

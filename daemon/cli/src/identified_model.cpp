@@ -54,10 +54,7 @@ Result<void> keep(const std::string& store, const ModelDocument& document,
 
 Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
                            const std::map<std::string, std::string>& more) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
+  if (auto made = create_folder(folder); !made) return made;
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
   for (const auto& [name, text] : more)
     if (auto done = replace_file(folder / name, text); !done) return done;

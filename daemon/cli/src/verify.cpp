@@ -64,14 +64,6 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
   return options;
 }
 
-Result<void> create_folder(const std::filesystem::path& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed)
-    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), failed.message()));
-  return {};
-}
-
 /// Saves the points to OUT, if given, before they are evaluated: a later error does not lose the
 /// measurement.
 Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {

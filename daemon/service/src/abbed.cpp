@@ -23,6 +23,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
 #include "abbe/base/exit_deadline.hpp"
+#include "abbe/base/text_file.hpp"
 #include "abbe/base/unix_socket.hpp"
 #include "abbe/devices/device_kind.hpp"
 #include "abbe/devices/device_options.hpp"
@@ -59,14 +60,6 @@ protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
   const auto utc = std::chrono::system_clock::now().time_since_epoch();
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) -
           time.now().time_since_epoch()};
-}
-
-Result<void> make_directory(const std::filesystem::path& directory) {
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error)
-    return fail(ErrorCode::Io, fmt::format("create {}: {}", directory.string(), error.message()));
-  return {};
 }
 
 /// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, and two daemons never meet.
@@ -477,7 +470,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {
-    if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
+    if (auto made = create_folder(directory); !made) return tl::unexpected(made.error());
   }
 
   using Step = Result<void> (State::*)();

@@ -4,6 +4,7 @@
 /// are packed to 4 bytes and have no padding.
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -20,117 +21,257 @@ inline constexpr bool kIsSetting = false;
 template <class Set, Command kId>
 inline constexpr bool kIsSetting<SettingAnswer<Set, kId>> = true;
 
-template <class T, class Packet>
-inline constexpr bool kIs = std::is_same_v<std::remove_const_t<T>, Packet>;
+/// `T` is the packet or the part of a packet `P`, const when it is written.
+template <class T, class P>
+concept Is = std::is_same_v<std::remove_const_t<T>, P>;
+template <class T>
+concept IsSetting = kIsSetting<std::remove_const_t<T>>;
+/// The requests without parameters.
+template <class T>
+concept HasNoFields = std::is_empty_v<std::remove_const_t<T>>;
 
-// NOLINTBEGIN(bugprone-branch-clone): packets of equal layout are listed each, as the documents do.
-/// Calls io(field, ...) with the fields of `p` after the common head of its kind of packet.
-template <class P, class Io>
+// One overload for each structure: a structure without one does not compile. Each calls
+// io(field, ...) with the fields after the common head of its kind of packet.
+
+template <HasNoFields P, class Io>
+constexpr void fields(P&, Io&&) ABBE_RT {}
+
+template <Is<Acknowledge> P, class Io>
+constexpr void fields(P&, Io&&) ABBE_RT {}
+
+template <Is<Units> P, class Io>
 constexpr void fields(P& p, Io&& io) ABBE_RT {
-  if constexpr (kIs<P, Units>) {
-    io(p.length, p.angle, p.temperature, p.pressure, p.humidity);
-  } else if constexpr (kIs<P, Environment>) {
-    io(p.temperature, p.pressure, p.humidity);
-  } else if constexpr (kIs<P, Refraction>) {
-    io(p.n_interferometer, p.n_adm);
-  } else if constexpr (kIs<P, SystemSettings>) {
-    io(p.weather_monitor, p.apply_transformation, p.apply_station_orientation, p.keep_last_position,
-       p.send_unsolicited_messages, p.send_reflector_position, p.try_mode, p.has_nivel,
-       p.has_video_camera);
-  } else if constexpr (kIs<P, TrackerClockReading>) {
-    io(p.seconds, p.microseconds);
-
-  } else if constexpr (kIs<P, SetUnits>) {
-    io(p.units);
-  } else if constexpr (kIs<P, SetStationOrientation>) {
-    io(p.translation, p.rotation);
-  } else if constexpr (kIs<P, SetTransformation>) {
-    io(p.translation, p.rotation, p.scale);
-  } else if constexpr (kIs<P, SetEnvironmentParams>) {
-    io(p.environment);
-  } else if constexpr (kIs<P, SetRefractionParams>) {
-    io(p.refraction);
-  } else if constexpr (kIs<P, SetMeasurementMode>) {
-    io(p.mode);
-  } else if constexpr (kIs<P, SetCoordinateSystemType>) {
-    io(p.type);
-  } else if constexpr (kIs<P, SetStationaryModeParams>) {
-    io(p.measurement_time_ms, p.use_adm);
-  } else if constexpr (kIs<P, SetContinuousTimeModeParams>) {
-    io(p.time_separation_ms, p.number_of_points, p.use_region, p.region_type);
-  } else if constexpr (kIs<P, SetContinuousDistanceModeParams>) {
-    io(p.spatial_distance, p.number_of_points, p.use_region, p.region_type);
-  } else if constexpr (kIs<P, SetReflector>) {
-    io(p.internal_id);
-  } else if constexpr (kIs<P, SetSearchParams>) {
-    io(p.radius, p.timeout_ms);
-  } else if constexpr (kIs<P, SetSystemSettings>) {
-    io(p.settings);
-  } else if constexpr (kIs<P, GoPosition>) {
-    io(p.position, p.use_adm);
-  } else if constexpr (kIs<P, FindReflector>) {
-    io(p.approximate_distance);
-  } else if constexpr (kIs<P, SetStatisticMode>) {
-    io(p.stationary, p.continuous);
-  } else if constexpr (kIs<P, SetTriggerSource>) {
-    io(p.source);
-  } else if constexpr (kIs<P, SetExternTriggerParams>) {
-    io(p.clock_transition, p.mode, p.start_signal, p.minimal_time_delay);
-  } else if constexpr (kIs<P, SetLongSystemParameter>) {
-    io(p.parameter, p.value);
-  } else if constexpr (kIs<P, GetLongSystemParameter>) {
-    io(p.parameter);
-
-  } else if constexpr (kIs<P, SystemStatusAnswer>) {
-    io(p.last_result, p.tracker_processor, p.laser, p.adm, p.version_major, p.version_minor,
-       p.version_build, p.weather_monitor, p.flags, p.serial_number);
-  } else if constexpr (kIs<P, TrackerStatusAnswer>) {
-    io(p.tracker);
-  } else if constexpr (kIs<P, UnitsAnswer>) {
-    io(p.units);
-  } else if constexpr (kIs<P, EnvironmentAnswer>) {
-    io(p.environment);
-  } else if constexpr (kIs<P, RefractionAnswer>) {
-    io(p.refraction);
-  } else if constexpr (kIs<P, ReflectorAnswer>) {
-    io(p.internal_id);
-  } else if constexpr (kIs<P, ReflectorsAnswer>) {
-    io(p.total, p.internal_id, p.target_type, p.surface_offset, p.name);
-  } else if constexpr (kIs<P, SystemSettingsAnswer>) {
-    io(p.settings);
-  } else if constexpr (kIs<P, LongSystemParameterAnswer>) {
-    io(p.parameter, p.value);
-  } else if constexpr (kIs<P, MeasurementStatusInfoAnswer>) {
-    io(p.last_result, p.bits);
-  } else if constexpr (kIs<P, ObjectTemperatureAnswer>) {
-    io(p.temperature);
-  } else if constexpr (kIs<P, TriggerBoardInfoAnswer>) {
-    io(p.card_type, p.fpga_version, p.max_trigger_frequency_hz, p.error);
-  } else if constexpr (kIs<P, TrackerInfoAnswer>) {
-    io(p.sensor_type, p.name, p.serial_number, p.other, p.max_data_rate_hz, p.more);
-
-  } else if constexpr (kIsSetting<std::remove_const_t<P>>) {
-    io(p.set);
-
-  } else if constexpr (kIs<P, ErrorResponse>) {
-    io(p.command, p.status);
-  } else if constexpr (kIs<P, StatusChange>) {
-    io(p.event);
-  } else if constexpr (kIs<P, SingleResult>) {
-    io(p.status, p.mode, p.try_mode, p.value, p.std_dev, p.std_total, p.pointing_error,
-       p.apriori_std, p.apriori_total, p.environment);
-  } else if constexpr (kIs<P, ReflectorPosition>) {
-    io(p.status, p.value);
-  } else if constexpr (kIs<P, MultiPoint>) {
-    io(p.status, p.time, p.value);
-  } else if constexpr (kIs<P, MultiPointStatistics>) {
-    io(p.apriori_std, p.apriori_total, p.covariance);
-  } else if constexpr (kIs<P, ExtendedMultiPoint>) {
-    io(p.point, p.statistics);
-  }
-  // Acknowledge and the bare requests have no fields of their own.
+  io(p.length, p.angle, p.temperature, p.pressure, p.humidity);
 }
-// NOLINTEND(bugprone-branch-clone)
+
+template <Is<Environment> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.temperature, p.pressure, p.humidity);
+}
+
+template <Is<Refraction> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.n_interferometer, p.n_adm);
+}
+
+template <Is<SystemSettings> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.weather_monitor, p.apply_transformation, p.apply_station_orientation, p.keep_last_position,
+     p.send_unsolicited_messages, p.send_reflector_position, p.try_mode, p.has_nivel,
+     p.has_video_camera);
+}
+
+template <Is<TrackerClockReading> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.seconds, p.microseconds);
+}
+
+template <Is<SetUnits> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.units);
+}
+
+template <Is<SetStationOrientation> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.translation, p.rotation);
+}
+
+template <Is<SetTransformation> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.translation, p.rotation, p.scale);
+}
+
+template <Is<SetEnvironmentParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.environment);
+}
+
+template <Is<SetRefractionParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.refraction);
+}
+
+template <Is<SetMeasurementMode> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.mode);
+}
+
+template <Is<SetCoordinateSystemType> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.type);
+}
+
+template <Is<SetStationaryModeParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.measurement_time_ms, p.use_adm);
+}
+
+template <Is<SetContinuousTimeModeParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.time_separation_ms, p.number_of_points, p.use_region, p.region_type);
+}
+
+template <Is<SetContinuousDistanceModeParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.spatial_distance, p.number_of_points, p.use_region, p.region_type);
+}
+
+template <Is<SetReflector> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.internal_id);
+}
+
+template <Is<SetSearchParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.radius, p.timeout_ms);
+}
+
+template <Is<SetSystemSettings> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.settings);
+}
+
+template <Is<GoPosition> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.position, p.use_adm);
+}
+
+template <Is<FindReflector> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.approximate_distance);
+}
+
+template <Is<SetStatisticMode> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.stationary, p.continuous);
+}
+
+template <Is<SetTriggerSource> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.source);
+}
+
+template <Is<SetExternTriggerParams> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.clock_transition, p.mode, p.start_signal, p.minimal_time_delay);
+}
+
+template <Is<SetLongSystemParameter> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.parameter, p.value);
+}
+
+template <Is<GetLongSystemParameter> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.parameter);
+}
+
+template <Is<SystemStatusAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.last_result, p.tracker_processor, p.laser, p.adm, p.version_major, p.version_minor,
+     p.version_build, p.weather_monitor, p.flags, p.serial_number);
+}
+
+template <Is<TrackerStatusAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.tracker);
+}
+
+template <Is<UnitsAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.units);
+}
+
+template <Is<EnvironmentAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.environment);
+}
+
+template <Is<RefractionAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.refraction);
+}
+
+template <Is<ReflectorAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.internal_id);
+}
+
+template <Is<ReflectorsAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.total, p.internal_id, p.target_type, p.surface_offset, p.name);
+}
+
+template <Is<SystemSettingsAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.settings);
+}
+
+template <Is<LongSystemParameterAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.parameter, p.value);
+}
+
+template <Is<MeasurementStatusInfoAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.last_result, p.bits);
+}
+
+template <Is<ObjectTemperatureAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.temperature);
+}
+
+template <Is<TriggerBoardInfoAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.card_type, p.fpga_version, p.max_trigger_frequency_hz, p.error);
+}
+
+template <Is<TrackerInfoAnswer> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.sensor_type, p.name, p.serial_number, p.other, p.max_data_rate_hz, p.more);
+}
+
+template <IsSetting P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.set);
+}
+
+template <Is<ErrorResponse> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.command, p.status);
+}
+
+template <Is<StatusChange> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.event);
+}
+
+template <Is<SingleResult> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.status, p.mode, p.try_mode, p.value, p.std_dev, p.std_total, p.pointing_error, p.apriori_std,
+     p.apriori_total, p.environment);
+}
+
+template <Is<ReflectorPosition> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.status, p.value);
+}
+
+template <Is<MultiPoint> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.status, p.time, p.value);
+}
+
+template <Is<MultiPointStatistics> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.apriori_std, p.apriori_total, p.covariance);
+}
+
+template <Is<ExtendedMultiPoint> P, class Io>
+constexpr void fields(P& p, Io&& io) ABBE_RT {
+  io(p.point, p.statistics);
+}
 
 template <class T>
 inline constexpr bool kIsArray = false;

@@ -2,7 +2,7 @@
 // the driver, its ring and a reader. Asked: 33,333 scans/s x 8 counters with nothing lost, at most
 // 10 % of one processor for driver and ring, and at least ten times the rate without loss.
 //   bench_counter_card [--seconds N] [--short]
-//   bench_counter_card --serve PORT        only the simulated card, until killed: for `usbip attach`
+//   bench_counter_card --serve PORT        only the simulated card, until killed (`usbip attach`)
 //   bench_counter_card --libusb [...]      the card that is plugged in (or attached), by libusb
 
 #include <fmt/format.h>

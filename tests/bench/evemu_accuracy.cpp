@@ -154,8 +154,8 @@ struct ExactArray {
   Observations operator()(Observations o, const Layout&, unsigned) const { return o; }
 };
 
-/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn anew for every seed; `stated`:
-/// the covariance is told.
+/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn again for every seed.
+/// `stated`: the fit gets the covariance.
 struct UncertainArray {
   bool stated_too = true;
   Observations operator()(Observations o, const Layout& layout, unsigned seed) const {
@@ -210,7 +210,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
   ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
 }
 
-/// A machine out of the prior bayes-pose believes in.
+/// A machine drawn from the prior of bayes-pose.
 Field drawn_machine(unsigned seed) {
   const ScaledDesign design =
       *ScaledDesign::of(reference_machine().chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});
@@ -249,7 +249,7 @@ void speed() {
   int evaluations = 0;
 
   for (double& s : seconds) {
-    const std::clock_t start = std::clock();  // of one core, whoever else has turns on it
+    const std::clock_t start = std::clock();  // of one core, without other processes
     const Solution solution = *solve(o);
     s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     evaluations = solution.hyper->evaluations;
@@ -272,8 +272,8 @@ int main(int argc, char** argv) {
   compare("8 um, 0.32 mrad, tilt x 0.5", reference_layout(0.5), {8e-6, 0.32e-3}, seeds, 1.0);
   compare("8 um, 0.32 mrad, tilt x 0.4", reference_layout(0.4), {8e-6, 0.32e-3}, seeds, 1.0);
 
-  // Flatter still: where the model holds. Beyond its balls it says inside = false, and nothing is
-  // asked.
+  // A flatter layout: compared inside the balls only. Outside them the model reports
+  // inside = false, and there is no requirement.
   compare("the same x 0.3, inside", reference_layout(0.3), {8e-6, 0.32e-3}, seeds, 1.0,
           Grid::OwnHull);
   compare("the same x 0.1, inside", reference_layout(0.1), {8e-6, 0.32e-3}, seeds, 1.0,

@@ -1,5 +1,5 @@
 #pragma once
-/// Work in a process of its own: forked while this process has no thread yet, begun when told to.
+/// Work in a process of its own: forked while this process has no thread yet, begun on request.
 /// Fast DDS starts threads, and a process with threads must not fork.
 
 #include <sys/mman.h>

@@ -4,10 +4,10 @@
 // the whole path, seen by a tracker in bursts of 332 points, and the run is identified; requests
 // for the status come as fast as they are answered. A thread of the highest priority on the hub's
 // processor does nothing but wake every 100 us: where it wakes late, no thread ran there, because
-// the hypervisor gave the processor to somebody else. This time is printed and taken off the hub's
-// cycle. Beside that the processor time of the longest cycle.
+// the hypervisor gave the processor to another guest. This time is printed and subtracted from the
+// hub's cycle. The processor time of the longest cycle is printed, too.
 //   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
-// Exit code 1: a cycle longer than 2 ms, or a model that did not come into force.
+// Exit code 1: a cycle longer than 2 ms, or a model that did not become active.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <pthread.h>
@@ -92,8 +92,9 @@ bool real_time(int priority) {
          ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
 }
 
-/// When no thread could run on the hub's processor. look() and taken_away() run there, too, and
-/// look() above the hub: whoever asks after an interruption finds it written.
+/// The times at which no thread could run on the hub's processor. look() and taken_away() run
+/// there, too, look() with a higher priority than the hub: after an interruption look() has
+/// recorded it before taken_away() reads it.
 class Interruptions {
  public:
   void look(const std::atomic<bool>& stop) {
@@ -173,7 +174,8 @@ std::vector<std::array<double, 3>> long_path() {
   return path;
 }
 
-/// The largest that can be published: the number of parameters is linear in how fine the nodes are.
+/// The largest model that can be published: its number of parameters is linear in the number of
+/// nodes per axis.
 calib::VolumetricModel largest_model(unsigned seed) {
   static const std::size_t finer = [] {
     const auto parameters = [](double f) {
@@ -236,7 +238,7 @@ class DrivenMachine final : public daemon::SampleSource {
   std::size_t driven_ = 0;
 };
 
-/// abbe-dds, as far as the hub can tell: takes everything from the socket.
+/// Stands in for abbe-dds: reads everything from the socket.
 void swallow(const std::filesystem::path& socket) {
   const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
@@ -333,7 +335,7 @@ class Bench {
   }
 
   void stream() const { std::this_thread::sleep_for(seconds_ * 1s); }
-  /// As somebody's `abbe model activate` would; the daemon follows the store.
+  /// As `abbe model activate` of another process; the daemon follows the store.
   void put_models_in_force() {
     for (unsigned seed = 1; seed <= 3; ++seed) {
       auto document = daemon::test::synthetic_document(seed);

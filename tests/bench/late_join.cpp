@@ -128,7 +128,7 @@ std::optional<double> join(Publisher& publisher, const std::string& domain) {
 }
 
 int measure(Publisher& publisher, const std::string& domain, std::size_t joins) {
-  static_cast<void>(join(publisher, domain));  // abbe-dds itself starts meanwhile
+  static_cast<void>(join(publisher, domain));  // abbe-dds itself starts at the same time
   std::vector<double> joined_s;
   std::size_t missed = 0;
 

@@ -1,15 +1,15 @@
 // Question: does the sample ring carry as many samples a second from thread to thread as the better
 // of boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Asked: median ratio >= 0.95
-// over >= 21 rounds. Each round runs all three, in an order that turns round by round, and gives
-// one ratio ours / better peer; of five short runs of each the fastest counts, because a run in
-// which a thread lost its processor says nothing about a ring. Writer: one push per sample, as
-// receive() does, trying again when full (nobody drops, so all carry the same samples). Reader: in
-// batches of 64 where the queue has them (ours, boost), one by one where not (moodycamel). The
+// over >= 21 rounds. Each round runs all three, in an order that rotates with every round, and
+// gives one ratio ours / better peer; of five short runs of each the fastest counts, because a run
+// in which a thread lost its processor does not measure the ring. Writer: one push per sample, as
+// receive() does, trying again when full (no queue drops, so all carry the same samples). Reader:
+// in batches of 64 where the queue has them (ours, boost), one by one where not (moodycamel). The
 // other lines give each its best: ours and boost also push in batches of 16.
 //
-// The sample ring is boost's queue behind the rule of the house (drop, count, mark), so against
-// boost the question is what the rule costs: a look at what was lost, a marked copy after each full
-// queue, which this writer meets often.
+// The sample ring is boost's queue plus the project's rule (drop, count, mark), so the
+// comparison with boost measures the cost of the rule: a check of the loss counter, and a marked
+// copy after each full queue, which is frequent with this writer.
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]
 
@@ -218,7 +218,7 @@ double compare(const char* what, bool batches, int rounds, std::uint32_t samples
   return median(ratios);
 }
 
-/// On a busy machine a run tells more of the scheduler than of the ring. Both threads inherit it.
+/// On a busy machine a run measures the scheduler rather than the ring. Both threads inherit it.
 bool take_priority() {
   const sched_param param{.sched_priority = 1};
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;

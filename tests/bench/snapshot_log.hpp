@@ -1,8 +1,8 @@
 #pragma once
 /// A subscriber that notes when each Snapshot reached it, with the same kind of reader as the bare
-/// hop: the stamp is taken in the listener, once the sample is out of the reader. Compensation
-/// tells when the hub had the axes in hand (age_ns counts from host_time_ns to that instant), so no
-/// clock is added to what is measured.
+/// hop: the stamp is taken in the listener, once the sample is out of the reader. The
+/// Compensation contains when the hub had the axes (age_ns counts from host_time_ns to that
+/// instant), so no further clock enters the measurement.
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -55,7 +55,7 @@ struct Arrival {
   std::int64_t arrived_ns = 0;
 };
 
-/// A turn of the hub that published.
+/// A cycle of the hub that published.
 struct HubCycle {
   std::int64_t host_time_ns = 0;
   std::int64_t hub_ns = 0;

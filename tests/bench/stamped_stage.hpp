@@ -44,8 +44,8 @@ class StampedStage {
                                                              {.node = 2, .axis = sim::Axis::Y},
                                                              {.node = 3, .axis = sim::Axis::Z}}};
 
-    // Without .speed a SYNC is dated by when it is read, and its answers leave at the times said
-    // here.
+    // Without .speed a SYNC gets the time at which it is read, and its answers are sent at the
+    // times given here.
     auto bus = sim::EncoderBus::open({}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     stage->bus_ = std::make_unique<sim::EncoderBus>(std::move(*bus));

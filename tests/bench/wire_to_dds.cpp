@@ -3,9 +3,9 @@
 // as they are installed, against a bare Fast DDS hop of the same rhythm that goes on beside it all
 // the while, half a cycle away, when abbe has nothing to do but to look every P: a shared machine
 // wakes a sleeping process within 30 us in one minute and within 200 us in the next. The hop alone,
-// before, is told, too. The hub looks every P, so a sample waits P/2 in the mean and P at most
-// before anything can happen to it. What else runs on the machine shows in the tails of both:
-// `nice -n -20 bench_wire_to_dds` lets the whole chain and the bare hop alike go before it.
+// measured before, is printed, too. The hub looks every P, so a sample waits P/2 in the mean and P
+// at most before anything can happen to it. What else runs on the machine shows in the tails of
+// both: `nice -n -20 bench_wire_to_dds` lets the whole chain and the bare hop alike go before it.
 //   bench_wire_to_dds [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -81,10 +81,10 @@ struct Path {
   std::size_t impossible = 0;  ///< arrivals before the departure
 };
 
-// ----------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 // matching departures and arrivals
 
-/// The publishing turn of the hub that an arrival belongs to: the last one before it.
+/// The publishing cycle of the hub that an arrival belongs to: the last one before it.
 const HubCycle* turn_of(const SnapshotLog& log, std::int64_t arrived_ns, std::int64_t left_ns) {
   const HubCycle* found = nullptr;
   for (std::size_t i = 0; i < log.turns.size(); ++i) {
@@ -152,7 +152,7 @@ Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) 
   return path;
 }
 
-// ----------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 // abbed, as it is installed
 
 /// The folder of one run, removed at the end unless something failed.
@@ -234,7 +234,7 @@ class Daemon {
   pid_t pid_ = 0;
 };
 
-// ----------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 // the run
 
 bool cycle_until(StampedStage& stage, std::chrono::seconds patience,
@@ -252,7 +252,7 @@ bool both_flow(const SnapshotLog& log) {
   return n > 0 && log.turns.size() > 0 && log.arrivals[n - 1].tracker_device_time_ns != 0;
 }
 
-/// The whole chain, from the first SYNC to the last arrival. False: said on stderr.
+/// The whole chain, from the first SYNC to the last arrival. False: reported on stderr.
 bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
                const std::function<void(std::int64_t away_ns)>& begin_hop, std::uint32_t domain,
                const Plan& plan) {
@@ -300,8 +300,8 @@ std::string load_average() {
   return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
 }
 
-/// How much of the machine nobody uses, from one call to the next. With nothing left, the p99 is
-/// the slice some other program was given by the scheduler (about 3 ms), not abbe's.
+/// The idle share of the processors, from one call to the next. Near zero, the p99 is the time
+/// slice that the scheduler gave another program (about 3 ms), not the delay of abbe.
 class IdleShare {
  public:
   IdleShare() { read(); }

@@ -41,7 +41,7 @@ class AbbedTest : public ::testing::Test {
   Config config_;
 };
 
-TEST_F(AbbedTest, AStartThatIsRefusedLeavesNoRecordingBehind) {
+TEST_F(AbbedTest, ARefusedStartLeavesNoRecording) {
   std::ofstream{config_.control.socket} << "not a socket";
   const auto abbed = Abbed::start(config_, {});
   ASSERT_FALSE(abbed);
@@ -49,7 +49,7 @@ TEST_F(AbbedTest, AStartThatIsRefusedLeavesNoRecordingBehind) {
   EXPECT_THAT(recordings(), IsEmpty());
 }
 
-TEST_F(AbbedTest, RecordsWhileItRunsAndKeepsNoFileThatHoldsNothing) {
+TEST_F(AbbedTest, RecordsWhileItRunsAndRemovesEmptyFiles) {
   auto abbed = Abbed::start(config_, {});
   ASSERT_TRUE(abbed) << abbed.error().text;
   EXPECT_EQ(recordings().size(), 1u);
@@ -70,7 +70,7 @@ TEST_F(AbbedTest, RunsWithoutADiskAndReportsIt) {
   EXPECT_TRUE((*abbed)->alive());
 }
 
-TEST_F(AbbedTest, ClosesWhatAKilledOneLeftOpen) {
+TEST_F(AbbedTest, ClosesTheRecordingOfAKilledDaemon) {
   fs::create_directories(config_.recording.dir);
   const fs::path left = config_.recording.dir / "abbe-killed.mcap.part";
   std::ofstream{left};
@@ -89,11 +89,11 @@ TEST_F(AbbedTest, RemovesNoRecordingBeforeATimeServerCouldSetTheClock) {
   auto abbed = Abbed::start(config_, {});
   ASSERT_TRUE(abbed) << abbed.error().text;
   (*abbed)->cycle();
-  abbed->reset();  // waits for what was begun aside
+  abbed->reset();  // waits for the background tasks
   EXPECT_TRUE(fs::exists(old));
 }
 
-TEST_F(AbbedTest, ASecondOneIsRefusedAndTheFirstGoesOn) {
+TEST_F(AbbedTest, ASecondDaemonIsRefusedAndTheFirstContinues) {
   const auto first = Abbed::start(config_, {});
   ASSERT_TRUE(first) << first.error().text;
   EXPECT_FALSE(Abbed::start(config_, {}));

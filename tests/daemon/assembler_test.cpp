@@ -59,7 +59,7 @@ TEST(Assembler, PutsTheAxesWhereTheTrackerPointIs) {
   assembler.emit(out);
   ASSERT_EQ(out.size(), 166u);
   for (const Snapshot& s : out) {
-    // A cubic through samples of a parabola is that parabola; what is left is rounding.
+    // A cubic through samples of a parabola is that parabola, except for rounding.
     EXPECT_NEAR(s.position[0], x_at(s.head.time), 1e-12);
     EXPECT_TRUE(s.has_tracker_point);
   }
@@ -91,7 +91,7 @@ TEST(Assembler, TheOrderOfArrivalChangesNothing) {
 
 TEST(Assembler, AnAxisSampleThatComesLateChangesNothing) {
   Batch in_order = axes_batch(kStart, kStart + 50ms);
-  in_order.axes[20].head.time += 300us;  // the bus said out of turn that it is off
+  in_order.axes[20].head.time += 300us;  // bus-off is reported between two SYNCs
   in_order.axes[20].missing_mask = 0b111;
   in_order.axes[30].head.time = in_order.axes[31].head.time;  // and once twice for one instant
   in_order.axes[30].missing_mask = 0b001;
@@ -115,7 +115,7 @@ TEST(Assembler, AnAxisSampleThatComesLateChangesNothing) {
   }
 }
 
-TEST(Assembler, ASampleThatIsTakenBackCountsForNoSnapshot) {
+TEST(Assembler, ARetractedSampleIsUsedInNoSnapshot) {
   Batch axes = axes_batch(kStart, kStart + 50ms);
   AxisSample back = axes.axes[20];
   back.missing_mask = 0b001;
@@ -168,7 +168,7 @@ TEST(Assembler, DoesNotInterpolateAcrossAGap) {
   EXPECT_TRUE(has(out.front().head.flags, SampleFlag::AxisMissing));
 }
 
-TEST(Assembler, GivesOutTheRestAtTheEnd) {
+TEST(Assembler, EmitsTheRemainingSnapshotsAtTheEnd) {
   Assembler assembler{{}};
   assembler.take(axes_batch(kStart, kStart + 100ms));
   assembler.take(burst(kStart + 90ms, 20));
@@ -184,7 +184,7 @@ protocol::ProbeTrigger touch_at(HostTime t) {
   return touch;
 }
 
-TEST(Assembler, ATouchThatKnowsTheAxesKeepsThem) {
+TEST(Assembler, ATouchWithItsOwnAxisPositionsKeepsThem) {
   Assembler assembler{{}};
   assembler.take(axes_batch(kStart, kStart + 100ms));
   Batch batch;
@@ -204,7 +204,7 @@ TEST(Assembler, ATouchThatKnowsTheAxesKeepsThem) {
   EXPECT_EQ(out[0].u_position[2], 1e-9);
 }
 
-TEST(Assembler, ATouchWithoutAxesGetsThoseOfItsInstant) {
+TEST(Assembler, ATouchWithoutAxisPositionsGetsThoseOfItsInstant) {
   Assembler assembler{{}};
   assembler.take(axes_batch(kStart, kStart + 100ms));
   Batch batch;
@@ -216,7 +216,7 @@ TEST(Assembler, ATouchWithoutAxesGetsThoseOfItsInstant) {
   EXPECT_NEAR(out[0].position[0], x_at(out[0].head.time), 1e-12);
 }
 
-TEST(Assembler, ATouchBeforeAPointDoesNotTakeItsEnvironmentAway) {
+TEST(Assembler, ATouchBeforeAPointLeavesThePointItsEnvironment) {
   Assembler assembler{{}};
   Batch batch = axes_batch(kStart, kStart + 1s);
   for (const auto at : {0ms, 500ms}) {

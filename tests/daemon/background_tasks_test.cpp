@@ -11,7 +11,7 @@
 namespace abbe::daemon {
 namespace {
 
-TEST(BackgroundTasks, AbandonedWorkIsNotWaitedForAndIsKnownToRun) {
+TEST(BackgroundTasks, AnAbandonedTaskIsNotWaitedForAndIsListedAsRunning) {
   auto go_on = std::make_shared<std::promise<void>>();
   auto ended = std::make_shared<std::promise<void>>();
   auto has_ended = ended->get_future();
@@ -42,17 +42,17 @@ TEST(BackgroundTasks, AbandonedWorkIsNotWaitedForAndIsKnownToRun) {
 }
 
 /// As the TasksMax of a unit refuses a thread.
-TEST(BackgroundTasks, IsDoneAllTheSameWhereTheSystemRefusesAThread) {
+TEST(BackgroundTasks, AlsoRunIfTheSystemRefusesAThread) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(work_without_threads(), testing::ExitedWithCode(7), "");
 }
 
-TEST(BackgroundTasks, AnExceptionArrivesWhereTheOutcomeIsAskedFor) {
+TEST(BackgroundTasks, AnExceptionIsRethrownWhereTheResultIsTaken) {
   auto work = run_abandonable([]() -> int { throw std::runtime_error{"no"}; });
   EXPECT_THROW((void)work.get(), std::runtime_error);
 }
 
-TEST(BackgroundTasks, WhatTheWorkHeldIsDestroyedBeforeWhoeverTakesTheOutcomeHasIt) {
+TEST(BackgroundTasks, CapturesAreDestroyedBeforeTheResultIsAvailable) {
   std::thread::id destroyed_on;
   std::shared_ptr<int> held{new int, [&destroyed_on](const int* p) {
                               destroyed_on = std::this_thread::get_id();

@@ -31,7 +31,7 @@ TEST(BoundedJson, RefusesDepthBeforeParsing) {
   EXPECT_NE(refusal_of(objects), "");
 }
 
-TEST(BoundedJson, BracketsInsideStringsAreNoDepth) {
+TEST(BoundedJson, BracketsInsideStringsDoNotCountAsDepth) {
   EXPECT_EQ(refusal_of('"' + std::string(1000, '[') + '"'), "");
   EXPECT_EQ(refusal_of("[\"\\\"" + std::string(1000, '{') + "\"]"), "");
   EXPECT_NE(refusal_of("[\"\\\\\"," + nested(40) + "]"),

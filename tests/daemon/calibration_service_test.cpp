@@ -85,7 +85,7 @@ TEST_F(CalibrationServiceTest, KeepsTheVerdictsOfEndedSessionsByTheirNumber) {
   EXPECT_EQ(service_->ended().back().reason, "cancelled by anna");
 }
 
-TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndMakesPlaceForTheNext) {
+TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndTheNextCanStart) {
   ASSERT_TRUE(service_->start(OtfRequest{path_m()}, "anna", now_));
   drive();
   ASSERT_EQ(state(), SessionState::Identifying) << service_->status().reason;

@@ -42,7 +42,7 @@ class Drive {
   }
   void pause(std::chrono::nanoseconds how_long) { now_ += how_long; }
   void jump(AxisPosition to) { q_ = to; }  ///< without a snapshot on the way
-  /// What the tracker's clock says besides host time; 500 s at first.
+  /// Offset of the tracker's clock from host time; 500 s at first.
   void set_device_clock(std::chrono::nanoseconds ahead) { device_ahead_ = ahead; }
   void lose_axes() { axes_known_ = false; }
   void set_environment(const protocol::EnvironmentSample& e) { environment_ = e; }
@@ -105,7 +105,7 @@ TEST(CalibrationSession, ScalesThatContradictAVertexEndTheRun) {
   file[2][1] += 0.4e-3;
   const std::string reason = reason_of_a_run_along(file);
   EXPECT_NE(
-      reason.find("at vertex 2 Y reads 100.000 mm, the path says 100.400 mm, 0.020 mm allowed"),
+      reason.find("at vertex 2 Y reads 100.000 mm, the path has 100.400 mm, 0.020 mm allowed"),
       std::string::npos)
       << reason;
 }
@@ -117,7 +117,7 @@ TEST(CalibrationSession, ScalesThatContradictAPathOfAnotherSizeEndTheRun) {
   EXPECT_NE(reason_of_a_run_along(file).find("at vertex 1 X reads 100.000 mm"), std::string::npos);
 }
 
-TEST(CalibrationSession, AMachineMayMissItsCommandByTheTolerance) {
+TEST(CalibrationSession, AMachineMayDeviateFromItsCommandByTheTolerance) {
   auto file = kPath;
   file[3][2] += 15e-6;
   EXPECT_EQ(reason_of_a_run_along(file), "");
@@ -156,7 +156,7 @@ TEST(CalibrationSession, EverySessionHasANumberOfItsOwn) {
   EXPECT_EQ(session.status().id, 2u);
 }
 
-TEST(CalibrationSession, AMachineThatCyclesOnItsPathIsGivenUpAtABound) {
+TEST(CalibrationSession, AMachineThatRepeatsItsPathEndsTheRunAtThePointLimit) {
   AcquisitionOptions options;
   options.most_points = 5000;
   CalibrationSession session{{options, {}}};
@@ -170,7 +170,7 @@ TEST(CalibrationSession, AMachineThatCyclesOnItsPathIsGivenUpAtABound) {
       << session.status().reason;
 }
 
-TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
+TEST(CalibrationSession, TheRunContainsTheTemperaturesOfScalesAndAir) {
   AcquisitionOptions options;
   constexpr double kAlpha = 10e-6, kFixed_m = -0.05;
   options.environment.thermal = {{0, {.axis = "X", .alpha_per_K = kAlpha, .fixed_m = kFixed_m}}};
@@ -200,7 +200,7 @@ TEST(CalibrationSession, TheRunKnowsItsScalesAndItsAir) {
   EXPECT_NEAR(run.u_scale, 2e-7, 0.3e-7);  // 0.2 K: 1.9e-7, 30 Pa: 0.8e-7
 }
 
-TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
+TEST(CalibrationSession, TheRunContainsTheUncertaintyLeftByTheControllersAirCorrection) {
   Config config;
   config.tracker.emplace();
   AcquisitionOptions options;
@@ -218,7 +218,7 @@ TEST(CalibrationSession, TheRunKnowsWhatTheControllersAirLeaves) {
   EXPECT_NEAR(std::get<OtfRun>(taken).u_scale, TrackerConfig::kControllersAir, 1e-18);
 }
 
-TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
+TEST(CalibrationSession, TheRunNamesAirThatIsNotMeasured) {
   Config config;
   config.tracker.emplace().weather = WeatherConfig::None;
   AcquisitionOptions options;
@@ -237,7 +237,7 @@ TEST(CalibrationSession, TheRunNamesAirThatNobodyMeasured) {
               testing::HasSubstr("air not measured"));
 }
 
-TEST(CalibrationSession, ASlowTrackerStandsLongEnoughForTwentyPoints) {
+TEST(CalibrationSession, TheStandstillOfASlowTrackerLastsTwentyPoints) {
   Config config;
   config.tracker.emplace().point_rate_hz = 10.0;
   const auto options = acquisition_options(config);
@@ -286,7 +286,7 @@ TEST(CalibrationSession, ShortLegsAtTheEndThatNoPointFellOnDoNotKeepTheRunGoing)
   EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
 }
 
-TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
+TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddPathLength) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -308,7 +308,7 @@ TEST(CalibrationSession, AClockMappingThatJumpsBackDoesNotAddWay) {
   EXPECT_EQ(session.status().state, SessionState::Identifying) << session.status().reason;
 }
 
-TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
+TEST(CalibrationSession, RefusesWhenTheBeamStaysLost) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -321,7 +321,7 @@ TEST(CalibrationSession, RefusesWhenTheBeamStaysAway) {
       << session.status().reason;
 }
 
-TEST(CalibrationSession, WaitsInWallTimeForASimulatorThatIsFasterThanTime) {
+TEST(CalibrationSession, WaitsInWallTimeForASimulatorFasterThanRealTime) {
   Config config;
   config.daemon.speed = 20.0;
   EXPECT_EQ(acquisition_options(config).arrival_time_out,
@@ -350,7 +350,7 @@ TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
     ASSERT_GT((*run)[i].device_time, (*run)[i - 1].device_time);
 }
 
-TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
+TEST(CalibrationSession, RefusesWhenTheTrackersClockRestarts) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -359,11 +359,11 @@ TEST(CalibrationSession, RefusesWhenTheTrackersClockBeginsAnew) {
   drive.set_device_clock(0s);
   drive.move(kPath[2]);
   EXPECT_EQ(session.status().state, SessionState::Refused);
-  EXPECT_NE(session.status().reason.find("clock began anew"), std::string::npos)
+  EXPECT_NE(session.status().reason.find("clock restarted"), std::string::npos)
       << session.status().reason;
 }
 
-TEST(CalibrationSession, WaitsOnWhenTheTrackersClockBeginsAnewBeforeTheRun) {
+TEST(CalibrationSession, KeepsWaitingWhenTheTrackersClockRestartsBeforeTheRun) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -388,7 +388,7 @@ TEST(CalibrationSession, EndsWhenNoPointArrivesAnyMore) {
       << session.status().reason;
 }
 
-TEST(CalibrationSession, DoesNotWaitForEverForTheMachineToStandAtTheStart) {
+TEST(CalibrationSession, WaitsForALimitedTimeForStandstillAtTheStart) {
   CalibrationSession silent, elsewhere;
   ASSERT_TRUE(silent.start({OtfRequest{kPath}, HostTime{10s}}));
   silent.tick(HostTime{10s} + 59min);
@@ -421,7 +421,7 @@ TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
       << session.status().reason;
 }
 
-TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
+TEST(CalibrationSession, RefusesWhenTheAxesStayMissing) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -434,7 +434,7 @@ TEST(CalibrationSession, RefusesWhenTheAxesStayAway) {
       << session.status().reason;
 }
 
-TEST(CalibrationSession, LooksAtNothingFromBeforeItsStart) {
+TEST(CalibrationSession, IgnoresSamplesFromBeforeItsStart) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{60s}}));
   Drive drive{session};

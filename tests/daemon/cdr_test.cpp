@@ -149,7 +149,7 @@ TEST(Cdr, DecodeTakesPaddingToAMultipleOfFourButNoMore) {
   EXPECT_FALSE(decode<v1::Snapshot>(payload).has_value());
 }
 
-TEST(Cdr, DecodeIsTotalOnDamagedBytes) {
+TEST(Cdr, DecodeOfDamagedBytesNeverCrashes) {
   std::mt19937 random(4711);
   const auto good = encoded(some_model());
   std::size_t refused = 0;
@@ -173,7 +173,7 @@ TEST(Cdr, NamesAreThoseOfDdsAndMcap) {
   EXPECT_EQ(topic_name<v1::ErrorGrid>(), "abbe/v1/ErrorGrid");
 }
 
-/// Bounded members of one struct as the IDL text says.
+/// Bounded members of one struct as in the IDL text.
 std::map<std::string, std::size_t> bounds_in_idl(const std::string& type) {
   std::string text(idl_text());
   const auto begin = text.find("struct " + type + " {");
@@ -183,7 +183,9 @@ std::map<std::string, std::size_t> bounds_in_idl(const std::string& type) {
   std::istringstream lines(text);
 
   for (std::string line; std::getline(lines, line);) {
-    // Lines such as `  @key string<64> machine;` and `  sequence<double, 8> position;  // m or rad`.
+    // Lines such as
+    //   @key string<64> machine;
+    //   sequence<double, 8> position;  // m or rad
     const auto close = line.find("> "), open = line.find_last_of("<,", close), end = line.find(';');
     if (close == std::string::npos || end == std::string::npos || close > end) continue;
     bounds[line.substr(close + 2, end - close - 2)] = std::stoul(line.substr(open + 1));

@@ -85,14 +85,14 @@ TEST_F(CliCalibrateProbe, ADamagedRecordingShowsItsResultAndEndsWithOne) {
   EXPECT_THAT(out, HasSubstr("the recording is damaged: chunk 2"));
 }
 
-TEST_F(CliCalibrateProbe, SaysWhatIsMissing) {
+TEST_F(CliCalibrateProbe, ReportsWhatIsMissing) {
   record(touches_at({1e-3, 8e-3}));
   const auto [exit, out] = calibrate("");
   EXPECT_EQ(exit, 1);
   EXPECT_THAT(out, HasSubstr("2 feeds, at least 3 are needed"));
 }
 
-TEST_F(CliCalibrateProbe, RefusesPlacesThatLieOnNoLine) {
+TEST_F(CliCalibrateProbe, RefusesContactsThatLieOnNoLine) {
   auto touches = touches_at({1e-3, 4e-3, 8e-3});
   for (std::size_t i = 0; i < 4; ++i) touches[i].position[2] += 20e-6;  // the part was moved
   record(touches);
@@ -101,7 +101,7 @@ TEST_F(CliCalibrateProbe, RefusesPlacesThatLieOnNoLine) {
   EXPECT_THAT(out, HasSubstr("are not linear in the feed"));
 }
 
-TEST_F(CliCalibrateProbe, LooksAtOneProbeIfAsked) {
+TEST_F(CliCalibrateProbe, EvaluatesOneProbeIfAProbeIsNamed) {
   record(touches_at({1e-3, 4e-3, 8e-3}));  // of probe 7
   EXPECT_EQ(calibrate("--probe 7").first, 0);
   EXPECT_EQ(calibrate("--probe 8").first, 1);

@@ -20,8 +20,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A daemon that goes through the given states, one a question; `at_question` is told how many
-/// there were.
+/// A daemon that goes through the given states, one per request; `at_question` is called with the
+/// number of requests so far.
 struct ScriptedDaemon {
   std::vector<nlohmann::json> sessions;
   std::function<void(std::size_t)> at_question = [](std::size_t) {};
@@ -54,7 +54,7 @@ class CliOfADaemon : public ::testing::Test {
   fs::path path_ = folder_.path() / "path.csv";
 };
 
-TEST_F(CliOfADaemon, CalibrateSaysWhatIsWaitedForAtEveryStep) {
+TEST_F(CliOfADaemon, CalibratePrintsWhatEveryStepWaitsFor) {
   const auto socket = folder_.path() / "told.sock";
   const auto daemon = ControlServer::open(
       socket,
@@ -75,7 +75,7 @@ nlohmann::json refused_as(const std::string& code) {
   return refused;
 }
 
-TEST_F(CliOfADaemon, CalibrateExitsAsTheSessionWasRefused) {
+TEST_F(CliOfADaemon, CalibrateExitsWithTheCodeOfTheRefusal) {
   const std::vector<std::pair<std::string, int>> codes{
       {"data_insufficient", 1}, {"bad_input", 3}, {"io", 4}, {"refused", 5}};
   for (const auto& [code, exit] : codes) {
@@ -88,7 +88,7 @@ TEST_F(CliOfADaemon, CalibrateExitsAsTheSessionWasRefused) {
   }
 }
 
-TEST_F(CliOfADaemon, ADaemonStartedAnewMeanwhileHasLostTheSession) {
+TEST_F(CliOfADaemon, ADaemonThatRestartedLosesTheSession) {
   const auto socket = folder_.path() / "lost.sock";
   const auto daemon = ControlServer::open(
       socket, ScriptedDaemon{{session("acquiring", "driving"), session("idle", "")}});
@@ -150,7 +150,7 @@ TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
                              HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
 }
 
-TEST_F(CliOfADaemon, ASearchOfADaemonStartedAnewIsLost) {
+TEST_F(CliOfADaemon, ADaemonThatRestartedLosesTheReferenceSearch) {
   const auto socket = folder_.path() / "search.sock";
   std::atomic<int> asked = 0;
   const auto daemon =

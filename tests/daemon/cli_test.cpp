@@ -163,7 +163,7 @@ TEST_F(Cli, AModelOfAnotherConfigurationDoesNotLockOutItsReplacement) {
   EXPECT_NE(after.at("id"), before.at("id"));
 }
 
-TEST_F(Cli, SaysThatFilesHoldNoTemperaturesOfScales) {
+TEST_F(Cli, ReportsThatFilesHoldNoTemperaturesOfScales) {
   const auto warm = write("warm.toml", text_of(files_.machine) + test::kWarmScales);
   const auto command = [&](const std::string& more) {
     return abbe(fmt::format("identify otf --machine '{}' --path '{}' --tracker '{}' -o '{}' {}",
@@ -234,7 +234,7 @@ TEST_F(Cli, ScalesThatContradictThePathAreNamedByVertexAndAxis) {
   EXPECT_THAT(
       ran.err,
       AllOf(HasSubstr("scaled.csv: the scales contradict the path: at vertex 0 X reads -59.940"),
-            HasSubstr("the path says -60.000 mm")));
+            HasSubstr("the path has -60.000 mm")));
   EXPECT_FALSE(fs::exists(folder_ / "scaled"));
 }
 
@@ -281,7 +281,7 @@ TEST_F(Cli, TheSummaryHasTheOffsetOfTheRanges) {
   EXPECT_NE(by_default.at("hash"), none.at("hash"));
 }
 
-TEST_F(Cli, TheVerdictNamesAirThatNobodyMeasured) {
+TEST_F(Cli, TheVerdictNamesAirThatIsNotMeasured) {
   const auto machine = write(
       "no_air.toml", test::synthetic_machine_toml() +
                          "host = \"t\"\nweather = \"none\"\nu_scale_ppm = 1\n" /* of [tracker] */);
@@ -300,7 +300,7 @@ TEST_F(Cli, NamesLineAndColumnOfAVertexOutsideTheTravel) {
   EXPECT_FALSE(fs::exists(folder_ / "outside"));
 }
 
-TEST_F(Cli, DoesNotTakeAMissingTargetForZero) {
+TEST_F(Cli, DoesNotReadAMissingTargetAsZero) {
   auto text = test::synthetic_machine_toml();
   const auto target = text.find("[target]");
   text.erase(target, text.find("[model]") - target);
@@ -331,7 +331,7 @@ TEST_F(Cli, ComparesTwoModels) {
       4);
 }
 
-TEST_F(Cli, SaysNothingOnStderrWhenItIsNotATerminal) {
+TEST_F(Cli, PrintsNothingOnStderrWhenItIsNotATerminal) {
   EXPECT_THAT(identified_.err, IsEmpty());
   EXPECT_THAT(identified_.out, Not(HasSubstr("\x1b")));
 }
@@ -402,7 +402,7 @@ TEST_F(Cli, ExitsWith3OnABadFileAndListsItsFaults) {
   EXPECT_FALSE(fs::exists(folder_ / "cut"));
 }
 
-TEST_F(Cli, ExitsWith4WhenAFileIsNotThereOrNotWritable) {
+TEST_F(Cli, ExitsWith4WhenAFileIsMissingOrNotWritable) {
   EXPECT_EQ(identify(files_.path, folder_ / "missing.csv", folder_ / "x").exit, 4);
   const auto ran = identify(files_.path, files_.tracker, files_.machine / "below-a-file");
   EXPECT_EQ(ran.exit, 4) << ran.err;
@@ -415,7 +415,7 @@ TEST_F(Cli, HelpNamesTheExitCodesAndEnds0) {
               AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
 }
 
-TEST_F(Cli, LooksAfterAStore) {
+TEST_F(Cli, ListsActivatesAndRollsBackModelsOfAStore) {
   const auto folder = folder_ / "store";
   auto store = ModelStore::open(folder).value();
   const auto a = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
@@ -435,7 +435,7 @@ TEST_F(Cli, LooksAfterAStore) {
   EXPECT_EQ(abbe("model rollback" + at).exit, 5);
 }
 
-TEST_F(Cli, SaysWhenAProgramOfItsOwnIsNotThere) {
+TEST_F(Cli, ReportsAMissingProgramOfItsOwn) {
   // An empty folder beside a copy of abbe: no abbe-sim next to it, none in this PATH.
   const auto copy = folder_ / "alone" / "abbe";
   fs::create_directories(copy.parent_path());
@@ -460,7 +460,7 @@ TEST_F(Cli, RunsAProgramBesideItself) {
   EXPECT_EQ(text_of(out), "sim got --seed 3\n");
 }
 
-/// A recording in which the daemon said it had identified a model, and which holds no run that
+/// A recording in which the daemon reported an identified model, and which holds no run that
 /// gives one.
 fs::path recording_of_a_lost_model(const fs::path& directory) {
   fs::create_directories(directory);

@@ -39,7 +39,7 @@ void expect_not_to_be_applied(const v1::Compensation& m) {
   EXPECT_EQ(m.model_id(), "m");
 }
 
-TEST(CompensationMessage, IsTheModelsErrorWhereTheMachineStands) {
+TEST(CompensationMessage, IsTheModelErrorAtTheMachinesPosition) {
   const auto m = message(view_inside());
   const auto expected =
       kModel.model.V_at({0.01, -0.02, -0.25}, {kTool_m[0], kTool_m[1], kTool_m[2]});
@@ -83,7 +83,7 @@ TEST(CompensationMessage, ForAnotherToolHasNoVector) {
   EXPECT_EQ(m.vector_m(), kNoVector);
 }
 
-TEST(CompensationMessage, OutsideTheVolumeIsSaid) {
+TEST(CompensationMessage, ReportsAPositionOutsideTheVolume) {
   auto view = view_inside();
   view.position[0] = 0.5;
   EXPECT_FALSE(message(view).inside());

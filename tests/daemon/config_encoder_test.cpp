@@ -74,7 +74,7 @@ TEST(ConfigEncoder, TakesTheMachinesOwnSyncOnEitherTransport) {
   EXPECT_THAT(faults_of(kMachine + udp + "local_port = 20000\n" + external + kNodes), SizeIs(0));
 }
 
-TEST(ConfigEncoder, RefusesWhereANodeIsToldWhatItIsAskedFor) {
+TEST(ConfigEncoder, RefusesAPositionByteUnlessTheSyncIsExternal) {
   EXPECT_THAT(
       faults_of(
           kMachine + kCanBus +

@@ -146,7 +146,7 @@ search_timeout_s = 7.5
   EXPECT_EQ(session.search->timeout_ms, 7500);
 }
 
-TEST(Config, RefusesASearchWithoutBothBoundsAndNamesNoControllerHas) {
+TEST(Config, RefusesASearchWithoutBothBoundsAndUnknownReflectorNames) {
   const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
   EXPECT_THAT(
       faults_of(tracker + "search_radius_mm = 30\n"),
@@ -176,7 +176,7 @@ TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
 
 // 1.044e-5 by quadrature over 15 to 30 C, 950 to 1050 hPa, 10 to 90 %: see
 // tests/calib/refractive_index_test.cpp.
-TEST(Config, AirNobodyCorrectsForIsUncertainAsThatOfAShopFloor) {
+TEST(Config, UncorrectedAirHasTheUncertaintyOfShopFloorAir) {
   for (const char* weather : {"none", "read"}) {
     const auto config = parse_config(
         kMachine + "[tracker]\nhost = \"t\"\nweather = \"" + weather + "\"\n", "abbed.toml");
@@ -187,7 +187,7 @@ TEST(Config, AirNobodyCorrectsForIsUncertainAsThatOfAShopFloor) {
   }
 }
 
-TEST(Config, TheControllerIsSetToTheAirThatIsStated) {
+TEST(Config, TheControllerIsSetToTheStatedAir) {
   const auto config =
       parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"none\"\n", "abbed.toml");
   ASSERT_TRUE(config);
@@ -198,7 +198,7 @@ TEST(Config, TheControllerIsSetToTheAirThatIsStated) {
   EXPECT_THAT(unmeasured_air_text(*config, 0.0).value_or(""), HasSubstr("20 C, 1013.25 hPa, 50 %"));
 }
 
-TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
+TEST(Config, ARateOfZeroMeansAtEveryNewSample) {
   const auto config =
       parse_config(kMachine + "[dds]\nsnapshot_hz = 0\ncompensation_hz = 0\n", "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
@@ -206,7 +206,7 @@ TEST(Config, TakesARateOfZeroForWheneverSomethingNewCame) {
   EXPECT_EQ(config->dds.compensation_hz, 0.0);
 }
 
-TEST(Config, KeysOfDdsSecurityAreMeantFromTheFilesFolder) {
+TEST(Config, DdsSecurityKeyPathsAreRelativeToTheFile) {
   const auto config =
       parse_config(kMachine + "[dds]\nsecurity = \"keys/daemon\"\n", "/etc/abbe/abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
@@ -266,7 +266,7 @@ TEST(Config, RefusesAnotherSpeedForRealDevices) {
   EXPECT_THAT(faults_of(kMachine + "[daemon]\nspeed = 10\nsimulated = true\n"), SizeIs(0));
 }
 
-TEST(Config, RefusesAChainThatIsNotOne) {
+TEST(Config, RefusesAKinematicChainThatIsNotAChain) {
   auto text = kMachine;
   text.replace(text.find("Y Z (C1)"), 8, "Y Y (C1)");
   EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("machine.chain:")));
@@ -319,7 +319,7 @@ TEST(Config, TakesThePointRatesATrackerHas) {
               ElementsAre(AllOf(HasSubstr("tracker.point_rate_hz"), HasSubstr("250 and 333.3"))));
 }
 
-TEST(Config, KnowsTheTwoModesOfATracker) {
+TEST(Config, ReadsBothModesOfATracker) {
   const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
   EXPECT_EQ(parse_config(tracker, "abbed.toml")->tracker->mode, TrackerModeConfig::Continuous);
   const auto config =
@@ -333,7 +333,7 @@ TEST(Config, KnowsTheTwoModesOfATracker) {
               ElementsAre(HasSubstr("tracker.stationary_time_ms")));
 }
 
-TEST(Config, LeavesTheProcessorsSleepToTheSystemUnlessTold) {
+TEST(Config, TheProcessorsIdleStatesAreNotLimitedByDefault) {
   EXPECT_FALSE(parse_config(kMachine, "abbed.toml")->daemon.cpu_latency);
   const auto config = parse_config(kMachine + "[daemon]\ncpu_latency_us = 0\n", "abbed.toml");
   ASSERT_TRUE(config);
@@ -360,7 +360,7 @@ TEST(Config, RefusesInfinity) {
   EXPECT_THAT(faults_of(text), ElementsAre(HasSubstr("axes.X.min_mm: must be finite")));
 }
 
-TEST(Config, SaysWhichFileCannotBeRead) {
+TEST(Config, NamesTheFileThatCannotBeRead) {
   const auto config = load_config("/nonexistent/abbed.toml");
   ASSERT_FALSE(config);
   EXPECT_EQ(config.error().code, ErrorCode::Io);
@@ -379,7 +379,7 @@ TEST(Config, MachineHashFollowsGeometryNotNoise) {
   EXPECT_NE(machine_hash(*plain), machine_hash(*longer));
 }
 
-TEST(Config, MachineHashFollowsWhatAReadingIs) {
+TEST(Config, MachineHashDependsOnTheSourceOfThePositions) {
   const std::string axes =
       R"({axis = "X", node = 1, step_nm = 10, offset_mm = 1}, {axis = "Y", node = 2},)";
   const std::string head = kMachine + kCanBus;
@@ -401,7 +401,7 @@ TEST(Config, MachineHashFollowsWhatAReadingIs) {
   EXPECT_THAT(hashes, SizeIs(7));  // each of them another
 }
 
-TEST(Config, MachineHashDoesNotDependOnTheWayTheBytesTake) {
+TEST(Config, MachineHashDoesNotDependOnTheTransport) {
   const auto can = parse_config(kMachine + kCanBus + kNodes, "a.toml");
   const auto udp = parse_config(
       kMachine + "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 9\n" +
@@ -437,7 +437,7 @@ TEST(ConfigProbe, NeedsChannelsOfACounterCard) {
               ElementsAre(HasSubstr("needs [counter_card]")));
 }
 
-TEST(ConfigProbe, RefusesWhatNoProbeCanDo) {
+TEST(ConfigProbe, RefusesImpossibleProbeValues) {
   EXPECT_THAT(faults_of(kMachine + kCardWithProbe + "[probe]\nconfirm_ms = 1\nchatter_ms = 2\n"),
               ElementsAre(HasSubstr("the chatter time must be below the confirmation")));
 }
@@ -465,7 +465,7 @@ TEST(Config, KeepsTheParticipantBehindTheHub) {
               SizeIs(0));
 }
 
-TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
+TEST(Config, DeviceNamesAreUniqueAndDifferFromThoseOfTheDaemonsParts) {
   const auto with = [](const std::string& tracker) {
     return faults_of(kMachine + "[tracker]\nhost = \"10.0.0.7\"\nname = \"" + tracker + "\"\n" +
                      kCanBus + kNodes);
@@ -478,7 +478,7 @@ TEST(Config, NoTwoDevicesShareANameAndNoneTakesThatOfAPartOfTheDaemon) {
                                              HasSubstr("reserved for a part of the daemon"))));
 }
 
-TEST(Config, RecordingsAreCutAndKeptForEverUnlessToldOtherwise) {
+TEST(Config, RecordingsAreSplitAndKeptForeverByDefault) {
   const auto silent = parse_config(kMachine, "abbed.toml");
   ASSERT_TRUE(silent);
   EXPECT_EQ(silent->recording.max_file_bytes, 4096ull << 20);

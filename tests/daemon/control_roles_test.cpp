@@ -29,7 +29,7 @@ std::string refused(const ControlPeer& peer, Role role, const ControlConfig& con
   return may ? "" : may.error().text;
 }
 
-TEST(ControlRoles, AreGivenByGroup) {
+TEST(ControlRoles, AreAssignedByGroup) {
   const auto changes = anna({kNobodysGroup, gid_of_group("dialout")});
   EXPECT_EQ(refused(changes, Role::Look), "");
   EXPECT_EQ(refused(changes, Role::Change), "");
@@ -41,16 +41,16 @@ TEST(ControlRoles, AreGivenByGroup) {
 
 TEST(ControlRoles, ARefusalNamesRoleUserGroupAndRemedy) {
   EXPECT_EQ(refused(anna({}), Role::Move),
-            "touch: moves a machine or tracker, which anna may not: that takes the group "
+            "touch: moves a machine or tracker, which anna may not: this requires the group "
             "\"plugdev\" ([control] "
-            "move_group): gpasswd -a anna plugdev, then log in anew");
+            "move_group): gpasswd -a anna plugdev, then log in again");
   EXPECT_THAT(refused(anna({}), Role::Change, {.change_group = "abbe-none", .move_group = ""}),
               AllOf(HasSubstr("changes what is in force"), HasSubstr("\"abbe-none\""),
                     HasSubstr("does not exist on this computer")));
   EXPECT_THAT(refused(anna({}), Role::Move, {.move_group = ""}), HasSubstr("names no group"));
 }
 
-TEST(ControlRoles, ALookGroupShutsOutWhoeverHasNoRole) {
+TEST(ControlRoles, ALookGroupExcludesUsersWithoutARole) {
   const ControlConfig control{
       .look_group = "audio", .change_group = "dialout", .move_group = "plugdev"};
   EXPECT_NE(refused(anna({kNobodysGroup}), Role::Look, control), "");

@@ -73,7 +73,7 @@ TEST_F(Control, ARefusalArrivesAsTheErrorItWas) {
   }
 }
 
-TEST_F(Control, AnAnswerThatSaysNothingIsARefusal) {
+TEST_F(Control, AnEmptyAnswerIsARefusal) {
   const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) {
     return json{{"ok", "perhaps"}};
   });
@@ -95,7 +95,7 @@ TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
   EXPECT_TRUE(ask_daemon(socket(), {{"do", "count"}, {"n", 3}}));
 }
 
-TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketLivesOn) {
+TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketStaysOpen) {
   const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) {
     return json{{"ok", true}, {"fault", "tracker says \xff\xc3"}};
   });
@@ -107,7 +107,7 @@ TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketLivesOn) {
   }
 }
 
-TEST_F(Control, WhoAsksIsWhatTheKernelSays) {
+TEST_F(Control, ThePeersUserIsTheOneTheKernelReports) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);
   const auto answer =
@@ -119,7 +119,7 @@ TEST_F(Control, WhoAsksIsWhatTheKernelSays) {
   EXPECT_EQ((*answer)["heard"]["who"], "anna");
 }
 
-TEST_F(Control, ThePeersGroupsAreWhatTheKernelSays) {
+TEST_F(Control, ThePeersGroupsAreThoseTheKernelReports) {
   std::vector<gid_t> groups;
   const auto server = ControlServer::open(socket(), [&](const json&, const ControlPeer& peer) {
     groups = peer.groups;
@@ -177,7 +177,7 @@ class RawClient {
   int fd_ = ::socket(AF_UNIX, SOCK_STREAM, 0);
 };
 
-TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiting) {
+TEST_F(Control, AClientThatNeverReadsDoesNotDelayOthersAndItsAnswersAreLimited) {
   constexpr int kAsked = 200;
   std::atomic<int> answered = 0;
   const auto server = ControlServer::open(socket(), [&](const json& request, const ControlPeer&) {
@@ -198,7 +198,7 @@ TEST_F(Control, AClientThatNeverReadsGetsNoMoreAnswersThanFitAndKeepsNobodyWaiti
   EXPECT_EQ(greedy.read_lines(kAsked), kAsked);
 }
 
-TEST_F(Control, ALineOfBracketsIsRefusedAndTheServerLivesOn) {
+TEST_F(Control, ALineOfBracketsIsRefusedAndTheServerContinues) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);
   const RawClient client;
@@ -209,7 +209,7 @@ TEST_F(Control, ALineOfBracketsIsRefusedAndTheServerLivesOn) {
   EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
 }
 
-TEST_F(Control, IdleConnectionsLockNobodyOut) {
+TEST_F(Control, IdleConnectionsDoNotBlockNewOnes) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);
   const std::vector<RawClient> idle(40);
@@ -228,7 +228,7 @@ TEST_F(Control, AnIdleConnectionIsClosed) {
   EXPECT_NE(client.read_to_end().find("idle for 20 ms"), std::string::npos);
 }
 
-TEST_F(Control, AListenerThatAcceptsNobodyIsGivenUp) {
+TEST_F(Control, AConnectionThatIsNotAcceptedTimesOut) {
   const int deaf = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -249,7 +249,7 @@ TEST_F(Control, AListenerThatAcceptsNobodyIsGivenUp) {
   ::close(deaf);
 }
 
-/// Nobody can open anything while it lives.
+/// While it exists, this process cannot open further file descriptors.
 class NoDescriptors {
  public:
   NoDescriptors() {
@@ -273,7 +273,7 @@ std::chrono::nanoseconds processor_time() {
   return std::chrono::seconds{t.tv_sec} + std::chrono::nanoseconds{t.tv_nsec};
 }
 
-TEST_F(Control, WithoutDescriptorsForANewcomerTheServerRestsAndTakesItLater) {
+TEST_F(Control, WithoutFileDescriptorsTheServerAcceptsAConnectionLater) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);
   RawClient client;
@@ -305,7 +305,7 @@ TEST_F(Control, TwoDaemonsOnOneSocketAreRefused) {
 }
 
 TEST_F(Control, ASocketLeftBehindIsReplaced) {
-  // What a killed daemon leaves: the file without anybody listening.
+  // What a killed daemon leaves: the socket file without a listener.
   const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -81,7 +81,7 @@ TEST(CounterCardConfig, NeedsEveryLinearAxis) {
       Contains(HasSubstr("axis Y has no channel")));
 }
 
-TEST(CounterCardConfig, WiringIsPartOfWhatAReadingIs) {
+TEST(CounterCardConfig, WiringIsPartOfTheMachineHash) {
   const auto hash = [](const std::string& x) {
     const auto config =
         parse_config(card("{axis = \"X\", " + x + R"(}, {axis = "Y", channel = 1, step_nm = 10},

@@ -101,7 +101,7 @@ TEST(CounterCardDevices, GiveTheAxesOfTheConfiguration) {
   EXPECT_THAT(devices->warnings(), Contains(HasSubstr("not yet verified on hardware")));
 }
 
-TEST(CounterCardDevices, NameTheCardThatIsNotTheConfiguredOne) {
+TEST(CounterCardDevices, ReportTheNameOfACardThatIsNotTheConfiguredOne) {
   CardInAThread card;
   const drivers::MonotonicTime time;
   auto devices = DeviceSet::start(configuration(card.port(), "01C0FFEE"), time);

@@ -69,7 +69,7 @@ class LeftCountingTest : public ::testing::Test {
   Config config_;
 };
 
-TEST_F(LeftCountingTest, IsWhatWasKept) {
+TEST_F(LeftCountingTest, ReadsBackTheStoredState) {
   leave(to_text(state()));
   const auto left = left_counting(config_, kBoot);
   ASSERT_TRUE(left.state) << left.warning;
@@ -83,13 +83,13 @@ TEST_F(LeftCountingTest, IsWhatWasKept) {
   EXPECT_TRUE(left.state->counting.datum[1].stated);
 }
 
-TEST_F(LeftCountingTest, WithoutAFileThereIsNothingToReport) {
+TEST_F(LeftCountingTest, WithoutAFileReportsNothing) {
   const auto left = left_counting(config_, kBoot);
   EXPECT_FALSE(left.state);
   EXPECT_THAT(left.warning, IsEmpty());
 }
 
-TEST_F(LeftCountingTest, RemovesWhatAKilledRunHadHalfWritten) {
+TEST_F(LeftCountingTest, RemovesThePartialFileOfAKilledRun) {
   const fs::path half = file().string() + ".4711.new";
   test::write_text(half, "{");
   leave(to_text(state()));
@@ -97,7 +97,7 @@ TEST_F(LeftCountingTest, RemovesWhatAKilledRunHadHalfWritten) {
   EXPECT_FALSE(fs::exists(half));
 }
 
-TEST_F(LeftCountingTest, HoldsForTheSameBootOnly) {
+TEST_F(LeftCountingTest, IsValidForTheSameBootOnly) {
   leave(to_text(state()));
   EXPECT_THAT(left_counting(config_, "9c01").warning,
               HasSubstr("this computer was restarted since"));
@@ -106,7 +106,7 @@ TEST_F(LeftCountingTest, HoldsForTheSameBootOnly) {
   EXPECT_FALSE(left_counting(config_, "").state);
 }
 
-TEST_F(LeftCountingTest, HoldsForTheSameSetUpOnly) {
+TEST_F(LeftCountingTest, IsValidForTheSameSetUpOnly) {
   leave(to_text(state()));
   auto changed = card_config("500");
   changed.daemon.data_dir = folder_.path();
@@ -115,7 +115,7 @@ TEST_F(LeftCountingTest, HoldsForTheSameSetUpOnly) {
   EXPECT_THAT(left.warning, HasSubstr("the set-up of the card was changed (axes)"));
 }
 
-TEST_F(LeftCountingTest, ADamagedFileIsKeptAside) {
+TEST_F(LeftCountingTest, ADamagedFileIsRenamedAndKept) {
   auto text = to_text(state());
   text[text.find("-0.3") + 3] = '4';
   leave(text);
@@ -127,7 +127,7 @@ TEST_F(LeftCountingTest, ADamagedFileIsKeptAside) {
   EXPECT_EQ(test::text_of(file().string() + ".damaged"), text);
 }
 
-TEST_F(LeftCountingTest, WhatIsNoFileIsKeptAsideToo) {
+TEST_F(LeftCountingTest, APathThatIsNoRegularFileIsRenamedToo) {
   fs::create_directory(file());
   EXPECT_THAT(left_counting(config_, kBoot).warning, HasSubstr("is not a regular file"));
   EXPECT_TRUE(fs::is_directory(file().string() + ".damaged"));
@@ -142,7 +142,7 @@ protocol::AxisSample counted_sample(HostTime at, bool restarted = false) {
   return sample;
 }
 
-TEST(ReferenceAfterARestart, TakesUpTheDatumOfACardThatWentOn) {
+TEST(ReferenceAfterARestart, RestoresTheDatumOfACardThatKeptCounting) {
   const auto config = card_config();
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
@@ -154,7 +154,7 @@ TEST(ReferenceAfterARestart, TakesUpTheDatumOfACardThatWentOn) {
   EXPECT_THAT(service.carried_on(), ElementsAre("X", "Z"));
 }
 
-TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatBeganAnew) {
+TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatRestarted) {
   const auto config = card_config();
   ReferenceService service{config, nullptr, some_counting()};
   Batch batch;
@@ -165,7 +165,7 @@ TEST(ReferenceAfterARestart, DropsTheDatumOfACardThatBeganAnew) {
   EXPECT_THAT(service.carried_on(), IsEmpty());
 }
 
-TEST(ReferenceAfterARestart, KeepsNoProgressFromBeforeTheCountersBeganAnew) {
+TEST(ReferenceAfterARestart, DropsTheProgressFromBeforeTheCountersRestarted) {
   const auto config = card_config();
   ReferenceService service{config, nullptr};
   const auto cycle = [&service](const protocol::AxisSample& sample, HostTime progress) {
@@ -219,7 +219,7 @@ TEST(CountingStateThread, ReportsADiskThatRefusesOnce) {
   EXPECT_THAT(faults[0], HasSubstr("would not be referenced"));
 }
 
-TEST(CountingStateThread, ADiskThatDoesNotAnswerDoesNotHoldUpTheEnd) {
+TEST(CountingStateThread, ADiskThatDoesNotRespondDoesNotDelayTheEnd) {
   const TemporaryFolder folder;
   std::vector<std::string> faults;
   std::atomic<int> disk{-1};

@@ -53,7 +53,7 @@ class DamagedRun : public ::testing::Test {
   static inline fs::path folder_, whole_;
 };
 
-TEST_F(DamagedRun, WholeItGivesAModelThatTheGateAccepts) {
+TEST_F(DamagedRun, UndamagedItGivesAModelThatTheGateAccepts) {
   EXPECT_EQ(abbe(fmt::format("replay '{}'", whole_.string())).exit, 0);
   const auto identified = identify(whole_);
   EXPECT_EQ(identified.exit, 0) << identified.err;
@@ -61,7 +61,7 @@ TEST_F(DamagedRun, WholeItGivesAModelThatTheGateAccepts) {
 }
 
 // node_spacing_mm = 60 becomes 20: the model would be another.
-TEST_F(DamagedRun, WithADamagedConfigurationIsRefusedUnlessThatIsGiven) {
+TEST_F(DamagedRun, WithADamagedConfigurationIsRefusedUnlessAConfigurationIsGiven) {
   const auto file = damaged(place_of("node_spacing_mm = 60") + 18, 4);
   for (const auto& ran : {abbe(fmt::format("replay '{}'", file.string())), identify(file)}) {
     EXPECT_EQ(ran.exit, 3);
@@ -84,14 +84,14 @@ TEST_F(DamagedRun, WithADamagedChunkTheGateRefusesItsModelAndTheReplayEndsWithOn
               HasSubstr("\"recording_gap\": \"the recording is"));
 }
 
-TEST_F(DamagedRun, CutOffAfterTheRunItGivesItsModelAllTheSame) {
+TEST_F(DamagedRun, TruncatedAfterTheRunItStillGivesItsModel) {
   auto bytes = bytes_of_file(whole_);
   const auto file = folder_ / "cut.mcap";
   write_file(file, bytes, bytes.size() - 3000);  // in the summary
   EXPECT_EQ(abbe(fmt::format("replay '{}'", file.string())).exit, 0);
 }
 
-TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataShows) {
+TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataIsDetected) {
   const TemporaryFolder folder;
   auto bytes = bytes_of_file(example_recording(folder.path(), 1, 5));
   protocol::mcap::LinearScan scan{std::as_bytes(std::span{bytes})};
@@ -118,7 +118,7 @@ TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataShows) {
     }
 }
 
-TEST_F(DamagedRun, ARecordingOfBeforeIsReadAndItsConfigurationNotedAsUnchecked) {
+TEST_F(DamagedRun, ARecordingWithoutConfigurationChecksumIsReadAndNotedAsUnchecked) {
   auto bytes = bytes_of_file(whole_);
   for (const std::string_view key : {"entries_sha256", "sha256"})
     for (auto at = bytes.begin();; ++at) {

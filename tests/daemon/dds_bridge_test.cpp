@@ -101,7 +101,7 @@ struct DdsBridgeTest : testing::Test {
   DdsBridge bridge{outlet};
   WallTime t{1000s};
 
-  /// abbed lives for `duration`: beats and turns every 50 ms.
+  /// abbed runs for `duration`: a beat and a cycle every 50 ms.
   void live(std::chrono::milliseconds duration) {
     for (const WallTime end = t + duration; t < end; t += 50ms) {
       bridge.beat(t, t);
@@ -134,7 +134,7 @@ TEST_F(DdsBridgeTest, SlicesBeyondASmallerGridAreDisposedAndNotRepeated) {
   EXPECT_EQ(outlet.count(Topic::ErrorGrid), written + 1);
 }
 
-TEST_F(DdsBridgeTest, SlicesOfAnAbbedBeforeAreDisposedToo) {
+TEST_F(DdsBridgeTest, SlicesOfAnEarlierAbbedAreDisposedToo) {
   bridge.beat(t, t);
   for (std::uint32_t i = 0; i < 3; ++i) publish(Topic::ErrorGrid, slice(i, 3));
   bridge.connected();
@@ -166,7 +166,7 @@ TEST_F(DdsBridgeTest, SilenceInvalidatesEveryMachineOnceAndWithin550Milliseconds
   EXPECT_EQ(outlet.count(Topic::ModelState), 4);
 }
 
-TEST_F(DdsBridgeTest, InvalidStateSaysWhyAndKeepsTheModel) {
+TEST_F(DdsBridgeTest, InvalidStateStatesTheReasonAndKeepsTheModel) {
   live(100ms);
   publish(Topic::ModelState, active("m", 7));
   bridge.lost();
@@ -177,7 +177,7 @@ TEST_F(DdsBridgeTest, InvalidStateSaysWhyAndKeepsTheModel) {
   EXPECT_EQ(state.sequence_number(), 8u);
 }
 
-TEST_F(DdsBridgeTest, LivelinessIsAssertedOnlyWhileTheSourceIsAlive) {
+TEST_F(DdsBridgeTest, LivelinessIsAssertedOnlyWhileTheSourceSends) {
   live(1000ms);
   EXPECT_EQ(outlet.assertions, 5);
   silent(550ms);
@@ -193,7 +193,7 @@ TEST_F(DdsBridgeTest, LiveSamplesStopWithTheSource) {
   EXPECT_EQ(outlet.count(Topic::Snapshot), 0);
 }
 
-TEST_F(DdsBridgeTest, BackAgainTheModelIsRepublishedButTheStateWaitsForTheSource) {
+TEST_F(DdsBridgeTest, AfterAReconnectionTheModelIsRepublishedButTheStateWaitsForTheSource) {
   live(100ms);
   publish(Topic::ErrorModel, model());
   publish(Topic::ModelState, active("m", 1));
@@ -214,7 +214,7 @@ TEST_F(DdsBridgeTest, DurableTopicsAreRepeated) {
   EXPECT_EQ(outlet.count(Topic::ModelState), 31);
 }
 
-TEST_F(DdsBridgeTest, ANewSourceVoidsWhatTheOldOneSaid) {
+TEST_F(DdsBridgeTest, ANewSourceInvalidatesTheMessagesOfTheOldOne) {
   live(100ms);
   publish(Topic::ErrorModel, model());
   publish(Topic::ModelState, active("m", 1));
@@ -232,7 +232,7 @@ TEST_F(DdsBridgeTest, BytesThatAreNoPayloadAreRefused) {
   EXPECT_TRUE(outlet.writes.empty());
 }
 
-TEST_F(DdsBridgeTest, AVectorsAgeCountsWhatItWaitedOnItsWay) {
+TEST_F(DdsBridgeTest, AVectorsAgeIncludesItsTimeInTransit) {
   live(100ms);
   publish(Topic::Compensation, vector_of_age(3ms), 40ms);
   EXPECT_EQ(outlet.last_age(), 43ms);
@@ -246,8 +246,8 @@ TEST_F(DdsBridgeTest, LiveSamplesThatWaitedLongerThanATenthOfASecondAreDiscarded
   EXPECT_EQ(bridge.outdated(), 2u);
 }
 
-// abbe-dds stood still for 3 s: it finds the beats and states of then.
-TEST_F(DdsBridgeTest, WhatWasSentBeforeAStallKeepsNothingAlive) {
+// abbe-dds was stopped for 3 s: it then reads beats and states that were sent during the stop.
+TEST_F(DdsBridgeTest, MessagesSentBeforeAStallDoNotAssertLiveliness) {
   live(100ms);
   publish(Topic::ModelState, active("m", 1));
   t += 3s;
@@ -260,7 +260,7 @@ TEST_F(DdsBridgeTest, WhatWasSentBeforeAStallKeepsNothingAlive) {
   EXPECT_EQ(outlet.assertions, assertions);
 }
 
-TEST_F(DdsBridgeTest, AStallOfItsOwnIsNoSilenceOfAbbed) {
+TEST_F(DdsBridgeTest, AStallOfAbbeDdsDoesNotCountAsSilenceOfAbbed) {
   live(100ms);
   publish(Topic::ModelState, active("m", 1));
   t += 800ms;

@@ -102,7 +102,7 @@ TEST_F(DdsLinkTest, AnAbbeDdsThatDoesNotAnswerIsNotReportedAsConnected) {
   EXPECT_STREQ(link_->state(), "connected");
 }
 
-TEST_F(DdsLinkTest, TakesFewNewcomersInACycleAndAllInTheEnd) {
+TEST_F(DdsLinkTest, AcceptsFewConnectionsPerCycleAndAllEventually) {
   std::vector<std::unique_ptr<FarEnd>> newcomers;
   for (int i = 0; i < 10; ++i) newcomers.push_back(std::make_unique<FarEnd>(path_));
   link_->poll();
@@ -122,7 +122,7 @@ TEST_F(DdsLinkTest, HandsOverThePayloadUnchanged) {
   EXPECT_EQ(seen[0].payload, payload);
 }
 
-TEST_F(DdsLinkTest, LateComerGetsTheNewestOfEveryDurableKey) {
+TEST_F(DdsLinkTest, ALateSubscriberGetsTheNewestOfEveryDurableKey) {
   link_->publish(Topic::ModelState, state_payload("a", 1));
   link_->publish(Topic::ModelState, state_payload("b", 2));
   link_->publish(Topic::ModelState, state_payload("a", 3));
@@ -134,7 +134,7 @@ TEST_F(DdsLinkTest, LateComerGetsTheNewestOfEveryDurableKey) {
   EXPECT_EQ(seen[1].payload, state_payload("a", 3));
 }
 
-TEST_F(DdsLinkTest, LateComerGetsNoSlicesOfALargerGridBefore) {
+TEST_F(DdsLinkTest, ALateSubscriberGetsNoSlicesOfALargerEarlierGrid) {
   for (std::uint32_t i = 0; i < 3; ++i) link_->publish(Topic::ErrorGrid, slice_payload("a", i, 3));
   link_->publish(Topic::ErrorGrid, slice_payload("b", 2, 3));
   link_->publish(Topic::ErrorGrid, slice_payload("a", 0, 1));
@@ -179,7 +179,7 @@ TEST_F(DdsLinkTest, NeverBlocksOnAPeerThatDoesNotReadAndKeepsWhatIsDurable) {
   EXPECT_TRUE(state_came);
 }
 
-/// Live samples are sent until the socket takes no more and `surplus` of them had to go.
+/// Sends live samples until the socket is full and `surplus` of them were dropped.
 std::uint64_t fill(DdsLink& link, std::uint64_t surplus) {
   std::uint64_t n = 0;
   while (link.counters().dropped_live < surplus)
@@ -206,7 +206,7 @@ TEST_F(DdsLinkTest, FullSocketDropsTheOldestLiveSampleAndKeepsTheNewest) {
   EXPECT_EQ(seen.size() + link_->counters().dropped_live, newest);
 }
 
-TEST_F(DdsLinkTest, FramesCarryTheInstantTheyWereSaid) {
+TEST_F(DdsLinkTest, FramesCarryTheInstantTheyWerePublished) {
   FarEnd far(path_);
   link_->poll();
   link_->publish(Topic::Snapshot, snapshot_payload(1), DdsLink::WallTime{17ms});
@@ -217,7 +217,7 @@ TEST_F(DdsLinkTest, FramesCarryTheInstantTheyWereSaid) {
   EXPECT_EQ(seen[1].at, 18s);
 }
 
-// Else abbe-dds would take the state before for what abbed says now.
+// Otherwise abbe-dds would take the earlier state for abbed's present one.
 TEST_F(DdsLinkTest, ABeatDoesNotOvertakeAState) {
   FarEnd far(path_);
   link_->poll();
@@ -241,7 +241,7 @@ TEST_F(DdsLinkTest, BeatsEvery100MillisecondsHoweverOftenItIsCalled) {
   EXPECT_EQ(far.take().size(), 10u);
 }
 
-TEST_F(DdsLinkTest, NoticesThatThePeerLeft) {
+TEST_F(DdsLinkTest, DetectsThatThePeerDisconnected) {
   {
     FarEnd far(path_);
     link_->poll();
@@ -309,19 +309,19 @@ TEST_F(DdsLinkTest, RefusesBytesThatAreNoPayload) {
   EXPECT_EQ(link_->counters().refused, 1u);
 }
 
-TEST_F(DdsLinkTest, SocketFileIsClosedToStrangers) {
+TEST_F(DdsLinkTest, SocketFileIsAccessibleToItsOwnerOnly) {
   struct stat file {};
   ASSERT_EQ(::stat(path_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 0777, 0660u);
 }
 
-TEST_F(DdsLinkTest, RefusesAPathThatALivingProcessServes) {
+TEST_F(DdsLinkTest, RefusesAPathThatARunningProcessServes) {
   const auto second = DdsLink::listen(path_);
   ASSERT_FALSE(second.has_value());
   EXPECT_THAT(second.error().text, testing::HasSubstr("already answers there"));
 }
 
-TEST_F(DdsLinkTest, ReplacesTheSocketFileOfADeadProcess) {
+TEST_F(DdsLinkTest, ReplacesTheSocketFileOfAnEndedProcess) {
   const auto stale = directory_ / "stale.sock";
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

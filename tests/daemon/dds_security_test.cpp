@@ -72,7 +72,7 @@ TEST_F(DdsSecurity, AMissingFileIsNamed) {
                                                  testing::HasSubstr("abbe dds keys")));
 }
 
-TEST_F(DdsSecurity, AKeyEverybodyCanReadIsRefused) {
+TEST_F(DdsSecurity, AWorldReadableKeyIsRefused) {
   make();
   ASSERT_EQ(::chmod((keys_ / "daemon/identity.key").c_str(), 0644), 0);
   const auto found = find_dds_identity(keys_, DdsRole::Daemon, now_);
@@ -87,10 +87,11 @@ TEST_F(DdsSecurity, AnExpiredIdentityIsRefusedWithItsDates) {
   EXPECT_THAT(found.error().text, testing::HasSubstr("make new keys"));
 }
 
-/// The profile of a site: `inside` stands in <rtps> of the participant profile of that name.
+/// The profile of a site: `inside` is in <rtps> of the participant profile of that name.
 std::string profile_text(const std::string& inside, const std::string& name = "abbe") {
   return R"(<?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles><participant profile_name=")" +
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles>)"
+         "<participant profile_name=\"" +
          name + "\"><rtps>" + inside + "</rtps></participant></profiles></dds>";
 }
 
@@ -103,7 +104,7 @@ std::string properties(const std::vector<std::string>& names) {
 
 const std::string kOwn = properties({"dds.sec.auth.plugin", "dds.sec.access.plugin"});
 
-TEST_F(DdsSecurity, AProfileOfTheSiteMayHaveItsOwn) {
+TEST_F(DdsSecurity, AProfileOfTheSiteMayHaveItsOwnSecurityProperties) {
   const fs::path profile = root_ / "dds.xml";
   std::ofstream(profile) << profile_text(kOwn);
   EXPECT_TRUE(dds_is_secured({}, profile));

@@ -48,7 +48,7 @@ TEST(DdsSupervisor, RefusesAProgramThatDoesNotExist) {
   EXPECT_FALSE(DdsSupervisor::start(options, WallTime{}).has_value());
 }
 
-TEST(DdsSupervisor, StartsAgainAtOnceAfterADeathInSteadyState) {
+TEST(DdsSupervisor, RestartsAtOnceAfterAnExitInSteadyState) {
   auto supervisor = DdsSupervisor::start(shell("exec sleep 60"), WallTime{});
   ASSERT_TRUE(supervisor.has_value());
   const pid_t first = supervisor->pid();
@@ -61,7 +61,7 @@ TEST(DdsSupervisor, StartsAgainAtOnceAfterADeathInSteadyState) {
   EXPECT_EQ(end_of(*supervisor), "signal 9 (Killed)");
 }
 
-TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
+TEST(DdsSupervisor, BacksOffWhenTheChildExitsAtStart) {
   auto supervisor = DdsSupervisor::start(shell("exit 3"), WallTime{});
   ASSERT_TRUE(supervisor.has_value());
   wait_for_end(supervisor->pid());
@@ -81,7 +81,7 @@ TEST(DdsSupervisor, BacksOffWhenTheChildDiesAtStart) {
   EXPECT_EQ(supervisor->restarts(), 2u);
 }
 
-TEST(DdsSupervisor, ASignalAtStartCostsTheFirstDelayEveryTime) {
+TEST(DdsSupervisor, ASignalAtStartIsFollowedByTheFirstDelayEveryTime) {
   auto supervisor = DdsSupervisor::start(shell("kill -SEGV $$"), WallTime{});
   ASSERT_TRUE(supervisor.has_value());
   for (int death = 1; death <= 3; ++death) {
@@ -120,7 +120,7 @@ TEST(DdsSupervisor, EndsAndReplacesAChildThatDoesNotAnswer) {
   EXPECT_EQ(process.last_end()->text(), supervisor->last_end()->text());
 }
 
-TEST(DdsSupervisor, AProgramThatIsGoneIsReportedAndTriedAgain) {
+TEST(DdsSupervisor, AMissingProgramIsReportedAndTriedAgain) {
   const auto program =
       std::filesystem::path{::testing::TempDir()} / ("abbe-gone-" + std::to_string(::getpid()));
   std::filesystem::create_symlink("/bin/sh", program);
@@ -150,7 +150,7 @@ TEST(DdsSupervisor, AProgramThatIsGoneIsReportedAndTriedAgain) {
   std::filesystem::remove(program);
 }
 
-TEST(DdsSupervisor, AHubThatDoesNotAskIsNotTheChildsFault) {
+TEST(DdsSupervisor, ADelayOfTheHubDoesNotCountAsSilenceOfTheChild) {
   DdsProcess process;
   auto options = shell("exec sleep 60");
   options.process = &process;
@@ -165,7 +165,7 @@ TEST(DdsSupervisor, AHubThatDoesNotAskIsNotTheChildsFault) {
 }
 
 /// As all of abbed after SIGSTOP and SIGCONT: the answer to the beat before lies unread.
-TEST(DdsProcess, AfterAPauseOfTheHubItsSilenceBeginsAnew) {
+TEST(DdsProcess, AfterAPauseOfTheHubTheSilenceTimerRestarts) {
   DdsProcess process;
   process.started(4711, WallTime{1s});
   for (auto at = 1s + 0ms; at <= 2s; at += 100ms) process.asked(WallTime{at});
@@ -176,7 +176,7 @@ TEST(DdsProcess, AfterAPauseOfTheHubItsSilenceBeginsAnew) {
   EXPECT_EQ(process.silent_for(), 2s);
 }
 
-TEST(DdsSupervisor, TellsTheChildWhoItsParentIs) {
+TEST(DdsSupervisor, PassesTheParentsProcessIdToTheChild) {
   const std::string me = std::to_string(::getpid());
   auto supervisor =
       DdsSupervisor::start(shell("[ \"$1 $2\" = \"--parent " + me + "\" ] && exit 7"), WallTime{});
@@ -230,7 +230,7 @@ TEST(DdsSupervisor, GivesTheChildItsPriorityWherePermitted) {
   EXPECT_EQ(::sched_getscheduler(supervisor->pid()), permitted ? SCHED_FIFO : SCHED_OTHER);
 }
 
-TEST(DdsSupervisor, StopsItsChildWhenItGoes) {
+TEST(DdsSupervisor, StopsItsChildWhenItEnds) {
   pid_t child = 0;
   {
     auto supervisor = DdsSupervisor::start(shell("exec sleep 60"), WallTime{});

@@ -51,7 +51,7 @@ std::string faults_of(const std::string& text) {
   return all;
 }
 
-TEST(EnvironmentConfiguration, KnowsDevicesByTheNameOfTheirMap) {
+TEST(EnvironmentConfiguration, FindsDevicesByTheNameOfTheirMap) {
   const auto config = config_of(kAir + kScales);
   ASSERT_EQ(config.environment.size(), 2u);
   EXPECT_EQ(std::get<drivers::ModbusTcp>(config.environment[0].address).host, "10.0.0.9");
@@ -96,7 +96,7 @@ expected = 4711
   EXPECT_EQ(map.proving[0].expected, 4711.0);
 }
 
-TEST(EnvironmentConfiguration, RefusesMapsThatCannotBeMeant) {
+TEST(EnvironmentConfiguration, RefusesInconsistentMaps) {
   const std::string custom = "[[environment]]\nname = \"a\"\nmap = \"custom\"\nhost = \"h\"\n";
   EXPECT_THAT(faults_of(custom), HasSubstr("no register is measured"));
   EXPECT_THAT(
@@ -109,7 +109,7 @@ TEST(EnvironmentConfiguration, RefusesMapsThatCannotBeMeant) {
       HasSubstr("must not be 0"));
 }
 
-TEST(EnvironmentConfiguration, RefusesAMapNobodyKnows) {
+TEST(EnvironmentConfiguration, RefusesAnUnknownMap) {
   EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"comet-t751\"\nhost = \"h\"\n"),
               HasSubstr("did you mean \"comet-t7510\"?"));
 }
@@ -170,7 +170,7 @@ fixed_mm = -200
   EXPECT_DOUBLE_EQ(use.thermal[0].config.fixed_m, -0.2);
 }
 
-TEST(ThermalConfiguration, IsPartOfWhatAReadingIs) {
+TEST(ThermalConfiguration, IsPartOfTheMachineHash) {
   const auto hash = [](const std::string& temperature, const std::string& alpha,
                        const std::string& u) {
     return machine_hash(config_of(kScales + "[[thermal]]\naxis = \"X\"\ntemperature = \"" +
@@ -185,7 +185,7 @@ TEST(ThermalConfiguration, IsPartOfWhatAReadingIs) {
   EXPECT_EQ(plain, hash("scale_x", "8", "1"));  // how well it is known changes no reading
 }
 
-TEST(ThermalConfiguration, RefusesATemperatureNobodyMeasures) {
+TEST(ThermalConfiguration, RefusesATemperatureThatIsNotMeasured) {
   EXPECT_THAT(
       faults_of(kScales +
                 "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
@@ -198,7 +198,7 @@ TEST(AirConfiguration, TakesTheUncertaintyOfCo2) {
   EXPECT_THAT(faults_of("[air]\nu_co2_ppm = -1\n"), HasSubstr("air.u_co2_ppm"));
 }
 
-TEST(AirConfiguration, RefusesToCorrectForAirThatNobodyMeasures) {
+TEST(AirConfiguration, RefusesToCorrectForAirThatIsNotMeasured) {
   EXPECT_THAT(
       faults_of("[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
       HasSubstr("an [[environment]] must measure"));

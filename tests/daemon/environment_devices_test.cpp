@@ -105,7 +105,7 @@ TEST_F(EnvironmentDevices, AreReadRecordedAndDecodedAgainFromTheirBytes) {
   }
 }
 
-TEST_F(EnvironmentDevices, SayByNameWhenAnotherOneAnswers) {
+TEST_F(EnvironmentDevices, ReportByNameThatAnotherDeviceAnswers) {
   auto devices = DeviceSet::start(config_for(server_.port(), kSerial + 1), time_);
   ASSERT_TRUE(devices) << devices.error().text;
   const auto refused = [&] {
@@ -117,7 +117,7 @@ TEST_F(EnvironmentDevices, SayByNameWhenAnotherOneAnswers) {
   EXPECT_TRUE(batch_.measured_environment.empty());
 }
 
-TEST_F(EnvironmentDevices, SayByNameWhenTheRegisterMapIsAnother) {
+TEST_F(EnvironmentDevices, ReportByNameThatTheRegisterMapDiffers) {
   const auto config =
       config_with(server_.port(),
                   "map = \"custom\"\n"

@@ -89,7 +89,7 @@ TEST(EnvironmentMerge, NeverFallsBackToTheTrackerForWhatADeviceIsToMeasure) {
   EXPECT_TRUE(std::isnan(e->air_temperature_K));
 }
 
-TEST(EnvironmentMerge, IsWithoutAirThatATrackerAssumes) {
+TEST(EnvironmentMerge, LeavesOutAirThatATrackerAssumes) {
   EnvironmentMerge merge{{}, kLag};
   Batch b;
   b.environment = {weather(kStart, 293.15)};
@@ -121,7 +121,7 @@ TEST(EnvironmentMerge, GivesTheSameWhateverTheOrderOfArrival) {
   early.take(first);
   early.take(second);
   late.take(first);
-  // The second sample has not come yet; at this instant nobody may know it.
+  // This instant is before the second sample: its value must not be used yet.
   EXPECT_EQ(early.at(kStart + 900ms)->temperature_K[2], late.at(kStart + 900ms)->temperature_K[2]);
 }
 
@@ -133,14 +133,14 @@ TEST(EnvironmentMerge, TakesSamplesInTheOrderOfTheirInstants) {
   EXPECT_EQ(merge.at(kStart + 1100ms)->temperature_K[2], 294.0);
 }
 
-TEST(EnvironmentMerge, ForgetsAValueOfASilentDevice) {
+TEST(EnvironmentMerge, DropsTheValueOfASilentDevice) {
   EnvironmentMerge merge{{.max_age = 60s}, kLag};
   merge.take(measured({scale_at(kStart, 293.0)}));
   EXPECT_EQ(merge.at(kStart + 60s)->temperature_K[2], 293.0);
   EXPECT_TRUE(std::isnan(merge.at(kStart + 61s)->temperature_K[2]));
 }
 
-TEST(ThermalCorrection, PutsAnAxisWhereItReallyIs) {
+TEST(ThermalCorrection, CorrectsAnAxisToItsTruePosition) {
   auto s = at_one_metre(296.15);
   correct_for_temperature(s, with_scale());
   EXPECT_NEAR(s.position[0] - 1.1, 24e-6, 1e-12);  // 1 m from the fixed point, 3 K, 8e-6 / K
@@ -156,7 +156,7 @@ TEST(ThermalCorrection, AddsItsUncertainty) {
   EXPECT_EQ(s.u_position[1], 1e-6);
 }
 
-TEST(ThermalCorrection, SaysThatAnAxisWithoutItsTemperatureIsNotKnown) {
+TEST(ThermalCorrection, MarksAnAxisWithoutItsTemperatureAsUnknown) {
   for (const auto& temperature : {std::optional<double>{}, std::optional{std::nan("")}}) {
     auto s = at_one_metre(temperature);
     correct_for_temperature(s, with_scale());
@@ -175,7 +175,7 @@ protocol::Snapshot with_point(double air_K) {
   return s;
 }
 
-TEST(RawDistances, AreCorrectedToTheAirThatIsThere) {
+TEST(RawDistances, AreCorrectedToTheMeasuredAir) {
   EnvironmentUseOptions use;
   auto assumed = with_point(293.15);
   use.air.assumed_index = index_of_air(assumed.environment, use.air)->n;
@@ -225,7 +225,7 @@ TEST(LiveView, ShowsCorrectedPositionsAndTheNewestTemperatures) {
   EXPECT_NEAR(view.view().position[0] - 1.1, 24e-6, 1e-12);
 }
 
-TEST(LiveView, DoesNotKnowTheAxesWithoutTheTemperatureOfTheirScale) {
+TEST(LiveView, ShowsNoAxesWithoutTheTemperatureOfTheirScale) {
   const drivers::MonotonicTime time;
   LiveView view{AssemblerOptions{.environment = with_scale()}, time};
   Batch batch;

@@ -43,7 +43,7 @@ calib::VolumetricModel of_half_the_volume() {
       .value();
 }
 
-TEST(ErrorGrid, SaysOfEveryNodeWhetherTheDataCoveredIt) {
+TEST(ErrorGrid, MarksEveryNodeAsCoveredByTheDataOrNot) {
   const auto nodes = nodes_of(grid_messages(in_force(of_half_the_volume()), {}));
   std::size_t inside = 0;
   for (const auto& node : nodes) {
@@ -61,7 +61,7 @@ TEST(ErrorGrid, HoldsEveryNodeWhileTheyFit) {
   for (const auto& slice : slices) EXPECT_TRUE(slice.every_node());
 }
 
-TEST(ErrorGrid, LeavesNodesOutOfTheLongestAxesAndSaysSo) {
+TEST(ErrorGrid, ReducesTheNodesOfTheLongestAxesAndReportsIt) {
   const auto model = in_force(test::synthetic_model(1, 6.0));  // 25 x 25 x 19
   const auto slices = grid_messages(model, {});
   const auto nodes = nodes_of(slices);

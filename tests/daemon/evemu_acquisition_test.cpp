@@ -54,7 +54,7 @@ struct EvemuAcquisitionTest : testing::Test {
   std::uint32_t number = 1;
 };
 
-TEST_F(EvemuAcquisitionTest, SaysWhatToTouchAndRunsFromTheFirstTouch) {
+TEST_F(EvemuAcquisitionTest, ReportsWhatToTouchAndRunsFromTheFirstTouch) {
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::WaitingAtStart);
   EXPECT_EQ(acquisition.reason(), "position 4 (1 of 8): touch ball 1, 25 points");
   touch(0);
@@ -101,7 +101,7 @@ TEST_F(EvemuAcquisitionTest, ATouchWithAnAxisMissingIsNotUsed) {
   EXPECT_THAT(acquisition.take_notes(), testing::ElementsAre(HasSubstr("an axis was not known")));
 }
 
-TEST_F(EvemuAcquisitionTest, LosesNothingToTouchesThatCannotBeUsed) {
+TEST_F(EvemuAcquisitionTest, KeepsTheUsableTouchesAmongUnusableOnes) {
   auto blind = touch_at(points_m[0], kFrom + 1s, 1);
   blind.missing_mask = 0b010;
   touch(0);
@@ -127,10 +127,10 @@ TEST_F(EvemuAcquisitionTest, EndsWhenTheCardLostItsZeroInTheMiddle) {
   after.head.flags |= protocol::SampleFlag::Restarted;
   acquisition.take(after);
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Failed);
-  EXPECT_THAT(acquisition.reason(), HasSubstr("probe 1 touch 9: its device began anew"));
+  EXPECT_THAT(acquisition.reason(), HasSubstr("probe 1 touch 9: its device restarted"));
 }
 
-TEST_F(EvemuAcquisitionTest, TouchesBeforeItWasAskedForDoNotCount) {
+TEST_F(EvemuAcquisitionTest, TouchesFromBeforeItsStartDoNotCount) {
   acquisition.take(touch_at(points_m[0], kFrom - 1s, 1));
   EXPECT_EQ(acquisition.points(), 0u);
 }
@@ -141,7 +141,7 @@ TEST_F(EvemuAcquisitionTest, IsCompleteWithTheLastPointOfTheLastPosition) {
   EXPECT_EQ(acquisition.release().touches.size(), points_m.size());
 }
 
-TEST_F(EvemuAcquisitionTest, EndsWhenNobodyTouchesAnyMore) {
+TEST_F(EvemuAcquisitionTest, EndsWhenNoTouchArrivesForTheTimeout) {
   touch(0);
   acquisition.tick(kFrom + 1h);
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Running);
@@ -151,7 +151,7 @@ TEST_F(EvemuAcquisitionTest, EndsWhenNobodyTouchesAnyMore) {
               HasSubstr("no touch for 3601 s; position 4 (1 of 8): touch ball 1"));
 }
 
-TEST_F(EvemuAcquisitionTest, TheSessionSaysEveryNewFeatureAndEveryNoteAsAnEvent) {
+TEST_F(EvemuAcquisitionTest, TheSessionReportsEveryNewFeatureAndEveryNoteAsAnEvent) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({request(), kFrom}));
   for (std::size_t i = 0; i < 25; ++i)
@@ -192,7 +192,7 @@ TEST(CalibrationRequest, KeepsEveryBitOfATaskWithABallArray) {
   EXPECT_EQ(again.sources, evemu.sources);
 }
 
-TEST(CalibrationRequest, NamesAMethodNobodyKnowsAndWhatIsMissing) {
+TEST(CalibrationRequest, NamesAnUnknownMethodAndWhatIsMissing) {
   const auto unknown = task_from_json({{"method", "magic"}});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().code, ErrorCode::Usage);

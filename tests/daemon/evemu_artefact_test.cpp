@@ -1,5 +1,5 @@
-/// A ball array that is warm where it is touched, and not exactly what its file says: files,
-/// configuration, live runs and their recordings.
+/// A ball array that is not at reference temperature when it is touched, and whose file has an
+/// uncertainty: files, configuration, live runs and their recordings.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -83,7 +83,7 @@ class WarmArray : public ::testing::Test {
     write("touches.csv", touches_of_a_perfect_machine(sim::true_array(stated, state)));
     write("calibrator.toml", sim::format_calibrator_toml(stated, state));
   }
-  /// The file as of somebody who does not know how the array grows.
+  /// Removes the expansion coefficient of the array from its file.
   void forget_expansion() const {
     write("calibrator.toml", std::regex_replace(text_of(folder_ / "calibrator.toml"),
                                                 std::regex{"(u_)?alpha_um_per_m_K[^\n]*\n"}, ""));
@@ -112,7 +112,7 @@ class WarmArray : public ::testing::Test {
 };
 const calib::Vector3 WarmArray::kFar_m{0.5, 0.2, 0.04}, WarmArray::kBall1_m{-0.09, 0.14, 0.03};
 
-TEST_F(WarmArray, IsTakenForTheMachineUntilItsTemperatureIsKnown) {
+TEST_F(WarmArray, IsAssumedToBeAtTheMachinesTemperatureUntilItsOwnIsKnown) {
   write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K, .u_alpha_per_K = 0.0});
   const auto corrected = identify("--artefact-C 24 --u-artefact-K 0.5");
   ASSERT_EQ(corrected.exit, kRefusedByTheGate) << corrected.err;
@@ -124,7 +124,7 @@ TEST_F(WarmArray, IsTakenForTheMachineUntilItsTemperatureIsKnown) {
   EXPECT_NEAR(wrong_m / ((kFar_m - kBall1_m).norm() * 4.0), kAlpha_per_K, 0.5e-6);
 }
 
-/// errors.csv of who knows that the machine has none.
+/// errors.csv of a machine without errors.
 std::string nothing_at_the_balls() {
   std::string text = "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um\n";
   for (const auto& T : sim::reference_positions())
@@ -135,7 +135,7 @@ std::string nothing_at_the_balls() {
   return text;
 }
 
-TEST_F(WarmArray, IsAsUncertainAsItsTemperatureAndItsFile) {
+TEST_F(WarmArray, HasTheUncertaintyOfItsTemperatureAndItsFile) {
   write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K, .u_alpha_per_K = 1e-6});
   write("reference.csv", nothing_at_the_balls());
   const auto ran = identify(
@@ -145,11 +145,11 @@ TEST_F(WarmArray, IsAsUncertainAsItsTemperatureAndItsFile) {
   const double of_temperature_m = along_m * std::hypot(0.5 * kAlpha_per_K, 4.0 * 1e-6);
   const double u_m = std::sqrt(error_near_the_far_end().cov_V_m2(0, 0));
   EXPECT_GT(u_m, 0.9 * of_temperature_m);
-  EXPECT_LT(u_m, 1.2 * of_temperature_m);  // and what is left of the noise
+  EXPECT_LT(u_m, 1.2 * of_temperature_m);  // plus the remaining noise
   EXPECT_LT(std::abs(error_near_the_far_end().V_m.x()), 3.0 * u_m);
 }
 
-TEST_F(WarmArray, StandsInEveryResult) {
+TEST_F(WarmArray, IsNamedInEveryResult) {
   write_array({.temperature_C = 24.0,
                .alpha_per_K = kAlpha_per_K,
                .u_alpha_per_K = 1e-6,
@@ -185,7 +185,7 @@ TEST_F(WarmArray, NeedsBothTemperatureAndExpansion) {
   const auto no_expansion = identify("--artefact-C 24 --u-artefact-K 0.5");
   EXPECT_EQ(no_expansion.exit, 3);
   EXPECT_THAT(no_expansion.err,
-              AllOf(HasSubstr("--artefact-C says how warm"),
+              AllOf(HasSubstr("--artefact-C gives the temperature"),
                     HasSubstr("add alpha_um_per_m_K and u_alpha_um_per_m_K to its file")));
   EXPECT_EQ(identify("--artefact-C 24").exit, 2);
   EXPECT_EQ(identify("--artefact-C 24 --u-artefact-K -1").exit, 2);
@@ -201,7 +201,7 @@ TEST_F(WarmArray, MayHaveItsTemperatureInTheConfiguration) {
   EXPECT_LT(error_near_the_far_end().V_m.norm(), 1e-6);
 }
 
-TEST_F(WarmArray, HasFaultsOfItsFileNamedWithTheLine) {
+TEST_F(WarmArray, ReportsFaultsOfItsFileWithTheLine) {
   const std::string whole =
       sim::format_calibrator_toml(sim::reference_ball_array(), {.alpha_per_K = kAlpha_per_K});
   expect_fault(std::regex_replace(whole, std::regex{"\nu_alpha_um_per_m_K[^\n]*"}, ""),
@@ -242,7 +242,7 @@ std::string config_text(const std::string& evemu) {
          evemu;
 }
 
-TEST_F(WarmArray, HasItSaidThatItsSensorIsInNoFile) {
+TEST_F(WarmArray, ReportsThatItsSensorIsInNoFile) {
   write_array({.temperature_C = 24.0, .alpha_per_K = kAlpha_per_K});
   write("machine.toml", config_text("artefact_sensor = \"plate\"\nu_artefact_K = 0.3\n"));
   const auto refused = identify();
@@ -271,7 +271,7 @@ std::string faults_with(const std::string& evemu) {
   return all;
 }
 
-TEST(ArtefactConfiguration, NamesWhatCannotBeMeant) {
+TEST(ArtefactConfiguration, NamesInconsistentValues) {
   EXPECT_EQ(faults_with("artefact_sensor = \"plate\"\nu_artefact_K = 0.2\n"), "");
   EXPECT_EQ(faults_with("artefact_C = 21.5\nu_artefact_K = 0.2\n"), "");
   EXPECT_THAT(
@@ -299,7 +299,7 @@ calib::evemu::Calibrator growing() {
   return calibrator;
 }
 
-TEST(ArtefactConfiguration, IsHeldAgainstTheCalibratorBeforeARunBegins) {
+TEST(ArtefactConfiguration, IsComparedWithTheCalibratorFileBeforeARunBegins) {
   const auto refusal = [](const std::string& evemu, const calib::evemu::Calibrator& calibrator) {
     const auto fine =
         check_evemu({.calibrator = calibrator}, *parse_config(config_text(evemu), "abbed.toml"));
@@ -332,7 +332,7 @@ TEST(ArtefactThermometer, GivesTheMeanAndHalfTheRange) {
   EXPECT_NEAR(found->u_temperature_K, std::hypot(0.4, 0.45 / std::sqrt(3.0)), 1e-12);
 }
 
-TEST(ArtefactThermometer, KnowsWhenItsSensorIsSilent) {
+TEST(ArtefactThermometer, ReportsASilentSensor) {
   ArtefactThermometer thermometer(ArtefactTemperatureConfig{.sensor = 1});
   EXPECT_FALSE(thermometer.take(at_temperature(std::nan(""))));
   EXPECT_FALSE(thermometer.take({}));
@@ -431,7 +431,7 @@ TEST(WarmRun, GivesTheSameModelLiveFromItsRecordingAndFromACommand) {
   const Batch batch = warm_run(request);
   const EvemuRun run = live_run(request, batch, config);
   ASSERT_TRUE(run.artefact);
-  // From 296 K up by 1 mK a touch; a sensor's value is in force 0.6 s after it was measured.
+  // From 296 K up by 1 mK a touch; a sensor's value is used from 0.6 s after it was measured.
   const double last_K = 1e-3 * static_cast<double>(batch.touches.size() - 1);
   EXPECT_NEAR(run.artefact->temperature_K, 296.0 + 0.5 * last_K, 2e-3);
   EXPECT_NEAR(run.artefact->u_temperature_K, std::hypot(0.3, 0.5 * last_K / std::sqrt(3.0)), 1e-3);

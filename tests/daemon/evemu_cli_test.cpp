@@ -107,7 +107,7 @@ class EvemuCli : public ::testing::Test {
   fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("evemu_cli_{}", ::getpid());
 };
 
-TEST_F(EvemuCli, IdentifiesFromTouchesAndCallsItAShape) {
+TEST_F(EvemuCli, IdentifiesFromTouchesAndReportsShapeOnly) {
   const auto ran = abbe(
       "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml "
       "--json -o "
@@ -160,7 +160,7 @@ TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
   EXPECT_EQ(to_json(*document), text);
 }
 
-TEST_F(EvemuCli, SaysThatFilesHoldNoTemperaturesOfScales) {
+TEST_F(EvemuCli, ReportsThatFilesHoldNoTemperaturesOfScales) {
   write("warm.toml", to_toml(config_tables::weak_portal()) + test::kWarmScales);
   const auto from_errors = [this](const std::string& more) {
     return abbe("identify evemu --machine warm.toml --errors errors.csv -o out " + more);
@@ -247,7 +247,7 @@ TEST_F(EvemuCli, ADamagedRecordingIsInTheVerdictAndInTheModel) {
               HasSubstr("\"recording_gap\": \"the recording is damaged"));
 }
 
-TEST_F(EvemuCli, SaysWhatARecordingWithoutACompleteRunLacks) {
+TEST_F(EvemuCli, ReportsWhatARecordingWithoutACompleteRunLacks) {
   Touches few = touches();
   few.resize(10);
   record_touches(folder_, few);
@@ -324,7 +324,7 @@ TEST_F(EvemuCli, NamesSwappedBlocks) {
   expect_refused(identify(all), 3, "position 6: blocks 1 and 2 are swapped");
 }
 
-TEST_F(EvemuCli, NamesAPositionNobodyTouched) {
+TEST_F(EvemuCli, NamesAPositionWithoutTouches) {
   auto all = touches();
   std::erase_if(all, [](const auto& t) { return t.position == 5; });
   expect_refused(identify(all), 1, "position 5: left out");
@@ -367,7 +367,7 @@ TEST_F(EvemuCli, ChoosesSparseModelsByFolds) {
   EXPECT_EQ(refused.exit, 3);
 }
 
-TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
+TEST_F(EvemuCli, AcceptsShapeOnlyWhenTheConfigurationNamesIt) {
   const std::string limits = "[gate]\nmax_error_mm = 10\nmax_gradient = 0.1\n";
   const auto accepted = [&](const std::string& gate) {
     write("machine.toml", to_toml(config_tables::weak_portal()) + gate);
@@ -390,11 +390,12 @@ TEST_F(EvemuCli, AcceptsAShapeWhenTheConfigurationSaysSoByName) {
   EXPECT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit, 3);
 }
 
-TEST_F(EvemuCli, ExplainsInItsReportWhatItCannotSee) {
+TEST_F(EvemuCli, ExplainsInItsReportWhatIsNotEstimable) {
   ASSERT_EQ(identify(touches()).exit, kRefused);
   const auto page = text_of(folder_ / "out/report.html");
-  EXPECT_THAT(page, AllOf(HasSubstr("The rotation nobody sees"), HasSubstr("shape only"),
-                          HasSubstr("Rotations of the positions"), HasSubstr("k_ezz3")));
+  EXPECT_THAT(page, AllOf(HasSubstr("rotation that touches do not determine"),
+                          HasSubstr("shape only"), HasSubstr("Rotations of the positions"),
+                          HasSubstr("k_ezz3")));
   EXPECT_THAT(page, ::testing::Not(HasSubstr("http://")));
 }
 
@@ -444,7 +445,7 @@ TEST_F(EvemuCli, NamesErrorsOfTheOppositeSign) {
   EXPECT_THAT(ran.err, HasSubstr("with all signs reversed"));
 }
 
-TEST_F(EvemuCli, DoesNotTakeAMissingTargetForZero) {
+TEST_F(EvemuCli, DoesNotReadAMissingTargetAsZero) {
   auto machine = config_tables::weak_portal();
   machine.target_offset_mm.reset();
   write("machine.toml", to_toml(machine));

@@ -60,17 +60,17 @@ std::string with_counter_card_and_probe() {
                      {"[counter_card]", "[reference]", "[probe]"});
 }
 
-TEST(ExampleConfig, IsGood) {
+TEST(ExampleConfig, IsValid) {
   ASSERT_FALSE(example().empty());
   EXPECT_EQ(faults(example()), "");
 }
 
-TEST(ExampleConfig, ItsCommentedKeysAreGoodToo) {
+TEST(ExampleConfig, ItsCommentedKeysAreValidToo) {
   ASSERT_NE(uncommented(), example());
   EXPECT_EQ(faults(uncommented()), "");
 }
 
-TEST(ExampleConfig, ItsExampleTablesAreGoodToo) {
+TEST(ExampleConfig, ItsExampleTablesAreValidToo) {
   ASSERT_EQ(faults(with_modbus_and_cmm()), "");
   const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
   EXPECT_EQ(config.environment.size(), 3u);

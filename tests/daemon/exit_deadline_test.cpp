@@ -17,7 +17,7 @@ TEST(ExitDeadline, EndsAProcessThatHangsWithItsMessageAndCode) {
       testing::ExitedWithCode(70), "the hub hangs");
 }
 
-TEST(ExitDeadline, LetsAProcessGoOnThatMeetsIt) {
+TEST(ExitDeadline, DoesNotAffectAProcessThatMeetsIt) {
   EXPECT_EXIT(
       {
         { const ExitDeadline deadline(60s, 70, "the hub hangs\n"); }

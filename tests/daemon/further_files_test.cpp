@@ -122,9 +122,9 @@ TEST_F(FurtherFiles, GiveTheirWeatherToAReplayAlsoFromRawBytes) {
       << "the other from its bytes";
 }
 
-/// Of before: log_time was when a message was published, and that of 10 was published after it was
-/// measured.
-TEST_F(FurtherFiles, GiveTheirWeatherAlsoFromBeforeTurnsWereRecorded) {
+/// Recordings without cycles: log_time is when a message was published, here of message 10 later
+/// than it was measured.
+TEST_F(FurtherFiles, GiveTheirWeatherAlsoWithoutRecordedCycles) {
   recorder_->record(example_environment(1), "tracker");
   recorder_->flush();
   recorder_->record(example_environment(10), "tracker", example_time(12));
@@ -143,8 +143,8 @@ TEST_F(FurtherFiles, GiveTheirWeatherAlsoFromBeforeTurnsWereRecorded) {
               ElementsAre(example_time(1), example_time(10)));
 }
 
-/// Three turns of several chunks each; one chunk fills a file.
-TEST_F(FurtherFiles, BeginWithAWholeTurn) {
+/// Three cycles of several chunks each; one chunk fills a file.
+TEST_F(FurtherFiles, BeginWithAWholeCycle) {
   for (std::uint32_t turn = 0; turn < 3; ++turn) {
     const HostTime taken = example_time(10 * (turn + 1));
     for (std::uint32_t i = 0; i < 20; ++i) {  // several chunks
@@ -166,12 +166,12 @@ TEST_F(FurtherFiles, BeginWithAWholeTurn) {
   EXPECT_EQ(turns.size(), 3u);
 }
 
-TEST_F(FurtherFiles, HandOnTheDatumsInForceOnly) {
+TEST_F(FurtherFiles, CarryOverTheValidDatumsOnly) {
   recorder_->attach(reference_request(example_time(1)), example_time(1));
   find_datum(0, 0.1, example_time(1));
   find_datum(0, 0.2, example_time(2));
   find_datum(1, 0.3, example_time(3));
-  record_axes(5, 0b110);  // Y and Z: a card that began anew
+  record_axes(5, 0b110);  // Y and Z: the card restarted
   recorder_->flush();
   record_axes(6, 0b110);
   const auto reader = second();
@@ -186,7 +186,7 @@ TEST_F(FurtherFiles, HandOnTheDatumsInForceOnly) {
   EXPECT_EQ(state->unknown, 0b110);
 }
 
-TEST_F(FurtherFiles, HandOnWhatWasFoundSinceTheLastSample) {
+TEST_F(FurtherFiles, CarryOverDatumsFoundSinceTheLastSample) {
   find_datum(0, 0.1, example_time(1));
   record_axes(5, 0b110);
   find_datum(1, 0.2, example_time(5));  // what waited fills the first file
@@ -197,7 +197,7 @@ TEST_F(FurtherFiles, HandOnWhatWasFoundSinceTheLastSample) {
   EXPECT_THAT(datums_of(read("run-3.mcap")), ElementsAre(0.1, 0.2));
 }
 
-/// A recording of a card that began anew while its axes moved, in files of some messages each.
+/// A recording of a card that restarted while its axes moved, in files of some messages each.
 class CutRecording : public ::testing::Test {
  protected:
   static constexpr int kMessagesPerFile = 150;
@@ -254,16 +254,16 @@ class CutRecording : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// A card is read far more often than it is recorded, and every file begins that choice anew: what
-// is read again lies between samples of the live run.
-TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesAsTheyWereKnownLive) {
+// A card is read far more often than it is recorded, and every file restarts the decimation: the
+// samples of a replay may lie between those of the live run.
+TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesOfTheLiveRun) {
   constexpr double kBetween_m = 1e-3;  // 50 ms at some 20 mm/s
   std::set<std::uint8_t> begun_with;
   std::size_t compared = 0;
 
   for (std::uint32_t n = 2; exists(n); ++n) {
     const auto reader = file(n);
-    if (reader.attachments().empty()) continue;  // the card had not said anything yet
+    if (reader.attachments().empty()) continue;  // no data of the card yet
     begun_with.insert(datum_state_from_attachment(reader.attachments().front())->unknown);
     const auto live = samples(reader, ReplaySource::Samples);
     for (const auto& again : samples(reader, ReplaySource::RawBytes)) {
@@ -299,7 +299,7 @@ std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum
   return batch.axes[0].missing_mask;
 }
 
-TEST(DatumState, AnAxisThatWasNotKnownIsNotKnownInTheNextFile) {
+TEST(DatumState, AnUnreferencedAxisStaysUnreferencedInTheNextFile) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b010}, {}, false), 0b010);
   EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, false), 0b000);
 }
@@ -308,7 +308,7 @@ TEST(DatumState, NoSetUpIsTheFirstInAFurtherFile) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b000}, {}, true), 0b111);
 }
 
-TEST(DatumState, WhatIsFoundLaterHolds) {
+TEST(DatumState, ADatumFoundLaterIsApplied) {
   EXPECT_EQ(missing_after({HostTime{10s}, 0b110}, {{.axis = 1, .from = HostTime{10s}}}, false),
             0b100);
 }

@@ -1,6 +1,6 @@
 /// Golden recordings: what devices sent, one recording per device and fault class, and what
 /// `abbe replay --raw --samples` makes of it. A line that changes here changes what is recorded on
-/// a shop floor: its cause stands in the same commit. tests/golden/record makes them anew.
+/// a shop floor: its cause is in the same commit. tests/golden/record makes them again.
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -70,7 +70,7 @@ TEST_P(Golden, RawBytesGiveTheCheckedSamples) {
                 << "\n  now:     " << (f == found.end() ? "(end)" : *f);
 }
 
-/// These recordings are from before the turns of the hub were recorded.
+/// These recordings are without the cycles of the hub.
 TEST_P(Golden, RawBytesGiveTheSamplesOfTheLiveRun) {
   const std::string replay =
       "'" + std::string(ABBE_PROGRAM) + "' replay --samples '" + unpacked() + "'";

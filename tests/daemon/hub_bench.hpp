@@ -76,7 +76,7 @@ class HubBench : public ::testing::Test {
     time_.passed += later;
     hub_->cycle(time_.wall_now());
   }
-  /// From a thread of its own, while the hub turns.
+  /// From a thread of its own, while the hub runs its cycles.
   nlohmann::json ask(const nlohmann::json& request) {
     auto answer = std::async(std::launch::async, [&] {
       return answer_request(*hub_, request, myself(), std::chrono::seconds{60});
@@ -85,7 +85,7 @@ class HubBench : public ::testing::Test {
       cycle(std::chrono::nanoseconds{0});
     return answer.get();
   }
-  /// As the store has it; in force once the hub has followed.
+  /// As in the store; active once the hub has followed.
   [[nodiscard]] Result<KeptModel> keep_a_model() {
     auto document = synthetic_document(1);
     document.machine_hash = machine_hash(config_);

@@ -21,7 +21,7 @@ using nlohmann::json;
 using protocol::HostTime;
 using tests::LockCount;
 
-/// Samples and bytes of every device, in every turn.
+/// Samples and bytes of every device, in every cycle.
 struct BusyDevices final : SampleSource {
   void drain(Batch& batch) override {
     ++turn;
@@ -72,10 +72,10 @@ class HubLocks : public test::HubBench<BusyDevices> {
   }
 
   std::uint64_t locks_ = 0;
-  std::uint64_t most_allocations_ = 0;  // in one turn
+  std::uint64_t most_allocations_ = 0;  // in one cycle
 };
 
-TEST_F(HubLocks, NoneIsTakenInATurn) {
+TEST_F(HubLocks, NoneIsTakenInACycle) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
   for (int i = 0; i < 3000; ++i) cycle();  // three seconds: health, recorder, store
   EXPECT_EQ(locks_, 0u);
@@ -93,7 +93,7 @@ TEST_F(HubLocks, NoneIsTakenForARequest) {
 
 /// A request that is parsed or written into the recording by the hub takes memory for each of its
 /// parts.
-TEST_F(HubLocks, WorkForARequestDoesNotGrowWithIt) {
+TEST_F(HubLocks, WorkForARequestDoesNotDependOnItsSize) {
   const auto machine = parse_config(to_toml(config_tables::mill()), "machine.toml");
   ASSERT_TRUE(machine) << machine.error().text;
   config_.machine = machine->machine;
@@ -114,7 +114,7 @@ TEST_F(HubLocks, WorkForARequestDoesNotGrowWithIt) {
   EXPECT_LT(most_for(20'000), 2 * for_three + 100);
 }
 
-TEST_F(HubLocks, NoneIsTakenForAModelThatSomebodyActivates) {
+TEST_F(HubLocks, NoneIsTakenForAModelActivatedByAnotherProcess) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
   const auto kept = keep_a_model();
   ASSERT_TRUE(kept) << kept.error().text;
@@ -123,7 +123,7 @@ TEST_F(HubLocks, NoneIsTakenForAModelThatSomebodyActivates) {
   EXPECT_EQ(locks_, 0u);
 }
 
-TEST_F(HubLocks, AreSeenByTheGuard) {
+TEST_F(HubLocks, AreDetectedByTheGuard) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
   const LockCount locks;
   std::mutex mutex;

@@ -60,7 +60,7 @@ class HubTest : public test::HubBench<FakeDevices> {
   }
 };
 
-TEST_F(HubTest, SaysThatItIsAliveWhetherOrNotAnythingComes) {
+TEST_F(HubTest, SendsHeartbeatsWithAndWithoutInput) {
   std::size_t beats = 0;
   for (int i = 0; i < 10; ++i) {
     cycle(100ms);
@@ -70,7 +70,7 @@ TEST_F(HubTest, SaysThatItIsAliveWhetherOrNotAnythingComes) {
   EXPECT_EQ(hub_->last_cycle(), time_.wall_now());
 }
 
-TEST_F(HubTest, WhatTheDevicesBringGoesOutInTheSameTurn) {
+TEST_F(HubTest, SamplesOfTheDevicesArePublishedInTheSameCycle) {
   activate_a_model();
   cycle();  // lets abbe-dds in
   cycle_with_axes();
@@ -105,14 +105,14 @@ TEST_F(HubTest, ATrackerAloneDoesNotKeepTheModelActive) {
   EXPECT_EQ(hub_->standing().status, ModelStatus::MODEL_STALE);
 }
 
-TEST_F(HubTest, SaysHowTheStreamsAreOnceASecond) {
+TEST_F(HubTest, PublishesTheHealthOfTheStreamsOnceASecond) {
   std::vector<v1::Health> sent;
   for (int i = 0; i < 25; ++i) {
     cycle(100ms);
     const auto more = messages<v1::Health>(far_->take(), Topic::Health);
     sent.insert(sent.end(), more.begin(), more.end());
   }
-  ASSERT_THAT(sent, SizeIs(3 * 4));  // at the first turn and twice a second later
+  ASSERT_THAT(sent, SizeIs(3 * 4));  // in the first cycle and twice a second later
   EXPECT_EQ(sent[0].stream(), "encoder");
   EXPECT_EQ(sent[1].stream(), "models");
   EXPECT_EQ(sent[2].stream(), "dds");
@@ -156,7 +156,7 @@ TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
       << "no sample for longer than the axes are known";
 }
 
-TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
+TEST_F(HubTest, RunsATaskOfAnotherThreadInItsNextCycle) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([] { return json{{"n", 3}}; }, 60s);
   });
@@ -164,7 +164,7 @@ TEST_F(HubTest, RunsATaskOfAnotherThreadAtItsNextTurn) {
   EXPECT_EQ(answer.get(), (json{{"n", 3}}));
 }
 
-TEST_F(HubTest, ATaskNobodyWaitsForAnyMoreDoesNotRun) {
+TEST_F(HubTest, ATaskWhoseCallerTimedOutDoesNotRun) {
   bool ran = false;
   const auto answer = hub_->call(
       [&ran] {
@@ -177,7 +177,7 @@ TEST_F(HubTest, ATaskNobodyWaitsForAnyMoreDoesNotRun) {
   EXPECT_FALSE(ran);
 }
 
-TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
+TEST_F(HubTest, AnExceptionOfATaskIsRethrownInTheCallingThread) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([]() -> json { throw std::runtime_error{"no"}; }, 60s);
   });
@@ -186,7 +186,7 @@ TEST_F(HubTest, ATaskThatThrowsThrowsInTheThreadThatAsked) {
   cycle();
 }
 
-TEST_F(HubTest, ARequestIsRefusedWithoutTheRoleItTakes) {
+TEST_F(HubTest, ARequestIsRefusedWithoutItsRole) {
   config_.control = {.look_group = "abbe-no-such-look",
                      .change_group = "abbe-no-such-change",
                      .move_group = "abbe-no-such-move"};
@@ -206,7 +206,7 @@ TEST_F(HubTest, ARequestIsRefusedWithoutTheRoleItTakes) {
   }
 }
 
-TEST_F(HubTest, WhatMovesAMachineOrChangesWhatIsInForceIsNotOpenToWhoeverLooks) {
+TEST_F(HubTest, MotionAndModelChangesAreRefusedToTheLookRole) {
   const auto role_of = [](const std::string& name, const std::string& member) {
     const auto verbs = control_verbs();
     const auto found = std::ranges::find_if(
@@ -223,7 +223,7 @@ TEST_F(HubTest, WhatMovesAMachineOrChangesWhatIsInForceIsNotOpenToWhoeverLooks) 
   EXPECT_EQ(role_of("tracker", ""), Role::Move);
 }
 
-TEST_F(HubTest, WhoeverOnlyLooksGivesTheTrackerNoOrderThatMovesIt) {
+TEST_F(HubTest, TrackerMotionOrdersAreRefusedToTheLookRole) {
   config_.control = {.change_group = "abbe-no-such-change", .move_group = "abbe-no-such-move"};
   const ControlPeer looks{.user = "anna", .uid = ::geteuid() + 1};
   for (const char* order : {"initialize", "home", "find", "reflector set"}) {
@@ -236,7 +236,7 @@ TEST_F(HubTest, WhoeverOnlyLooksGivesTheTrackerNoOrderThatMovesIt) {
       HasSubstr("not in this daemon"));
 }
 
-TEST_F(HubTest, CollectsStandstillsForWhoeverAsksOverTheSocket) {
+TEST_F(HubTest, CollectsStandstillsRequestedOverTheSocket) {
   config_.tracker.emplace().host = "127.0.0.1";
   VerificationService verification{config_};
   Hub hub{HubParts{.config = config_,

@@ -109,7 +109,7 @@ TEST_F(InputFiles, ShowAtMostTwentyFaults) {
   EXPECT_THAT(faults.back(), HasSubstr("and 30 more"));
 }
 
-TEST_F(InputFiles, SuspectDegrees) {
+TEST_F(InputFiles, ReportAnglesThatLookLikeDegrees) {
   EXPECT_THAT(tracker_faults("time_s,range_mm,azimuth_rad,elevation_rad\n0,2000,90,45\n"),
               ElementsAre(HasSubstr("azimuth_rad: more than one revolution"),
                           HasSubstr("elevation_rad: beyond the vertical")));
@@ -144,7 +144,7 @@ TEST_F(InputFiles, CarryTheHashOfTheirBytes) {
   EXPECT_EQ(points->source.sha256, sha256_hex(text));
 }
 
-TEST_F(InputFiles, SayWhichFileIsNotThere) {
+TEST_F(InputFiles, NameAMissingFile) {
   const auto points = read_points_csv("/nonexistent/points.csv");
   ASSERT_FALSE(points);
   EXPECT_EQ(points.error().code, ErrorCode::Io);

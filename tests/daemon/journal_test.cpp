@@ -72,7 +72,7 @@ TEST(Journal, SendsFieldsInTheNativeProtocol) {
                                    "ABBE_DEVICE=tracker\nABBE_STATE=connecting\n");
 }
 
-TEST(Journal, AJournalThatTakesNothingDoesNotHoldItUpAndLearnsHowManyItMissed) {
+TEST(Journal, AJournalThatDoesNotReadDoesNotBlockAndGetsTheCountOfMissedLines) {
   const TemporaryFolder folder;
   const FakeJournal journal{folder.path() / "socket"};
   const auto sink = native_journal(folder.path() / "socket");
@@ -148,12 +148,12 @@ std::string field(const JournalEntry& entry, const std::string& name) {
   return "(none)";
 }
 
-TEST_F(StateObserverTest, WhatStaysIsNotRepeated) {
+TEST_F(StateObserverTest, AnUnchangedStateIsNotRepeated) {
   EXPECT_THAT(look(), IsEmpty());
   EXPECT_THAT(look(1h), IsEmpty());
 }
 
-TEST_F(StateObserverTest, ARefusedDeviceIsOneWarningThatSaysWhatToDo) {
+TEST_F(StateObserverTest, ARefusedDeviceIsOneWarningWithARemedy) {
   tracker("connecting", false, "connect 10.0.0.7:700: Connection refused");
   const auto entries = look();
   ASSERT_THAT(entries, SizeIs(1));
@@ -174,7 +174,7 @@ TEST_F(StateObserverTest, FaultsThatRepeatAreALineAMinuteWithTheirCount) {
   EXPECT_THAT(lines(60s), ElementsAre(HasSubstr("12889 faults or lost samples more")));
 }
 
-TEST_F(StateObserverTest, WhatFlapsIsLimitedAndWhatWasLeftOutIsCounted) {
+TEST_F(StateObserverTest, ChangesBackAndForthAreLimitedAndOmittedOnesAreCounted) {
   std::size_t logged = 0;
   for (int i = 0; i < 100; ++i) {
     tracker(i % 2 == 0 ? "streaming" : "beam lost", true, "");
@@ -246,7 +246,7 @@ struct KeptEntries final : JournalSink {
   std::vector<std::string>& kept;
 };
 
-TEST(JournalThread, LooksOnceMoreWhenItEndsAndOutlivesADefect) {
+TEST(JournalThread, ObservesOnceMoreAtItsEndAndContinuesAfterAnInternalError) {
   std::vector<std::string> kept;
   int looks = 0;
   {

@@ -123,7 +123,7 @@ TEST_F(LeftRecordings, WithZerosAtTheEndLoseThem) {
   EXPECT_THAT(read(file("abbe-1.mcap")).losses(), IsEmpty());
 }
 
-TEST_F(LeftRecordings, WithADamagedMiddleStayAndAreReported) {
+TEST_F(LeftRecordings, WithADamagedMiddleAreKeptAndReported) {
   leave("abbe-1");
   {
     std::ofstream more{file("abbe-1.mcap.part"), std::ios::app | std::ios::binary};
@@ -177,7 +177,7 @@ TEST_F(LeftRecordings, WithADamagedChunkAreClosedAndTheReaderReportsIt) {
   EXPECT_THAT(read(file("abbe-1.mcap")).damage(), HasSubstr("the recording is damaged: chunk 1"));
 }
 
-TEST_F(LeftRecordings, ThatHoldNothingAreRemoved) {
+TEST_F(LeftRecordings, ThatAreEmptyAreRemoved) {
   write_file(file("abbe-0.mcap.part"), {}, 0);
   auto options = example_options(folder_.path());
   options.name = "abbe-1";
@@ -190,7 +190,7 @@ TEST_F(LeftRecordings, ThatHoldNothingAreRemoved) {
   EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
-TEST_F(LeftRecordings, OfThisRunAndOfALivingRecorderAreLeftAlone) {
+TEST_F(LeftRecordings, OfThisRunAndOfARunningRecorderAreNotChanged) {
   leave("abbe-now");
   auto options = example_options(folder_.path());
   options.name = "abbe-living";
@@ -202,7 +202,7 @@ TEST_F(LeftRecordings, OfThisRunAndOfALivingRecorderAreLeftAlone) {
   EXPECT_TRUE(fs::exists(file("abbe-living.mcap.part")));
 }
 
-TEST_F(LeftRecordings, ThatWereWhollyWrittenOnlyGetTheirName) {
+TEST_F(LeftRecordings, ThatAreCompleteAreOnlyRenamed) {
   const auto finished = example_recording(folder_.path(), 2, 5);
   const auto bytes = bytes_of_file(finished);
   fs::rename(finished, file("abbe-1.mcap.part"));

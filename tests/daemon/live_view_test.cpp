@@ -48,7 +48,7 @@ TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
   EXPECT_EQ(live.view().velocity[1], 0.0);
 }
 
-TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
+TEST(LiveView, ARetractedAxisLeavesTheOthersUnchanged) {
   LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kStart, 0.1)));
   auto sample = axes_at(kStart + 1ms, 0.1001);
@@ -66,7 +66,7 @@ TEST(LiveView, AnAxisThatIsTakenBackLeavesTheOthersAsTheyWere) {
   EXPECT_EQ(live.view().velocity[1], 0.0);
 }
 
-TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
+TEST(LiveView, DoesNotShowThePointOfATrackerThatStopped) {
   LiveView live{AssemblerOptions{}, kTime};
   protocol::TrackerPoint point;
   point.head.time = kStart;
@@ -83,7 +83,7 @@ TEST(LiveView, DoesNotShowThePointOfATrackerThatDied) {
   EXPECT_TRUE(live.view().has_tracker_point) << "the beam is back";
 }
 
-TEST(LiveView, DoesNotShowATouchOfLongAgo) {
+TEST(LiveView, DoesNotShowAnOldTouch) {
   LiveView live{AssemblerOptions{}, kTime};
   Batch touch;
   touch.taken = kStart;
@@ -103,7 +103,7 @@ Batch weather_at(HostTime t) {
   return b;
 }
 
-TEST(LiveView, JudgesByTheClockWhatIsCurrentWhileOnlyTheEnvironmentReports) {
+TEST(LiveView, ExpiresValuesByTheClockWhileOnlyTheEnvironmentReports) {
   LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kStart, 0.1)));
   protocol::TrackerPoint point;
@@ -123,7 +123,7 @@ TEST(LiveView, JudgesByTheClockWhatIsCurrentWhileOnlyTheEnvironmentReports) {
   EXPECT_EQ(live.view().missing_mask, 0) << "the encoders are back";
 }
 
-TEST(LiveView, ReportsOnceThatTheAxesAreNoLongerKnownThoughNothingCame) {
+TEST(LiveView, ReportsOnceThatTheAxesExpiredWithoutNewInput) {
   LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kStart, 0.1)));
   Batch nothing;
@@ -135,7 +135,7 @@ TEST(LiveView, ReportsOnceThatTheAxesAreNoLongerKnownThoughNothingCame) {
   EXPECT_FALSE(live.take(nothing));
 }
 
-TEST(LiveView, OfSimulatedDevicesTheWallTimeCounts) {
+TEST(LiveView, OfSimulatedDevicesUsesWallTime) {
   const drivers::MonotonicTime ten_times{10.0};
   LiveView live{AssemblerOptions{}, ten_times};
   live.take(of(axes_at(kStart, 0.1)));
@@ -145,7 +145,7 @@ TEST(LiveView, OfSimulatedDevicesTheWallTimeCounts) {
   EXPECT_EQ(live.view().missing_mask, 0b1111);
 }
 
-TEST(LiveView, SaysThatNothingCame) {
+TEST(LiveView, ReportsThatNothingWasReceived) {
   LiveView live{AssemblerOptions{}, kTime};
   EXPECT_FALSE(live.take(Batch{}));
   EXPECT_FALSE(live.axes_known_at());
@@ -161,7 +161,7 @@ TEST(LiveView, ATrackerPointDoesNotMakeTheAxesYounger) {
   EXPECT_TRUE(live.view().has_tracker_point);
 }
 
-TEST(LiveView, KnowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
+TEST(LiveView, ShowsTheAxesOnlyWhileEachOfXyzAnswersWithoutAFault) {
   const auto missing = [](AxisSample& a) { a.missing_mask = 0b100; };
   const auto bus_off = [](AxisSample& a) { a.head.flags |= SampleFlag::BusOff; };
   const auto alarm = [](AxisSample& a) { a.head.flags |= SampleFlag::DeviceError; };

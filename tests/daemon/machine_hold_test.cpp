@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 class MachineHold : public ::testing::Test {
  protected:
   MachineHold() {
-    // Nobody listens at port 1: nothing but the file says whether a release is awaited.
+    // No server listens at port 1: only the file shows whether a release is awaited.
     auto config = parse_config(
         to_toml(config_tables::half_metre_mill()) + "[cmm]\nhost = \"127.0.0.1\"\nport = 1\n",
         "abbed.toml");
@@ -75,7 +75,7 @@ TEST_F(MachineHold, ADirectoryInItsPlaceHoldsTheMachine) {
   EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("cannot be read")));
 }
 
-TEST_F(MachineHold, APipeInItsPlaceHoldsTheMachineAndNotTheStart) {
+TEST_F(MachineHold, APipeInItsPlaceHoldsTheMachineAndDoesNotBlockTheStart) {
   ASSERT_EQ(::mkfifo(file().c_str(), 0600), 0);
   EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("is not a regular file")));
 }
@@ -88,7 +88,7 @@ TEST_F(MachineHold, TheOldFormatHoldsTheMachine) {
   EXPECT_THAT(awaited(), HasSubstr("unknown reason"));
 }
 
-/// A computer that answers nobody: each try to connect lasts.
+/// A computer that does not answer: each attempt to connect blocks until its time-out.
 class SilentPeer {
  public:
   SilentPeer() {
@@ -117,7 +117,7 @@ class SilentPeer {
   std::uint16_t port_ = 0;
 };
 
-TEST_F(MachineHold, IsReportedAndReleasedWhileTheServerIsAway) {
+TEST_F(MachineHold, IsReportedAndReleasedWhileTheServerIsUnreachable) {
   const SilentPeer peer;
   config_.cmm->port = peer.port();
   test::write_text(file(), "a motion is under way\n");

@@ -39,7 +39,7 @@ class ModelAuthorityTest : public ::testing::Test {
   ~ModelAuthorityTest() override { fs::remove_all(folder_); }
 
   ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow); }
-  /// Somebody's command, in a process of its own as it were.
+  /// The store as a command in another process opens it.
   ModelStore store() { return ModelStore::open(folder_).value(); }
   [[nodiscard]] ModelDocument document(unsigned seed) const {
     auto d = synthetic_document(seed);
@@ -139,7 +139,7 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
   EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
 }
 
-TEST_F(ModelAuthorityTest, OnlyAModelOfThisMachineConfigurationMustBeBeaten) {
+TEST_F(ModelAuthorityTest, IsComparedOnlyWithAModelOfThisMachineConfiguration) {
   auto other = document(1);
   other.machine_hash = "of another machine";
   auto authority = open();
@@ -162,7 +162,7 @@ TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
   EXPECT_THAT(standing.reason, HasSubstr("axes_compensated"));
 }
 
-TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) {
+TEST_F(ModelAuthorityTest, AForcedModelNamesUserAndReasonAlsoAfterARestart) {
   auto authority = open();
   const auto id =
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
@@ -172,7 +172,7 @@ TEST_F(ModelAuthorityTest, AForcedModelNamesWhoForcedItAndWhyAlsoAfterARestart) 
   EXPECT_EQ(fresh_standing(open()).reason, "forced by anna: crane test");
 }
 
-TEST_F(ModelAuthorityTest, ARollbackIsSaidAndWhetherTheGateEverAcceptedTheModel) {
+TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {
   auto authority = open();
   const auto forced =
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
@@ -203,7 +203,7 @@ TEST_F(ModelAuthorityTest, FollowsTheStoreOnceForEachChange) {
   EXPECT_FALSE(follow(authority));
 }
 
-TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
+TEST_F(ModelAuthorityTest, AStoreThatBecomesDamagedChangesNothing) {
   auto authority = open();
   const auto id =
       add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
@@ -213,7 +213,7 @@ TEST_F(ModelAuthorityTest, AStoreThatIsBeingDamagedChangesNothing) {
 }
 
 // As when its owner and mode are put right: nothing of it that could be watched changes by that.
-TEST_F(ModelAuthorityTest, AStoreThatCannotBeReadIsSaidAndReadAgainUntilItCan) {
+TEST_F(ModelAuthorityTest, AnUnreadableStoreIsReportedAndReadAgain) {
   auto authority = open();
   const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
 
@@ -237,7 +237,7 @@ TEST_F(ModelAuthorityTest, AStoreThatCannotBeReadIsSaidAndReadAgainUntilItCan) {
   EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
 }
 
-TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
+TEST_F(ModelAuthorityTest, ARepairedModelFileBecomesActive) {
   const auto id =
       add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   const fs::path file = store().model_path(id);
@@ -249,7 +249,7 @@ TEST_F(ModelAuthorityTest, AModelFileThatWasRepairedComesIntoForce) {
   EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
 }
 
-TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) {
+TEST_F(ModelAuthorityTest, AReadResultOlderThanTheActiveModelIsDiscarded) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("first"), kNow));
   ASSERT_TRUE(store().activate(store().add(document(3), true, {}, actor("third")).value(),
@@ -270,7 +270,7 @@ TEST_F(ModelAuthorityTest, WhatWasReadBeforeAnotherModelWasTakenUpIsNotTakenUp) 
   EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
 }
 
-TEST_F(ModelAuthorityTest, WhatWasKeptBeforeARollbackIsNotTakenUpAfterIt) {
+TEST_F(ModelAuthorityTest, AModelStoredBeforeARollbackIsNotActivatedAfterIt) {
   auto authority = open();
   const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
   const auto since = authority.revision();
@@ -284,7 +284,7 @@ TEST_F(ModelAuthorityTest, WhatWasKeptBeforeARollbackIsNotTakenUpAfterIt) {
   EXPECT_EQ(fresh_standing(authority).model->id, first);
 }
 
-TEST_F(ModelAuthorityTest, AModelIsEncodedWhereItIsRead) {
+TEST_F(ModelAuthorityTest, AModelIsEncodedInTheThreadThatReadsIt) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
   const auto standing = fresh_standing(authority);
@@ -296,7 +296,7 @@ TEST_F(ModelAuthorityTest, AModelIsEncodedWhereItIsRead) {
             grid_messages(*standing.model, {.machine = "mill"}).size());
 }
 
-TEST_F(ModelAuthorityTest, TheModelOfBeforeIsDestroyedOnAnotherThread) {
+TEST_F(ModelAuthorityTest, ThePreviousModelIsDestroyedOnAnotherThread) {
   auto authority = open();
   const auto destroyed = std::make_shared<std::promise<std::thread::id>>();
   ActiveModel first;
@@ -354,7 +354,7 @@ TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
   EXPECT_FALSE(follow(authority));
 }
 
-TEST_F(ModelAuthorityTest, ADamagedStateIsSetAsideAtTheStartAndReportedUntilAModelIsActivated) {
+TEST_F(ModelAuthorityTest, ADamagedStateIsRenamedAtTheStartAndReportedUntilAModelIsActivated) {
   const auto id =
       add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 30);
@@ -373,7 +373,7 @@ TEST_F(ModelAuthorityTest, ADamagedStateIsSetAsideAtTheStartAndReportedUntilAMod
 }
 
 // As where the disk is read-only at the start, or the store's lock is held: the name is taken.
-TEST_F(ModelAuthorityTest, ADamagedStateThatCouldNotBeSetAsideAtTheStartIsLater) {
+TEST_F(ModelAuthorityTest, ADamagedStateThatCannotBeRenamedAtTheStartIsRenamedLater) {
   (void)add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 30);
   const auto aside = folder_ / "state.json.damaged-2023-11-14T22-30-00Z";
@@ -393,7 +393,7 @@ TEST_F(ModelAuthorityTest, ADamagedStateThatCouldNotBeSetAsideAtTheStartIsLater)
   EXPECT_EQ(authority.fault(), "");
 }
 
-TEST_F(ModelAuthorityTest, AStateThatIsDamagedLaterIsSetAsideAndTheModelStaysInForce) {
+TEST_F(ModelAuthorityTest, AStateThatIsDamagedLaterIsRenamedAndTheModelStaysActive) {
   auto authority = open();
   const auto id =
       add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
@@ -438,7 +438,7 @@ TEST_F(ModelAuthorityTest, TheStartRemovesWhatKilledProcessesLeftInTheStore) {
   EXPECT_TRUE(fs::exists(living)) << "it may be writing";
 }
 
-TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckSaysSo) {
+TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckIsMarked) {
   auto unchecked = document(1);
   unchecked.recording_gap = "12 messages of the run are missing";
   auto authority = open();
@@ -449,7 +449,7 @@ TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckSaysSo) {
       "accepted by the gate; no replay can check this model: 12 messages of the run are missing");
 }
 
-TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotTakenUp) {
+TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotActivated) {
   auto unpublishable = document(1);
   unpublishable.estimator = std::string(33, 'e');
   const auto id = store().add(unpublishable, true, {}, actor("by hand")).value();

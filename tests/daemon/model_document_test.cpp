@@ -121,7 +121,7 @@ TEST(ModelDocument, IsRefusedWhenItsArtefactWasChanged) {
   EXPECT_FALSE(parse_model(without.erase(from, to - from), "model.json"));
 }
 
-TEST(ModelDocument, NamesWhatCannotBeOfItsArtefact) {
+TEST(ModelDocument, NamesInconsistentValuesOfItsArtefact) {
   const auto fault = [](const std::string& what, const std::string& with) {
     const auto read = parse_model(replaced(to_json(with_artefact(14)), what, with), "model.json");
     return read ? std::string{} : read.error().details.front();

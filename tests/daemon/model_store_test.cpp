@@ -103,7 +103,7 @@ TEST_F(ModelStoreTest, AModelActivatedTwiceIsRolledBackAtOnce) {
 }
 
 // As versions before wrote it: a rollback to the model that was active already.
-TEST_F(ModelStoreTest, ARollbackLeavesActiveWhatItSays) {
+TEST_F(ModelStoreTest, ARollbackActivatesTheModelItReports) {
   const auto a = add(1), b = add(2);
   auto store = open();
   for (const auto& id : {a, b, b}) ASSERT_TRUE(store.activate(id, actor("better")));
@@ -200,7 +200,7 @@ TEST_F(ModelStoreTest, ListsAModelWhoseFileIsGoneWithItsFault) {
   EXPECT_THAT(entries[0].fault, HasSubstr(a));
 }
 
-TEST_F(ModelStoreTest, SaysThatItCannotBeListed) {
+TEST_F(ModelStoreTest, ReportsThatItCannotBeListed) {
   add(1);
   const auto store = open();
   fs::rename(folder_ / "models", folder_ / "elsewhere");
@@ -208,7 +208,7 @@ TEST_F(ModelStoreTest, SaysThatItCannotBeListed) {
   EXPECT_EQ(store.find("0123").error().code, ErrorCode::Io);
 }
 
-TEST_F(ModelStoreTest, WaitsForNoPipeThatLiesInIt) {
+TEST_F(ModelStoreTest, DoesNotBlockOnAPipeInItsFolder) {
   add(1);
   const auto piped = add(2);
   fs::remove(open().model_path(piped));
@@ -223,8 +223,8 @@ TEST_F(ModelStoreTest, WaitsForNoPipeThatLiesInIt) {
   EXPECT_THAT(ModelStore::open(folder_).error().text, HasSubstr("is not a regular file"));
 }
 
-// Anybody who can open the lock can hold it.
-TEST_F(ModelStoreTest, TheLockBelongsToWhoMayWriteToTheStore) {
+// A user who can open the lock file can hold the lock.
+TEST_F(ModelStoreTest, TheLockIsAccessibleToUsersWhoMayWriteToTheStore) {
   fs::create_directories(folder_);
   fs::permissions(folder_, fs::perms{0755});
   add(1);
@@ -255,7 +255,7 @@ TEST_F(ModelStoreTest, AModelIsOnTheDiskAlsoWhenTheLockIsHeldAndTheHolderIsNamed
   EXPECT_TRUE(open().add(document, true, {}, actor("daemon")));
 }
 
-TEST_F(ModelStoreTest, SaysThatTheStateIsDamaged) {
+TEST_F(ModelStoreTest, ReportsThatTheStateIsDamaged) {
   add(1);
   fs::resize_file(folder_ / "state.json", 20);
   const auto store = ModelStore::open(folder_);
@@ -288,7 +288,7 @@ TEST_F(ModelStoreTest, SurvivesAKillAtAnyMoment) {
   }
 }
 
-TEST_F(ModelStoreTest, FindsByPrefixOrSaysHowManyThereAre) {
+TEST_F(ModelStoreTest, FindsByPrefixOrReportsTheNumberOfMatches) {
   const auto id = add(1);
   EXPECT_EQ(open().find("active").error().code, ErrorCode::Usage);
   EXPECT_EQ(open().find("zzzz").error().code, ErrorCode::Usage);

@@ -59,7 +59,7 @@ TEST_F(OldRecordings, AreRemovedWhenTheyAreOlder) {
   EXPECT_THAT(removed(), IsEmpty());
 }
 
-TEST_F(OldRecordings, OfThisRunAgeButTheOneThatIsWritten) {
+TEST_F(OldRecordings, OfThisRunAreRemovedWhenOldExceptTheOneBeingWritten) {
   record("abbe-47.mcap", 100h);
   record("abbe-47-2.mcap", 23h);
   record("abbe-47-3.mcap.part", 50h);
@@ -89,7 +89,7 @@ TEST_F(OldRecordings, StayWhenOneIsDatedInTheFuture) {
   EXPECT_THAT(removed(), IsEmpty());
 }
 
-TEST_F(OldRecordings, DatedByADeadClockStay) {
+TEST_F(OldRecordings, DatedByAStoppedClockStay) {
   record("abbe-1.mcap", 0h);
   fs::last_write_time(folder_.path() / "abbe-1.mcap",
                       std::chrono::file_clock::from_sys(std::chrono::sys_seconds{24h}));
@@ -133,7 +133,7 @@ TEST_F(OldRecordings, StayAllWithoutAStore) {
   EXPECT_FALSE(fs::exists(store_));
 }
 
-TEST_F(OldRecordings, WhatOthersPutThereStays) {
+TEST_F(OldRecordings, FilesOfOtherProgramsStay) {
   record("abbe-9.mcap", 0h);
   record("notes.txt", 25h);
   record("reference.mcap", 25h);

@@ -41,7 +41,7 @@ TEST(PathReadings, AMachineThatNeverStandsIsComparedNowhere) {
   EXPECT_EQ(*stood, 0u);
 }
 
-TEST(PathReadings, AVertexThatWasDrivenElsewhereIsNamed) {
+TEST(PathReadings, AVertexDrivenAtAnotherPlaceIsNamed) {
   auto other = kPath_m;
   other[2][1] += 30e-6;
   const auto stood = compare_with_path("e.csv", driven(other), kPath_m, kTolerance_m);
@@ -51,7 +51,7 @@ TEST(PathReadings, AVertexThatWasDrivenElsewhereIsNamed) {
               HasSubstr("e.csv: the scales contradict the path: at vertex 2 Y reads 200.030 mm"));
 }
 
-TEST(PathReadings, OfTheLastVertexToo) {
+TEST(PathReadings, ALastVertexDrivenAtAnotherPlaceIsNamedToo) {
   auto other = kPath_m;
   other.back()[2] -= 30e-6;
   const auto stood = compare_with_path("e.csv", driven(other), kPath_m, kTolerance_m);

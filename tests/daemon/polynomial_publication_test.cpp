@@ -50,11 +50,11 @@ TEST_F(PolynomialPublication, TheVectorHasTheUncertaintyOfTheModel) {
   EXPECT_EQ(m.cov_m2()[3], e.cov_V_m2(1, 1));
 }
 
-TEST_F(PolynomialPublication, OutsideTheBallsItSaysSo) {
+TEST_F(PolynomialPublication, ReportsPositionsOutsideTheBalls) {
   EXPECT_FALSE(compensation(standing_at({0.3, -0.1, 0.04})).inside());
 }
 
-TEST_F(PolynomialPublication, ForAnotherToolThereIsNoNumber) {
+TEST_F(PolynomialPublication, ForAnotherToolThereIsNoVector) {
   const auto m = compensation(standing_at(inside_m), {0.0, 0.0, 0.05});
   EXPECT_FALSE(m.tool_ok());
   EXPECT_EQ(m.vector_m()[0], 0.0);
@@ -80,7 +80,7 @@ TEST_F(PolynomialPublication, ItsMessagesFitAndTheGridDoesNotClaimToBeLinear) {
   }
 }
 
-TEST_F(PolynomialPublication, TheGridIsFineAndItsUncertaintyHoldsBetweenNodesToo) {
+TEST_F(PolynomialPublication, TheGridsUncertaintyIsValidBetweenNodesToo) {
   std::size_t nodes = 0;
   const v1::GridNode* inside = nullptr;
   const auto slices = grid_messages(model, {});

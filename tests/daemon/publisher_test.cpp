@@ -103,7 +103,7 @@ TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
   EXPECT_EQ(sent[0].age_ns(), 2'000'000);
 }
 
-TEST_F(PublisherTest, WhatTakesAVectorBackWaitsForNoRate) {
+TEST_F(PublisherTest, ARetractedVectorIsPublishedAtOnce) {
   publish_live(view(), active(), kNow, kWall);
   auto broken = view();
   broken.missing_mask = 0b010;
@@ -142,7 +142,7 @@ TEST_F(PublisherTest, ModelAndGridGoOutOncePerRevision) {
   EXPECT_THAT(messages<v1::ModelState>(seen, Topic::ModelState), SizeIs(1));
 }
 
-TEST_F(PublisherTest, WhatWasEncodedElsewhereGoesOutWithSequenceNumbersOfThisPublisher) {
+TEST_F(PublisherTest, MessagesEncodedElsewhereGetSequenceNumbersOfThisPublisher) {
   publish_live(view(), active(), kNow, kWall);  // has numbers already
   const auto before = taken<v1::Compensation>(Topic::Compensation).at(0).sequence_number();
   publisher_->model(active(), kNow, kWall);

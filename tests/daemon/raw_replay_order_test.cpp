@@ -1,5 +1,5 @@
-/// A driver may read bytes late: what it then had sent before counts for its samples, whatever the
-/// stamps say. And the hub may take bytes a turn before it takes what the driver makes of them.
+/// A driver may read bytes late: its samples then depend on what it had sent before it read them,
+/// not on the stamps. And the hub may take bytes one cycle before the samples made of them.
 
 #include <gmock/gmock.h>
 
@@ -28,8 +28,8 @@ std::string encoders_alone() {
          to_toml(config_tables::Encoder{.sync_period_us = 1000});
 }
 
-/// A live run by hand: what the driver would read, in its order, goes into its receiver and into a
-/// recording.
+/// A live run without a driver: the bytes a driver would read go, in its order, into its receiver
+/// and into a recording.
 class LiveEncoders {
  public:
   explicit LiveEncoders(const std::filesystem::path& folder)
@@ -143,7 +143,7 @@ std::vector<HostTime> cycles_from_bytes(const RecordingReader& recording, const 
   return turns;
 }
 
-TEST(RawReplay, GivesSamplesInTheTurnsOfTheLiveRunNotInThoseOfTheirBytes) {
+TEST(RawReplay, GivesSamplesInTheCyclesOfTheLiveRunNotInThoseOfTheirBytes) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   const HostTime start = example_time(0);
@@ -157,7 +157,7 @@ TEST(RawReplay, GivesSamplesInTheTurnsOfTheLiveRunNotInThoseOfTheirBytes) {
   EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), live.turns());
 }
 
-TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
+TEST(RawReplay, ARetractedSampleComesInACycleOfItsOwn) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   for (std::int64_t i = 0; i < 20; ++i) {
@@ -179,7 +179,7 @@ TEST(RawReplay, ASampleThatIsTakenBackComesInATurnOfItsOwn) {
   EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), turns);
 }
 
-TEST(RawReplay, WhatTheLiveRunDidNotHaveComesWithItsBytes) {
+TEST(RawReplay, SamplesMissingInTheLiveRunComeWithTheirBytes) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   live.lose_samples();

@@ -84,7 +84,7 @@ TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
   }
 }
 
-TEST_F(DamagedRecording, CutBeforeItsMetadataEndsIsRefusedWithASentence) {
+TEST_F(DamagedRecording, CutBeforeItsMetadataEndsIsRefusedWithAMessage) {
   for (std::size_t cut = 0; cut < 100; ++cut) {
     const auto reader = open(whole_, cut);
     ASSERT_FALSE(reader) << cut;
@@ -93,7 +93,7 @@ TEST_F(DamagedRecording, CutBeforeItsMetadataEndsIsRefusedWithASentence) {
   }
 }
 
-TEST_F(DamagedRecording, CutInsideAChunkGivesItsWholeMessagesAndSaysWhere) {
+TEST_F(DamagedRecording, CutInsideAChunkGivesItsWholeMessagesAndReportsWhere) {
   const std::size_t cut = (chunk_starts_[1] + chunk_ends_[1]) / 2;
   const auto reader = open(whole_, cut);
   ASSERT_TRUE(reader);
@@ -107,7 +107,7 @@ TEST_F(DamagedRecording, CutInsideAChunkGivesItsWholeMessagesAndSaysWhere) {
   EXPECT_EQ(reader->losses()[0].what.find(wanted), 0u) << reader->losses()[0].what;
 }
 
-TEST_F(DamagedRecording, AFlippedBitCostsOneChunkAndIsSaid) {
+TEST_F(DamagedRecording, AFlippedBitLosesOneChunkAndIsReported) {
   FileBytes flipped = whole_;
   flipped[chunk_ends_[1] - 20] ^= 4;
   const auto reader = open(flipped, flipped.size());
@@ -119,7 +119,7 @@ TEST_F(DamagedRecording, AFlippedBitCostsOneChunkAndIsSaid) {
                                      ": its checksum is wrong, passed over"});
 }
 
-TEST_F(DamagedRecording, ADamagedSummaryCostsNothing) {
+TEST_F(DamagedRecording, ADamagedSummaryLosesNothing) {
   FileBytes flipped = whole_;
   flipped[flipped.size() - 12] ^= 4;
   const auto reader = open(flipped, flipped.size());
@@ -143,7 +143,7 @@ TEST_F(DamagedRecording, NoSingleDamagedByteLosesMoreThanItsChunkOrConfusesTheRe
   }
 }
 
-TEST(RecordingReader, RefusesWhatIsNoRecording) {
+TEST(RecordingReader, RefusesAFileThatIsNoRecording) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "file";
   write_file(file, {'h', 'e', 'l', 'l', 'o'}, 5);
@@ -154,10 +154,9 @@ TEST(RecordingReader, RefusesWhatIsNoRecording) {
   EXPECT_EQ(RecordingReader::open(folder.path() / "missing").error().code, ErrorCode::Io);
 }
 
-// --- kill -9
-// -------------------------------------------------------------------------------------------------------
+// --- kill -9 -------------------------------------------------------------------------------------
 
-/// Records samples 0, 1, 2, ... for ever and says through `pipe` how many are in finished chunks.
+/// Records samples 0, 1, 2, ... for ever and sends through `pipe` how many are in finished chunks.
 [[noreturn]] void record_until_killed(const std::filesystem::path& directory, int pipe) {
   auto options = example_options(directory);
   options.chunk_bytes = 8 * 1024;

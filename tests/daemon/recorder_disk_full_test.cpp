@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 using State = RecorderStatus::State;
 using WallTime = Recorder::WallTime;
 
-/// No file of this process may grow beyond `bytes` while this lives.
+/// No file of this process may grow beyond `bytes` while this object exists.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -71,7 +71,7 @@ class DiskFull : public ::testing::Test {
 // About 67 kB of schemas stand at the front of a file, so at 95 kB it has a few chunks.
 constexpr rlim_t kFewChunks = 95'000;
 
-TEST_F(DiskFull, AcquisitionGoesOnAndTheFaultIsSaid) {
+TEST_F(DiskFull, AcquisitionContinuesAndTheFaultIsReported) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open();
   record(recorder, 1000);
@@ -136,7 +136,7 @@ TEST_F(DiskFull, RecordingGoesOnInANewFileWhenThereIsRoomAgain) {
       << "every file explains itself, with what is known of axes";
 }
 
-TEST_F(DiskFull, TheNextFileSaysHowManyMessagesAreMissing) {
+TEST_F(DiskFull, TheNextFileStatesHowManyMessagesAreMissing) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open(WallTime{100s});
   constexpr std::uint32_t kHandedOver = 2000;
@@ -160,7 +160,7 @@ TEST_F(DiskFull, TheNextFileSaysHowManyMessagesAreMissing) {
   EXPECT_EQ(lost_before, (std::vector<std::uint32_t>{static_cast<std::uint32_t>(before.lost), 0}));
 }
 
-TEST_F(DiskFull, WhileItStaysFullNoStumpsPileUp) {
+TEST_F(DiskFull, WhileItStaysFullNoPartialFilesAccumulate) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open(WallTime{100s});
   record(recorder, 1000);
@@ -188,7 +188,7 @@ TEST_F(DiskFull, AtTheStartIsNoError) {
   EXPECT_EQ(sound_messages("run.mcap", true), 10u + 1u) << "with the weather of before";
 }
 
-TEST_F(DiskFull, LessThanTheDemandedFreeSpaceCountsAsFull) {
+TEST_F(DiskFull, LessThanTheRequiredFreeSpaceCountsAsFull) {
   auto options = example_options(folder_.path());
   options.min_free_bytes = std::numeric_limits<std::uint64_t>::max() / 2;
   const auto recorder = Recorder::open(options, example_info(), {});
@@ -196,7 +196,7 @@ TEST_F(DiskFull, LessThanTheDemandedFreeSpaceCountsAsFull) {
   EXPECT_EQ(recorder->status().state, State::DiskFull);
 }
 
-TEST_F(DiskFull, ClosingThenSaysThatTheRecordingIsNotWhole) {
+TEST_F(DiskFull, ClosingReportsAnIncompleteRecording) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open();
   record(recorder, 1000);

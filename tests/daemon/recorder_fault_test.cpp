@@ -122,7 +122,7 @@ TEST_F(RecorderFault, TheNextFileAsksForTheCalibrationThatIsRunning) {
   EXPECT_EQ(requests_in("run-2.mcap"), 1u);
 }
 
-TEST_F(RecorderFault, TheDigestSaysWhatTheRecordingLacksOfTheRun) {
+TEST_F(RecorderFault, TheDigestStatesWhatTheRecordingLacksOfTheRun) {
   recorder_.attach(request(), example_time(0));
   record_example(recorder_, 1);
   recorder_.flush();

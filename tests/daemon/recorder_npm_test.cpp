@@ -117,7 +117,7 @@ TEST_F(RecordingInPublicLibraries, TheStreamIsWholeAndItsChecksumsHold) {
   EXPECT_EQ(seen["indexed"]["statistics"]["messageCount"], "100");
 }
 
-TEST_F(RecordingInPublicLibraries, MetadataAndAttachmentsAreSeen) {
+TEST_F(RecordingInPublicLibraries, MetadataAndAttachmentsAreRead) {
   auto recorder = Recorder::open(example_options(folder_.path()), example_info(), {});
   ASSERT_TRUE(recorder);
   recorder->attach({"path.csv", "text/csv", "x_mm,y_mm,z_mm\n"}, example_time(0));

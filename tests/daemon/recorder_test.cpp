@@ -186,7 +186,7 @@ TEST_F(RecorderTest, AnExistingRecordingIsNeverOverwritten) {
       << second.error().text;
 }
 
-TEST_F(RecorderTest, AFolderThatCannotBeMadeIsSaidAndTriedAgain) {
+TEST_F(RecorderTest, AFolderThatCannotBeMadeIsReportedAndTriedAgain) {
   const auto nowhere = folder_.path() / "nowhere";
   write_file(nowhere, {'x'}, 1);
   auto recorder = Recorder::open(example_options(nowhere), example_info(), WallTime{100s});
@@ -220,7 +220,7 @@ TEST_F(RecorderTest, AChunkIsClosedBeforeItOutgrowsItsSize) {
   EXPECT_EQ(read("run.mcap").message_count(), 500u);
 }
 
-TEST_F(RecorderTest, AFileThatHoldsNothingIsRemoved) {
+TEST_F(RecorderTest, AnEmptyFileIsRemoved) {
   Recorder recorder = open();
   const auto closed = recorder.close();
   ASSERT_TRUE(closed) << closed.error().text;
@@ -356,7 +356,7 @@ RecorderOptions small_files(const std::filesystem::path& folder) {
   return options;
 }
 
-TEST_F(RecorderTest, AFullFileIsClosedAndTheNextGoesOnWithoutAHole) {
+TEST_F(RecorderTest, AFullFileIsClosedAndTheNextContinuesWithoutAGap) {
   Recorder recorder = open(small_files(folder_.path()));
   auto point = example_point(1);
   point.head.lost_before = 0;

@@ -66,7 +66,7 @@ TEST_F(RecorderThreadTest, RecordsWhatItIsHanded) {
   EXPECT_EQ(finish().message_count(), 50u);
 }
 
-TEST_F(RecorderThreadTest, EveryMessageSaysInWhichTurnItWasTaken) {
+TEST_F(RecorderThreadTest, EveryMessageCarriesTheCycleInWhichItWasTaken) {
   start(1 << 20);
   for (const std::uint32_t first : {0u, 10u}) {
     Batch b = batch(first, 2);
@@ -94,7 +94,7 @@ TEST_F(RecorderThreadTest, EveryMessageSaysInWhichTurnItWasTaken) {
               testing::ElementsAre(std::pair{taken_at(0), 18}, std::pair{taken_at(10), 18}));
 }
 
-TEST_F(RecorderThreadTest, WhatThereIsNoRoomForIsCountedWithItsRawBlocks) {
+TEST_F(RecorderThreadTest, MessagesThatDoNotFitAreCountedWithTheirRawBlocks) {
   start(1000);
   thread_->hand_over(batch(0, 100));
   EXPECT_EQ(thread_->dropped(), 500u);
@@ -102,7 +102,7 @@ TEST_F(RecorderThreadTest, WhatThereIsNoRoomForIsCountedWithItsRawBlocks) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "run.mcap")) << "it would hold nothing";
 }
 
-TEST_F(RecorderThreadTest, ABlockTakesTheRoomOfItsBytesOnly) {
+TEST_F(RecorderThreadTest, ABlockTakesTheSpaceOfItsBytesOnly) {
   start(20'000);  // ten RawBlocks
   Batch b;
   for (std::uint32_t i = 0; i < 100; ++i) b.raw.push_back({kEncoder, example_block(i)});
@@ -140,7 +140,7 @@ TEST_F(RecorderThreadTest, RecordsEnvironmentDevicesUnderTheirNames) {
   EXPECT_EQ(blocks, expected);
 }
 
-TEST_F(RecorderThreadTest, EveryEnvironmentDeviceSaysItsOwnLosses) {
+TEST_F(RecorderThreadTest, EveryEnvironmentDeviceReportsItsOwnLosses) {
   start(2'000);
   thread_->hand_over(measured(1, 0, 100));  // too much at once
   EXPECT_EQ(thread_->dropped(), 200u);
@@ -166,7 +166,7 @@ TEST_F(RecorderThreadTest, EveryEnvironmentDeviceSaysItsOwnLosses) {
               UnorderedElementsAre(Pair("air", 0u), Pair("scales", 100u), Pair("scales", 0u)));
 }
 
-TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamSaysHowManyAreMissing) {
+TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamStatesHowManyAreMissing) {
   start(10'000);
   thread_->hand_over(batch(0, 2));
   thread_->hand_over(batch(2, 100));  // too much at once

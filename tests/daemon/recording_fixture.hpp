@@ -1,5 +1,5 @@
 #pragma once
-/// A folder of its own for every test, samples whose content says which number they have, and
+/// A folder of its own for every test, samples whose content contains their number, and
 /// recordings of them.
 
 #include <gtest/gtest.h>

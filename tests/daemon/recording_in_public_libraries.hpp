@@ -26,8 +26,8 @@ class PublicLibraries {
   static constexpr const char* kSkipped =
       "node and npm are not installed: the public MCAP libraries were not asked";
 
-  /// Installs the libraries beside the test program (once, as package-lock.json says), then asks
-  /// them.
+  /// Installs the libraries beside the test program (once, as in package-lock.json), then
+  /// runs the check in them.
   [[nodiscard]] static nlohmann::json verify(const std::string& arguments) {
     const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mcap_npm";
     install(folder);

@@ -69,7 +69,7 @@ TEST(ReferenceConfig, RefusesAPeriodThatHoldsNoWholeNumberOfCounts) {
   EXPECT_THAT(faults_of(kCard + odd), Contains(HasSubstr("must be a whole number")));
 }
 
-TEST(ReferenceConfig, IsPartOfWhatAReadingIs) {
+TEST(ReferenceConfig, IsPartOfTheMachineHash) {
   EXPECT_NE(machine_hash(config_of(kCard)), machine_hash(config_of(kCard + reference(""))));
   EXPECT_EQ(machine_hash(config_of(kCard + reference("tolerance_um = 2\n"))),
             machine_hash(config_of(kCard + reference(""))));
@@ -136,7 +136,7 @@ TEST(ReferenceService, AnAxisIsMissingUntilItsMarksWereFound) {
   EXPECT_FALSE(service.status().at(0).known);
 }
 
-TEST(ReferenceService, ThenItReadsTheMachine) {
+TEST(ReferenceService, AReferencedAxisReadsTheMachinesPosition) {
   const auto config = config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   ASSERT_TRUE(service.start());
@@ -148,7 +148,7 @@ TEST(ReferenceService, ThenItReadsTheMachine) {
   EXPECT_NEAR(service.status().at(0).reading_at_zero, Traverse::kLiveBegan_m, 5e-6);
 }
 
-TEST(ReferenceService, ACardThatBeganAnewHasNoDatumAnyMore) {
+TEST(ReferenceService, ACardThatRestartedHasNoDatum) {
   const auto config = config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   ASSERT_TRUE(service.start());
@@ -199,7 +199,7 @@ SetDatumHere z_at(HostTime now) {
   return {.axes = {"Z"}, .now = now};
 }
 
-TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStand) {
+TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilADatumIsSet) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
 
@@ -218,7 +218,7 @@ TEST(ReferenceService, AxesWithoutMarksAreNotKnownUntilSomebodySaysWhereTheyStan
   EXPECT_EQ(service.unknown(), service.without_zero()) << "no axis of this card has marks";
 }
 
-TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
+TEST(ReferenceService, RefusesToSetTheDatumOfAMovingAxis) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
@@ -236,7 +236,7 @@ TEST(ReferenceService, NobodyCanSayWhereAMovingAxisStands) {
   EXPECT_TRUE(service.set_datum_here(z_at(HostTime{2500ms})));
 }
 
-TEST(ReferenceService, ASilentCardDoesNotSayWhereAxesAre) {
+TEST(ReferenceService, RefusesToSetTheDatumWhileTheCardIsSilent) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
@@ -246,7 +246,7 @@ TEST(ReferenceService, ASilentCardDoesNotSayWhereAxesAre) {
   EXPECT_THAT(silent.error().text, HasSubstr("silent for 0.6 s"));
 }
 
-TEST(ReferenceService, NoZeroChangesUnderACalibration) {
+TEST(ReferenceService, NoDatumChangesDuringACalibration) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
@@ -257,7 +257,7 @@ TEST(ReferenceService, NoZeroChangesUnderACalibration) {
   EXPECT_TRUE(service.set_datum_here(here));
 }
 
-TEST(ReferenceService, NobodyKnowsAZeroExactly) {
+TEST(ReferenceService, RefusesADatumWithoutUncertainty) {
   const auto config = config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
@@ -267,7 +267,7 @@ TEST(ReferenceService, NobodyKnowsAZeroExactly) {
   EXPECT_EQ(service.set_datum_here(here).error().code, ErrorCode::Usage);
 }
 
-TEST(ReferenceService, ZeroHereHoldsForTheFirstSetUpOnly) {
+TEST(ReferenceService, AConfiguredDatumIsValidForTheFirstSetUpOnly) {
   const auto config =
       config_of(kCard.substr(0, kCard.find("axes")) + kHere + kCard.substr(kCard.find("axes")));
   ReferenceService service{config, nullptr};
@@ -310,7 +310,7 @@ TEST(Datum, IsTheSameFromTheRecording) {
   EXPECT_EQ(back->stated, datum.stated);
 }
 
-TEST(Datum, HoldsForWhatIsLaterThanItWasFound) {
+TEST(Datum, AppliesToSamplesLaterThanItWasFound) {
   Datum datum{config_of(kCard + reference(""))};
   datum.found({.axis = 2, .reading_at_zero = 0.3, .from = HostTime{10s}});
   Batch batch;

@@ -69,7 +69,7 @@ ReferenceOptions options() {
   return o;
 }
 
-TEST(ReferenceSession, FindsWhereTheLiveCounterBegan) {
+TEST(ReferenceSession, FindsThePositionAtWhichTheLiveCounterStarted) {
   ReferenceSession session{options()};
   TwoCards cards;
   cards.drive(
@@ -94,7 +94,7 @@ TEST(ReferenceSession, DrivenSlowlyAlignsTheCardsToACount) {
               kPeriod_m / kCountsPerPeriod * static_cast<double>(cards.live_zero), 0.25e-6);
 }
 
-TEST(ReferenceSession, SaysThatTheCardsMustBeAlignedBetter) {
+TEST(ReferenceSession, ReportsThatTheCardsMustBeAlignedBetter) {
   ReferenceOptions o = options();
   o.axes[0].max_half_width_counts = 0.1;
   ReferenceSession session{o};
@@ -105,7 +105,7 @@ TEST(ReferenceSession, SaysThatTheCardsMustBeAlignedBetter) {
   EXPECT_NE(session.axis(0).reason.find("slowly"), std::string::npos) << session.axis(0).reason;
 }
 
-TEST(ReferenceSession, TurningRoundBetweenMarksGivesNoDatumFromThoseBefore) {
+TEST(ReferenceSession, AReversalBetweenMarksDiscardsTheMarksBefore) {
   ReferenceSession session{options()};
   TwoCards cards;
   // Two marks up, back over them, two up again: never four of one direction.

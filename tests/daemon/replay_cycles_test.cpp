@@ -1,5 +1,5 @@
-/// A replay gives the turns of the hub again: what a snapshot lacked live because a stream came
-/// late, it lacks once more, although the recording has it.
+/// A replay repeats the cycles of the hub: a value that a live snapshot lacked because its stream
+/// was late is missing in the replay, too, although the recording contains it.
 
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
@@ -74,7 +74,7 @@ class LiveHub {
   std::vector<Snapshot> snapshots_;
 };
 
-TEST(ReplayTurns, WhatCameTooLateLiveComesTooLateAgain) {
+TEST(ReplayTurns, ASampleThatWasLateLiveIsLateInTheReplay) {
   const TemporaryFolder folder;
   LiveHub hub{folder.path()};
   const HostTime start = example_time(0);

@@ -49,7 +49,7 @@ TEST(StandstillPoints, TakeTheMeansOfAStationaryTracker) {
   for (const auto& p : points.points()) EXPECT_GE(p.tracker_points, 2u);
 }
 
-TEST(StandstillPoints, AreNotThereWhileTheMachineOnlyPauses) {
+TEST(StandstillPoints, AreNotReportedForAShortPause) {
   EXPECT_TRUE(seen(3ms, 900ms, 15s).points().empty());
 }
 
@@ -62,7 +62,7 @@ TEST(StandstillPoints, EndWithTheStream) {
   EXPECT_EQ(points.standing(), 0u);
 }
 
-TEST(StandstillPoints, LeaveOutWhatTheTrackerCallsInvalid) {
+TEST(StandstillPoints, LeaveOutPointsTheTrackerMarksInvalid) {
   StandstillPoints points;
   for (auto t = 0ns; t < 3s; t += 3ms) {
     auto s = at(t, 3s);

@@ -61,7 +61,7 @@ Batch refused() {
   return batch;
 }
 
-TEST(TouchService, AsksForOneTouchAndItsWayAtATime) {
+TEST(TouchService, RequestsOneTouchAndItsApproachPathAtATime) {
   Machine machine;
   TouchService service{machine, true};
 
@@ -81,7 +81,7 @@ TEST(TouchService, AsksForOneTouchAndItsWayAtATime) {
   EXPECT_EQ(service.status().touches[1].position[2], 0.2);
 }
 
-TEST(TouchService, AJobHasABound) {
+TEST(TouchService, AJobHasALimit) {
   const std::vector<TouchRequest> touches(TouchJob::kMostTouches);
   EXPECT_TRUE(touch_job(touches));
   EXPECT_THAT(touch_job(std::vector<TouchRequest>(touches.size() + 1)).error().text,
@@ -91,12 +91,12 @@ TEST(TouchService, AJobHasABound) {
   EXPECT_EQ(touch_job({roundabout}).error().code, ErrorCode::Usage);
 }
 
-TEST(TouchService, EndsAtARefusedTouchWithWhatTheMachineSaid) {
+TEST(TouchService, EndsAtARefusedTouchWithTheMachinesMessage) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
   service.cycle(refused(), 0, "", kFirstCycle);
-  EXPECT_TRUE(service.status().running);  // why was not asked for in that turn
+  EXPECT_TRUE(service.status().running);  // the reason is given in the next cycle
   service.cycle({}, 0, "PtMeas was refused: 1006 Surface not found", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_THAT(service.status().reason, HasSubstr("touch 1 of 2 was refused"));
@@ -104,7 +104,7 @@ TEST(TouchService, EndsAtARefusedTouchWithWhatTheMachineSaid) {
   EXPECT_EQ(machine.asked.size(), 2u);
 }
 
-TEST(TouchService, KeepsTheTouchesUntilTheMachineWentAway) {
+TEST(TouchService, KeepsTheTouchesMadeBeforeTheConnectionWasLost) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
@@ -114,7 +114,7 @@ TEST(TouchService, KeepsTheTouchesUntilTheMachineWentAway) {
   EXPECT_EQ(service.status().touches.size(), 1u);
 }
 
-TEST(TouchService, ATouchThatReportsNothingIsSaidToHaveReportedNothing) {
+TEST(TouchService, ATouchWithoutAResultIsReported) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
@@ -122,7 +122,7 @@ TEST(TouchService, ATouchThatReportsNothingIsSaidToHaveReportedNothing) {
   EXPECT_THAT(service.status().reason, HasSubstr("the machine reported nothing"));
 }
 
-TEST(TouchService, RefusesWhatCannotBe) {
+TEST(TouchService, RefusesImpossibleJobs) {
   Machine machine;
   TouchService none{machine, false};
   EXPECT_THAT(none.start(two_touches()).error().text, HasSubstr("[cmm]"));
@@ -133,7 +133,7 @@ TEST(TouchService, RefusesWhatCannotBe) {
   EXPECT_EQ(service.start(two_touches()).error().code, ErrorCode::Refused);
 }
 
-TEST(TouchService, StopsTheMotionWhenCancelledAndSaysWhereTheTipStands) {
+TEST(TouchService, StopsTheMotionWhenCancelledAndReportsThePositionOfTheTip) {
   Machine machine;
   TouchService service{machine, true};
 
@@ -177,7 +177,7 @@ TEST(TouchService, StopsTheMachineAlsoOnItsWayOut) {
   EXPECT_THAT(service.status().reason, HasSubstr("the tip was reported at"));
 }
 
-TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
+TEST(TouchService, EndsWhenNoClientRequestsTheStatusAnyMore) {
   Machine machine;
   TouchService service{machine, true};
 
@@ -188,9 +188,9 @@ TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
   service.cycle({}, 1, "", kFirstCycle + 2100ms);
   service.cycle({}, 1, "", kFirstCycle + 4000ms);
   EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
-  (void)service.status();  // the daemon's own looking is nobody's
+  (void)service.status();  // the daemon's own call is no client request
   service.cycle({}, 1, "", kFirstCycle + 4200ms);
-  EXPECT_THAT(service.status().reason, HasSubstr("nobody looked on"));
+  EXPECT_THAT(service.status().reason, HasSubstr("no client requested the touches"));
   EXPECT_TRUE(service.status().running);  // until the machine stands
   EXPECT_EQ(machine.stopped, 1);
   service.cycle({}, 1, "", kFirstCycle + 4300ms);
@@ -200,7 +200,7 @@ TEST(TouchService, EndsWhenNobodyLooksOnAnyMore) {
   EXPECT_EQ(machine.asked.size(), 2u);  // the second touch was never begun
 }
 
-TEST(TouchService, CountsTheTimeAnewForEveryStart) {
+TEST(TouchService, RestartsTheStatusTimeOutAtEveryStart) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches()));
@@ -211,7 +211,7 @@ TEST(TouchService, CountsTheTimeAnewForEveryStart) {
   EXPECT_TRUE(service.status().reason.empty()) << service.status().reason;
 }
 
-TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
+TEST(TouchService, RetractsAfterTheLastTouchAndRunsUntilItHas) {
   Machine machine;
   TouchService service{machine, true};
 
@@ -229,7 +229,7 @@ TEST(TouchService, LeavesWhenAllWasTouchedAndRunsUntilItHas) {
   EXPECT_TRUE(service.status().reason.empty());
 }
 
-TEST(TouchService, DoesNotLeaveFromWhereItWasCancelled) {
+TEST(TouchService, DoesNotRetractAfterACancel) {
   Machine machine;
   TouchService service{machine, true};
   ASSERT_TRUE(service.start(two_touches({{.position_m = {0, 0, 0.5}, .touch = false}})));
@@ -239,7 +239,7 @@ TEST(TouchService, DoesNotLeaveFromWhereItWasCancelled) {
   EXPECT_EQ(machine.asked.size(), 2u);
 }
 
-TEST(TouchService, AsksNothingOfAMachineThatIsNotReady) {
+TEST(TouchService, SendsNothingToAMachineThatIsNotReady) {
   Machine machine;
   machine.ready = false;
   TouchService service{machine, true};

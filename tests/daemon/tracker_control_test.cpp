@@ -1,4 +1,4 @@
-/// `abbe tracker`: the daemon, a simulated tracker on its TCP port, and whoever asks over the
+/// `abbe tracker`: the daemon, a simulated tracker on its TCP port, and clients on the
 /// control socket.
 
 #include <gmock/gmock.h>
@@ -225,7 +225,7 @@ TEST_F(TrackerControl, AnOrderWithoutAnAnswerIsReportedAsTimedOut) {
   EXPECT_THAT(order["text"].get<std::string>(), HasSubstr("no answer to"));
 }
 
-TEST_F(TrackerControl, WhatCannotBeIsRefusedBeforeItIsSent) {
+TEST_F(TrackerControl, AnInvalidOrderIsRefusedBeforeItIsSent) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   for (const json& distance : json::parse(R"([0, -1, 2500, null, "far"])")) {
     const auto answer = ask(find(distance));
@@ -257,7 +257,7 @@ TEST_F(TrackerControl, OrdersAreRefusedWhileACalibrationTakesReadings) {
   EXPECT_EQ(carried_out(kHome)["outcome"], "done");
 }
 
-TEST_F(TrackerControl, OneOrderIsCarriedOutAtATimeAndNoRunBeginsMeanwhile) {
+TEST_F(TrackerControl, OneOrderIsCarriedOutAtATimeAndNoRunBeginsDuringIt) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   tracker_->inject(sim::FaultKind::Mute);
   ASSERT_TRUE(ask(kHome));
@@ -288,7 +288,7 @@ TEST_F(TrackerControl, TheConfiguredReflectorIsSetAndTheBeamSentHomeAfterInitial
   EXPECT_EQ(carried_out({{"do", "tracker_reflectors"}})["reflectors"][2]["in_use"], true);
 }
 
-TEST_F(TrackerControl, TheCommandGivesOrdersAndPrintsWhatCameOfThem) {
+TEST_F(TrackerControl, TheCommandSendsOrdersAndPrintsTheirResults) {
   ASSERT_NO_FATAL_FAILURE(start_measuring());
   const auto list = abbe("reflector list");
 

@@ -1,4 +1,4 @@
-/// Orders to a tracker, and what is said of those that nobody reports.
+/// Orders to a tracker, and the result shown for orders without a report.
 
 #include "abbe/service/tracker_service.hpp"
 
@@ -53,7 +53,7 @@ TEST_F(TrackerOrders, AreUnderWayUntilTheyAreReported) {
   EXPECT_EQ(service_.orders().back().report->text, "there");
 }
 
-TEST_F(TrackerOrders, ThatNobodyReportsFailAndALateReportCounts) {
+TEST_F(TrackerOrders, WithoutAReportFailAndALateReportIsStillUsed) {
   ASSERT_TRUE(home());
   service_.cycle(kBegin + 10s);
   EXPECT_NE(service_.running(), nullptr);

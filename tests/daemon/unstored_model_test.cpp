@@ -137,8 +137,8 @@ TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), IsEmpty());
 }
 
-/// Whoever waits for the store's lock waits as for a disk that stalls, at most 5 s of real time.
-TEST_F(UnstoredModel, CancelDiscardsAModelForWhichTheStoreDoesNotAnswer) {
+/// A wait for the store's lock is limited as for a disk that stalls: at most 5 s of real time.
+TEST_F(UnstoredModel, CancelDiscardsAModelWhileTheStoreDoesNotRespond) {
   start();
   const int lock =
       ::open((folder_ / "models" / "lock").c_str(), O_RDONLY | O_CREAT | O_CLOEXEC, 0600);
@@ -179,7 +179,7 @@ TEST_F(UnstoredModel, TheEndOfTheDaemonTriesOnceMoreToStoreTheModel) {
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
 }
 
-TEST_F(UnstoredModel, TheEndOfTheDaemonIsNotHeldUpByWhoHoldsTheStoresLock) {
+TEST_F(UnstoredModel, TheEndOfTheDaemonIsNotDelayedByTheStoresLock) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(end_while_the_lock_is_held(), ::testing::ExitedWithCode(0),
               "is lost: lock the model store .* has held it for 1 s");
@@ -194,7 +194,7 @@ TEST_F(UnstoredModel, AModelWhoseIdentificationHasJustEndedIsStoredAtTheEndOfThe
   EXPECT_THAT(ModelStore::open(folder_ / "models").value().list().value(), SizeIs(1));
 }
 
-TEST_F(UnstoredModel, AModelWhoseRunIsNotRecordedIsActiveAndSaysThatNoReplayCanCheckIt) {
+TEST_F(UnstoredModel, AModelWhoseRunIsNotRecordedIsActiveAndMarkedAsNotReplayable) {
   RecorderThreadOptions options;
   options.recorder.directory = folder_ / "recordings";
   options.recorder.name = "abbe-full";

@@ -42,7 +42,7 @@ TEST(VerificationService, CollectsBetweenBeginAndEnd) {
   EXPECT_DOUBLE_EQ((*service.points(*number))->points()[1].mean.reading_m.x(), 0.2);
 }
 
-TEST(VerificationService, OneThatNobodyEndsStopsAtItsBound) {
+TEST(VerificationService, StopsAtItsLimitIfItIsNotEnded) {
   const Config config = watched();
   VerificationService service(config);
   const auto number = service.begin();
@@ -59,14 +59,14 @@ TEST(VerificationService, OneThatNobodyEndsStopsAtItsBound) {
   }
 
   EXPECT_EQ((*service.points(*number))->points().size(), VerificationService::kMostPoints);
-  EXPECT_THAT(service.stopped(), testing::HasSubstr("10000 standstills are the most"));
+  EXPECT_THAT(service.stopped(), testing::HasSubstr("the limit of 10000 standstills is reached"));
   ASSERT_TRUE(service.end(*number));
   EXPECT_EQ((*service.points(*number))->points().size(), VerificationService::kMostPoints);
   ASSERT_TRUE(service.begin());
   EXPECT_EQ(service.stopped(), "");
 }
 
-TEST(VerificationService, BelongsToWhoeverBeganLast) {
+TEST(VerificationService, BelongsToTheClientThatBeganLast) {
   const Config config = watched();
   VerificationService service(config);
   EXPECT_EQ(service.points(0).error().code, ErrorCode::Refused);
@@ -76,7 +76,7 @@ TEST(VerificationService, BelongsToWhoeverBeganLast) {
   EXPECT_TRUE(service.points(second));
 }
 
-TEST(VerificationService, RefusesReadingsThatSayNothing) {
+TEST(VerificationService, RefusesReadingsWithoutInformation) {
   const Config without;
   EXPECT_EQ(VerificationService(without).begin().error().code, ErrorCode::Refused);
   Config compensated = watched();

@@ -75,7 +75,7 @@ class VerifyCli : public ::testing::Test {
   fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("verify_cli_{}", ::getpid());
 };
 
-TEST_F(VerifyCli, SaysHowMuchAModelLeaves) {
+TEST_F(VerifyCli, ReportsTheResidualErrorOfAModel) {
   const auto ran = abbe("verify model.json --points verification.csv --json");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
@@ -142,7 +142,7 @@ TEST_F(VerifyCli, GivesNoRatioForAGoodModelOnACoarseGrid) {
                              Not(HasSubstr("above 1"))));
 }
 
-TEST_F(VerifyCli, SaysFirstThatABadModelMakesItWorse) {
+TEST_F(VerifyCli, ReportsFirstThatABadModelIncreasesTheError) {
   const auto document = test::synthetic_document(3);
   write("tables.json", to_json(document));
   write("points.csv", points_of_tables(document, -1.0));
@@ -252,7 +252,7 @@ TEST_F(VerifyCli, CollectsThePointsOfTheRunningDaemon) {
   EXPECT_EQ(text_of(folder_ / "out/verification.csv"), text_of(folder_ / "verification.csv"));
 }
 
-TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoAnswer) {
+TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoResult) {
   auto points = tracker_points(study::table3_machine());
   points.resize(3);
   const auto server = daemon_with(folder_ / "control.sock", points);
@@ -262,11 +262,11 @@ TEST_F(VerifyCli, KeepsCollectedPointsThatAllowNoAnswer) {
             2);  // nowhere to keep them
 }
 
-TEST_F(VerifyCli, SaysThatTheDaemonWentAwayAndReportsWhatThereIs) {
+TEST_F(VerifyCli, ReportsThatTheDaemonStoppedAndEvaluatesThePointsCollected) {
   const auto points = tracker_points(study::table3_machine());
   const auto live = daemon_with(folder_ / "live.sock", points);
 
-  // Gives all it has, then knows nothing of a collection, as a daemon that was started anew.
+  // Sends all its points, then reports that no collection runs, as a daemon that restarted.
   const auto server = std::move(*ControlServer::open(
       folder_ / "control.sock",
       [&](const nlohmann::json& request, const ControlPeer&) -> nlohmann::json {
@@ -314,7 +314,7 @@ TEST_F(VerifyCli, NamesFileAndLineOfBadPoints) {
                              HasSubstr("verification.csv:3:")));
 }
 
-TEST_F(VerifyCli, SaysWhenTheDataAllowNoAnswer) {
+TEST_F(VerifyCli, ReportsThatTheDataAllowNoResult) {
   auto points = tracker_points(study::table3_machine());
   points.resize(3);
   write("verification.csv", to_verification_csv(points));
@@ -327,7 +327,7 @@ TEST_F(VerifyCli, SaysWhenTheDataAllowNoAnswer) {
   EXPECT_THAT(ran.err, HasSubstr("left-handed"));
 }
 
-TEST_F(VerifyCli, RefusesNonsenseOnTheCommandLine) {
+TEST_F(VerifyCli, RefusesInvalidCommandLines) {
   EXPECT_EQ(abbe("verify model.json").exit, 2);
   EXPECT_EQ(abbe("verify model.json --points verification.csv --grid-mm 1,2").exit, 2);
   EXPECT_EQ(abbe("verify model.json --points verification.csv --frame best").exit, 2);

@@ -1,4 +1,4 @@
-/// Another device answers on the configured port: said by name, and nothing of it becomes a sample.
+/// Another device answers on the configured port: it is reported by name and gives no samples.
 
 #include <gmock/gmock.h>
 
@@ -25,7 +25,7 @@ struct Expecting {
 
 class WrongDevice : public testing::TestWithParam<Expecting> {};
 
-TEST_P(WrongDevice, IsSaidByNameAndGivesNoSamples) {
+TEST_P(WrongDevice, IsReportedByNameAndGivesNoSamples) {
   const drivers::MonotonicTime time;
   auto thermometer = sim::ModbusServer::open({}, time.now()).value();
   const std::string port = std::to_string(thermometer.port());

@@ -1,7 +1,7 @@
 #pragma once
 /// Arrivals of a laser tracker as measured: one packet every 332 ms (5-95 %: 324 to 344 ms), points
-/// at 500 Hz, so 166 a packet. A packet is delayed by a constant nobody knows, and by more: mostly
-/// a few ms, now and then tens of ms.
+/// at 500 Hz, so 166 a packet. A packet is delayed by an unknown constant plus a varying part:
+/// mostly a few ms, sometimes tens of ms.
 
 #include <chrono>
 #include <cmath>

@@ -80,7 +80,7 @@ void wait_for_stamps(UdpLine& line) {
   FAIL() << "the kernel stamps nothing";
 }
 
-TEST(UdpCanBus, BelievesTheStampOfEveryDatagramThatWaited) {
+TEST(UdpCanBus, UsesTheStampOfEveryQueuedDatagram) {
   UdpLine line;
   ASSERT_NO_FATAL_FAILURE(wait_for_stamps(line));
   const auto widened = line.bus.counters().time_widened;
@@ -131,7 +131,7 @@ TEST(UdpCanBus, CountsGarbageAndLostDatagrams) {
   EXPECT_EQ(line.bus.counters().lost, 3u);
 }
 
-TEST(UdpCanBus, SaysWhetherAllThatCameWasRead) {
+TEST(UdpCanBus, ReportsWhetherTheQueueIsEmpty) {
   UdpLine line;
   line.peer.send(std::array{can::standard_frame(0x182, {1})});  // not asked for
 
@@ -148,7 +148,7 @@ TEST(UdpCanBus, SaysWhetherAllThatCameWasRead) {
   EXPECT_TRUE(rest->all);
 }
 
-TEST(UdpCanBus, ARoomThatIsFullIsNotTheEnd) {
+TEST(UdpCanBus, AFullOutputBufferIsNotTheEnd) {
   UdpLine line;
   line.peer.send(
       std::vector<can::CanFrame>(line.frames.size() + 1, can::standard_frame(0x181, {1})));
@@ -158,9 +158,9 @@ TEST(UdpCanBus, ARoomThatIsFullIsNotTheEnd) {
   EXPECT_FALSE(full->all);
 }
 
-TEST(UdpCanBus, SaysThatANameHasNoAddress) {
+TEST(UdpCanBus, ReportsThatANameHasNoAddress) {
   MonotonicTime time;
-  const std::string no_name(300, 'x');  // longer than any name may be: nobody is asked
+  const std::string no_name(300, 'x');  // longer than any name may be: no name server is asked
   UdpCanBus bus{{.peer_address = no_name, .peer_port = 1}, time};
   const auto refused = bus.open(kIds);
   ASSERT_FALSE(refused);
@@ -211,7 +211,7 @@ int socket_to(const drivers::UdpCanBus& bus) {
   return fd;
 }
 
-TEST(UdpCanBus, HearsNobodyButItsPeer) {
+TEST(UdpCanBus, ReceivesFromItsPeerOnly) {
   UdpLine line;
   const int stranger = socket_to(line.bus);
   EXPECT_GT(::send(stranger, "no", 2, 0), 0);
@@ -226,7 +226,7 @@ TEST(UdpCanBus, HearsNobodyButItsPeer) {
   EXPECT_EQ(line.bus.foreign_sender(), "127.0.0.1:" + std::to_string(ntohs(from.sin_port)));
 }
 
-TEST(UdpCanBus, TakesNoRoomFromItsPeerForAFloodOfStrangers) {
+TEST(UdpCanBus, DatagramsOfOtherSendersTakeNoSpaceFromThoseOfThePeer) {
   UdpLine line;
   const int stranger = socket_to(line.bus);
   const std::vector<char> big(8192);
@@ -239,7 +239,7 @@ TEST(UdpCanBus, TakesNoRoomFromItsPeerForAFloodOfStrangers) {
   EXPECT_EQ(line.bus.counters().lost, 0u);
 }
 
-TEST(UdpCanBus, SaysWhichPortIsTaken) {
+TEST(UdpCanBus, NamesThePortThatIsInUse) {
   MonotonicTime time;
   EncoderPeer holder{std::span<const can::EncoderIdentity>{}};
   UdpCanBus bus{{.local_port = holder.port(), .peer_port = 9}, time};
@@ -291,7 +291,7 @@ TEST(LinuxFrame, FiltersMatchExactlyTheDataFramesAskedFor) {
   EXPECT_FALSE(passes(0x181 | CAN_EFF_FLAG));
 }
 
-TEST(SocketCanBus, SaysWhatTheSystemRefused) {
+TEST(SocketCanBus, ReportsWhatTheSystemRefused) {
   MonotonicTime time;
   SocketCanBus bus{{.interface = "nocan99"}, time};
   const auto opened = bus.open(kIds);

@@ -41,7 +41,7 @@ class EncoderConformancePeer {
     options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
     options.receiver.sync_period = 4ms;
     options.sample_capacity = 64;
-    options.raw_capacity_blocks = 64;  // nobody reads them here: full all the time
+    options.raw_capacity_blocks = 64;  // not read here: always full
     auto bus = std::make_unique<drivers::UdpCanBus>(
         drivers::UdpCanOptions{.peer_port = peer_.port(), .speed = 0.0}, time_);
     device_ = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time_));
@@ -79,8 +79,8 @@ class EncoderConformancePeer {
   /// The cable, not the peer: what the device sends gets lost.
   void unplug() {}
   void plug_in() { peer_.drain(); }
-  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going
-  /// off and on.
+  /// A cycle gives one sample whatever the nodes send; only a bus that goes off and on gives many
+  /// at once.
   void flood() {
     std::vector<can::CanFrame> frames;
     for (int i = 0; i < 200; ++i) {

@@ -75,7 +75,7 @@ TEST_F(EncoderDeviceOnUdp, GoesOnWithTheOtherAxisWhenOneIsMute) {
   EXPECT_EQ(samples.back().missing_mask, 0);
 }
 
-TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatBootedAnew) {
+TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatRebooted) {
   begin_streaming();
   peer.restart();
   EXPECT_NE(peer.node(0).objects.tpdo(1).transmission_type, 1);
@@ -87,7 +87,7 @@ TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatBootedAnew) {
   EXPECT_EQ(peer.node(0).objects.tpdo(1).transmission_type, 1);
 }
 
-TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatStandsIdle) {
+TEST_F(EncoderDeviceOnUdp, ReconfiguresANodeThatIsNotOperational) {
   begin_streaming();
   peer.node(0).state = can::NodeState::PreOperational;
   ASSERT_TRUE(cycles_until([&] { return peer.node(0).state == can::NodeState::Operational; }));
@@ -117,7 +117,7 @@ TEST_F(EncoderDeviceOnUdp, ReportsAMuteNodeOnceNotEveryRetry) {
   EXPECT_EQ(device->status().faults, 1u);
 }
 
-TEST_F(EncoderDeviceOnUdp, SaysBusOffAndStopsTheSync) {
+TEST_F(EncoderDeviceOnUdp, ReportsBusOffAndStopsTheSync) {
   begin_streaming();
   const std::array off{can::encode_error_frame(
       {.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)})};
@@ -158,7 +158,7 @@ TEST_F(EncoderDeviceOnUdp, ListensAgainAfterALongBusOff) {
   ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
 }
 
-TEST_F(EncoderDeviceOnUdp, SendsNothingWhereAMasterCameWhileTheBusWasOff) {
+TEST_F(EncoderDeviceOnUdp, SendsNothingIfAnotherSyncProducerStartedDuringBusOff) {
   begin_streaming();
   bus_is_off_for(2100);
   const auto before = peer.nmt().size();
@@ -172,7 +172,7 @@ TEST_F(EncoderDeviceOnUdp, SendsNothingWhereAMasterCameWhileTheBusWasOff) {
   EXPECT_EQ(peer.nmt().size(), before);
 }
 
-TEST_F(EncoderDeviceOnUdp, QuietOfABusThatIsOffIsNotListenedTo) {
+TEST_F(EncoderDeviceOnUdp, SilenceDuringBusOffDoesNotCountAsAQuietBus) {
   turns(100);
   ASSERT_EQ(device->status().state, "listening");
   peer.talk_to(bus->local_port());
@@ -197,7 +197,7 @@ TEST_F(EncoderDeviceOnUdp, ConfiguresNodesThatLostPowerWhileTheBusWasOffAndClose
   ASSERT_TRUE(cycles_until([&] { return !samples.empty() && samples.back().missing_mask == 0; }));
 }
 
-TEST_F(EncoderDeviceOnUdp, AThreadThatWasHeldUpReconfiguresNobody) {
+TEST_F(EncoderDeviceOnUdp, ADelayedThreadReconfiguresNoNode) {
   begin_streaming();
   turns(200);
   const auto nmt = peer.nmt().size();
@@ -318,7 +318,7 @@ TEST_F(EncoderDeviceOnUdp, RefusesAnEncoderOfAnotherStepOnceWithBothValues) {
   EXPECT_EQ(device->status().state, "degraded");
 }
 
-TEST_F(EncoderDeviceOnUdp, NamesATunnelThatHoldsFramesBack) {
+TEST_F(EncoderDeviceOnUdp, ReportsATunnelThatHoldsFramesBack) {
   begin_streaming();
   std::vector<can::CanFrame> held;
   for (int i = 0; i < 3000; ++i) {
@@ -339,7 +339,7 @@ TEST_F(EncoderDeviceOnUdp, NamesATunnelThatHoldsFramesBack) {
               testing::AllOf(testing::HasSubstr("bundles"), testing::HasSubstr("cannelloni")));
 }
 
-TEST_F(EncoderDeviceOnUdp, NamesAnswersThatComeAfterTheirCycle) {
+TEST_F(EncoderDeviceOnUdp, ReportsAnswersThatComeAfterTheirCycle) {
   begin_streaming();
   for (int i = 0; i < 3000; ++i) {
     peer.serve(time.now());
@@ -356,7 +356,7 @@ TEST_F(EncoderDeviceOnUdp, NamesAnswersThatComeAfterTheirCycle) {
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("after the end of their cycle"));
 }
 
-TEST_F(EncoderDeviceOnUdp, ReportsStrangersOnItsPort) {
+TEST_F(EncoderDeviceOnUdp, ReportsOtherSendersOnItsPort) {
   begin_streaming();
   const int stranger = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in to{};
@@ -398,7 +398,7 @@ TEST_F(EncoderDeviceOnUdp, CountsPositionsThatAreTooShortAsFaults) {
   EXPECT_THAT(device->status().last_fault, testing::HasSubstr("too short"));
 }
 
-TEST_F(EncoderDeviceOnUdp, TellsOfANodeThatAnswersTwiceInACycle) {
+TEST_F(EncoderDeviceOnUdp, ReportsANodeThatAnswersTwiceInACycle) {
   begin_streaming();
   const auto before = device->status().faults;
   peer.send(std::array{can::encode_position(0x182, can::PositionType::Signed32, 5)});
@@ -420,7 +420,7 @@ TEST_F(EncoderDeviceOnUdp, RefusesASyncThatOnlyTheKernelCouldSend) {
   EXPECT_THAT(refused.error().text, testing::HasSubstr("SocketCAN"));
 }
 
-TEST_F(EncoderDeviceOnUdp, SurvivesAFloodOfPositions) {
+TEST_F(EncoderDeviceOnUdp, KeepsStreamingDuringAFloodOfPositions) {
   begin_streaming();
   const std::vector<can::CanFrame> flood(
       4000, can::encode_position(0x181, can::PositionType::Signed32, 5));
@@ -480,12 +480,12 @@ TEST(EncoderDevice, RefusesABadConfiguration) {
   EXPECT_FALSE(EncoderDevice::create({}, std::make_unique<UdpCanBus>(UdpCanOptions{}, time), time));
 }
 
-TEST(EncoderDevice, SaysThatNobodyListensAndGoesOnTrying) {
+TEST(EncoderDevice, ReportsThatThePeerDoesNotListenAndKeepsTrying) {
   SteppedTime time;
   std::uint16_t port = 0;
   {
     port = EncoderPeer{std::span<const EncoderIdentity>{}}.port();
-  }  // closed again: nobody is there
+  }  // closed again: no peer listens
   EncoderDeviceOptions options;
   options.receiver.axes = {{.name = "X", .node = 1}};
   auto device = EncoderDevice::create(

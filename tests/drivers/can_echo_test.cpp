@@ -88,7 +88,7 @@ TEST_F(EncoderDeviceWithEcho, DatesASampleByTheEcho) {
   EXPECT_EQ(device->status().faults, 0u);
 }
 
-TEST_F(EncoderDeviceWithEcho, MarksWhatDoesNotLeaveAndKeepsTheNextBack) {
+TEST_F(EncoderDeviceWithEcho, MarksASyncThatIsNotSentAndDelaysTheNext) {
   begin_streaming();
   echoing->stop();
   turns(8);

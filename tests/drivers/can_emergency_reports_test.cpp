@@ -50,7 +50,7 @@ TEST(EmergencyReports, ReportAnotherCodeWithinTheSecondAfterIt) {
   EXPECT_FALSE(r.reports.take_fault(kStart + 1h));
 }
 
-TEST(EmergencyReports, ForgetTheEmergencyOfAnAxisThatIsWellAgain) {
+TEST(EmergencyReports, ClearTheEmergencyOfARecoveredAxis) {
   Reports r;
   r.emcy(0x5000, kStart);
   (void)r.reports.take_fault(kStart);

@@ -31,7 +31,7 @@ TEST(ForeignSync, ListensAgainEachTimeTheBusIsOpened) {
   EXPECT_TRUE(foreign.may_send(kStart + 1h + ForeignSync::kListenFor));
 }
 
-TEST(ForeignSync, ListensShorterAfterAShortBreakOfABusThatWasOurs) {
+TEST(ForeignSync, ListensShorterAfterAShortBreakIfItProducedTheSync) {
   ForeignSync foreign;
   foreign.opened(kStart);
   EXPECT_TRUE(foreign.may_send(kStart + 2s));
@@ -42,7 +42,7 @@ TEST(ForeignSync, ListensShorterAfterAShortBreakOfABusThatWasOurs) {
   EXPECT_TRUE(foreign.may_send(kStart + 4s + ForeignSync::kListenFor));
 }
 
-TEST(ForeignSync, ListensForThreePeriodsOfAProducerThatWasHereOnce) {
+TEST(ForeignSync, ListensForThreePeriodsOfAProducerSeenBefore) {
   ForeignSync foreign;
   foreign.opened(kStart);
   foreign.heard(kStart);
@@ -54,7 +54,7 @@ TEST(ForeignSync, ListensForThreePeriodsOfAProducerThatWasHereOnce) {
   EXPECT_TRUE(foreign.may_send(ours + 1s + 900ms));
 }
 
-TEST(ForeignSync, QuietOfAClosedBusIsNone) {
+TEST(ForeignSync, SilenceOfAClosedBusDoesNotCountAsQuiet) {
   ForeignSync foreign;
   foreign.opened(kStart);
   foreign.heard(kStart + 1s);
@@ -66,7 +66,7 @@ TEST(ForeignSync, QuietOfAClosedBusIsNone) {
   EXPECT_EQ(foreign.period(), 10ms) << "not from before";
 }
 
-TEST(ForeignSync, HearsAProducerOfOneSyncASecond) {
+TEST(ForeignSync, DetectsAProducerOfOneSyncASecond) {
   ForeignSync foreign;
   foreign.opened(kStart);
   foreign.heard(kStart + 1s);
@@ -85,7 +85,7 @@ TEST(ForeignSync, MeasuresThePeriodAlthoughSyncsAreMissing) {
   EXPECT_EQ(foreign.period(), 4ms);
 }
 
-/// The nodes, and another producer of SYNCs that the test lets speak.
+/// The nodes, and another SYNC producer, controlled by the test.
 class BesideAnotherProducer : public EncoderDeviceOnUdp {
  protected:
   void SetUp() override {
@@ -115,7 +115,7 @@ class BesideAnotherProducer : public EncoderDeviceOnUdp {
   }
 };
 
-TEST_F(BesideAnotherProducer, SendsNothingWhereItHearsASyncBeforeItsFirst) {
+TEST_F(BesideAnotherProducer, SendsNothingIfItReceivesASyncBeforeItsFirst) {
   cycles_with_foreign_syncs(5000);
   EXPECT_EQ(peer.frames_received(), 0u);
   EXPECT_EQ(device->status().state, "foreign SYNC");
@@ -125,7 +125,7 @@ TEST_F(BesideAnotherProducer, SendsNothingWhereItHearsASyncBeforeItsFirst) {
                                                  HasSubstr("10.000 ms"), HasSubstr("external")));
 }
 
-TEST_F(BesideAnotherProducer, StopsWhenItHearsASyncLater) {
+TEST_F(BesideAnotherProducer, StopsWhenItReceivesASyncLater) {
   begin_streaming();
   cycles_with_foreign_syncs(100);
   peer.serve(time.now());
@@ -135,7 +135,7 @@ TEST_F(BesideAnotherProducer, StopsWhenItHearsASyncLater) {
   EXPECT_EQ(device->status().state, "foreign SYNC");
 }
 
-TEST_F(BesideAnotherProducer, StreamsAgainOnceTheOtherIsGoneForGood) {
+TEST_F(BesideAnotherProducer, StreamsAgainOnceTheOtherProducerHasStopped) {
   cycles_with_foreign_syncs(100);
   turns(1000);
   time.advance(ForeignSync::kQuietFor);
@@ -151,7 +151,7 @@ TEST_F(BesideAnotherProducer, SendsNothingAfterAnInterfaceWasDownForLong) {
   EXPECT_EQ(device->status().state, "foreign SYNC");
 }
 
-TEST_F(BesideAnotherProducer, HearsAProducerThatWasStartedWhileTheInterfaceWasDown) {
+TEST_F(BesideAnotherProducer, DetectsAProducerThatStartedWhileTheInterfaceWasDown) {
   begin_streaming();
   peer.serve(time.now());
   const auto sent = peer.frames_received();

@@ -14,7 +14,7 @@ namespace {
 using namespace encoder_line;
 using protocol::SampleFlag;
 
-TEST(EncoderReceiver, AnAnswerStampedBeforeTheSyncIsNotItsAnswer) {
+TEST(EncoderReceiver, AnAnswerStampedBeforeTheSyncIsNotAssignedToIt) {
   Line line;
   line.sync(kStart);
   line.frame(position(1, 7), kStart - 100us);
@@ -23,7 +23,7 @@ TEST(EncoderReceiver, AnAnswerStampedBeforeTheSyncIsNotItsAnswer) {
   EXPECT_EQ(line.receiver.counters().late_frames, 1u);
 }
 
-TEST(EncoderReceiver, WhoAnswersTwiceInACycleIsNotBelieved) {
+TEST(EncoderReceiver, AnAxisThatAnswersTwiceInACycleIsInvalid) {
   Line line;
   line.sync(kStart);
   line.frame(position(1, 10), kStart + 10us);
@@ -36,7 +36,7 @@ TEST(EncoderReceiver, WhoAnswersTwiceInACycleIsNotBelieved) {
   EXPECT_EQ(line.receiver.counters().duplicate_frames, 1u);
 }
 
-TEST(EncoderReceiver, ALateAnswerDoesNotPassForThatOfTheNextCycle) {
+TEST(EncoderReceiver, ALateAnswerIsNotAssignedToTheNextCycle) {
   Line line;
   line.cycle(kStart, 1000);
   line.sync(kStart + 1ms);
@@ -58,7 +58,7 @@ TEST(EncoderReceiver, ALateAnswerDoesNotPassForThatOfTheNextCycle) {
   EXPECT_EQ(line.samples.back().count[0], 4000);
 }
 
-TEST(EncoderReceiver, ASampleThatHasLeftIsTakenBackByASecondAnswer) {
+TEST(EncoderReceiver, APublishedSampleIsRetractedByASecondAnswer) {
   Line line;
   line.cycle(kStart, 1000);
   line.cycle(kStart + 3ms, 2000);
@@ -90,7 +90,7 @@ TEST(EncoderReceiver, AnswersBeforeTheFirstSyncAreNoSamples) {
   EXPECT_EQ(line.samples[0].missing_mask, 0);
 }
 
-TEST(EncoderReceiver, AnswersToASyncNobodyHeardTakeNothingBack) {
+TEST(EncoderReceiver, AnswersToASyncThatWasNotReceivedRetractNothing) {
   Line line;
   line.cycle(kStart, 1000);
   for (const can::NodeId node : kNodes) line.frame(position(node, 2000), kStart + 1200us);
@@ -101,7 +101,7 @@ TEST(EncoderReceiver, AnswersToASyncNobodyHeardTakeNothingBack) {
   EXPECT_EQ(line.samples[1].head.lost_before, 1u);
 }
 
-TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsDoubtful) {
+TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsAmbiguous) {
   Line line;
   line.cycle(kStart, 1000);
   line.sync(kStart + 1ms);
@@ -113,7 +113,7 @@ TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsDoubtful) {
   EXPECT_EQ(line.receiver.counters().missing_answers, 6u);
 }
 
-TEST(EncoderReceiver, AnAnswerThatIsKnownToBeLateLeavesNoDoubt) {
+TEST(EncoderReceiver, AnAnswerKnownToBeLateLeavesNoAmbiguity) {
   for (const bool before_the_sync : {true, false}) {
     Line line;
     line.cycle(kStart, 1000);
@@ -131,7 +131,7 @@ TEST(EncoderReceiver, AnAnswerThatIsKnownToBeLateLeavesNoDoubt) {
   }
 }
 
-TEST(EncoderReceiver, APauseOrABootUpLeavesNothingUnderWay) {
+TEST(EncoderReceiver, AfterAPauseOrABootUpNoReplyIsOutstanding) {
   for (const bool paused : {true, false}) {
     Line line;
     line.cycle(kStart, 1000);
@@ -153,7 +153,7 @@ struct Answer {
   std::int64_t count;
 };
 
-TEST(EncoderReceiver, JitterWithinThePeriodCastsNoDoubt) {
+TEST(EncoderReceiver, JitterWithinThePeriodCausesNoAmbiguity) {
   Line line;
   std::mt19937 random{7};
   std::uniform_int_distribution<int> sync_us{-80, 80}, answer_us{20, 690};
@@ -172,7 +172,7 @@ TEST(EncoderReceiver, JitterWithinThePeriodCastsNoDoubt) {
   for (const auto& sample : line.samples) ASSERT_EQ(sample.head.flags, 0u);
 }
 
-TEST(EncoderReceiver, BelievesNoOldAnswerOfANodeThatIsLateNowAndThen) {
+TEST(EncoderReceiver, DiscardsOldAnswersOfANodeThatIsSometimesLate) {
   constexpr int kCycles = 20'000;
   Line line;
   std::mt19937 random{11};

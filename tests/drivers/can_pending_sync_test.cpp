@@ -75,7 +75,7 @@ class SyncUnderWayTest : public testing::Test {
   std::vector<ReceivedFrame> out;
 };
 
-TEST_F(SyncUnderWayTest, LeavesWhenItsEchoSays) {
+TEST_F(SyncUnderWayTest, IsSentAtTheTimeOfItsEcho) {
   under_way.sent(kStart);
   EXPECT_EQ(under_way.deadline(), kStart + kAnswerWithin);
   EXPECT_TRUE(under_way.waits(kStart + 1ms));
@@ -94,7 +94,7 @@ TEST_F(SyncUnderWayTest, WithoutAnEchoCountsFromSendingWhenTheAnswersShouldHaveC
   EXPECT_THAT(settle({}, kStart + 2ms), IsEmpty()) << "once";
 }
 
-TEST_F(SyncUnderWayTest, KeepsOthersBackUntilItHasLeftAndItsAnswersHaveCome) {
+TEST_F(SyncUnderWayTest, DelaysFurtherSyncsUntilItIsSentAndAnswered) {
   under_way.sent(kStart);
   ASSERT_THAT(settle({}, kStart + 1ms), ElementsAre(sync(0us)));
   EXPECT_TRUE(under_way.waits(kStart + 50ms));
@@ -103,13 +103,13 @@ TEST_F(SyncUnderWayTest, KeepsOthersBackUntilItHasLeftAndItsAnswersHaveCome) {
   EXPECT_FALSE(under_way.waits(kStart + 50ms + kSyncPeriod));
 }
 
-TEST_F(SyncUnderWayTest, IsGivenUpInTheEnd) {
+TEST_F(SyncUnderWayTest, TimesOutEventually) {
   under_way.sent(kStart);
   EXPECT_TRUE(under_way.waits(kStart + PendingSync::kPatience - 1ns));
   EXPECT_FALSE(under_way.waits(kStart + PendingSync::kPatience));
 }
 
-TEST_F(SyncUnderWayTest, CountsFromSendingWhereItsAnswerIsToldFirst) {
+TEST_F(SyncUnderWayTest, CountsFromSendingIfItsAnswerIsReceivedBeforeItsEcho) {
   under_way.sent(kStart);
   EXPECT_THAT(settle({answer(kStart + 200us)}, kStart + 205us),
               ElementsAre(sync(0us), frame(200us)));
@@ -123,7 +123,7 @@ TEST_F(SyncUnderWayTest, CountsFromSendingWhereItsAnswerIsToldFirst) {
       << "the echo of the one before is none of this one";
 }
 
-TEST_F(SyncUnderWayTest, LateAnswersToTheOneBeforeAndOtherFramesSayNothingOfIt) {
+TEST_F(SyncUnderWayTest, LateAnswersToThePreviousSyncAndOtherFramesAreIgnored) {
   (void)settle({}, kStart);
   under_way.sent(kStart);
   (void)settle({echo(kStart)}, kStart);  // node 1 does not answer this one in time
@@ -134,7 +134,7 @@ TEST_F(SyncUnderWayTest, LateAnswersToTheOneBeforeAndOtherFramesSayNothingOfIt) 
               ElementsAre(frame(1010us), frame(1020us), sync(1060us), frame(1200us)));
 }
 
-TEST_F(SyncUnderWayTest, CountsFromSendingWhereTheStampOfItsEchoIsNotBelieved) {
+TEST_F(SyncUnderWayTest, CountsFromSendingIfTheStampOfItsEchoIsRejected) {
   under_way.sent(kStart);
   auto late = echo(kStart + 5ms);
   late.time_widened = true;
@@ -143,7 +143,7 @@ TEST_F(SyncUnderWayTest, CountsFromSendingWhereTheStampOfItsEchoIsNotBelieved) {
   EXPECT_FALSE(under_way.waits(kStart + 5ms));
 }
 
-TEST_F(SyncUnderWayTest, AnEchoOfNoneIsNone) {
+TEST_F(SyncUnderWayTest, AnEchoWithoutAPendingSyncIsIgnored) {
   EXPECT_THAT(settle({echo(kStart), heartbeat(kStart + 1us)}, kStart + 1ms),
               ElementsAre(frame(1us)));
   under_way.sent(kStart);

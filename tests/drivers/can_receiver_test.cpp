@@ -102,7 +102,7 @@ TEST(EncoderReceiver, AFrameAfterTheDeadlineClosesTheCycleAndIsNotUsed) {
   EXPECT_EQ(line.receiver.counters().late_frames, 1u);
 }
 
-TEST(EncoderReceiver, AnAxisNeverHeardHasNoPosition) {
+TEST(EncoderReceiver, AnAxisThatNeverAnsweredHasNoPosition) {
   Line line;
   line.sync(kStart);
   line.frame(position(1, 7), kStart + 100us);
@@ -164,7 +164,7 @@ TEST(EncoderReceiver, ReadsSixtyFourBitPositions) {
   EXPECT_EQ(line.samples.at(0).count[2], -10'000'000'000);
 }
 
-TEST(EncoderReceiver, ReadsTheStepAlongFromTheBus) {
+TEST(EncoderReceiver, ReadsTheStepFromTheBus) {
   Line line{three_axes(std::nullopt)};
   for (const can::NodeId node : kNodes) {
     EXPECT_FALSE(line.receiver.scale(node - 1u));
@@ -186,13 +186,13 @@ TEST(EncoderReceiver, RefusesAStepOfZeroAndKeepsTheAxisMissing) {
   EXPECT_EQ(line.receiver.counters().scale_refusals, 3u);
 }
 
-TEST(EncoderReceiver, TheConfiguredScaleWinsOverTheEncoders) {
+TEST(EncoderReceiver, TheConfiguredScaleOverridesTheEncoders) {
   Line line;
   line.frame(can::standard_frame(0x581, {0x43, 0x05, 0x60, 0x01, 25, 0, 0, 0}), kStart);
   EXPECT_DOUBLE_EQ(*line.receiver.scale(0), 1e-8);
 }
 
-TEST(EncoderReceiver, AnEmergencyStaysUntilTheNodeTakesItBack) {
+TEST(EncoderReceiver, AnEmergencyStaysUntilTheNodeClearsIt) {
   Line line;
   line.frame(can::encode_emergency({.node = 2, .code = 0x5000, .error_register = 1}), kStart);
   line.cycle(kStart, 1);
@@ -205,7 +205,7 @@ TEST(EncoderReceiver, AnEmergencyStaysUntilTheNodeTakesItBack) {
   EXPECT_EQ(line.receiver.counters().emergencies, 1u);
 }
 
-TEST(EncoderReceiver, MissesAHeartbeatThatStopped) {
+TEST(EncoderReceiver, ReportsAHeartbeatThatStopped) {
   Line line;
   line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart);
   line.cycle(kStart + 350ms, 1);
@@ -260,7 +260,7 @@ TEST(EncoderReceiver, ReadsWhereAFixedMappingHasThePosition) {
   EXPECT_EQ(line.samples[0].count[2], 1000);
 }
 
-TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeSays) {
+TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeStates) {
   Line line;
   line.frame(can::standard_frame(0x581, {0x4B, 0x17, 0x10, 0, 0xE8, 3, 0, 0}), kStart);  // 1000 ms
   line.frame(can::encode_heartbeat(1, can::NodeState::Operational), kStart);
@@ -270,7 +270,7 @@ TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeSays) {
   EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
 }
 
-TEST(EncoderReceiver, TurnsARotaryEncoderWithoutScalingAtItsOwnRevolutions) {
+TEST(EncoderReceiver, UnwrapsARotaryEncoderWithoutScalingAtItsPhysicalRevolution) {
   EncoderReceiverOptions options;
   options.axes = {{.name = "C",
                    .node = 1,
@@ -332,7 +332,7 @@ TEST(EncoderReceiver, ABootUpMarksTheNextSampleRestarted) {
   EXPECT_FALSE(has(line.samples.at(2).head.flags, SampleFlag::Restarted));
 }
 
-TEST(EncoderReceiver, ALossEndsTheOpenCycleAndTheNextSampleSaysSo) {
+TEST(EncoderReceiver, ALossEndsTheOpenCycleAndMarksTheNextSample) {
   Line line;
   line.cycle(kStart, 1000);
   line.sync(kStart + 1ms);
@@ -350,7 +350,7 @@ TEST(EncoderReceiver, ALossEndsTheOpenCycleAndTheNextSampleSaysSo) {
   EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::GapBefore));
 }
 
-TEST(EncoderReceiver, TakesTheLossARawBlockTellsOf) {
+TEST(EncoderReceiver, CountsTheLossReportedByARawBlock) {
   EncoderReceiver receiver{three_axes()};
   std::vector<AxisSample> samples;
   const auto keep = [&](const AxisSample& s) { samples.push_back(s); };
@@ -372,7 +372,7 @@ TEST(EncoderReceiver, TakesTheLossARawBlockTellsOf) {
   EXPECT_EQ(samples[0].missing_mask, 0b111);
 }
 
-TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerNobodyKnowsTheTimeOf) {
+TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerOfUnknownTime) {
   Line line;
   line.sync(kStart);
   line.frame(position(kNodes[0], 1), kStart + 100us);
@@ -389,7 +389,7 @@ TEST(EncoderReceiver, FlagsAndWidensACycleWithAnAnswerNobodyKnowsTheTimeOf) {
   EXPECT_FALSE(has(line.samples[1].head.flags, SampleFlag::TimeWidened));
 }
 
-TEST(EncoderReceiver, FlagsAndWidensACycleWhoseSyncWasHeardAtATimeNobodyKnows) {
+TEST(EncoderReceiver, FlagsAndWidensACycleWithASyncOfUnknownTime) {
   Line line;
   line.keep(line.receiver.on_sent(can::encode_sync(), kStart, true));
   for (const can::NodeId node : kNodes) line.frame(position(node, 1), kStart + 100us);
@@ -418,7 +418,7 @@ TEST(EncoderReceiver, CountsTpdosTooShortForAPosition) {
   EXPECT_EQ(line.samples.at(0).missing_mask, 0b111);
 }
 
-TEST(EncoderReceiver, IgnoresStrangersOnTheBus) {
+TEST(EncoderReceiver, IgnoresFramesOfOtherNodes) {
   Line line;
   line.sync(kStart);
   for (const std::uint32_t id : {0x000u, 0x080u, 0x184u, 0x281u, 0x601u, 0x7FFu}) {

@@ -42,7 +42,7 @@ constexpr std::uint64_t kSeeds = 50;
 // the model's coefficients were chosen on seeds 0 to 399
 constexpr std::uint64_t kFirstSeed = 900'000;
 
-/// The measured profile with 15 ppm and a constant delay nobody knows, of 0 to 2 ms.
+/// The measured profile with 15 ppm and an unknown constant delay of 0 to 2 ms.
 BurstProfile measured(std::uint64_t seed) {
   return {
       seed,
@@ -77,7 +77,7 @@ TEST(ClockModel, StatesAnUncertaintyThatCoversTheTruth) {
 
 // Without the constant delay only the fit is left, and its own share of the uncertainty has to
 // cover it.
-TEST(ClockModel, KnowsHowWellTheEnvelopeIsFollowed) {
+TEST(ClockModel, StatesTheUncertaintyOfItsEnvelope) {
   std::uint64_t covered = 0;
   double sum_of_u_s = 0.0;
   for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + kSeeds; ++seed) {
@@ -117,7 +117,7 @@ TEST(ClockModel, ReportsASkewBeyondItsBoundAndNeverSettlesOnIt) {
   }
 }
 
-TEST(ClockModel, TakesNoScatterForASkewBeyondItsBound) {
+TEST(ClockModel, DoesNotMistakeScatterForASkewBeyondItsBound) {
   constexpr std::uint64_t kManySeeds = 200;
   for (std::uint64_t seed = 0; seed < kManySeeds; ++seed) {
     ClockModel model;
@@ -129,7 +129,7 @@ TEST(ClockModel, TakesNoScatterForASkewBeyondItsBound) {
   }
 }
 
-TEST(ClockModel, IsUnsettledWithAnHonestUncertaintyAtFirst) {
+TEST(ClockModel, IsUnsettledWithARealisticUncertaintyAtFirst) {
   ClockModel model;
   EXPECT_FALSE(model.to_host(DeviceTime{}).settled);
   model.observe(DeviceTime{5s}, HostTime{100s});
@@ -155,7 +155,7 @@ TEST(ClockModel, DoesNotMoveForAStalledNetwork) {
   EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{i * 332ms}).time - before), 1us);
 }
 
-TEST(ClockModel, BeginsAnewWhenTheDeviceClockGoesBack) {
+TEST(ClockModel, RestartsWhenTheDeviceClockGoesBack) {
   ClockModel model;
   for (int i = 0; i < 100; ++i) model.observe(DeviceTime{i * 332ms}, HostTime{100s + i * 332ms});
   EXPECT_EQ(model.observe(DeviceTime{1s}, HostTime{140s}), ClockModel::Observed::Restarted);
@@ -164,14 +164,14 @@ TEST(ClockModel, BeginsAnewWhenTheDeviceClockGoesBack) {
   EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{1s}).time - HostTime{140s}), 2ms);
 }
 
-TEST(ClockModel, BeginsAnewWhenTheDeviceClockJumpsAhead) {
+TEST(ClockModel, RestartsWhenTheDeviceClockJumpsAhead) {
   ClockModel model;
   for (int i = 0; i < 100; ++i) model.observe(DeviceTime{i * 332ms}, HostTime{100s + i * 332ms});
   EXPECT_EQ(model.observe(DeviceTime{5000s}, HostTime{133200ms}), ClockModel::Observed::Restarted);
   EXPECT_LT(std::chrono::abs(model.to_host(DeviceTime{5000s}).time - HostTime{133200ms}), 2ms);
 }
 
-TEST(ClockModel, BeginsAnewWhenTheDeviceClockLostTimeForGood) {
+TEST(ClockModel, RestartsWhenTheDeviceClockLosesTimePermanently) {
   ClockModel model;
   int i = 0;
   for (; i < 100; ++i) model.observe(DeviceTime{i * 332ms}, HostTime{100s + i * 332ms});
@@ -198,7 +198,7 @@ TEST(ClockModel, GoesOnAfterTenMinutesOfSilence) {
       2ms);
 }
 
-TEST(ClockModel, SaysTheSameForTheSameArrivals) {
+TEST(ClockModel, GivesTheSameResultForTheSameArrivals) {
   ClockModel a;
   ClockModel b;
   BurstProfile one(11, {});

@@ -10,7 +10,7 @@ class FaultyCard {
  public:
   static constexpr std::chrono::nanoseconds kCycle = 1ms;
   static constexpr std::chrono::nanoseconds kSilenceLimit = 100ms;
-  // 300 requests, one in two turns; pauses
+  // 300 requests, one in two cycles; pauses
   static constexpr std::chrono::nanoseconds kRecoveryLimit = 3s;
   static constexpr bool kTornCanBeFinished = true;
 
@@ -65,7 +65,7 @@ class FaultyCard {
   static drivers::CounterCardOptions options() {
     auto options = CardBench::default_options();
     options.sample_capacity = 256;
-    options.raw_capacity_blocks = 64;  // nobody reads them here: full all the time
+    options.raw_capacity_blocks = 64;  // not read here: always full
     return options;
   }
   sim::UsbipServer& server() { return bench_.server; }

@@ -27,7 +27,7 @@ TEST(CounterCardDevice, ReadsPositionsOfTheMovingAxis) {
   const auto& last = samples.back();
   const double seconds = std::chrono::duration<double>(last.head.time - first.head.time).count();
 
-  // A young clock model may still turn its slope by 1 %.
+  // A young clock model may still change its slope by 1 %.
   EXPECT_NEAR((last.position[0] - first.position[0]) / seconds, kSpeed_m_per_s, 2e-4);
   EXPECT_EQ(last.position[1], 0.0);
   EXPECT_EQ(last.axis_count, 2);
@@ -125,15 +125,14 @@ TEST(CounterCardDevice, LatchesTheProbeToOneClockPeriodWithItsOwnTimer) {
     const double truth =
         kSpeed_m_per_s * std::chrono::duration<double>(edge - begin.axes.head.time).count();
 
-    // The host time of the first scan is only as good as the clock model; all touches share its
-    // error.
+    // The host time of the first scan has the error of the clock model; all touches share it.
     EXPECT_NEAR(x - begin.axes.position[0], truth, 1e-3 * kSpeed_m_per_s);
   }
 
   EXPECT_EQ(bench.device->receiver().counters().latch_disagreements, 0u);
 }
 
-TEST(CounterCardDevice, SaysThatTheLatchIsAnAssumption) {
+TEST(CounterCardDevice, ReportsThatTheLatchIsAnAssumption) {
   CardBench bench;
   EXPECT_THAT(bench.device->assumption(), HasSubstr("not yet verified on hardware"));
 }
@@ -240,7 +239,7 @@ TEST(CounterCardDevice, RefusesAnOldFirmware) {
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("firmware version"));
 }
 
-TEST(CounterCardDevice, SaysThatTheClockStandsStill) {
+TEST(CounterCardDevice, ReportsThatTheClockStandsStill) {
   auto card = simulated_card();
   card.channels[5].phases = std::monostate{};
   CardBench bench{CardBench::default_options(), card};
@@ -270,7 +269,7 @@ TEST(CounterCardDevice, ReportsAClockThatRunsTooFast) {
   EXPECT_TRUE(has(bench.take_samples().back().head.flags, SampleFlag::ClockUnsettled));
 }
 
-TEST(CounterCardDevice, SaysThatTheLatchCountsAnotherClock) {
+TEST(CounterCardDevice, ReportsThatTheLatchCountsAnotherClock) {
   auto options = CardBench::default_options();
   options.receiver.wiring.clock_source = drivers::ClockSource::Timer0;
   auto card = simulated_card();
@@ -284,7 +283,7 @@ TEST(CounterCardDevice, SaysThatTheLatchCountsAnotherClock) {
               HasSubstr("latch channel 6 does not count the clock"));
 }
 
-TEST(CounterCardDevice, LooksForACardByLibusbAndSaysThatThereIsNone) {
+TEST(CounterCardDevice, SearchesForACardWithLibusbAndReportsThatThereIsNone) {
   auto options = CardBench::default_options();
   options.serial = "no such card";
   drivers::SteppedTime time;
@@ -303,7 +302,7 @@ TEST(CounterCardDevice, LooksForACardByLibusbAndSaysThatThereIsNone) {
   EXPECT_FALSE((*device)->status().connected);
 }
 
-TEST(CounterCardDevice, RefusesAWiringThatCannotBe) {
+TEST(CounterCardDevice, RefusesAnImpossibleWiring) {
   auto options = CardBench::default_options();
   options.receiver.wiring.axes[0].scale = 0.0;
   drivers::SteppedTime time;

@@ -30,7 +30,7 @@ TEST(LatchTracker, IsExactWhenBothCountersBeginWithTheClock) {
   EXPECT_EQ(tracker.latest()->half_width, 0);
 }
 
-TEST(LatchTracker, KnowsTheFirstEdgeOfAForeignClockToOneScan) {
+TEST(LatchTracker, BoundsTheFirstEdgeOfAForeignClockToOneScan) {
   LatchTracker tracker{CountWidth::Bits32, false};
   std::uint64_t raw = 0;
   run(tracker, 0, 9000, 4321, -123'456, raw);
@@ -67,7 +67,7 @@ TEST(LatchTracker, UnwrapsALatchThatIsMuchOlderThanTheClocksRange) {
   EXPECT_EQ(tracker.latest()->clock_count, begin + 5001);
 }
 
-TEST(LatchTracker, NoticesALatchThatIsNotOfThisClock) {
+TEST(LatchTracker, DetectsALatchOfAnotherClock) {
   LatchTracker tracker{CountWidth::Bits32, true};
   std::uint64_t raw = 0;
   run(tracker, 0, 9000, 4321, 50'000, raw);
@@ -76,7 +76,7 @@ TEST(LatchTracker, NoticesALatchThatIsNotOfThisClock) {
   EXPECT_LE(std::abs(tracker.latest()->clock_count - 4321), tracker.latest()->half_width);
 }
 
-TEST(LatchTracker, SaysNothingBeforeTheFirstEdge) {
+TEST(LatchTracker, GivesNoTimeBeforeTheFirstEdge) {
   LatchTracker tracker{CountWidth::Bits48, false};
   std::uint64_t raw = 0;
   run(tracker, 0, 9000, 1'000'000, 0, raw);

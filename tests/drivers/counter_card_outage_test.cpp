@@ -1,5 +1,5 @@
-// Faults, outages and hosts that are held up: what the counter card driver keeps, and what it says
-// of the rest. Against the simulated card, over a real USB/IP connection in stepped time.
+// Faults, outages and delayed hosts: what the counter card driver keeps, and what it reports as
+// lost. Against the simulated card, over a real USB/IP connection in stepped time.
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ bool any_restarted(const std::vector<protocol::AxisSample>& samples) {
       samples, [](const auto& s) { return has(s.head.flags, SampleFlag::Restarted); });
 }
 
-TEST(CounterCardOutage, OneFailedRequestIsSentAgainAndCostsNothing) {
+TEST(CounterCardOutage, OneFailedRequestIsSentAgainAndNothingIsLost) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -61,7 +61,7 @@ TEST(CounterCardOutage, OneFailedRequestIsSentAgainAndCostsNothing) {
   EXPECT_EQ(bench.device->status().faults, 0u);
 }
 
-TEST(CounterCardOutage, RequestsThatFailAgainAndAgainZeroNoCounter) {
+TEST(CounterCardOutage, RequestsThatFailRepeatedlyResetNoCounter) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -90,7 +90,7 @@ TEST(CounterCardOutage, CountsGoOnAfterALostConnectionAndTheGapIsMarked) {
   expect_the_same_zero(before, samples.back());
 }
 
-TEST(CounterCardOutage, AClockThatWentRoundMeanwhileWentOnAllTheSame) {
+TEST(CounterCardOutage, AClockThatWrappedDuringTheOutageIsTakenAsContinuous) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -108,7 +108,7 @@ TEST(CounterCardOutage, AClockThatWentRoundMeanwhileWentOnAllTheSame) {
   EXPECT_EQ(after.axes.count[1], before.axes.count[1]);
 }
 
-TEST(CounterCardOutage, CountsBeginAnewAfterTheCardWasWithoutPower) {
+TEST(CounterCardOutage, CountsRestartAfterAPowerFailureOfTheCard) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -126,7 +126,7 @@ TEST(CounterCardOutage, CountsBeginAnewAfterTheCardWasWithoutPower) {
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("did not continue"));
 }
 
-TEST(CounterCardOutage, AClockThatStandsElsewhereThanItMustIsAnotherSessionOfTheCard) {
+TEST(CounterCardOutage, AnUnexpectedClockValueMeansThatTheCardRestarted) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -138,7 +138,7 @@ TEST(CounterCardOutage, AClockThatStandsElsewhereThanItMustIsAnotherSessionOfThe
   EXPECT_TRUE(any_restarted(bench.take_samples()));
 }
 
-TEST(CounterCardOutage, NoticesADeafCardWithinItsSilenceAlsoWhileItsStatusIsAwaited) {
+TEST(CounterCardOutage, DetectsASilentCardWithinItsTimeOutAlsoWhileItsStatusIsAwaited) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   for (const auto phase : {0ms, 30ms, 60ms, 90ms}) {  // of the status question
@@ -152,7 +152,7 @@ TEST(CounterCardOutage, NoticesADeafCardWithinItsSilenceAlsoWhileItsStatusIsAwai
   }
 }
 
-TEST(CounterCardOutage, AHostHeldUpForLongerThanTheSilenceMissesNoScan) {
+TEST(CounterCardOutage, AHostDelayedForLongerThanTheTimeOutLosesNoScan) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   for (const auto phase : {0ms, 30ms, 60ms, 90ms}) {  // of the status question
@@ -164,7 +164,7 @@ TEST(CounterCardOutage, AHostHeldUpForLongerThanTheSilenceMissesNoScan) {
   EXPECT_EQ(bench.device->status().gaps, 0u);
 }
 
-/// Turns until a request has left whose answer was not yet read.
+/// Runs cycles until a request is sent whose answer is not yet read.
 void cycle_until_asked(CardBench& bench) {
   std::array<protocol::RawBlock, 64> blocks;
   const auto asked = [&] {
@@ -183,7 +183,7 @@ void cycle_until_asked(CardBench& bench) {
   }));
 }
 
-TEST(CounterCardOutage, AHostHeldUpWhileTheStatusIsAwaitedReadsTheAnswerFirst) {
+TEST(CounterCardOutage, AHostDelayedWhileTheStatusIsAwaitedReadsTheAnswerFirst) {
   auto card = simulated_card();
   card.fifo_bytes = std::size_t{1024} * 1024;  // no overrun in 0.6 s
   CardBench bench{CardBench::default_options(), card};
@@ -196,7 +196,7 @@ TEST(CounterCardOutage, AHostHeldUpWhileTheStatusIsAwaitedReadsTheAnswerFirst) {
   EXPECT_EQ(bench.device->status().gaps, 0u);
 }
 
-TEST(CounterCardOutage, AHostHeldUpUntilTheCardOverranKeepsTheZero) {
+TEST(CounterCardOutage, AHostDelayedUntilTheCardOverranKeepsTheDatum) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);
@@ -211,7 +211,7 @@ TEST(CounterCardOutage, AHostHeldUpUntilTheCardOverranKeepsTheZero) {
   EXPECT_EQ(bench.device->receiver().counters().restarted, 0u);
 }
 
-TEST(CounterCardOutage, BytesTornOnceAfterTheCardWasOpenedAgainZeroNothing) {
+TEST(CounterCardOutage, BytesTornOnceAfterTheCardWasReopenedResetNothing) {
   CardBench bench;
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(50ms);

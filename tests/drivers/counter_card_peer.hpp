@@ -85,7 +85,7 @@ class CardBench {
     device->receive();
     time.advance(kCycle);
   }
-  /// Turns until `done()`; false after `limit` of host time.
+  /// Runs cycles until `done()`; false after `limit` of host time.
   template <class Done>
   bool until(Done done, std::chrono::nanoseconds limit = 3s) {
     for (const auto end = time.now() + limit; !done();) {

@@ -117,7 +117,7 @@ TEST_F(CounterCardReceiverTest, MarksAndCountsLostScansByTheClock) {
   EXPECT_EQ(receiver_.counters().lost_scans, 7u);
 }
 
-TEST_F(CounterCardReceiverTest, MakesNothingOfBytesThatAreNoScans) {
+TEST_F(CounterCardReceiverTest, GivesNoScansFromOtherBytes) {
   start();
   push(card_.scans(10));
   std::vector<std::byte> garbage(16 * 20);
@@ -162,7 +162,7 @@ TEST_F(CounterCardReceiverTest, KeepsCountsOverARestartOfTheScanAndMarksIt) {
   EXPECT_EQ(scans[0].axes.head.lost_before, 400u);
 }
 
-TEST_F(CounterCardReceiverTest, AnOverrunInAHostThatWasHeldUpZeroesNothing) {
+TEST_F(CounterCardReceiverTest, AnOverrunOfADelayedHostResetsNothing) {
   for (const int batches : {1, 50, 9'000}) {
     start();
     card_.x = 4000;
@@ -182,7 +182,7 @@ TEST_F(CounterCardReceiverTest, AnOverrunInAHostThatWasHeldUpZeroesNothing) {
   }
 }
 
-TEST_F(CounterCardReceiverTest, ALateBatchBeforeOrAfterTheCardWasOpenedAgainZeroesNothing) {
+TEST_F(CounterCardReceiverTest, ALateBatchBeforeOrAfterTheCardWasReopenedResetsNothing) {
   for (const auto& [before, after] : {std::pair{2s, 0s}, std::pair{0s, 2s}}) {
     start();
     for (int i = 0; i < 9'000; ++i) push(card_.scans(40));
@@ -198,7 +198,7 @@ TEST_F(CounterCardReceiverTest, ALateBatchBeforeOrAfterTheCardWasOpenedAgainZero
   }
 }
 
-TEST_F(CounterCardReceiverTest, AClockAheadOfTheHostsIsThatOfOtherCounters) {
+TEST_F(CounterCardReceiverTest, AClockAheadOfTheHostsMeansThatTheCountersRestarted) {
   start();
   for (int i = 0; i < 9'000; ++i) push(card_.scans(40));
   card_.lose(12 * 40'000);
@@ -208,8 +208,8 @@ TEST_F(CounterCardReceiverTest, AClockAheadOfTheHostsIsThatOfOtherCounters) {
   EXPECT_EQ(receiver_.counters().restarted, 1u);
 }
 
-/// 32 bits go round in 72 minutes at 1 MHz: after a day the clock may have stood anywhere.
-TEST_F(CounterCardReceiverTest, AfterTooLongTheClockNoLongerTellsThatItIsTheSame) {
+/// 32 bits wrap in 72 minutes at 1 MHz: after a day any clock value is possible.
+TEST_F(CounterCardReceiverTest, AfterTooLongTheClockCannotShowThatTheCountersContinued) {
   std::uint64_t anew = 0;
   for (const auto& [outage, foreign] : {std::pair{8h, false}, std::pair{24h, true}}) {
     start();
@@ -223,7 +223,7 @@ TEST_F(CounterCardReceiverTest, AfterTooLongTheClockNoLongerTellsThatItIsTheSame
   }
 }
 
-TEST_F(CounterCardReceiverTest, BeginsAnewWhenACounterIsSetUp) {
+TEST_F(CounterCardReceiverTest, RestartsWhenACounterIsSetUp) {
   start();
   card_.x = 4000;
   push(card_.scans(10));
@@ -235,7 +235,7 @@ TEST_F(CounterCardReceiverTest, BeginsAnewWhenACounterIsSetUp) {
   EXPECT_TRUE(has(scans[0].axes.head.flags, SampleFlag::Restarted));
 }
 
-TEST_F(CounterCardReceiverTest, SeeksTheBeginningOfAScanInARecording) {
+TEST_F(CounterCardReceiverTest, FindsTheBeginningOfAScanInARecording) {
   card_.x = 900;
   const auto bytes = card_.scans(100);
   const auto scans = push(std::span{bytes}.subspan(5));
@@ -256,7 +256,7 @@ TEST_F(CounterCardReceiverTest, GivesTheLatchInCountsOfTheClock) {
   EXPECT_EQ(receiver_.counters().edges, 1u);
 }
 
-TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockWithAGapForARestartOfIt) {
+TEST_F(CounterCardReceiverTest, TreatsAJumpOfTheClockWithAGapAsARestart) {
   start();
   for (int i = 0; i < 50; ++i) push(card_.scans(40));
   card_.lose(40'000);  // one second
@@ -267,7 +267,7 @@ TEST_F(CounterCardReceiverTest, TakesAJumpOfTheClockWithAGapForARestartOfIt) {
   EXPECT_EQ(receiver_.counters().clock_jumps, 1u);
 }
 
-TEST_F(CounterCardReceiverTest, FindsTheRestartAlsoWhereALateBatchHidTheJump) {
+TEST_F(CounterCardReceiverTest, DetectsTheRestartAlsoIfALateBatchHidTheJump) {
   start();
   for (int i = 0; i < 50; ++i) push(card_.scans(40));
   card_.lose(3'000);  // 75 ms
@@ -330,7 +330,7 @@ TEST_F(CounterCardReceiverTest, AnEarlierGapThatIsShorterThanTheJumpIsNotItsCaus
   for (const auto& scan : scans) EXPECT_FALSE(has(scan.axes.head.flags, SampleFlag::Restarted));
 }
 
-TEST_F(CounterCardReceiverTest, CountsThatWentOnInStepAreThoseOfTheSameCardHoweverLateTheyCame) {
+TEST_F(CounterCardReceiverTest, CountsConsistentWithTheClockContinueHoweverLateTheyCome) {
   start();
   now_ += 200ms;  // the host was busy when the first came
   push(card_.scans(40));

@@ -63,7 +63,7 @@ class CardThatStays : public ::testing::Test {
     }
     return latest;
   }
-  /// Nobody asks the card for anything.
+  /// Time in which the card receives no request.
   void away(std::chrono::nanoseconds time) {
     bench_.device.reset();
     bench_.server.poll(bench_.time.now());
@@ -81,7 +81,7 @@ class CardThatStays : public ::testing::Test {
   CardBench bench_;
 };
 
-TEST_F(CardThatStays, CountsGoOnWhereTheCardDid) {
+TEST_F(CardThatStays, CountsContinueIfTheCardKeptCounting) {
   const auto before = progress();
   EXPECT_EQ(before.serial_number(), "01ABBE08");
   away(20s);
@@ -99,7 +99,7 @@ TEST_F(CardThatStays, CountsGoOnWhereTheCardDid) {
   EXPECT_GT(bench_.device->receiver().counters().withheld_scans, 0u);
 }
 
-TEST_F(CardThatStays, CountsGoOnOverARoundOfTheClock) {
+TEST_F(CardThatStays, CountsContinueOverAWrapOfTheClock) {
   const auto before = progress();
   away(4300s);  // 2^32 at 1 MHz are 4295 s
   run_on(before);
@@ -109,7 +109,7 @@ TEST_F(CardThatStays, CountsGoOnOverARoundOfTheClock) {
   EXPECT_GT(bench_.keeper.scans.front().clock_count, std::int64_t{1} << 32);
 }
 
-TEST_F(CardThatStays, ACardThatWasWithoutPowerBeginsAnew) {
+TEST_F(CardThatStays, ACardThatLostPowerRestarts) {
   const auto before = progress();
   away(1s);
   bench_.server.card().restart();
@@ -123,7 +123,7 @@ TEST_F(CardThatStays, ACardThatWasWithoutPowerBeginsAnew) {
 
 // Its clock runs like before, from another zero: not one scan of it may look like the counters of
 // before.
-TEST_F(CardThatStays, ACardThatAnotherProgramSetUpBeginsAnew) {
+TEST_F(CardThatStays, ACardThatAnotherProgramSetUpRestarts) {
   const auto before = progress();
   away(500ms);
   run(slow_options());
@@ -136,7 +136,7 @@ TEST_F(CardThatStays, ACardThatAnotherProgramSetUpBeginsAnew) {
   EXPECT_THAT(bench_.device->status().last_fault, HasSubstr("s behind its expected count"));
 }
 
-TEST_F(CardThatStays, AnotherCardBeginsAnew) {
+TEST_F(CardThatStays, AnotherCardRestarts) {
   auto before = progress();
   before.set_serial_number("01C0FFEE");
   away(1s);
@@ -147,7 +147,7 @@ TEST_F(CardThatStays, AnotherCardBeginsAnew) {
   EXPECT_THAT(bench_.device->status().last_fault, HasSubstr("its serial number is \"01ABBE08\""));
 }
 
-TEST_F(CardThatStays, TooLongIsTooLongToTell) {
+TEST_F(CardThatStays, AfterTooLongACardIsTreatedAsRestarted) {
   const auto before = progress();
   // 50 ms and 200 ppm of it, both ways, are more than 0.5 % of 4295 s
   away(std::chrono::hours{16});
@@ -157,7 +157,7 @@ TEST_F(CardThatStays, TooLongIsTooLongToTell) {
   EXPECT_TRUE(has(samples.front().head.flags, SampleFlag::Restarted));
 }
 
-// A replay of the second run's bytes, told what the run was told, makes the same scans.
+// A replay of the second run's bytes with the same kept state gives the same scans.
 TEST_F(CardThatStays, TheBytesGiveTheSameScans) {
   const auto before = progress();
   away(20s);

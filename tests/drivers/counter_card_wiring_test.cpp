@@ -13,7 +13,7 @@ std::string refusal(const CounterCardWiring& wiring) {
   return checked ? "" : checked.error().text;
 }
 
-TEST(CounterCardWiring, OfTheTestsIsFine) {
+TEST(CounterCardWiring, OfTheTestsIsValid) {
   EXPECT_EQ(refusal(tests::card_wiring()), "");
 }
 
@@ -56,7 +56,7 @@ TEST(CounterCardWiring, ReadsTheUsedChannelsInAscendingOrder) {
               testing::ElementsAre(0, 1, 5, 6));
 }
 
-TEST(CounterCardWiring, SaysWhatIsAnAssumption) {
+TEST(CounterCardWiring, NamesItsAssumptions) {
   auto wiring = tests::card_wiring();
   EXPECT_TRUE(rests_on_assumption(wiring));
   wiring.latch_verified = true;

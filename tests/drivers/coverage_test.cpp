@@ -22,7 +22,7 @@ TEST(Expanded95, IsZeroForNothing) {
   EXPECT_EQ(expanded_95(0.0, 0.0), 0.0);
 }
 
-TEST(Expanded95, CoversWhatItSaysForEveryMixture) {
+TEST(Expanded95, HasItsStatedCoverageForEveryMixture) {
   std::mt19937 random(9);
   for (const double half_width : {0.05, 0.5, 1.0, 3.0, 20.0}) {
     const double U = expanded_95(half_width, 1.0);

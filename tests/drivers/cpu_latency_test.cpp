@@ -22,7 +22,7 @@ std::optional<std::int32_t> bound_in_force() {
   return us;
 }
 
-TEST(CpuLatencyBound, HoldsUntilItIsGone) {
+TEST(CpuLatencyBound, IsActiveUntilItsDestruction) {
   const auto before = bound_in_force();
   if (!before || ::access(kCpuLatencyFile, W_OK) != 0)
     GTEST_SKIP() << kCpuLatencyFile << " cannot be used here";
@@ -35,7 +35,7 @@ TEST(CpuLatencyBound, HoldsUntilItIsGone) {
   EXPECT_NE(bound_in_force(), 77);
 }
 
-TEST(CpuLatencyBound, SaysWhatRefusedIt) {
+TEST(CpuLatencyBound, ReportsWhatRefusedIt) {
   const auto bound = CpuLatencyBound::request(5us, "/nowhere/cpu_dma_latency");
   ASSERT_FALSE(bound);
   EXPECT_THAT(bound.error().text, AllOf(HasSubstr("5 us"), HasSubstr("/nowhere/cpu_dma_latency"),

@@ -18,7 +18,7 @@ using drivers::DeviceThread;
 using drivers::DeviceThreadOptions;
 using drivers::RealTimeMode;
 
-/// Counts its turns and, if told to, throws in one of them.
+/// Counts its cycles and, on request, throws in one of them.
 class CycleCounter final : public drivers::Device {
  public:
   explicit CycleCounter(int throw_in_cycle = -1) : throw_in_cycle_(throw_in_cycle) {}
@@ -47,7 +47,7 @@ void wait_for(const std::function<bool()>& done) {
   while (!done()) std::this_thread::yield();  // bounded by the test's own time-out
 }
 
-TEST(DeviceThread, TurnsUntilStopped) {
+TEST(DeviceThread, RunsCyclesUntilStopped) {
   CycleCounter device;
   auto thread = DeviceThread::start(device, {.wait_at_most = 7ms});
   ASSERT_TRUE(thread);
@@ -60,7 +60,7 @@ TEST(DeviceThread, TurnsUntilStopped) {
   EXPECT_EQ(device.turns, turns);
 }
 
-TEST(DeviceThread, FillsALatencyHistogramWithEveryTurn) {
+TEST(DeviceThread, FillsALatencyHistogramWithEveryCycle) {
   CycleCounter device;
   auto thread = DeviceThread::start(device, {});
   ASSERT_TRUE(thread);
@@ -78,7 +78,7 @@ TEST(DeviceThread, HandsOverTheExceptionThatEndedIt) {
   EXPECT_EQ(device.turns, 3);
 }
 
-TEST(DeviceThread, NeverSaysThatADeviceStreamsWhoseLoopHasEnded) {
+TEST(DeviceThread, NeverReportsStreamingAfterItsLoopHasEnded) {
   CycleCounter device(3);
   const auto thread = DeviceThread::start(device, {.name = "tracker", .first_back_off = 1h});
   ASSERT_TRUE(thread);
@@ -92,7 +92,7 @@ TEST(DeviceThread, NeverSaysThatADeviceStreamsWhoseLoopHasEnded) {
   EXPECT_THAT(status.last_fault, testing::HasSubstr("no such register"));
 }
 
-TEST(DeviceThread, WhoSeesThatItFailedSeesThatItHasEnded) {
+TEST(DeviceThread, FailureIsReportedOnlyAfterTheThreadHasEnded) {
   for (int i = 0; i < 200; ++i) {
     CycleCounter device(0);
     const auto thread = DeviceThread::start(device, {.wait_at_most = 1us, .first_back_off = 1h});
@@ -141,7 +141,7 @@ TEST(DeviceThread, WarnsAndRunsInIgnoreMode) {
   wait_for([&] { return device.turns > 0; });
 }
 
-TEST(DeviceThread, SaysEverythingTheSystemRefusedAtOnce) {
+TEST(DeviceThread, ReportsEverythingTheSystemRefusedAtOnce) {
   CycleCounter device;
   const auto thread = DeviceThread::start(
       device, {.mode = RealTimeMode::Enforce, .priority = 1000, .cpu = kNoSuchProcessor});
@@ -150,7 +150,7 @@ TEST(DeviceThread, SaysEverythingTheSystemRefusedAtOnce) {
                                                   testing::HasSubstr("SCHED_FIFO priority 1000")));
 }
 
-TEST(DeviceThread, RunsWhereItIsPut) {
+TEST(DeviceThread, RunsOnItsConfiguredProcessor) {
   class Where final : public drivers::Device {
    public:
     void wait(std::chrono::nanoseconds) override { cpu = sched_getcpu(); }

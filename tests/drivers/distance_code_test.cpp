@@ -159,8 +159,8 @@ TEST(DistanceCode, ChecksItsConfiguration) {
   EXPECT_TRUE(drivers::check({.increment = 1000, .length = 36'000, .rotary = true}));
 }
 
-/// An axis that is driven here and there over its scale, its marks read with noise. What can happen
-/// to it is drawn; what it says in the end is compared with where it is.
+/// An axis that is driven back and forth over its scale, its marks read with noise. Its faults are
+/// drawn at random; the datum found at the end is compared with the true one.
 class Traverse {
  public:
   Traverse(const DistanceCode& code, std::mt19937& random)
@@ -188,7 +188,7 @@ class Traverse {
 
  private:
   bool chance(double p) { return std::uniform_real_distribution<double>{}(random_) < p; }
-  /// One in a traverse: of two within four marks nobody can tell that they make another legal four.
+  /// At most one per traverse: two faults within four marks can give another valid sequence.
   bool fault() { return !std::exchange(faulty_, true); }
   [[nodiscard]] bool at_end() const { return direction_ > 0 ? at_ + 1 >= marks_.size() : at_ == 0; }
   [[nodiscard]] std::int64_t count(double periods) const {
@@ -258,7 +258,7 @@ TEST(MarkTraverse, NeedsFourMarksOfOneDirection) {
   EXPECT_EQ((*datum)->offset_periods, 0.0);
 }
 
-TEST(MarkTraverse, BeginsAnewAfterAReversalBetweenTwoMarks) {
+TEST(MarkTraverse, RestartsAfterAReversalBetweenTwoMarks) {
   MarkTraverse traverse{one_count_per_period()};
   (void)traverse.on_mark(2000);
   (void)traverse.on_mark(2503);
@@ -271,7 +271,7 @@ TEST(MarkTraverse, BeginsAnewAfterAReversalBetweenTwoMarks) {
   EXPECT_EQ(traverse.marks(), 1u);
 }
 
-TEST(MarkTraverse, KnowsAScaleThatCountsBackwards) {
+TEST(MarkTraverse, DetectsAScaleThatCountsBackwards) {
   MarkTraverseOptions options = one_count_per_period();
   options.counts_per_period = -4.0;
   MarkTraverse traverse{options};
@@ -282,7 +282,7 @@ TEST(MarkTraverse, KnowsAScaleThatCountsBackwards) {
   EXPECT_NEAR((*outcome)->offset_periods, 10.0, 1e-12);
 }
 
-TEST(MarkTraverse, SaysThatTheScaleIsAnotherOne) {
+TEST(MarkTraverse, ReportsThatTheScaleIsAnotherOne) {
   MarkTraverse traverse{one_count_per_period()};
   std::vector<MarkFault> faults;
   for (const std::int64_t mark : marks_of({.increment = 2000, .length = 100'000})) {
@@ -305,7 +305,7 @@ TEST(CounterAlignment, NarrowsTheDifferenceFromMarkToMark) {
   EXPECT_EQ(alignment.half_width(), 1.0);
 }
 
-TEST(CounterAlignment, SaysThatACardMiscounted) {
+TEST(CounterAlignment, ReportsThatACardMiscounted) {
   drivers::CounterAlignment alignment;
   EXPECT_TRUE(alignment.add(1'000, 3, 7));
   EXPECT_FALSE(alignment.add(2'010, 1'002, 1'005));

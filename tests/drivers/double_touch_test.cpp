@@ -53,7 +53,7 @@ TEST(DoubleTouch, RefusesTouchesThatDisagree) {
   }
 }
 
-TEST(DoubleTouch, WantsAFindFirst) {
+TEST(DoubleTouch, RequiresAFindFirst) {
   DoubleTouch both{DoubleTouchRules{}};
   const auto point = both.on_touch(touch_at(0.3, 0.001));
   ASSERT_TRUE(point);

@@ -40,7 +40,7 @@ class FailingBus final : public CanBus {
   bool fails_ = false;
 };
 
-/// Two nodes and the device on one stepped clock. A turn is 1 ms, a SYNC period 4 ms.
+/// Two nodes and the device on one stepped clock. A cycle is 1 ms, a SYNC period 4 ms.
 class EncoderDeviceOnUdp : public testing::Test {
  protected:
   static constexpr std::chrono::milliseconds kCycle{1};
@@ -89,7 +89,7 @@ class EncoderDeviceOnUdp : public testing::Test {
     device->wait(kCycle);
     device->receive();
   }
-  /// Turns in which nothing is heard: a frame would show that the bus is back.
+  /// Cycles without a received frame: a frame would show that the bus is back.
   void bus_is_off_for(int turns) {
     send_condition(can::BusCondition::BusOff);
     for (int i = 0; i < turns; ++i) {

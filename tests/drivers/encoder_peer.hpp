@@ -64,7 +64,7 @@ class EncoderPeer : public EncoderNodes {
     pollfd p{fd_, POLLIN, 0};
     ::poll(&p, 1, ms);
   }
-  /// Forgets everything that came: the cable was out.
+  /// Discards everything received: the cable was unplugged.
   void drain() {
     std::array<std::byte, 65536> buffer{};
     while (::recv(fd_, buffer.data(), buffer.size(), 0) >= 0) {

@@ -152,7 +152,7 @@ TEST_F(EnvironmentAgainstTheSimulator, RefusesSwappedWordsBecauseTheyAreImplausi
   EXPECT_EQ(device_->status().state, "refused");
 }
 
-TEST_F(EnvironmentAgainstTheSimulator, SaysNotAvailableWhenTheSensorIsGone) {
+TEST_F(EnvironmentAgainstTheSimulator, ReportsNotAvailableWhenTheSensorIsMissing) {
   start({.model = sim::ModbusModel::Indigo520Hmp},
         drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(40);
@@ -166,7 +166,7 @@ TEST_F(EnvironmentAgainstTheSimulator, SaysNotAvailableWhenTheSensorIsGone) {
   EXPECT_EQ(got.back().measured, protocol::kAllOfTheAir);
 }
 
-TEST_F(EnvironmentAgainstTheSimulator, TakesBusyForAFaultThatPasses) {
+TEST_F(EnvironmentAgainstTheSimulator, TreatsBusyAsATransientFault) {
   start({.model = sim::ModbusModel::CometT7510},
         drivers::known_map("comet-t7510", {.serial_number = 20969999}).value());
   turns(20);
@@ -205,7 +205,7 @@ TEST_F(EnvironmentAgainstTheSimulator, ToleratesLateAnswersWithinTheTimeOut) {
   EXPECT_EQ(device_->status().faults, 0u) << device_->status().last_fault;
 }
 
-TEST_F(EnvironmentAgainstTheSimulator, MakesTheSameSamplesOfTheRawBytes) {
+TEST_F(EnvironmentAgainstTheSimulator, MakesTheSameSamplesFromTheRawBytes) {
   start({.model = sim::ModbusModel::Indigo520Hmp},
         drivers::known_map("vaisala-indigo520-hmp", {}).value());
   turns(60);

@@ -66,7 +66,7 @@ TEST_P(OneLine, AsksOneAfterTheOtherOverOneConnection) {
             GetParam() == modbus::Transport::Tcp ? 1u : 0u);  // a terminal has none
 }
 
-TEST_P(OneLine, ADeviceThatIsMuteLeavesTheOtherItsRounds) {
+TEST_P(OneLine, AMuteDeviceDoesNotDelayTheOther) {
   cycles_for(2s);
   bus_.slaves[1].mute = true;
   (void)samples_of(1);
@@ -84,7 +84,7 @@ TEST_P(OneLine, ADeviceThatIsMuteLeavesTheOtherItsRounds) {
   EXPECT_EQ(bus_.collisions, 0u);
 }
 
-TEST_P(OneLine, AnAnswerThatComesTooLateIsNotTheOthers) {
+TEST_P(OneLine, ALateAnswerIsNotAssignedToTheOtherDevice) {
   cycles_for(2s);
   bus_.slaves[1].late = 150ms;  // after its time-out
   cycles_for(4s);
@@ -93,7 +93,7 @@ TEST_P(OneLine, AnAnswerThatComesTooLateIsNotTheOthers) {
   EXPECT_EQ(bus_.collisions, 0u);
 }
 
-TEST_P(OneLine, BothAreBackWhenTheLineIsBack) {
+TEST_P(OneLine, BothReconnectWhenTheLineIsBack) {
   cycles_for(2s);
   bus_.unplug();
   cycles_for(2s);
@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(Modbus, OneLine,
                            return i.param == modbus::Transport::Rtu ? "Rtu" : "Tcp";
                          });
 
-/// Moves by as much as somebody waits, without waiting.
+/// A clock that advances by the requested waiting time at once.
 class WaitedTime final : public drivers::TimeSource {
  public:
   [[nodiscard]] protocol::HostTime now() const noexcept override { return now_; }
@@ -196,7 +196,7 @@ TEST(EnvironmentLine, TwoNamesOfALineThatWasAbsentDoNotShareItSilently) {
   std::filesystem::remove_all(names);
 }
 
-TEST(EnvironmentLine, KnowsALineByAnyOfItsNames) {
+TEST(EnvironmentLine, RecognizesALineByAnyOfItsNames) {
   const ModbusBusPeer bus{modbus::Transport::Rtu};
   const auto link = std::get<drivers::ModbusSerial>(bus.address()).path;
   const drivers::ModbusSerial real{.path = std::filesystem::canonical(link).string()};

@@ -41,7 +41,7 @@ class Receiver : public testing::TestWithParam<Transport> {
   Progress last_ = Progress::Waiting;
 };
 
-TEST_P(Receiver, ProvesTheDeviceThenMeasures) {
+TEST_P(Receiver, ChecksTheDeviceThenMeasures) {
   to_first_sample();
   ASSERT_EQ(last_, Progress::Sample);
   const auto& s = receiver_.sample();
@@ -102,7 +102,7 @@ TEST_P(Receiver, GivesAnImplausibleValueLaterOnAsNotAvailable) {
   EXPECT_EQ(receiver_.counters().implausible, 1u);
 }
 
-TEST_P(Receiver, RefusesADeviceThatDoesNotKnowTheAddress) {
+TEST_P(Receiver, RefusesADeviceWithoutTheAddress) {
   receiver_.begin();
   const auto request = receiver_.next_request().value();
   receiver_.sent(request, now_);
@@ -121,7 +121,7 @@ TEST_P(Receiver, TakesAnAnswerByteByByte) {
   EXPECT_EQ(receiver_.push(std::span{answer}.last(1), now_), Progress::Answered);
 }
 
-TEST_P(Receiver, BelievesNothingItDidNotAskFor) {
+TEST_P(Receiver, IgnoresUnrequestedAnswers) {
   receiver_.begin();
   const auto answer = modbus_answer(GetParam(), receiver_.next_request().value(), registers_);
   EXPECT_EQ(receiver_.push(answer, now_), Progress::Failed);
@@ -154,7 +154,7 @@ TEST(RegisterMap, ReadsTouchingRegistersAtOnce) {
   EXPECT_EQ(reads[1].count, 4);
 }
 
-TEST(RegisterMap, IsRefusedIfItCannotBeMeant) {
+TEST(RegisterMap, IsRefusedIfItIsInconsistent) {
   EXPECT_FALSE(check(drivers::RegisterMap{}));
   auto twice = small_map();
   twice.measured.push_back(twice.measured[0]);
@@ -174,7 +174,7 @@ TEST(KnownMaps, NeedASerialNumberWhereTheAddressesAreAmbiguous) {
   EXPECT_FALSE(drivers::known_map("nobody-knows-this", {}));
 }
 
-TEST(KnownMaps, AreAllInOrder) {
+TEST(KnownMaps, AreAllValid) {
   drivers::KnownMapOptions comet{.serial_number = 1};
   drivers::KnownMapOptions inputs{.inputs = {0, 1, 2, 3, 4, 5, 6, 7}};
   EXPECT_TRUE(check(drivers::known_map("vaisala-indigo520-hmp", {}).value()));

@@ -11,7 +11,7 @@ class FaultyMeasuringMachine {
  public:
   static constexpr std::chrono::nanoseconds kCycle = 100ms;  // no server reports more often
   static constexpr std::chrono::nanoseconds kSilenceLimit = 3s;
-  static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two turns a command
+  static constexpr std::chrono::nanoseconds kRecoveryLimit = 30s;  // two cycles per command
   static constexpr bool kTornCanBeFinished = true;
 
   static std::set<std::string_view> shown(Fault fault) { return shown_over_tcp(fault, "ready"); }

@@ -18,7 +18,7 @@ using drivers::SteppedTime;
 using protocol::ProbeTrigger;
 using protocol::TouchFlag;
 
-TEST(IppDevice, MeasuresWhatIsAsked) {
+TEST(IppDevice, MeasuresRequestedPoints) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure(on_top());
@@ -59,7 +59,7 @@ TEST(IppDevice, ReadsAtTheTouchWhatAMachineWithErrorsReads) {
   }
 }
 
-TEST(IppDevice, GoesTheWayToATouchWithoutTouching) {
+TEST(IppDevice, MovesAlongTheApproachPathWithoutTouching) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure({.position_m = {0.1, 0.2, 0.0}, .touch = false});
@@ -72,7 +72,7 @@ TEST(IppDevice, GoesTheWayToATouchWithoutTouching) {
   EXPECT_EQ(stage.device->status().faults, 0u);
 }
 
-TEST(IppDevice, ForgetsWhatIsBehindAWayThatWasRefused) {
+TEST(IppDevice, DropsTheRequestsBehindARefusedMove) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.peer.machine().inject({.kind = sim::FaultKind::RefuseWay}, stage.time.now());
@@ -84,7 +84,7 @@ TEST(IppDevice, ForgetsWhatIsBehindAWayThatWasRefused) {
       << stage.last_fault();
 }
 
-TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
+TEST(IppDevice, DropsTheTouchIfTheConnectionIsLostDuringTheMove) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.peer.reset_connection();
@@ -97,7 +97,7 @@ TEST(IppDevice, ForgetsTheTouchWhenTheConnectionIsLostOnTheWay) {
   EXPECT_TRUE(stage.touches.empty());
 }
 
-TEST(IppDevice, ForgetsWhatIsAskedOfAMachineThatIsAway) {
+TEST(IppDevice, DropsRequestsWhileTheMachineIsNotConnected) {
   IppStage stage;
   stage.device->measure(on_top());
   stage.cycle();
@@ -170,12 +170,12 @@ TEST(IppDevice, RefusesAMachineThatIsNotHomed) {
   EXPECT_NE(stage.last_fault().find("not homed"), std::string::npos);
 }
 
-TEST(IppDevice, HomesTheMachineIfItMay) {
+TEST(IppDevice, HomesTheMachineIfPermitted) {
   IppStage stage{not_homed(), that_may_home()};
   EXPECT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
 }
 
-TEST(IppDevice, NamesAPeerThatIsNoMeasuringMachine) {
+TEST(IppDevice, ReportsAPeerThatIsNoMeasuringMachine) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.send("HTTP/1.1 400 Bad Request\r\n");
@@ -184,7 +184,7 @@ TEST(IppDevice, NamesAPeerThatIsNoMeasuringMachine) {
   EXPECT_NE(stage.last_fault().find("HTTP/1.1"), std::string::npos);
 }
 
-TEST(IppDevice, NamesAnAnswerThatNobodyAskedFor) {
+TEST(IppDevice, ReportsAnUnrequestedAnswer) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready"));
   stage.peer.send("09999 %\r\n");

@@ -1,7 +1,7 @@
 #pragma once
 /// The simulated measuring machine's server on a listening socket of 127.0.0.1, in the test's own
-/// thread, with what it says in the test's hands: lines are gathered, and sent when the test says
-/// so.
+/// thread, with its output under the test's control: lines are gathered, and sent when the test
+/// calls send_gathered().
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ class IppDmePeer {
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] sim::IppDmeDevice& machine() { return *machine_; }
 
-  /// Lets a client in, hears it, does what is due. What the machine says is gathered.
+  /// Accepts a client, reads its commands, advances the machine and gathers its output.
   void serve(protocol::HostTime now) {
     accept_client(now);
     hear(now);
@@ -47,7 +47,7 @@ class IppDmePeer {
   void send_gathered() {
     if (!holding_) send(std::exchange(gathered_, {}));
   }
-  /// What the machine says reaches nobody.
+  /// true: the machine's output is discarded.
   void hold_answers(bool hold) {
     holding_ = hold;
     gathered_.clear();

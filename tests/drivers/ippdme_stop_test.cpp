@@ -56,7 +56,7 @@ struct MovingStage : IppStage {
   }
 };
 
-TEST(IppStop, AStrangeTagWhileMovingIsAbortedFirst) {
+TEST(IppStop, AnUnknownTagWhileMovingIsAbortedFirst) {
   MovingStage stage;
   stage.inject(sim::FaultKind::OddTag);
   stage.expect_stopped_and_held();
@@ -84,7 +84,7 @@ TEST(IppStop, GarbageWhileMovingIsAbortedFirst) {
   }
 }
 
-TEST(IppStop, ARequestStopsTheMotionAndForgetsThePoints) {
+TEST(IppStop, ARequestStopsTheMotionAndDropsThePoints) {
   MovingStage stage;
   stage.device->measure(on_top());
   stage.device->abort();
@@ -247,7 +247,7 @@ TEST(IppStop, GarbageBehindAnAbortDoesNotHideItsAnswer) {
   }
 }
 
-TEST(IppRelease, TheReasonOfAHoldStaysWhateverIsRefusedMeanwhile) {
+TEST(IppRelease, TheReasonOfAHoldStaysAfterFurtherRefusals) {
   std::string kept;
   IppDeviceOptions options;
   options.machine_changed = [&](const drivers::IppMachine& machine) { kept = machine.held; };
@@ -262,7 +262,7 @@ TEST(IppRelease, TheReasonOfAHoldStaysWhateverIsRefusedMeanwhile) {
   EXPECT_EQ(kept, "reports 0500 Emergency stop (severity 3)");
 }
 
-TEST(IppStop, AMotionIsKeptBeforeItBeginsAndForgottenAtRest) {
+TEST(IppStop, AMotionIsStoredBeforeItBeginsAndErasedAtStandstill) {
   std::vector<bool> moving;
   IppDeviceOptions options;
   options.machine_changed = [&](const drivers::IppMachine& m) { moving.push_back(m.moving); };
@@ -383,7 +383,7 @@ TEST(IppRelease, NothingMovesOrClearsAfterAnEmergencyStop) {
   stage.expect_stopped_and_held();
 }
 
-TEST(IppRelease, ARefusedTouchHoldsTheMachineUntilAPersonReleasesIt) {
+TEST(IppRelease, ARefusedTouchHoldsTheMachineUntilAnOperatorReleasesIt) {
   IppStage stage;
   ASSERT_TRUE(stage.state_becomes("ready")) << stage.last_fault();
   stage.device->measure({.position_m = {0.3, 0.3, 0.0}});

@@ -51,12 +51,12 @@ TEST(KernelStampMap, FallsBackToUserSpaceTimeWithoutAStamp) {
   EXPECT_EQ(a.u_time, 1ms);
 }
 
-TEST(KernelStampMap, BelievesNoStampBeforeTheQueueWasKnownToBeEmpty) {
+TEST(KernelStampMap, RejectsStampsBeforeTheQueueWasKnownToBeEmpty) {
   KernelStampMap map;
   EXPECT_TRUE(map.arrival(kWall + 10s, at(10s), HostTime{10s}).widened);
 }
 
-TEST(KernelStampMap, BelievesEveryStampOfABatch) {
+TEST(KernelStampMap, AcceptsEveryStampOfABatch) {
   KernelStampMap map = begun();
   for (const auto came : {10301ms, 10302ms, 10303ms}) {  // one reading of the clocks for all three
     const Arrival a = map.arrival(kWall + came, at(10305ms), HostTime{10305ms});
@@ -66,25 +66,25 @@ TEST(KernelStampMap, BelievesEveryStampOfABatch) {
   EXPECT_EQ(map.widened(), 0u);
 }
 
-TEST(KernelStampMap, BelievesWhatWasLeftBehindByAReadThatWasTooSmall) {
+TEST(KernelStampMap, AcceptsStampsLeftByAReadThatWasTooSmall) {
   KernelStampMap map = begun();
   EXPECT_FALSE(map.arrival(kWall + 10301ms, at(10305ms), HostTime{10305ms}).widened);
   EXPECT_EQ(map.arrival(kWall + 10302ms, at(10309ms), HostTime{10309ms}).time, HostTime{10302ms});
 }
 
-TEST(KernelStampMap, BelievesNoStampFromTheFuture) {
+TEST(KernelStampMap, RejectsAStampFromTheFuture) {
   KernelStampMap map = begun();
   const Arrival a = map.arrival(kWall + 10301ms, at(10300ms), HostTime{10300ms});
   EXPECT_TRUE(a.widened);
   EXPECT_EQ(a.time, HostTime{10300ms});
 }
 
-TEST(KernelStampMap, BelievesNoStampOlderThanTheEmptyQueue) {
+TEST(KernelStampMap, RejectsAStampOlderThanTheEmptyQueue) {
   KernelStampMap map = begun();
   EXPECT_TRUE(map.arrival(kWall + 9999ms, at(10300ms), HostTime{10300ms}).widened);
 }
 
-TEST(KernelStampMap, CountsWhatItDidNotBelieve) {
+TEST(KernelStampMap, CountsRejectedStamps) {
   KernelStampMap map = begun();
   const auto before = map.widened();
   map.arrival(std::nullopt, at(10300ms), HostTime{10300ms});
@@ -92,7 +92,7 @@ TEST(KernelStampMap, CountsWhatItDidNotBelieve) {
   EXPECT_EQ(map.widened(), before + 1);
 }
 
-TEST(KernelStampMap, NoticesAStepTooSmallForTheAgeToShow) {
+TEST(KernelStampMap, DetectsAStepTooSmallToAppearInTheAge) {
   KernelStampMap map = begun();
   // stamped, then the wall clock was put forward by 100 ms: the age would be 101 ms of 300 possible
   // ones
@@ -101,7 +101,7 @@ TEST(KernelStampMap, NoticesAStepTooSmallForTheAgeToShow) {
   EXPECT_EQ(a.time, HostTime{10300ms});
 }
 
-TEST(KernelStampMap, BelievesStampsAgainAfterAStep) {
+TEST(KernelStampMap, AcceptsStampsAgainAfterAStep) {
   KernelStampMap map = begun();
   map.arrival(kWall + 10299ms, at(10300ms, 3600s), HostTime{10300ms});
   map.nothing_older_than(at(10300ms, 3600s));

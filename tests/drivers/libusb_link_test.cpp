@@ -45,7 +45,7 @@ TEST_F(LibusbLinkTest, OpensAnotherCardOnceAndNotAgainWhileItStaysPluggedIn) {
   EXPECT_EQ(other_.opened, 2);
 }
 
-TEST_F(LibusbLinkTest, TwoCardsAndNoSerialNumberAreSaidWithoutOpeningThemAgain) {
+TEST_F(LibusbLinkTest, TwoCardsWithoutASerialNumberAreReportedWithoutReopeningThem) {
   fake_bus.devices = {&ours_, &other_};
   drivers::LibusbLink link{card(""), time_};
   for (int i = 0; i < 10; ++i)

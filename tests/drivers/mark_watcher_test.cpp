@@ -42,14 +42,14 @@ TEST(MarkWatcher, GivesTheCountAtTheMarkBetweenTwoScans) {
   EXPECT_EQ(found[0].head.time, HostTime{3ms});
 }
 
-TEST(MarkWatcher, TheFirstScanSaysNothing) {
+TEST(MarkWatcher, TheFirstScanReportsNoMark) {
   MarkWatcher watcher;
   watcher.on_scan(scan(1ms, 0, 15));
   watcher.on_scan(scan(2ms, 10, 15));
   EXPECT_TRUE(crossings_of(watcher).empty());
 }
 
-TEST(MarkWatcher, TheFirstCrossingAfterARestartSaysSo) {
+TEST(MarkWatcher, TheFirstCrossingAfterARestartIsMarked) {
   MarkWatcher watcher;
   watcher.on_scan(scan(1ms, 0, 15));
   auto anew = scan(2ms, 0, 0);

@@ -1,7 +1,8 @@
 #pragma once
 /// A Modbus device in the test's own thread, on a listening socket of 127.0.0.1 or on a pseudo
-/// terminal, with its answers in the test's hands: proving registers are answered at once, measured
-/// ones when the test says so. Nothing happens but in the functions a test calls.
+/// terminal, with its answers under the test's control: identification registers are answered at
+/// once, measured ones when the test requests it. Nothing happens but in the functions a test
+/// calls.
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -1,5 +1,5 @@
 #pragma once
-/// What a Modbus device says, as bytes, and a small register map with registers to match.
+/// What a Modbus device sends, as bytes, and a small register map with registers to match.
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #pragma once
 /// A scale with distance-coded marks, made from its drawing: fixed marks every N, the k-th coded
-/// mark k + 1 beyond the middle. Knows nothing of how they are decoded.
+/// mark k + 1 beyond the middle. Independent of the decoder.
 
 #include <algorithm>
 #include <cstdint>

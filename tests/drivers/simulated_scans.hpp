@@ -1,7 +1,7 @@
 #pragma once
 /// Scans of a counter card that watches a probe touch again and again, computed from the truth:
 /// constant speed through each contact, scales that count, a clock that counts, a latch, an edge
-/// counter. Knows nothing of how touches are found.
+/// counter. Independent of the touch detector.
 
 #include <array>
 #include <cmath>

@@ -89,7 +89,7 @@ TEST(LatencyHistogram, PutsEveryDurationBelowItsBucketsBoundAndAboveTheLast) {
   }
 }
 
-TEST(LatencyHistogram, KnowsItsQuantilesToAQuarterOctave) {
+TEST(LatencyHistogram, GivesItsQuantilesToAQuarterOctave) {
   LatencyHistogram h;
   for (int i = 1; i <= 1000; ++i) h.record(i * 1us);
   const auto counts = h.read();
@@ -109,7 +109,7 @@ TEST(LatencyHistogram, KeepsWhatFitsNoBucket) {
   EXPECT_EQ(h.read().quantile(1.0), 3600s);
 }
 
-TEST(MonotonicTime, GoesAtTheGivenSpeed) {
+TEST(MonotonicTime, RunsAtTheGivenSpeed) {
   const MonotonicTime real(1.0);
   const MonotonicTime fast(100.0);
   const auto before = real.now();
@@ -122,7 +122,7 @@ TEST(MonotonicTime, GoesAtTheGivenSpeed) {
   EXPECT_EQ(fast.host(1s), 100s);
 }
 
-TEST(SteppedTime, MovesOnlyWhenToldTo) {
+TEST(SteppedTime, MovesOnlyWhenStepped) {
   SteppedTime time(HostTime{5s});
   EXPECT_EQ(time.now(), HostTime{5s});
   time.advance(20ms);

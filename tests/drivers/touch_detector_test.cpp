@@ -134,7 +134,7 @@ TEST(TouchDetector, SubtractsTheDelayOfARadioProbe) {
   EXPECT_EQ(detector.counters().touches.value(), 20u);
 }
 
-TEST(TouchDetector, SaysHowTheApproachWas) {
+TEST(TouchDetector, ReportsTheApproach) {
   const SimulatedProbe probe;
   for (const ProbeTrigger& t : touches_of(probe, options_for(probe), 5)) {
     EXPECT_NEAR(t.speed_m_s, 4e-3, 4e-5);
@@ -206,7 +206,7 @@ TEST(TouchDetector, DismissesVibrationBeforeATouch) {
   EXPECT_EQ(detector.counters().dismissed.value(), 5u);
 }
 
-TEST(TouchDetector, TakesNoEdgeOfTheReleaseForATouch) {
+TEST(TouchDetector, DoesNotTreatAReleaseEdgeAsATouch) {
   const SimulatedProbe probe{.chatter_s = {2.5e-3}};  // while retracting
   TouchOptions options = options_for(probe);
   EXPECT_EQ(touches_of(probe, options, 8).size(), 8u);
@@ -240,7 +240,7 @@ TEST(TouchDetector, KeepsTheScansAroundEveryTouch) {
   EXPECT_LT(window.front().edge_count, window.back().edge_count);
 }
 
-TEST(TouchDetector, SaysThatThereIsNoPositionWhereScansWereLost) {
+TEST(TouchDetector, ReportsThatThereIsNoPositionWhereScansWereLost) {
   const SimulatedProbe probe{.jitter_s = 0.0};
   SimulatedScans scans{probe, 6};
   TouchDetector detector{options_for(probe)};

@@ -1,5 +1,5 @@
 // Touches through the simulated card's wire: a probe on the index of a latch channel, USB/IP,
-// driver, detector, against the time and place of the contact that the simulation knows. The long
+// driver, detector, against the time and place of the contact in the simulation. The long
 // figure (10,000 touches) runs on computed scans in touch_detector_test.cpp; here are enough for
 // the wire to show what it does.
 
@@ -78,7 +78,7 @@ TEST(TouchOverTheWire, LatchedTouchesLieWithinTheirIntervals) {
   std::size_t scans_taken = 0;
   const HostTime end = kBegin + sim::seconds_to_ns(kPeriod_s * kTouches) + 20ms;
   while (bench.time.now() < end) {
-    // An edge must be told before the scans around it are made.
+    // An edge must be set before the scans around it are made.
     const double next_s = kPeriod_s * static_cast<double>(contacts.size());
     if (contacts.size() < kTouches && bench.time.now() >= kBegin + sim::seconds_to_ns(next_s)) {
       contacts.push_back(kBegin + sim::seconds_to_ns(next_s + where(random)));

@@ -49,7 +49,7 @@ class TrackerDeviceTest : public testing::Test {
     }
     return true;
   }
-  /// The device thread is held up: the controller goes on, nobody reads.
+  /// The device thread is delayed: the controller continues, its data are not read.
   void hold_up(std::chrono::nanoseconds duration) {
     for (const auto end = time_.now() + duration; time_.now() < end; time_.advance(20ms)) {
       peer_.serve(time_.now());
@@ -84,7 +84,7 @@ TEST_F(TrackerDeviceTest, StreamsFromTheSimulatedController) {
   EXPECT_EQ(device_->status().gaps, 0u);
 }
 
-TEST_F(TrackerDeviceTest, TellsTheWeather) {
+TEST_F(TrackerDeviceTest, ReportsTheWeather) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));
   run(1s);
@@ -154,7 +154,7 @@ TEST_F(TrackerDeviceTest, RawBytesGiveTheSamePointsAgain) {
   }
 }
 
-TEST_F(TrackerDeviceTest, RecordsWhatItAsked) {
+TEST_F(TrackerDeviceTest, RecordsItsRequests) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));
   run(20ms);
@@ -169,7 +169,7 @@ TEST_F(TrackerDeviceTest, RecordsWhatItAsked) {
   EXPECT_EQ(asked.back(), emscon::Command::StartMeasurement);
 }
 
-TEST_F(TrackerDeviceTest, SaysWhatAnsweredInsteadOfATracker) {
+TEST_F(TrackerDeviceTest, ReportsWhatAnsweredInsteadOfATracker) {
   make_device();
   cycle();
   cycle();
@@ -184,7 +184,7 @@ TEST_F(TrackerDeviceTest, SaysWhatAnsweredInsteadOfATracker) {
   EXPECT_TRUE(run_until_state("streaming")) << "it tries again";
 }
 
-TEST_F(TrackerDeviceTest, SaysThatNobodyListensAndTriesAgain) {
+TEST_F(TrackerDeviceTest, ReportsARefusedConnectionAndTriesAgain) {
   peer_.unplug();
   served_ = false;
   make_device();
@@ -196,7 +196,7 @@ TEST_F(TrackerDeviceTest, SaysThatNobodyListensAndTriesAgain) {
   EXPECT_TRUE(run_until_state("streaming"));
 }
 
-TEST_F(TrackerDeviceTest, StopsTheMeasurementWhenItGoes) {
+TEST_F(TrackerDeviceTest, StopsTheMeasurementWhenItEnds) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));
   ASSERT_TRUE(peer_.controller().streaming());
@@ -206,7 +206,7 @@ TEST_F(TrackerDeviceTest, StopsTheMeasurementWhenItGoes) {
   EXPECT_FALSE(peer_.controller().streaming());
 }
 
-TEST_F(TrackerDeviceTest, StandsABusyController) {
+TEST_F(TrackerDeviceTest, RetriesABusyController) {
   make_device();
   peer_.serve(time_.now());
   peer_.controller().inject({sim::FaultKind::Busy, 0.0, 3.0, 0.0, 0}, time_.now());
@@ -223,7 +223,7 @@ TEST_F(TrackerDeviceTest, ComesBackAfterAReboot) {
   EXPECT_TRUE(run_until_state("streaming"));
 }
 
-TEST_F(TrackerDeviceTest, AThreadThatWasHeldUpReadsItsPointsBeforeItJudgesTheirSilence) {
+TEST_F(TrackerDeviceTest, ADelayedThreadReadsItsPointsBeforeItReportsSilence) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));
   run(5s);
@@ -234,7 +234,7 @@ TEST_F(TrackerDeviceTest, AThreadThatWasHeldUpReadsItsPointsBeforeItJudgesTheirS
   EXPECT_EQ(device_->status().gaps, 0u);
 }
 
-TEST_F(TrackerDeviceTest, AThreadThatWasHeldUpReadsTheAnswerBeforeItJudgesItLate) {
+TEST_F(TrackerDeviceTest, ADelayedThreadReadsTheAnswerBeforeItReportsATimeOut) {
   make_device();
   ASSERT_TRUE(run_until_state("configuring"));
   hold_up(3s + 1s);

@@ -1,7 +1,7 @@
 #pragma once
 /// The simulated tracker controller on a listening socket of 127.0.0.1, in the test's own thread,
-/// with its point packets in the test's hands: they are gathered, and sent, held back or torn as
-/// the test says; answers and events go out at once. Nothing happens but in the functions a test
+/// with its point packets under the test's control: they are gathered, and sent, held back or torn
+/// on request; answers and events go out at once. Nothing happens but in the functions a test
 /// calls.
 
 #include <arpa/inet.h>
@@ -83,7 +83,7 @@ class TrackerPeer {
   }
   void send(std::string_view text) { send(std::as_bytes(std::span{text})); }
 
-  /// `count` points at once, a microsecond apart, right after the last ones said.
+  /// `count` points at once, a microsecond apart, right after the last ones.
   void flood(std::size_t count) {
     std::vector<emscon::MultiPoint> points;
     for (std::size_t k = 0; k < count; ++k)
@@ -109,7 +109,7 @@ class TrackerPeer {
     listener_ = bound_socket(port_);
     ASSERT_EQ(::listen(listener_.get(), 4), 0);
   }
-  /// Off and on again: the connection is lost, the controller's clock begins anew.
+  /// Off and on again: the connection is lost, the controller's clock restarts.
   void restart(HostTime now) {
     hang_up();
     power_on(now);
@@ -181,7 +181,7 @@ class TrackerPeer {
   sim::Socket client_;
   std::unique_ptr<sim::TrackerDevice> controller_;
   std::unique_ptr<emscon::PacketFramer> framer_ = std::make_unique<emscon::PacketFramer>();
-  std::deque<Bytes> points_;  ///< one burst each, not yet said
+  std::deque<Bytes> points_;  ///< one burst each, not yet sent
   Bytes torn_;
   protocol::DeviceTime last_said_{};
   std::int32_t clock_ahead_ = 0;  ///< s

@@ -83,7 +83,7 @@ TEST_F(TrackerReceiverTest, StampsPointsWithWhenTheyWereMeasuredNotWhenTheyCame)
   EXPECT_FALSE(has_flag(points_.back(), SampleFlag::ClockUnsettled));
 }
 
-TEST_F(TrackerReceiverTest, SaysWhileTheClockIsNotSettled) {
+TEST_F(TrackerReceiverTest, MarksPointsWhileTheClockIsNotSettled) {
   packet_at(now_, 10);
   EXPECT_TRUE(has_flag(points_.back(), SampleFlag::ClockUnsettled));
 }
@@ -114,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
         StatusFlag{"Unheard", static_cast<emscon::PointStatus>(99), SampleFlag::PointInvalid}),
     [](const auto& status) { return status.param.name; });
 
-TEST_F(TrackerReceiverTest, ABadStatusOfThePacketSpoilsItsPoints) {
+TEST_F(TrackerReceiverTest, ABadStatusOfThePacketMarksItsPoints) {
   emscon::MultiHead head;
   head.status = emscon::Status::SystemNotReady;
   packet_at(now_, 3, head);
@@ -151,10 +151,9 @@ TEST_F(TrackerReceiverTest, GivesTheSamePointsForAnySplitOfTheBytes) {
   }
 }
 
-// --- holes
-// ----------------------------------------------------------------------------------------------------------
+// --- holes ---------------------------------------------------------------------------------------
 
-TEST_F(TrackerReceiverTest, AHoleIsMarkedWithHowManyPointsItSwallowed) {
+TEST_F(TrackerReceiverTest, AGapIsMarkedWithTheNumberOfLostPoints) {
   push(burst(
            std::array{point(DeviceTime{1s}), point(DeviceTime{1002ms}), point(DeviceTime{1010ms})}),
        now_);
@@ -176,7 +175,7 @@ TEST_F(TrackerReceiverTest, APointThatIsNotLaterThanTheOneBeforeIsInvalid) {
   EXPECT_EQ(receiver_->counters().time_disorder, 2u);
 }
 
-TEST_F(TrackerReceiverTest, TheFirstPointAfterALostBeamSaysSo) {
+TEST_F(TrackerReceiverTest, TheFirstPointAfterALostBeamIsMarked) {
   stream_until(now_ + 2s);
   const auto before = points_.size();
   push(tests::tracker::packet(
@@ -191,7 +190,7 @@ TEST_F(TrackerReceiverTest, TheFirstPointAfterALostBeamSaysSo) {
   EXPECT_EQ(receiver_->counters().beam_losses, 1u);
 }
 
-TEST_F(TrackerReceiverTest, PointsOfBeforeTheBreakDoNotReturnTheBeam) {
+TEST_F(TrackerReceiverTest, PointsFromBeforeTheBreakDoNotCountAsTheBeamsReturn) {
   packet_at(now_, 10);
   push(tests::tracker::packet(emscon::StatusChange{emscon::Event::MeasurementNotReady}), now_);
   packet_at(now_ + 20ms, 10);  // the ten points that followed without a hole
@@ -201,7 +200,7 @@ TEST_F(TrackerReceiverTest, PointsOfBeforeTheBreakDoNotReturnTheBeam) {
   EXPECT_TRUE(has_flag(points_[20], SampleFlag::BeamReturned));
 }
 
-TEST_F(TrackerReceiverTest, AClockThatJumpedBackBeginsAnew) {
+TEST_F(TrackerReceiverTest, AClockThatJumpedBackRestartsItsMapping) {
   stream_until(now_ + 20s);
   const auto before = points_.size();
   push(burst(points_until(DeviceTime{1s}, 10, 2ms)), now_);
@@ -212,8 +211,7 @@ TEST_F(TrackerReceiverTest, AClockThatJumpedBackBeginsAnew) {
   EXPECT_EQ(receiver_->clock().restarts, 1u);
 }
 
-// --- connections
-// ----------------------------------------------------------------------------------------------------
+// --- connections ---------------------------------------------------------------------------------
 
 TEST_F(TrackerReceiverTest, ANewConnectionIsMarkedOnItsFirstPoint) {
   begin_connection();
@@ -242,7 +240,7 @@ TEST_F(TrackerReceiverTest, ARefusedStartOpensNothing) {
   EXPECT_TRUE(points_.empty());
 }
 
-TEST_F(TrackerReceiverTest, TheRestOfABrokenConnectionIsForgotten) {
+TEST_F(TrackerReceiverTest, TheRestOfABrokenConnectionIsDiscarded) {
   begin_connection();
   const Bytes torn = burst(points_until(device(now_), 5, 2ms));
   push(std::span{torn}.first(100), now_);
@@ -260,7 +258,7 @@ TEST_F(TrackerReceiverTest, ARecordingMayBeginInTheMiddleOfAPacket) {
   EXPECT_TRUE(malformed_.empty());
 }
 
-TEST_F(TrackerReceiverTest, AHoleInARecordingIsMarkedAndGotOver) {
+TEST_F(TrackerReceiverTest, AGapInARecordingIsMarkedAndSkipped) {
   begin_connection();
   packet_at(now_, 3);
   const Bytes cut = burst(points_until(device(now_ + 300ms), 5, 2ms));
@@ -272,7 +270,7 @@ TEST_F(TrackerReceiverTest, AHoleInARecordingIsMarkedAndGotOver) {
   EXPECT_TRUE(has_flag(points_[3], SampleFlag::GapBefore));
 }
 
-TEST_F(TrackerReceiverTest, NonsenseIsToldOnceWithItsFirstBytes) {
+TEST_F(TrackerReceiverTest, MalformedBytesAreReportedOnceWithTheFirstBytes) {
   begin_connection();
   const std::string page = "HTTP/1.1 400 Bad Request\r\n\r\n";
   push(std::as_bytes(std::span{page}), now_);
@@ -283,7 +281,7 @@ TEST_F(TrackerReceiverTest, NonsenseIsToldOnceWithItsFirstBytes) {
   EXPECT_FALSE(malformed_[0].error);
 }
 
-TEST_F(TrackerReceiverTest, AnUndecodablePacketIsNonsenseWithItsReason) {
+TEST_F(TrackerReceiverTest, AnUndecodablePacketIsReportedWithItsReason) {
   begin_connection();
   Bytes bytes = burst(points_until(device(now_), 2, 2ms));
   bytes[12] = std::byte{7};
@@ -292,8 +290,7 @@ TEST_F(TrackerReceiverTest, AnUndecodablePacketIsNonsenseWithItsReason) {
   EXPECT_EQ(malformed_[0].error, emscon::DecodeError::CountMismatch);
 }
 
-// --- weather and stationary
-// -----------------------------------------------------------------------------------------
+// --- weather and stationary ----------------------------------------------------------------------
 
 TEST_F(TrackerReceiverTest, WeatherIsSiAndComesOnlyWhenItChanges) {
   emscon::MultiHead head;
@@ -323,7 +320,7 @@ TEST_F(TrackerReceiverTest, AStationaryResultIsTimedByItsMiddle) {
   EXPECT_EQ(weather_.size(), 1u);
 }
 
-TEST_F(TrackerReceiverTest, AnswersErrorsAndEventsAreHandedOn) {
+TEST_F(TrackerReceiverTest, AnswersErrorsAndEventsArePassedOn) {
   push({}, now_);
   push(tests::tracker::ok(emscon::Command::SetUnits), now_);
   push(tests::tracker::packet(emscon::StatusChange{emscon::Event::LaserWarmedUp}), now_);

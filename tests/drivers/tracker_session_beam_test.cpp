@@ -32,7 +32,7 @@ TEST_F(TrackerSessionTest, AReconnectDoesNotInitialize) {
 }
 
 class RefusedStart : public TrackerSessionTest, public testing::WithParamInterface<Status> {};
-TEST_P(RefusedStart, WaitsForTheBeamAndDisturbsNobody) {
+TEST_P(RefusedStart, WaitsForTheBeamAndSendsNothing) {
   connect();
   pass_query(TrackerProcessorStatus::Initialised);
   answer_until(Command::StartMeasurement);
@@ -87,7 +87,7 @@ TEST_F(TrackerSessionTest, AnOrderStopsTheMeasurementAndStartsItAgain) {
   EXPECT_EQ(session_.state(), TrackerState::Streaming);
 }
 
-TEST_F(TrackerSessionTest, ARefusedOrderSaysWhyAndTheMeasurementGoesOn) {
+TEST_F(TrackerSessionTest, ARefusedOrderReportsTheReasonAndTheMeasurementContinues) {
   reach_streaming();
   on(TrackerOrder{TrackerOrder::What::FindReflector, 8, "", 2.5});
   answer_until(Command::FindReflector);
@@ -102,7 +102,7 @@ TEST_F(TrackerSessionTest, ARefusedOrderSaysWhyAndTheMeasurementGoesOn) {
   EXPECT_EQ(session_.fault().count, 0u);
 }
 
-TEST_F(TrackerSessionTest, AnOrderWaitsForTheAnswerThatIsUnderWay) {
+TEST_F(TrackerSessionTest, AnOrderWaitsForTheOutstandingReply) {
   reach_streaming();
   say(Event::MeasurementNotReady);
   let_pass(options_.keep_alive);
@@ -116,7 +116,7 @@ TEST_F(TrackerSessionTest, AnOrderWaitsForTheAnswerThatIsUnderWay) {
   EXPECT_TRUE(session_.take_report()->done());
 }
 
-TEST_F(TrackerSessionTest, AnOrderToATrackerThatIsNotThereIsRefused) {
+TEST_F(TrackerSessionTest, AnOrderToATrackerThatIsNotConnectedIsRefused) {
   on(TrackerOrder{TrackerOrder::What::GoHome, 1, "", 0.0});
   const auto report = session_.take_report();
   ASSERT_TRUE(report);
@@ -184,7 +184,7 @@ TEST_F(NamedReflector, ThatIsUnknownIsAFaultThatNamesTheKnownOnes) {
   EXPECT_THAT(session_.fault().text, HasSubstr("\"SMR 0.5\"\" (3), \"Cat eye\" (4)"));
 }
 
-TEST_F(TrackerSessionTest, ANameThatATerminalWouldObeyIsShownWithQuestionMarks) {
+TEST_F(TrackerSessionTest, ANameWithTerminalControlCharactersIsShownWithQuestionMarks) {
   reach_streaming();
   on(TrackerOrder{TrackerOrder::What::ListReflectors, 3, "", 0.0});
   on(emscon::Answer{emscon::ReflectorAnswer{Status::Ok, 4}});
@@ -195,7 +195,7 @@ TEST_F(TrackerSessionTest, ANameThatATerminalWouldObeyIsShownWithQuestionMarks) 
   EXPECT_EQ(report->reflectors[0].name, "?[2JSMR?");
 }
 
-TEST_F(TrackerSessionTest, AListWithoutEndIsCutOff) {
+TEST_F(TrackerSessionTest, AListWithoutEndIsTruncated) {
   reach_streaming();
   on(TrackerOrder{TrackerOrder::What::ListReflectors, 3, "", 0.0});
   on(emscon::Answer{emscon::ReflectorAnswer{Status::Ok, 4}});

@@ -7,8 +7,7 @@
 namespace abbe::drivers {
 namespace {
 
-// --- what goes wrong before points come
-// -----------------------------------------------------------------------------
+// --- what goes wrong before points come ----------------------------------------------------------
 
 TEST_F(TrackerSessionTest, WaitsForAHeatingLaserAndAsksAgain) {
   connect();
@@ -23,7 +22,7 @@ TEST_F(TrackerSessionTest, WaitsForAHeatingLaserAndAsksAgain) {
   EXPECT_EQ(session_.fault().count, 0u);
 }
 
-TEST_F(TrackerSessionTest, GoesOnAtOnceWhenTheLaserSaysItIsWarm) {
+TEST_F(TrackerSessionTest, ContinuesAtOnceWhenTheLaserReportsReady) {
   connect();
   emscon::SystemStatusAnswer heating;
   heating.laser = emscon::LaserStatus::Heating;
@@ -32,7 +31,7 @@ TEST_F(TrackerSessionTest, GoesOnAtOnceWhenTheLaserSaysItIsWarm) {
   EXPECT_EQ(sent_.size(), 2u);
 }
 
-TEST_F(TrackerSessionTest, WaitsWarmWhenACommandSaysSo) {
+TEST_F(TrackerSessionTest, WaitsForTheLaserWhenACommandReportsItNotReady) {
   connect();
   pass_query();
   answer_until(Command::Initialize);
@@ -73,7 +72,7 @@ TEST_F(TrackerSessionTest, ACommandWithoutAnswerIsAFaultAfterThreeSeconds) {
   EXPECT_EQ(session_.fault().text, "tracker 10.0.0.7:700: no answer to SetUnits in 3 s");
 }
 
-TEST_F(TrackerSessionTest, AsksAControllerThatWasAwayUntilItHears) {
+TEST_F(TrackerSessionTest, RepeatsTheFirstCommandUntilARestartedControllerAnswers) {
   connect();
   tick_after(options_.ask_again);
   tick_after(options_.ask_again);
@@ -84,7 +83,7 @@ TEST_F(TrackerSessionTest, AsksAControllerThatWasAwayUntilItHears) {
   EXPECT_EQ(session_.fault().count, 0u);
 }
 
-TEST_F(TrackerSessionTest, AControllerThatNeverHearsIsAFaultAfterThreeSeconds) {
+TEST_F(TrackerSessionTest, AControllerThatNeverAnswersIsAFaultAfterThreeSeconds) {
   connect();
   let_pass(2999ms);
   EXPECT_EQ(session_.state(), TrackerState::Querying);
@@ -123,7 +122,7 @@ TEST_F(TrackerSessionTest, AServerBusyForEverIsAFault) {
   EXPECT_THAT(session_.fault().text, HasSubstr("SetUnits was refused: server busy (1)"));
 }
 
-TEST_F(TrackerSessionTest, ARefusalSaysWhatWasRefusedAndWhy) {
+TEST_F(TrackerSessionTest, ARefusalIsReportedWithCommandAndReason) {
   connect();
   pass_query();
   answer_until(Command::SetCoordinateSystemType);
@@ -141,7 +140,7 @@ TEST_F(TrackerSessionTest, AParameterOutOfRangeButAcceptedIsNoFault) {
   EXPECT_EQ(sent_.back(), Command::SetSystemSettings);
 }
 
-TEST_F(TrackerSessionTest, WhatAnOlderControllerDoesNotKnowIsLeftOut) {
+TEST_F(TrackerSessionTest, CommandsUnknownToAnOlderControllerAreLeftOut) {
   connect();
   pass_query();
   answer_until(Command::SetStatisticMode);
@@ -151,7 +150,7 @@ TEST_F(TrackerSessionTest, WhatAnOlderControllerDoesNotKnowIsLeftOut) {
   EXPECT_EQ(sent_.back(), Command::StartMeasurement);
 }
 
-TEST_F(TrackerSessionTest, NonsenseSaysWhatCameInstead) {
+TEST_F(TrackerSessionTest, MalformedBytesAreReportedWithTheirContent) {
   connect();
   TrackerProtocolError nonsense;
   nonsense.length = 8;
@@ -163,17 +162,16 @@ TEST_F(TrackerSessionTest, NonsenseSaysWhatCameInstead) {
                                                "48 54 54 50 2f 31 2e 31 \"HTTP/1.1\""));
 }
 
-TEST_F(TrackerSessionTest, ASecondClientIsToldSo) {
+TEST_F(TrackerSessionTest, ASecondClientIsRefusedWithTheReason) {
   connect();
   on(emscon::ErrorResponse{Command::GetSystemStatus, Status::MultipleConnectionsNotAllowed});
   EXPECT_TRUE(closed());
   EXPECT_THAT(session_.fault().text, HasSubstr("another client is connected"));
 }
 
-// --- reconnecting
-// ---------------------------------------------------------------------------------------------------
+// --- reconnecting --------------------------------------------------------------------------------
 
-TEST_F(TrackerSessionTest, AConnectionThatDoesNotComeIsGivenUp) {
+TEST_F(TrackerSessionTest, AConnectionAttemptTimesOut) {
   on(TrackerTick{});
   tick_after(options_.connect_timeout);
   EXPECT_TRUE(closed());
@@ -193,7 +191,7 @@ TEST_F(TrackerSessionTest, PausesDoubleUpToTheLongest) {
   EXPECT_THAT(pauses, ElementsAre(250ms, 500ms, 500ms, 500ms));
 }
 
-TEST_F(TrackerSessionTest, PausesAreShortAgainOncePointsCame) {
+TEST_F(TrackerSessionTest, PausesAreShortAgainOncePointsArrive) {
   for (int i = 0; i < 5; ++i) {
     on(TrackerTick{});
     on(TrackerConnectionLost{"connection refused"});
@@ -204,13 +202,13 @@ TEST_F(TrackerSessionTest, PausesAreShortAgainOncePointsCame) {
   EXPECT_EQ(session_.deadline() - now_, options_.first_pause);
 }
 
-TEST_F(TrackerSessionTest, ARestartedServerIsSetUpAnew) {
+TEST_F(TrackerSessionTest, ARestartedServerIsSetUpAgain) {
   reach_streaming();
   say(Event::ServerStarted);
   EXPECT_THAT(sent_, ElementsAre(Command::GetSystemStatus));
 }
 
-TEST_F(TrackerSessionTest, AClosingServerIsLeftAndFoundAgain) {
+TEST_F(TrackerSessionTest, AClosingServerIsDisconnectedAndReconnected) {
   reach_streaming();
   say(Event::ServerClosing);
   EXPECT_TRUE(closed());
@@ -219,8 +217,7 @@ TEST_F(TrackerSessionTest, AClosingServerIsLeftAndFoundAgain) {
   EXPECT_EQ(session_.state(), TrackerState::Connecting);
 }
 
-// --- streaming and the beam
-// -----------------------------------------------------------------------------------------
+// --- streaming and the beam ----------------------------------------------------------------------
 
 TEST_F(TrackerSessionTest, SilenceWhileStreamingIsAFault) {
   reach_streaming();
@@ -233,7 +230,7 @@ TEST_F(TrackerSessionTest, SilenceWhileStreamingIsAFault) {
   EXPECT_THAT(session_.fault().text, HasSubstr("no points in 1.5 s"));
 }
 
-TEST_F(TrackerSessionTest, ALostBeamIsWaitedForAndTheControllerAskedWhetherItLives) {
+TEST_F(TrackerSessionTest, DuringALostBeamTheControllerIsPolled) {
   reach_streaming();
   on(emscon::ErrorResponse{Command::StartMeasurement, Status::Unknown});
   EXPECT_EQ(session_.state(), TrackerState::BeamLost);
@@ -246,7 +243,7 @@ TEST_F(TrackerSessionTest, ALostBeamIsWaitedForAndTheControllerAskedWhetherItLiv
   EXPECT_EQ(session_.fault().count, 0u);
 }
 
-TEST_F(TrackerSessionTest, AControllerThatDiesWithoutABeamIsAFault) {
+TEST_F(TrackerSessionTest, AControllerThatStopsDuringALostBeamIsAFault) {
   reach_streaming();
   say(Event::MeasurementNotReady);
   let_pass(options_.keep_alive + options_.command_timeout);
@@ -289,7 +286,7 @@ TEST_F(TrackerSessionTest, MeasuringIsStartedAgainIfNoPointsFollowTheBeam) {
   EXPECT_EQ(session_.state(), TrackerState::Streaming);
 }
 
-TEST_F(TrackerSessionTest, PointsOfBeforeTheBreakDoNotEndIt) {
+TEST_F(TrackerSessionTest, PointsFromBeforeTheBreakDoNotEndIt) {
   reach_streaming();
   say(Event::MeasurementNotReady);
   let_pass(300ms);
@@ -297,7 +294,7 @@ TEST_F(TrackerSessionTest, PointsOfBeforeTheBreakDoNotEndIt) {
   EXPECT_EQ(session_.state(), TrackerState::BeamLost);
 }
 
-TEST_F(TrackerSessionTest, AMissedReadyEventIsMadeUpByAsking) {
+TEST_F(TrackerSessionTest, AMissedReadyEventIsReplacedByAStatusRequest) {
   reach_streaming();
   say(Event::MeasurementNotReady);
   let_pass(options_.keep_alive);

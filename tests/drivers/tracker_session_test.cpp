@@ -65,10 +65,9 @@ TEST_F(TrackerSessionTest, SendsOneCommandAtATime) {
   EXPECT_THAT(sent_, ElementsAre(Command::GetSystemStatus));
 }
 
-// --- stopping
-// -------------------------------------------------------------------------------------------------------
+// --- stopping ------------------------------------------------------------------------------------
 
-TEST_F(TrackerSessionTest, StopsAMeasurementThenClosesAndStaysAway) {
+TEST_F(TrackerSessionTest, StopsAMeasurementThenClosesAndStaysDisconnected) {
   reach_streaming();
   on(TrackerStopRequested{});
   EXPECT_EQ(session_.state(), TrackerState::Stopping);
@@ -97,8 +96,7 @@ TEST_F(TrackerSessionTest, ADeadlineInThePastIsNeverLeftBehindByATick) {
   }
 }
 
-// --- the other modes
-// ------------------------------------------------------------------------------------------------
+// --- the other modes -----------------------------------------------------------------------------
 
 class StationarySession : public TrackerSessionTest {
  protected:
@@ -113,7 +111,7 @@ class StationarySession : public TrackerSessionTest {
   }
 };
 
-TEST_F(StationarySession, TellsEnvironmentReflectorAndMode) {
+TEST_F(StationarySession, SetsUpEnvironmentReflectorAndMode) {
   connect();
   pass_query();
   answer_until(Command::StartMeasurement);

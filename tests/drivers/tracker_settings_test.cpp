@@ -75,7 +75,7 @@ class TrackerSettingsTest : public testing::Test {
   std::unique_ptr<TrackerDevice> device_;
 };
 
-TEST_F(TrackerSettingsTest, AreAsBeforeWhenAbbeHasLeft) {
+TEST_F(TrackerSettingsTest, AreRestoredWhenAbbeDisconnects) {
   emscon::SystemSettings settings;
   settings.apply_transformation = settings.has_nivel = settings.has_video_camera = true;
   settings.keep_last_position = settings.send_unsolicited_messages = false;
@@ -129,7 +129,7 @@ TEST_F(TrackerSettingsTest, OfAnotherProgramDoNotReachThePoints) {
     EXPECT_NEAR(point.p_tracker_m[k], seen.p_tracker_m[static_cast<Eigen::Index>(k)], 1e-3);
 }
 
-TEST_F(TrackerSettingsTest, OfBeforeSurviveALostConnection) {
+TEST_F(TrackerSettingsTest, ThatAreToBeRestoredSurviveALostConnection) {
   ask(emscon::SetUnits{{emscon::LengthUnit::Inch, emscon::AngleUnit::Degree}});
   make_device();
   ASSERT_TRUE(reaches("streaming"));
@@ -141,7 +141,7 @@ TEST_F(TrackerSettingsTest, OfBeforeSurviveALostConnection) {
             emscon::LengthUnit::Inch);
 }
 
-TEST_F(TrackerSettingsTest, ArePutBackBeforeARefusedConnectionIsGivenUp) {
+TEST_F(TrackerSettingsTest, AreRestoredBeforeARefusedConnectionIsClosed) {
   ask(emscon::SetUnits{{emscon::LengthUnit::Inch, emscon::AngleUnit::Degree}});
   options_.session.reflector = "no such reflector";
   make_device();
@@ -152,7 +152,7 @@ TEST_F(TrackerSettingsTest, ArePutBackBeforeARefusedConnectionIsGivenUp) {
             emscon::LengthUnit::Inch);
 }
 
-TEST_F(TrackerSettingsTest, AMuteControllerIsLeftAllTheSame) {
+TEST_F(TrackerSettingsTest, AMuteControllerIsDisconnectedWithoutRestoring) {
   make_device();
   ASSERT_TRUE(reaches("streaming"));
   peer_.controller().inject({sim::FaultKind::Mute, 0.0, 60.0, 0.0, 0}, time_.now());
@@ -204,7 +204,7 @@ TEST_F(CarriedReflector, IsFoundOnOrder) {
   EXPECT_EQ(peer_.controller().initializations(), 1u);
 }
 
-TEST_F(TrackerSettingsTest, EveryOrderIsReportedWhateverIsOrderedMeanwhile) {
+TEST_F(TrackerSettingsTest, EveryOrderIsReportedAlsoIfAnotherFollows) {
   make_device();
   ASSERT_TRUE(reaches("streaming"));
   std::set<std::uint64_t> reported;

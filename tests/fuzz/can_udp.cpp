@@ -1,5 +1,5 @@
 // Any bytes as a CAN-over-UDP datagram: refused, or read to the end and written again to the same
-// bytes, but for the FD flag byte's meaning, which nobody checks. Also as a raw block to the
+// bytes, except for the bits of the FD flag byte, which are not checked. Also as a raw block to the
 // replaying receiver.
 
 #include <algorithm>

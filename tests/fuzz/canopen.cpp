@@ -54,7 +54,7 @@ abbe::drivers::EncoderReceiverOptions two_axes() {
   return options;
 }
 
-/// A client talks to the server; what the fuzzer says comes in between.
+/// A client talks to the server; the fuzzer's frames come in between.
 struct World {
   inline static const ObjectDictionary kFresh{{.node = 1}};  // made once: half of the time else
   ObjectDictionary objects = kFresh;

@@ -34,8 +34,8 @@ std::vector<std::byte> round_trip(std::span<const std::byte> payload) {
   return again;
 }
 
-/// A type that is published: what we encode has a key. A stranger's bytes may decode without (text
-/// that goes on after its NUL), and nobody takes them then.
+/// A type that is published: what we encode has a key. Foreign bytes may decode without a key (text
+/// that continues after its NUL); they are then discarded.
 template <class T>
 void published(daemon::Topic topic, std::span<const std::byte> payload) {
   (void)daemon::payload_key(topic, payload);

@@ -110,7 +110,7 @@ TEST_F(SocketCan, CountsWhatDidNotFitIntoTheKernelsQueue) {
   const auto got = read(narrow, kSent).size();
   ASSERT_LT(got, kSent);
 
-  // The kernel tells with the next frame.
+  // The kernel reports it with the next frame.
   ASSERT_TRUE(other.send(numbered(kSent)));
   const auto after = read(narrow, 2);
   ASSERT_EQ(after.size(), 2u);
@@ -157,7 +157,7 @@ TEST_F(SocketCan, RefusesAClassicInterfaceWhereFdIsAskedFor) {
   EXPECT_TRUE(content.open(kIds).has_value());
 }
 
-TEST_F(SocketCan, ReportsWhatTheControllerSaysOfTheBus) {
+TEST_F(SocketCan, ReportsTheControllersBusState) {
   for (const auto condition :
        {can::BusCondition::Passive, can::BusCondition::BusOff, can::BusCondition::Restarted}) {
     ASSERT_TRUE(other.send_condition(condition));
@@ -187,7 +187,7 @@ TEST_F(SocketCan, AFullReadWithAFrameOfItsOwnAmongItIsNotTheEnd) {
   EXPECT_TRUE(second->all);
 }
 
-TEST_F(SocketCan, SaysThatTheInterfaceWentDownAndOpensAgainWhenItIsUp) {
+TEST_F(SocketCan, ReportsThatTheInterfaceWentDownAndReopensWhenItIsUp) {
   std::array<ReceivedFrame, 4> frames{};
   vcan.down();
   const auto failed = bus.read(frames, 1s);
@@ -205,7 +205,7 @@ TEST_F(SocketCan, SaysThatTheInterfaceWentDownAndOpensAgainWhenItIsUp) {
   EXPECT_GE(read(bus, 1).size(), 1u);
 }
 
-TEST_F(SocketCan, SaysThatTheInterfaceIsGone) {
+TEST_F(SocketCan, ReportsThatTheInterfaceIsGone) {
   vcan.remove();
   std::array<ReceivedFrame, 4> frames{};
   ASSERT_FALSE(bus.read(frames, 1s));
@@ -220,7 +220,7 @@ struct OwnSync : SocketCan {
   void SetUp() override { ASSERT_TRUE(bus.open(kWithSync).has_value()); }
 };
 
-TEST_F(OwnSync, ComesBackAsAnEchoOfWhenItLeft) {
+TEST_F(OwnSync, ComesBackAsAnEchoWithItsTimeOfSending) {
   wait_for_stamps(bus, other, numbered(0));
   const auto before = time.now();
   ASSERT_TRUE(bus.send(std::array{can::encode_sync()}).has_value());
@@ -235,14 +235,14 @@ TEST_F(OwnSync, ComesBackAsAnEchoOfWhenItLeft) {
   EXPECT_LE(got[0].time, after + 5ms);
 }
 
-TEST_F(OwnSync, IsAllThatIsHeardOfWhatWeSend) {
+TEST_F(OwnSync, IsTheOnlyOwnFrameThatIsReceived) {
   ASSERT_TRUE(bus.send(std::array{numbered(1), can::encode_sync()}).has_value());
   const auto got = read(bus, 1);
   ASSERT_EQ(got.size(), 1u);
   EXPECT_TRUE(got[0].echo);
 }
 
-TEST_F(OwnSync, IsToldFromThatOfAnotherProgram) {
+TEST_F(OwnSync, IsDistinguishedFromThatOfAnotherProgram) {
   ASSERT_TRUE(other.send(can::encode_sync()));
   const auto got = read(bus, 1);
   ASSERT_EQ(got.size(), 1u);
@@ -262,7 +262,7 @@ TEST_F(KernelSync, ComesBackAsAnEcho) {
   EXPECT_TRUE(can::decode_sync(other.receive(1000ms).value_or(can::CanFrame{})).has_value());
 }
 
-TEST_F(KernelSync, StopsWhenTold) {
+TEST_F(KernelSync, StopsOnRequest) {
   ASSERT_TRUE(bus.start_sync(1ms).has_value());
   ASSERT_GE(read(bus, 5).size(), 5u);
   bus.stop_sync();
@@ -288,7 +288,7 @@ TEST_F(KernelSync, IsRefusedOnAnInterfaceThatIsDown) {
   EXPECT_THAT(refused.error().text, HasSubstr("Network is down"));
 }
 
-TEST(SocketCanWithout, SaysWhichInterfaceIsMissing) {
+TEST(SocketCanWithout, NamesTheMissingInterface) {
   MonotonicTime time;
   SocketCanBus bus{{.interface = "can99"}, time};
   const auto refused = bus.open(kIds);

@@ -1,6 +1,6 @@
 #pragma once
-/// What the tests do to a CAN interface from outside the driver: make it, take it down, put frames
-/// on it that nobody asked for. Needs root, as in the guest.
+/// What the tests do to a CAN interface from outside the driver: make it, take it down, put
+/// unrequested frames on it. Needs root, as in the guest.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -102,7 +102,7 @@ class CanSocket {
     return true;
   }
   bool send(const can::CanFrame& frame) const { return send({&frame, 1}); }
-  /// As a controller would say it; vcan hands on what is written to it.
+  /// As a controller would report it; vcan passes on what is written to it.
   bool send_condition(can::BusCondition condition) const {
     return send(
         can::encode_error_frame({.conditions = static_cast<can::BusConditions>(condition)}));

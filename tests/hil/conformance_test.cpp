@@ -22,8 +22,8 @@ class VcanConformancePeer {
     drivers::EncoderDeviceOptions options;
     options.receiver.axes = {{.name = "X", .node = 1}, {.name = "Y", .node = 2}};
     options.receiver.sync_period = 4ms;
-    options.sample_capacity = 16;      // the bus hands over 64 frames a turn
-    options.raw_capacity_blocks = 64;  // nobody reads them here: full all the time
+    options.sample_capacity = 16;      // the bus hands over 64 frames per cycle
+    options.raw_capacity_blocks = 64;  // not read here: always full
     auto bus = std::make_unique<drivers::SocketCanBus>(
         drivers::SocketCanOptions{.interface = vcan_.name(), .speed = 0.0}, time_);
     device_ = std::move(*drivers::EncoderDevice::create(options, std::move(bus), time_));
@@ -65,8 +65,8 @@ class VcanConformancePeer {
     vcan_.up();
     nodes_.drain();
   }
-  /// A cycle makes one sample whatever the nodes say; only the bus can make many at once, by going
-  /// off and on.
+  /// A cycle gives one sample whatever the nodes send; only a bus that goes off and on gives many
+  /// at once.
   void flood() {
     for (int i = 0; i < 100; ++i) {
       (void)nodes_.socket().send_condition(can::BusCondition::BusOff);

@@ -1,7 +1,7 @@
 // Deadlines of the encoder path in virtual time: the guest's clock counts instructions of a
-// processor of some 500 MIPS, so what is late here is late by its own logic, queues and scheduling
-// and not by anybody's load. It says nothing about the latency of real hardware. Every peer lives
-// in the guest; the simulated nodes run above the device thread, because hardware would take no
+// processor of some 500 MIPS, so a delay here comes from the driver's logic, queues and scheduling,
+// not from other load. It is no measure of the latency of real hardware. Every peer runs in
+// the guest; the simulated nodes run above the device thread, because hardware would take no
 // processor time at all.
 //
 // ABBE_HIL_SECONDS: virtual seconds of each run (default 5).
@@ -38,15 +38,16 @@ double us(nanoseconds t) {
   return std::chrono::duration<double, std::micro>(t).count();
 }
 
-/// What the device thread saw of its own turns. Filled by that thread, read when it has ended.
+/// What the device thread measured of its own cycles. Filled by that thread, read when it has
+/// ended.
 struct Seen {
   std::vector<AxisSample> samples;
   std::vector<nanoseconds>
-      ready_to_ring;  ///< oldest frame of a turn in the kernel until its samples are out
+      ready_to_ring;  ///< oldest frame of a cycle in the kernel until its samples are out
   std::vector<nanoseconds> sync_to_flag;  ///< SYNC to the sample that marks an axis as missing
 };
 
-/// The device thread's loop with a look at the clock after each turn.
+/// The device thread's loop with a look at the clock after each cycle.
 class MeasuredDevice {
  public:
   MeasuredDevice(const CanInterface& interface, SyncSource sync) {
@@ -132,7 +133,7 @@ class DeadlinesInVirtualTime : public testing::TestWithParam<Case> {
   void SetUp() override { ASSERT_TRUE(drivers::lock_memory().empty()); }
   void begin() {
     ASSERT_TRUE(device.state_becomes("streaming")) << device.status().last_fault;
-    ::usleep(1'000'000);  // the kernel cleans up after whoever ran before
+    ::usleep(1'000'000);  // the kernel cleans up after earlier processes
     before = device.status();
     device.begin_to_measure();
   }

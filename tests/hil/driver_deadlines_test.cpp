@@ -21,7 +21,7 @@ using std::chrono::nanoseconds;
 constexpr int kDevicePriority = 50;
 constexpr int kPeerPriority = 90;  // hardware would take no processor time at all
 
-/// The device thread's loop with a look at the clock after each turn.
+/// The device thread's loop with a look at the clock after each cycle.
 template <class Driver>
 class MeasuredDriver {
  public:
@@ -69,7 +69,7 @@ class MeasuredDriver {
     samples_ = samples_ + n;
     if (!came) return;
 
-    // More bytes of one write may come in a later turn: they are as old.
+    // More bytes of one write may come in a later cycle: they are as old.
     if (const auto written = peer_.take_written()) written_ = *written;
     if (n != 0 && measuring_ && written_ != HostTime{}) times_.push_back(now - written_);
   }
@@ -98,7 +98,7 @@ class DriverDeadlines : public testing::Test {
     MeasuredDriver<Driver> driver;
 
     ASSERT_TRUE(driver.streams()) << driver.status().last_fault;
-    ::usleep(500'000);  // the kernel cleans up after whoever ran before
+    ::usleep(500'000);  // the kernel cleans up after earlier processes
     const auto before = driver.status();
     driver.begin_to_measure();
     ::usleep(static_cast<useconds_t>(run_time(5s) / 1us));

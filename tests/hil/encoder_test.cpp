@@ -1,6 +1,6 @@
 // The encoder driver with its own thread against the simulated nodes on a virtual CAN bus: SYNC by
-// the device thread and by the kernel. Real time on an emulated processor: what must hold however
-// late anybody is. The deadlines are in deadlines_test.cpp.
+// the device thread and by the kernel. Real time on an emulated processor: these tests must
+// pass whatever the delays. The deadlines are in deadlines_test.cpp.
 
 #include <gmock/gmock.h>
 #include <algorithm>
@@ -106,7 +106,7 @@ TEST_P(EncodersOnVcan, StampAllAxesWithTheOneTimeOfTheSync) {
   std::erase_if(samples, [](const auto& s) { return !complete(s); });
 
   // Nodes on one axis of the machine took their positions at one time, and that time is the
-  // sample's. Anybody may still lose an emulated processor between two readings of the clocks.
+  // sample's. Any process may still lose an emulated processor between two readings of the clocks.
   EXPECT_GT(
       share_of([](const auto& s) { return s.count[0] == s.count[3] && s.count[1] == s.count[4]; }),
       0.9);
@@ -127,14 +127,14 @@ TEST_P(EncodersOnVcan, MarkAnAxisThatIsMissing) {
   ASSERT_TRUE(until([&] { return complete(samples.back()); }));
 }
 
-TEST_P(EncodersOnVcan, SayThatTheControllerIsErrorPassive) {
+TEST_P(EncodersOnVcan, ReportThatTheControllerIsErrorPassive) {
   begin_streaming();
   ASSERT_TRUE(other.send_condition(can::BusCondition::Passive));
   EXPECT_TRUE(until([&] { return seen(SampleFlag::BusError); }));
   EXPECT_EQ(device->status().state, "streaming");
 }
 
-TEST_P(EncodersOnVcan, SayBusOffAtOnceAndComeBack) {
+TEST_P(EncodersOnVcan, ReportBusOffAtOnceAndRecover) {
   begin_streaming();
   encoders.inject({.kind = FaultKind::BusOff, .duration_s = 0.3});
   ASSERT_TRUE(state_becomes("bus off"));
@@ -144,7 +144,7 @@ TEST_P(EncodersOnVcan, SayBusOffAtOnceAndComeBack) {
   ASSERT_TRUE(until([&] { return seen(SampleFlag::Restarted) && complete(samples.back()); }));
 }
 
-TEST_P(EncodersOnVcan, SayThatTheInterfaceIsDownAndComeBackWhenItIsUp) {
+TEST_P(EncodersOnVcan, ReportThatTheInterfaceIsDownAndRecoverWhenItIsUp) {
   begin_streaming();
   vcan.down();
 
@@ -187,9 +187,9 @@ INSTANTIATE_TEST_SUITE_P(Sync, EncodersOnVcan,
 
 class SyncOfTheDevice : public testing::TestWithParam<SyncSource> {};
 
-TEST_P(SyncOfTheDevice, SeesAnotherSyncProducer) {
-  // Frames of this computer cannot be told from the kernel's own SYNC; but before that has run,
-  // none is ours.
+TEST_P(SyncOfTheDevice, DetectsAnotherSyncProducer) {
+  // Frames of this computer cannot be distinguished from the kernel's own SYNC; but before the
+  // kernel's SYNC has run, none is ours.
   drivers::MonotonicTime time;
   const VirtualCan vcan;
   drivers::EncoderDeviceOptions options;
@@ -213,7 +213,7 @@ TEST_P(SyncOfTheDevice, SeesAnotherSyncProducer) {
 INSTANTIATE_TEST_SUITE_P(Sync, SyncOfTheDevice,
                          testing::Values(SyncSource::Thread, SyncSource::Kernel), sync_name);
 
-TEST(EncodersWithoutAnInterface, SayWhichIsMissingOnce) {
+TEST(EncodersWithoutAnInterface, NameTheMissingInterfaceOnce) {
   drivers::MonotonicTime time;
   drivers::EncoderDeviceOptions options;
   options.receiver.axes = SimulatedEncoders::axes(1);

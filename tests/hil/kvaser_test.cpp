@@ -1,6 +1,6 @@
 // The SocketCAN transport and the encoder driver on two emulated Kvaser PCI cards (SJA1000
 // controllers with the kernel's own driver) on one bus: can0 is ours, can1 the rest of the world.
-// Not paced by the bit rate, and the emulator knows no bus errors: no missing acknowledge, no
+// Not paced by the bit rate, and the emulator has no bus errors: no missing acknowledge, no
 // bus-off; see vcan for those, and a real controller for restart-ms.
 
 #include <gmock/gmock.h>
@@ -63,7 +63,7 @@ struct Kvaser : testing::Test {
   }
 };
 
-TEST_F(Kvaser, IsConfiguredAsTheHandbookSays) {
+TEST_F(Kvaser, IsConfiguredAsInTheHandbook) {
   const auto said = said_by("ip -details link show can0");
   EXPECT_THAT(said, HasSubstr("state ERROR-ACTIVE"));
   EXPECT_THAT(said, HasSubstr("restart-ms 100"));
@@ -117,14 +117,14 @@ TEST_F(Kvaser, AccountsForEveryFrameOfABurst) {
     overflows += report && has(report->conditions, can::BusCondition::ReceiveOverflow) ? 1 : 0;
   }
 
-  // The controller's own FIFO may overflow, which it says; the kernel's queue must not, or it is
+  // The controller's own FIFO may overflow, which it reports; an overflow of the kernel's queue is
   // counted.
   const bool all = data + bus.counters().lost == sent;
   EXPECT_TRUE(all || overflows != 0) << data << " of " << sent << ", no overflow told";
   EXPECT_EQ(overflows, statistic("can0", "rx_over_errors") - overruns_before);
 }
 
-TEST_F(Kvaser, SaysThatTheLinkIsDownAndComesBack) {
+TEST_F(Kvaser, ReportsThatTheLinkIsDownAndRecovers) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(kIds).has_value());
   ours.down();
@@ -139,7 +139,7 @@ TEST_F(Kvaser, SaysThatTheLinkIsDownAndComesBack) {
   EXPECT_EQ(read(bus, 1).size(), 1u);
 }
 
-TEST_F(Kvaser, TellsTheSyncWhenItHasLeftTheController) {
+TEST_F(Kvaser, ReportsTheSyncWhenItHasLeftTheController) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
   ASSERT_TRUE(bus.start_sync(5ms).has_value());
@@ -149,7 +149,7 @@ TEST_F(Kvaser, TellsTheSyncWhenItHasLeftTheController) {
   for (std::size_t i = 1; i < got.size(); ++i) EXPECT_GT(got[i].time, got[i - 1].time);
 }
 
-TEST_F(Kvaser, TellsOurOwnSyncWhenItHasLeftTheController) {
+TEST_F(Kvaser, ReportsOurOwnSyncWhenItHasLeftTheController) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
   const CanSocket other{theirs};
@@ -162,7 +162,7 @@ TEST_F(Kvaser, TellsOurOwnSyncWhenItHasLeftTheController) {
   }
 }
 
-TEST_F(Kvaser, HearsARivalOfTheKernelsSync) {
+TEST_F(Kvaser, DetectsAForeignSyncBesideTheKernels) {
   SocketCanBus bus{{.interface = "can0"}, time};
   ASSERT_TRUE(bus.open(std::array<std::uint32_t, 1>{can::cob::kSync}).has_value());
   const CanSocket foreign{theirs};

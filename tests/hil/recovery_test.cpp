@@ -49,7 +49,7 @@ class Recovery {
 
   void measure() {
     drivers::DeviceStatus before;
-    // On a busy computer one turn may outlast the time just before the fault.
+    // On a busy computer one cycle may outlast the time just before the fault.
     (void)cycles_until(begin_ - kJustBefore, [&] {
       if (monotonic().now() < begin_) before = driver_.device->status();
       return false;

@@ -65,7 +65,7 @@ class ServedDevices {
     peer_.poll(clock_.now());
     if (sent(fds) == before) return;
 
-    // On the one processor of the guest nobody of lower priority has run since the write.
+    // On the one processor of the guest no thread of lower priority has run since the write.
     std::int64_t none = 0;
     written_.compare_exchange_strong(none, clock_.now().time_since_epoch().count(),
                                      std::memory_order_relaxed);

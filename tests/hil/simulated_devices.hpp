@@ -1,6 +1,6 @@
 #pragma once
-/// Each driver with its simulated device, for whoever gives the device a thread (ServedDevices) and
-/// the driver its turns.
+/// Each driver with its simulated device. The user runs the device in a thread (ServedDevices) and
+/// calls the driver's cycles.
 
 #include <fmt/format.h>
 #include <unistd.h>

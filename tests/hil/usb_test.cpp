@@ -252,7 +252,7 @@ TEST_F(CardThroughLibusb, IsLostWhenItsConnectionBreaksAndStreamsWhenItIsBack) {
 
 /// A gadget of the kernel itself, unplugged by taking it off its controller: transfers fail first,
 /// the notice comes after.
-TEST(LibusbLinkOnDummyHcd, TellsAnUnplug) {
+TEST(LibusbLinkOnDummyHcd, ReportsAnUnplug) {
   ASSERT_TRUE(run("tests/hil/guest/plug-gadget"));
   drivers::MonotonicTime time;
   drivers::LibusbLink link{

@@ -16,7 +16,7 @@ class VcanNodes : public EncoderNodes {
     while (const auto frame = socket_.receive()) on_frame(*frame, now);
     beat(now);
   }
-  /// Forgets everything that came: the cable was out.
+  /// Discards everything received: the cable was unplugged.
   void drain() {
     while (socket_.receive()) {
     }

@@ -52,7 +52,7 @@ TEST(ByteReader, ReadsBackWhatWasWritten) {
   EXPECT_EQ(reader.remaining(), 0u);
 }
 
-TEST(ByteReader, GivesZeroPastItsEndAndSaysSo) {
+TEST(ByteReader, GivesZeroPastItsEndAndReportsIt) {
   const std::array<std::byte, 3> in{std::byte{1}, std::byte{2}, std::byte{3}};
   ByteReader reader{in};
   EXPECT_EQ(reader.little<std::uint32_t>(), 0u);

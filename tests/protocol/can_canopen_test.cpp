@@ -15,7 +15,7 @@ TEST(CanFrame, GivesNoPayloadForRemoteFrames) {
   EXPECT_TRUE(frame.payload().empty());
 }
 
-TEST(CanFrame, NeverReadsPastItsDataWhateverTheLengthSays) {
+TEST(CanFrame, NeverReadsPastItsDataWhateverTheLength) {
   CanFrame frame;
   frame.length = 255;
   EXPECT_EQ(frame.payload().size(), CanFrame::kMaxData);

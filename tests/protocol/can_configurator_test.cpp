@@ -92,7 +92,7 @@ TEST(EncoderConfigurator, ReadsUnitsPerRevolutionOfARotaryEncoder) {
   EXPECT_FALSE(bench.configurator.description().step_nm);
 }
 
-TEST(EncoderConfigurator, TellsAnotherDeviceFromAnEncoder) {
+TEST(EncoderConfigurator, DistinguishesAnotherDeviceFromAnEncoder) {
   Bench bench{{.node = 5}, {.node = 5}};
   bench.objects.set_number(object::kDeviceType, 0x00020192);  // a drive: profile 402
   bench.run();
@@ -181,7 +181,7 @@ TEST(EncoderConfigurator, UsesAFirstEntryThatCannotBeWrittenWhereItIsThePosition
   EXPECT_EQ(bench.objects.tpdo(1).mapped, 1);
 }
 
-TEST(EncoderConfigurator, DoesWithoutAHeartbeatThatCannotBeSet) {
+TEST(EncoderConfigurator, ContinuesWithoutAHeartbeatThatCannotBeSet) {
   Bench bench{{.node = 5}, {.node = 5}};
   fix(bench.objects, object::kHeartbeatTime, 1000, 2);
   bench.run();
@@ -237,7 +237,7 @@ TEST(EncoderConfigurator, GivesUpOnAMuteNodeAfterAllRetries) {
   EXPECT_EQ(now, HostTime{} + 1500ms);
 }
 
-TEST(EncoderConfigurator, BeginsAnewWhenStartedAgain) {
+TEST(EncoderConfigurator, RepeatsTheWholeSequenceWhenStartedAgain) {
   Bench bench{{.node = 5}, {.node = 5}};
   bench.run();
   bench.objects.reset();

@@ -25,7 +25,7 @@ ObjectDictionary open_for_mapping() {
   return objects;
 }
 
-TEST(ObjectDictionary, SaysWhatItIs) {
+TEST(ObjectDictionary, ContainsItsIdentity) {
   const ObjectDictionary objects{{.node = 5, .vendor = 0x11, .serial = 0x22}};
   EXPECT_EQ(objects.number(object::kDeviceType), 0x00080196u);
   EXPECT_EQ(objects.number(object::kVendor), 0x11u);
@@ -155,7 +155,7 @@ TEST(ObjectDictionary, ResetBringsTheFactoryConfigurationBack) {
   EXPECT_EQ(objects.tpdo(1).mapping[0], mapped_position(PositionType::Signed32));
 }
 
-TEST(ObjectDictionary, IsFullAtItsCapacityAndSaysSo) {
+TEST(ObjectDictionary, ReportsThatItIsFullAtItsCapacity) {
   ObjectDictionary objects{{}};
   bool added = true;
   std::uint16_t index = 0x2000;

@@ -113,7 +113,7 @@ TEST(SdoClient, ReportsTheServersAbort) {
   EXPECT_TRUE(link.client.aborted_by_server());
 }
 
-TEST(SdoClient, AbortsAndTriesAgainTwiceWhenTheServerIsMute) {
+TEST(SdoClient, AbortsAndRetriesTwiceWhenTheServerIsMute) {
   SdoClient client{5};
   HostTime now{};
   client.start_upload(object::kDeviceType, now);
@@ -158,7 +158,7 @@ TEST(SdoClient, EachSegmentGetsItsOwnTimeOut) {
   EXPECT_EQ(link.client.state(), SdoClient::State::Done);
 }
 
-TEST(SdoClient, AbortsAnUploadWhoseToggleStandsStill) {
+TEST(SdoClient, AbortsAnUploadWhoseToggleDoesNotChange) {
   SdoClient client{5};
   client.start_upload(object::kDeviceName, HostTime{});
   client.on_frame(answer({0x41, 0x08, 0x10, 0, 20, 0, 0, 0}), HostTime{});
@@ -179,7 +179,7 @@ TEST(SdoClient, AbortsADownloadWhoseToggleIsWrong) {
   EXPECT_EQ(client.abort_code(), AbortCode::ToggleBit);
 }
 
-TEST(SdoClient, RefusesMoreBytesThanItHoldsAndSizesThatLie) {
+TEST(SdoClient, RefusesMoreBytesThanItHoldsAndWrongSizes) {
   SdoClient client{5};
   client.start_upload(kScratch, HostTime{});
   client.on_frame(answer({0x41, 0x00, 0x20, 0, 0xFF, 0xFF, 0, 0}), HostTime{});
@@ -202,7 +202,7 @@ TEST(SdoClient, StopsAnEndlessUploadOfUnknownSize) {
   EXPECT_EQ(client.abort_code(), AbortCode::OutOfMemory);
 }
 
-TEST(SdoClient, IgnoresAnswersToOtherQuestions) {
+TEST(SdoClient, IgnoresAnswersToOtherRequests) {
   SdoClient client{5};
   client.start_upload({0x6004, 0}, HostTime{});
   client.on_frame(answer({0x43, 0x05, 0x60, 1, 1, 0, 0, 0}), HostTime{});  // another object
@@ -241,7 +241,7 @@ TEST(SdoServer, AbortsARepeatedToggle) {
             answer({0x80, 0x08, 0x10, 0, 0, 0, 0x03, 0x05}));
 }
 
-TEST(SdoServer, AbortsATransferTheClientLeft) {
+TEST(SdoServer, AbortsATransferTheClientAbandoned) {
   Link link;
   (void)link.server.on_frame(standard_frame(0x605, {0x40, 0x08, 0x10, 0, 0, 0, 0, 0}), link.now);
   EXPECT_FALSE(link.server.on_time(link.now + 499ms));

@@ -148,7 +148,7 @@ TEST(CanUdp, StopsAddingWhenTheBufferIsFull) {
   EXPECT_EQ(writer.count(), 2u);
 }
 
-TEST(CanUdp, SaysHowLongAFrameWillBe) {
+TEST(CanUdp, GivesTheLengthOfAFrameInAdvance) {
   std::mt19937 random{11};
   for (int i = 0; i < 100; ++i) {
     const auto frame = random_frame(random);
@@ -165,7 +165,7 @@ TEST(SequenceGaps, CountsWhatIsMissingAcrossTheWrap) {
   EXPECT_EQ(gaps.lost(), 3u);
 }
 
-TEST(SequenceGaps, TellsALateDatagramFromALargeGap) {
+TEST(SequenceGaps, DistinguishesALateDatagramFromALargeGap) {
   SequenceGaps gaps;
   (void)gaps.on_sequence(10);
   EXPECT_EQ(gaps.on_sequence(12), 1u);

@@ -135,7 +135,7 @@ TEST(EmsconRequest, AnyFlippedByteIsRefusedOrDecodesCleanly) {
   }
 }
 
-TEST(EmsconEncode, WritesNothingWhereThereIsNoRoom) {
+TEST(EmsconEncode, WritesNothingIntoATooSmallBuffer) {
   for (const Request& request : samples::requests()) {
     Bytes room(encoded(request).size() - 1);
     EXPECT_EQ(encode(request, room), 0u);

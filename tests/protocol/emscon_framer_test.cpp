@@ -85,7 +85,7 @@ TEST_F(EmsconFramer, TakesTheLargestPacketsOneAfterAnother) {
   EXPECT_EQ(whole, 4u);
 }
 
-TEST_F(EmsconFramer, RefusesASizeThatCannotBe) {
+TEST_F(EmsconFramer, RefusesAnImpossibleSize) {
   for (const char* head :
        {"07000000 00000000", "00000000 00000000", "01000100 00000000", "ffffffff 00000000"}) {
     framer_->reset();
@@ -103,7 +103,7 @@ TEST_F(EmsconFramer, StaysBrokenUntilReset) {
   EXPECT_EQ(feed(good), std::vector<Bytes>{good});
 }
 
-TEST_F(EmsconFramer, ShowsWhatItRefused) {
+TEST_F(EmsconFramer, ShowsTheBytesItRefused) {
   const Bytes nonsense = from_hex("48545450 2f312e31");
   feed(nonsense);
   EXPECT_TRUE(std::ranges::equal(framer_->refused(), nonsense));

@@ -41,11 +41,11 @@ TEST(IppDmeResponse, ReadsErrors) {
   EXPECT_EQ(r->error.text, "Surface not found");
 }
 
-TEST(IppDmeResponse, KnowsWhatNobodyAskedFor) {
+TEST(IppDmeResponse, RecognizesUnsolicitedResponses) {
   EXPECT_EQ(parse_response("E0000 # PtMeas(X(1),Y(2),Z(3))")->tag, kUnsolicited);
 }
 
-TEST(IppDmeResponse, RefusesWhatTheGrammarDoesNotKnow) {
+TEST(IppDmeResponse, RefusesTextOutsideTheGrammar) {
   EXPECT_EQ(parse_response("0001 &").error(), LineError::BadTag);
   EXPECT_EQ(parse_response("00000 &").error(), LineError::BadTag);
   EXPECT_EQ(parse_response("00001&").error(), LineError::NoSpace);
@@ -84,7 +84,7 @@ TEST(IppDmeCommand, ReadsEveryKindOfArgument) {
   EXPECT_EQ(arguments[3].kind, Argument::Kind::Name);
 }
 
-TEST(IppDmeCommand, RefusesWhatTheGrammarDoesNotKnow) {
+TEST(IppDmeCommand, RefusesTextOutsideTheGrammar) {
   EXPECT_EQ(parse_command("00001 Home").error(), LineError::BadMethod);
   EXPECT_EQ(parse_command("00001 Home() now").error(), LineError::BadMethod);
   EXPECT_EQ(parse_command("00001 X(1").error(), LineError::BadMethod);
@@ -117,7 +117,7 @@ TEST(IppDmeLineFramer, GivesLinesHoweverTheyAreCut) {
   EXPECT_EQ(lines, (std::vector<std::string>{"00001 &", "00001 # X(1)", "00001 %"}));
 }
 
-TEST(IppDmeLineFramer, StopsAtWhatIsNoText) {
+TEST(IppDmeLineFramer, StopsAtBytesThatAreNotText) {
   for (const std::string_view bad : {"00001 \x01", "00001 &\n", "00001 &\r0", "\xff"}) {
     const auto framer = std::make_unique<LineFramer>();
     framer->push(bytes_of(bad));

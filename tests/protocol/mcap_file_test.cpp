@@ -147,7 +147,7 @@ TEST(McapScan, OfAFileCutAnywhereGivesEveryFinishedChunkAndTheWholeMessagesOfThe
   }
 }
 
-TEST(McapScan, SaysWhichChunkIsDamagedAndGoesOnBehindIt) {
+TEST(McapScan, ReportsWhichChunkIsDamagedAndContinuesBehindIt) {
   SmallFile file;
   file.bytes[file.chunk_ends[1] - 5] ^= std::byte{1};
   std::vector<ScannedChunk::State> states;
@@ -173,7 +173,7 @@ TEST(McapScan, StopsWhereAPowerCutLeftZeros) {
   EXPECT_FALSE(scan.complete());
 }
 
-TEST(McapScan, PassesOverRecordsOfUnknownKind) {
+TEST(McapScan, SkipsRecordsOfUnknownKind) {
   const SmallFile file;
   Buffer bytes{file.bytes.begin(), file.bytes.begin() + static_cast<std::ptrdiff_t>(file.data_end)};
   const std::size_t private_record = bytes.size();
@@ -186,7 +186,7 @@ TEST(McapScan, PassesOverRecordsOfUnknownKind) {
   EXPECT_TRUE(scan.complete());
 }
 
-TEST(McapScan, SaysThatACompressedChunkCannotBeOpened) {
+TEST(McapScan, ReportsThatACompressedChunkCannotBeOpened) {
   Buffer bytes;
   append_magic(bytes);
   append(bytes, Chunk{{0, 0, 100, 0, "zstd", 0}, {}});

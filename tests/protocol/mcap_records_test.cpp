@@ -32,7 +32,7 @@ void expect_round_trip(const T& record, Opcode opcode) {
   EXPECT_EQ(once, twice);
 }
 
-TEST(McapRecords, AHeaderLiesInTheFileAsTheSpecificationSays) {
+TEST(McapRecords, AHeaderIsLaidOutAsInTheSpecification) {
   Buffer buffer;
   append(buffer, Header{"ros2", "me"});
   const std::string_view expected{"\x01\x0E\0\0\0\0\0\0\0\x04\0\0\0ros2\x02\0\0\0me", 9 + 14};

@@ -23,7 +23,7 @@ TEST(Modbus, ComputesTheChecksumOfTheStandard) {
   EXPECT_EQ(crc16(bytes({0x02, 0x07})), 0x1241);  // [Modbus over Serial Line V1.02] 6.2.2
 }
 
-TEST(Modbus, AsksOverTcpAsTheStandardShows) {
+TEST(Modbus, EncodesTcpRequestsAsInTheStandard) {
   std::array<std::byte, 32> out{};
   const auto n = encode(kRequest, Transport::Tcp, out);
   // [Modbus V1.1b3] 6.3
@@ -42,12 +42,12 @@ TEST(Modbus, ReadsItsOwnRequestsBack) {
   }
 }
 
-TEST(Modbus, WritesNothingIntoTooLittleRoom) {
+TEST(Modbus, WritesNothingIntoATooSmallBuffer) {
   std::array<std::byte, 11> out{};
   EXPECT_EQ(encode(kRequest, Transport::Tcp, out), 0u);
 }
 
-TEST(Modbus, UnderstandsTheAnswerOfTheStandard) {
+TEST(Modbus, DecodesTheAnswerOfTheStandard) {
   // [Modbus V1.1b3] 6.3: registers 108 to 110 hold 022Bh, 0000h, 0064h.
   const auto frame = bytes({0, 0, 0, 0, 0, 9, 17, 3, 6, 0x02, 0x2B, 0x00, 0x00, 0x00, 0x64});
   const auto answer = decode_answer(frame, Transport::Tcp, kRequest);
@@ -67,7 +67,7 @@ TEST(Modbus, WaitsForTheWholeAnswer) {
         << n << " bytes";
 }
 
-TEST(Modbus, SaysWhichExceptionItIs) {
+TEST(Modbus, NamesTheException) {
   const auto answer =
       decode_answer(bytes({0, 0, 0, 0, 0, 3, 17, 0x83, 2}), Transport::Tcp, kRequest);
   ASSERT_TRUE(answer && *answer);
@@ -81,7 +81,7 @@ TEST(Modbus, RefusesTheAnswerOfAnotherUnit) {
   EXPECT_EQ(answer->error(), DecodeError::Unit);
 }
 
-TEST(Modbus, RefusesTheAnswerToAnotherQuestion) {
+TEST(Modbus, RefusesTheAnswerToAnotherRequest) {
   const auto answer = decode_answer(bytes({17, 3, 4}), Transport::Rtu, kRequest);
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->error(), DecodeError::Length);
@@ -95,7 +95,7 @@ TEST(ModbusRegisters, TakeTheLowWordFirstAsVaisalaDoes) {
       30.56F);
 }
 
-TEST(ModbusRegisters, GiveNotANumberForWhatIsNone) {
+TEST(ModbusRegisters, GiveNanForValuesThatAreNotAvailable) {
   EXPECT_TRUE(std::isnan(
       decode_register(bytes({0x7F, 0xC0, 0, 0}), RegisterType::Float32, WordOrder::HighFirst)));
   EXPECT_TRUE(std::isnan(

@@ -29,7 +29,7 @@ CdrError error_of(std::span<const std::byte> cdr) {
   return decoded ? CdrError::BufferTooSmall : decoded.error();
 }
 
-TEST(RawBytesCdr, LiesInTheBytesAsXcdr1Says) {
+TEST(RawBytesCdr, IsLaidOutAsXcdr1) {
   const std::string_view expected{
       "\x00\x01\x00\x00"
       "\x06\0\0\0laser\0"
@@ -76,7 +76,7 @@ TEST(RawBytesCdr, EveryShortenedEncodingIsRefused) {
   }
 }
 
-TEST(RawBytesCdr, WhatTheIdlForbidsIsRefused) {
+TEST(RawBytesCdr, BytesOutsideTheIdlsBoundsAreRefused) {
   const auto with = [](std::size_t at, std::uint8_t value) {
     auto cdr = encoded(kValue);
     cdr[at] = std::byte{value};
@@ -90,7 +90,7 @@ TEST(RawBytesCdr, WhatTheIdlForbidsIsRefused) {
   EXPECT_EQ(error_of(with(37, 9)), CdrError::OutOfBounds);  // more than 2048 bytes
 }
 
-TEST(RawBytesCdr, WhatTheIdlForbidsIsNotWritten) {
+TEST(RawBytesCdr, ValuesOutsideTheIdlsBoundsAreNotWritten) {
   std::vector<std::byte> out(2 * kMaxRawBytesCdrSize);
   RawBytes value = kValue;
   value.device = "a device whose name is much too long";

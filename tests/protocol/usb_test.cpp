@@ -21,7 +21,7 @@ TEST(UsbSetup, IsEightLittleEndianBytes) {
   EXPECT_EQ(decode_setup(encoded), (usb::Setup{0x40, 0xB4, 0x1234, 0x005D, 0x0002}));
 }
 
-TEST(UsbSetup, AsksForStringsInEnglish) {
+TEST(UsbSetup, RequestsStringsInEnglish) {
   const auto setup = get_descriptor(DescriptorType::String, 3, 255);
   EXPECT_EQ(setup.value, 0x0303);
   EXPECT_EQ(setup.index, 0x0409);
@@ -48,7 +48,7 @@ TEST(UsbDescriptors, ReadsAStringAsAscii) {
   EXPECT_EQ(text->view(), "A?7");
 }
 
-TEST(UsbDescriptors, RefusesAStringThatClaimsMoreThanItHas) {
+TEST(UsbDescriptors, RefusesAStringWhoseLengthExceedsTheBuffer) {
   EXPECT_FALSE(decode_string(bytes(8, 3, 'A', 0)));
 }
 

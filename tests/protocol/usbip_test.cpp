@@ -36,7 +36,7 @@ TEST(UsbipOperations, ImportRequestIsFortyBytes) {
   EXPECT_EQ(decode_import_request(std::span{out}.first(40))->view(), "1-1");
 }
 
-TEST(UsbipOperations, ImportReplyPutsTheIdsWhereTheProtocolSays) {
+TEST(UsbipOperations, ImportReplyPutsTheIdsAtTheirSpecifiedOffsets) {
   std::array<std::byte, kImportReplySize> out{};
   const auto device = card("1-1");
   ASSERT_EQ(encode_import_reply(OpStatus::Ok, &device, out), 320u);
@@ -53,7 +53,7 @@ TEST(UsbipOperations, ARefusedImportIsItsHead) {
   EXPECT_EQ(decode_import_reply(std::span{out}.first(8))->status, OpStatus::NoDevice);
 }
 
-TEST(UsbipOperations, TellsAMessageCutShortFromAnotherVersion) {
+TEST(UsbipOperations, DistinguishesATruncatedMessageFromAnotherVersion) {
   std::array<std::byte, 64> out{};
   (void)encode_import_request(BusId{"1-1"}, out);
   EXPECT_EQ(decode_import_request(std::span{out}.first(39)).error(), OpError::Truncated);
@@ -108,7 +108,7 @@ TEST(UsbipUrb, RepliesSurviveTheWire) {
   EXPECT_EQ(std::get<Unlink>(*decode_urb(encode(Urb{unlink}))), unlink);
 }
 
-TEST(UsbipUrb, TakesBothWaysOfSayingNotIsochronous) {
+TEST(UsbipUrb, TakesBothEncodingsOfNotIsochronous) {
   auto bytes = encode(Urb{Submit{}});
   for (std::size_t i = 32; i < 36; ++i) bytes[i] = std::byte{0};
   EXPECT_TRUE(decode_urb(bytes));
@@ -116,7 +116,7 @@ TEST(UsbipUrb, TakesBothWaysOfSayingNotIsochronous) {
   EXPECT_EQ(decode_urb(bytes).error(), UrbError::Isochronous);
 }
 
-TEST(UsbipUrb, RefusesWhatIsNoTransfer) {
+TEST(UsbipUrb, RefusesMessagesThatAreNoTransfer) {
   auto bytes = encode(Urb{Unlink{}});
   bytes[3] = std::byte{9};
   EXPECT_EQ(decode_urb(bytes).error(), UrbError::UnknownCommand);

@@ -18,8 +18,8 @@ EncoderReceiverOptions two_axes() {
   return options;
 }
 
-/// Everything a bus can say, cycle after cycle, an axis missing in every third, a second answer in
-/// every fifth.
+/// Every kind of frame on the bus, cycle after cycle, an axis missing in every third, a second
+/// answer in every fifth.
 void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
   const HostTime t{1h + 1ms * i};
   const auto count = static_cast<std::int64_t>(i * 1000);

@@ -63,7 +63,7 @@ TEST_F(TrackerRealTimePath, MakesNoSystemCall) {
   });
 }
 
-TEST_F(TrackerRealTimePath, StandsNonsenseAndNewConnections) {
+TEST_F(TrackerRealTimePath, HandlesMalformedBytesAndNewConnections) {
   expect_no_allocation(100, [this](std::size_t i) {
     static constexpr std::array<std::byte, 12> kMalformed{std::byte{'G'}, std::byte{'E'},
                                                           std::byte{'T'}, std::byte{' '}};

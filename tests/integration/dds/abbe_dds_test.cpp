@@ -51,7 +51,7 @@ TEST_F(AbbeDds, DomainWithoutPortsEndsWithTwo) {
   EXPECT_EQ(exit_code({"--socket", socket, "--domain", "233"}), 2);
 }
 
-// Fast DDS would make a participant that nobody hears, also when the network has come.
+// Fast DDS would make a participant that no other receives, also after the network has come up.
 TEST_F(AbbeDds, WithoutAnInterfaceOfItsProfileItEndsWithFour) {
   std::stringstream text;
   text << std::ifstream(ABBE_LOOPBACK_PROFILE).rdbuf();
@@ -87,7 +87,7 @@ TEST_F(AbbeDds, WithoutSocketAndConfigurationItIsUsage) {
   EXPECT_EQ(exit_code({}), 2);
 }
 
-TEST_F(AbbeDds, LeavesWhenItsParentIsSomebodyElse) {
+TEST_F(AbbeDds, EndsWhenItsParentIsAnotherProcess) {
   EXPECT_EQ(exit_code({"--socket", socket, "--domain", domain_.text(), "--profile",
                        ABBE_LOOPBACK_PROFILE, "--parent", "1"}),
             0);
@@ -146,7 +146,7 @@ TEST_F(AbbeDds, AsAServiceItFeedsTheWatchdogOnlyWhileItsLoopRuns) {
 }
 
 /// The notification socket it has inherited is abbed's.
-TEST_F(AbbeDds, AsAChildItTellsTheServiceManagerNothing) {
+TEST_F(AbbeDds, AsAChildItSendsNothingToTheServiceManager) {
   auto link = daemon::DdsLink::listen(socket);
   ASSERT_TRUE(link) << link.error().text;
   const NotifySocket manager(directory_ / "notify");

@@ -1,9 +1,9 @@
-// Stands for abbed: publishes the sample messages over a DdsLink until it is killed, and supervises
-// abbe-dds
-// as abbed does.   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
-// Prints "child PID" whenever abbe-dds was started. The first component of its vectors tells when they were
-// made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in its environment the state
-// is STALE until SIGUSR1.
+// Replaces abbed: publishes the sample messages over a DdsLink until it is killed, and supervises
+// abbe-dds as abbed does.
+//   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
+// Prints "child PID" at every start of abbe-dds. The first component of its vectors is the time at
+// which they were made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in
+// its environment the state is STALE until SIGUSR1.
 #include <signal.h>
 
 #include <cstdio>

@@ -81,13 +81,15 @@ TEST(ReceivedLattice, RefusesAGridWithAHole) {
   EXPECT_FALSE(lattice_of(nodes).has_value());
 }
 
-TEST(GridComparison, ARigidMotionIsWhatNoMeasurementSees) {
+TEST(GridComparison, ARigidMotionIsNotObservable) {
   const Vector3 shift(3e-6, 0, -2e-6), rotation(1e-6, 2e-6, -1e-6);
-  const auto known = known_with([&](const Vector3& p) -> Vector3 { return shift + rotation.cross(p); });
+  const auto moved = [&](const Vector3& p) -> Vector3 { return shift + rotation.cross(p); };
+  const auto known = known_with(moved);
   const auto comparison = known.compared();
   ASSERT_TRUE(comparison.has_value());
   EXPECT_GT(comparison->after.mean_m, 1e-6);
-  EXPECT_LT(comparison->after_rigid_free.max_m, 1e-12);  // second order of the rotation, and rounding
+  // Left are the second order of the rotation and rounding.
+  EXPECT_LT(comparison->after_rigid_free.max_m, 1e-12);
 }
 
 TEST(GridComparison, PointsOutsideAreCountedAndLeftOut) {

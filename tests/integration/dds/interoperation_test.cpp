@@ -68,7 +68,7 @@ using DdsInteroperation = ShopFloor;
 TEST_F(DdsInteroperation, CycloneThatJoinsLateReadsModelAndGridFieldByField) {
   start_feeder();
   {
-    // Somebody else already has the model: it was published before the late one comes.
+    // Another subscriber already has the model: it was published before the late one joins.
     Process early(watch({"--until-model", "--timeout", "20"}));
     ASSERT_EQ(early.wait_for_end(), 0) << early.transcript();
   }
@@ -151,7 +151,7 @@ TEST_F(DdsInteroperation, WatchComparesTheReceivedGridWithKnownErrors) {
   EXPECT_EQ(rows, 1 + kNodesPerAxis * kNodesPerAxis * kNodesPerAxis);
 }
 
-TEST_F(DdsInteroperation, WatchWithoutAnybodySaysSoAndEndsWithOne) {
+TEST_F(DdsInteroperation, WatchWithoutAPublisherReportsItAndEndsWithOne) {
   Process process(watch({"--until-model", "--timeout", "0.3"}));
   EXPECT_EQ(process.wait_for_end(), 1);
 }

@@ -44,8 +44,8 @@ pid_t announced_child(Process& feeder) {
 
 }  // namespace
 
-// ----------------------------------------------------------------------------------------------------
-// what the lines of the examples tell
+// -------------------------------------------------------------------------------------------------
+// content of the lines that the examples print
 
 void SubscriberRecord::take(const std::string& line) {
   long long stamp = 0;
@@ -110,7 +110,7 @@ std::uint64_t SubscriberRecord::understated() const {
   return understated_;
 }
 
-// ----------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 // the rounds
 
 struct LiveTruth::Subscriber {
@@ -198,13 +198,13 @@ void LiveTruth::expect_all_apply(HostNs since, const std::string& what) {
   figures_.longest_return_s = std::max(figures_.longest_return_s, seconds(now_ns() - begin));
 }
 
-/// Until it is over; `dead` are those nobody may trust meanwhile.
+/// Returns when the blow is over; no subscriber may apply vectors of `dead` during it.
 void LiveTruth::strike(Blow blow, double duration_s, const std::vector<Machine*>& dead) {
   Machine& a = *machines_.front();
   const pid_t child = announced_child(*a.feeder);
   switch (blow) {
     case Blow::KillMachine:
-      ::kill(child, SIGSTOP);  // it would say INVALID when its abbed is gone
+      ::kill(child, SIGSTOP);  // it would publish INVALID when its abbed has ended
       a.feeder->signal(SIGKILL);
       ::kill(child, SIGKILL);
       wait(duration_s);
@@ -274,7 +274,7 @@ LiveTruthFigures LiveTruth::figures() const {
   return all;
 }
 
-// ----------------------------------------------------------------------------------------------------
+// -------------------------------------------------------------------------------------------------
 // a network of its own
 
 bool enter_own_network() {

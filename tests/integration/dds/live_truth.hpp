@@ -1,5 +1,5 @@
 #pragma once
-/// What a subscriber did with the vectors of every machine, as its stamped lines tell, and the
+/// What a subscriber did with the vectors of every machine, as in its stamped lines, and the
 /// rounds of kills, stops and outages it is put through.
 
 #include <cstdint>

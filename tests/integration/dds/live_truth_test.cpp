@@ -73,8 +73,8 @@ class LiveTruthTest : public ShopFloor {
     if (own_network_) truth.round(LiveTruth::Blow::Outage, 4.0);
     expect_truth(truth.figures());
   }
-  /// With keys Fast DDS and Cyclone DDS do not authenticate again whom they have not forgotten
-  /// themselves: nobody may forget anybody within 30 s.
+  /// With keys Fast DDS and Cyclone DDS authenticate a participant again only after they dropped it
+  /// themselves: no participant may drop another within 30 s.
   void hold_through_the_longest_stops_and_outage() {
     if (std::getenv("ABBE_LIVE_TRUTH_ROUNDS") == nullptr) GTEST_SKIP() << "scripts/soak live-truth";
     LiveTruth truth(parts());
@@ -117,7 +117,7 @@ TEST_F(LiveTruthTest, HoldsThroughKillsStopsAndAnOutage) {
 
 /// Longer than the lease that Fast DDS gives a participant by default: abbe-dds would drop it, but
 /// not it abbe-dds.
-TEST_F(LiveTruthTest, NoSubscriberIsOrphanedByALongPause) {
+TEST_F(LiveTruthTest, EverySubscriberReconnectsAfterALongPause) {
   LiveTruth truth(parts());
   ASSERT_TRUE(truth.begin());
   truth.round(LiveTruth::Blow::StopSubscriber, 22.0);

@@ -1,5 +1,6 @@
-// Who dies or hangs is noticed, by both kinds of subscriber, in the times the contract states; each
-// test prints what it took. The decision "apply or not" comes from the two example subscribers.
+// Both kinds of subscriber detect a process that ended or hangs within the times of the contract;
+// each test prints the time it took. The decision "apply or not" comes from the two example
+// subscribers.
 #include <signal.h>
 
 #include <cstdio>
@@ -64,7 +65,7 @@ TEST_F(DdsLiveness, TheWriterOfTheStateIsNoLongerAliveWhenAbbedHangs) {
   expect_both("vmc-3: not alive", stopped, 3s);
 }
 
-TEST_F(DdsLiveness, BothApplyAgainOnceAbbedTalksAgain) {
+TEST_F(DdsLiveness, BothApplyAgainOnceAbbedSendsAgain) {
   const auto stopped = Clock::now();
   feeder_->signal(SIGSTOP);
   ASSERT_TRUE(fast.wait_for(kInvalid, stopped));
@@ -95,9 +96,9 @@ TEST_F(DdsLiveness, AHungAbbeDdsIsNotTrusted) {
   ::kill(pid, SIGKILL);
 }
 
-/// The lease of a site's profile is shorter than what the subscriber takes for lost: Cyclone DDS
-/// forgets abbe-dds, but not the other way round.
-TEST_F(ShopFloor, CycloneIsNotOrphanedByAParticipantItForgot) {
+/// The lease of a site's profile is shorter than the silence after which the subscriber counts it
+/// as lost: Cyclone DDS drops abbe-dds, but abbe-dds does not drop Cyclone DDS.
+TEST_F(ShopFloor, CycloneReconnectsToAParticipantItDropped) {
   std::stringstream text;
   text << std::ifstream(ABBE_LOOPBACK_PROFILE).rdbuf();
   const std::string lease = "<leaseDuration><sec>40<";
@@ -137,9 +138,9 @@ class DdsTwoMachines : public ShopFloor {
   Process watching{watch({})};
 };
 
-TEST_F(DdsTwoMachines, ADeadOneIsNotKeptAliveByTheOther) {
+TEST_F(DdsTwoMachines, AnEndedPublisherIsNotKeptAliveByTheOther) {
   const auto killed = Clock::now();
-  ::kill(abbe_dds_pid(), SIGSTOP);  // else it would say INVALID
+  ::kill(abbe_dds_pid(), SIGSTOP);  // otherwise it would publish INVALID
   feeder_->signal(SIGKILL);
   ::kill(abbe_dds_pid(), SIGKILL);
   for (Process* subscriber : {&fast, &cyclone, &watching}) {

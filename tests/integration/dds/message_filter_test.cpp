@@ -57,7 +57,7 @@ TEST_P(MessageFilter, BlanksTypesAndNothingElse) {
   }
 }
 
-TEST_P(MessageFilter, LeavesOtherWritersAndOtherParametersAlone) {
+TEST_P(MessageFilter, DoesNotChangeOtherWritersAndOtherParameters) {
   for (const auto& untouched : {announcement(kSomebodys, {kTypeObject}, GetParam()),
                                 announcement(kPublications, {kTopicName}, GetParam())}) {
     Bytes message = untouched;
@@ -91,7 +91,7 @@ TEST(MessageFilterInput, CutsStatisticsOffTheEndAndDropsMessagesThatHaveThemElse
   EXPECT_EQ(filter_message(in_the_middle), 0u);
 }
 
-TEST(MessageFilterInput, DropsLengthsThatLie) {
+TEST(MessageFilterInput, DropsWrongLengths) {
   Bytes too_long = with_statistics(400, 8);
   EXPECT_EQ(filter_message(too_long), 0u);
   Bytes odd = announcement(kSomebodys, {kTopicName});

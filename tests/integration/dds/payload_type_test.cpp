@@ -1,4 +1,4 @@
-// On the wire nothing may tell our pass-through type from the types fastddsgen generates.
+// On the wire our pass-through type is identical to the types fastddsgen generates.
 #include "abbe/dds/payload_type.hpp"
 
 #include <fastdds/rtps/common/InstanceHandle.h>

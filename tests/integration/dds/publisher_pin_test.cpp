@@ -24,13 +24,13 @@ struct PublisherPinTest : testing::Test {
   }
 };
 
-TEST_F(PublisherPinTest, TheFirstOneIsPinned) {
+TEST_F(PublisherPinTest, TheFirstPublisherIsPinned) {
   EXPECT_EQ(pin.heard(kFirst, now), Verdict::NewlyPinned);
   EXPECT_EQ(pin.heard(kFirst, now + 10ms), Verdict::Pinned);
   EXPECT_EQ(pin.pinned(), kFirst);
 }
 
-TEST_F(PublisherPinTest, ASecondOneBesideItIsARival) {
+TEST_F(PublisherPinTest, ASecondPublisherBesideItIsIgnored) {
   send({kFirst}, 500ms);
   EXPECT_EQ(send({kFirst, kSecond}, 90ms), Verdict::Waiting);
   EXPECT_EQ(send({kFirst, kSecond}, 60s), Verdict::Foreign);
@@ -48,7 +48,7 @@ TEST_F(PublisherPinTest, ASuccessorIsPinnedOnceTheFirstWasSilentFor300Ms) {
   EXPECT_FALSE(pin.remembers(kFirst));
 }
 
-TEST_F(PublisherPinTest, ARivalIsNotTheSuccessorOfAFirstThatRestarts) {
+TEST_F(PublisherPinTest, AnIgnoredPublisherIsNotTheSuccessorOfAFirstThatRestarts) {
   send({kFirst}, 500ms);
   send({kFirst, kSecond}, 1s);
   EXPECT_EQ(send({kSecond}, 400ms), Verdict::Foreign);
@@ -57,15 +57,15 @@ TEST_F(PublisherPinTest, ARivalIsNotTheSuccessorOfAFirstThatRestarts) {
   EXPECT_EQ(send({kThird, kSecond}, 20s), Verdict::Foreign);
 }
 
-TEST_F(PublisherPinTest, ARivalIsAcceptedAfterTenSecondsOfSilence) {
+TEST_F(PublisherPinTest, AnIgnoredPublisherIsAcceptedAfterTenSecondsOfSilence) {
   send({kFirst, kSecond}, 1s);
   EXPECT_EQ(send({kSecond}, 9900ms), Verdict::Foreign);
   send({kSecond}, 100ms);
   EXPECT_EQ(pin.pinned(), kSecond);
 }
 
-/// The subscriber was stopped: what it hears first says nothing about silence.
-TEST_F(PublisherPinTest, ASubscriberThatStoodStillKeepsToTheFirst) {
+/// The subscriber was stopped: the time before its first sample is no silence of the publisher.
+TEST_F(PublisherPinTest, ASubscriberThatWasPausedKeepsTheFirstPublisher) {
   send({kFirst}, 500ms);
   send({kFirst, kSecond}, 50ms);
   now += 5s;

@@ -53,7 +53,7 @@ class DdsReaders : public testing::Test {
 };
 
 /// As where the program that reads was held up by its terminal.
-TEST_F(DdsReaders, WhatIsTakenAfterItsWriterWasLostIsNoSignOfLife) {
+TEST_F(DdsReaders, ASampleTakenAfterItsWriterWasLostDoesNotAssertLiveliness) {
   write_state(1);
   ASSERT_TRUE(comes([this] { return take() > 0; }));
   EXPECT_TRUE(readers_.is_alive(writer_));

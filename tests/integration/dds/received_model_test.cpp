@@ -20,7 +20,7 @@ ReceivedModel complete() {
   return model;
 }
 
-TEST(ReceivedModel, CompleteActiveAndAliveIsApplied) {
+TEST(ReceivedModel, CompleteActiveModelOfALivePublisherIsApplied) {
   EXPECT_TRUE(complete().decide(true).apply);
 }
 
@@ -102,7 +102,7 @@ TEST(Decide, RefusesEachBreachOfTheRule) {
   EXPECT_TRUE(refused([](auto& c) { c.model_id("another"); }));
 }
 
-TEST(Decide, CountsWhatTheVectorWaited) {
+TEST(Decide, IncludesTheVectorsWaitingTime) {
   const auto c = test::compensation(1);  // 1 of 500 ms old
   EXPECT_TRUE(decide(c, 499ms, test::active_state(1), true).apply);
   EXPECT_FALSE(decide(c, 500ms, test::active_state(1), true).apply);
@@ -117,7 +117,7 @@ v1::Compensation vector_of(std::chrono::nanoseconds host_time) {
   return c;
 }
 
-TEST(Delay, IsWhatAVectorNeededMoreThanTheQuickest) {
+TEST(Delay, IsTheExcessOverTheFastestVector) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (auto t = 0ms; t <= 200ms; t += 10ms)
@@ -128,7 +128,7 @@ TEST(Delay, IsWhatAVectorNeededMoreThanTheQuickest) {
               50e3);  // less what clocks may drift apart
 }
 
-TEST(Delay, LearnsNothingFromTimesOutOfRange) {
+TEST(Delay, IgnoresTimesOutOfRange) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (auto t = 0ms; t <= 210ms; t += 10ms) (void)delay.of(vector_of(70s + t), ours + t);
@@ -148,14 +148,14 @@ TEST(Delay, LearnsNothingFromTimesOutOfRange) {
   EXPECT_EQ(delay.of(vector_of(70s + 230ms), ours + 230ms), 0ns);
 }
 
-TEST(Delay, LongSilenceDoesNotMakeASlowVectorQuick) {
+TEST(Delay, ALongSilenceDoesNotReduceTheDelayOfASlowVector) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (auto t = 0ms; t <= 200ms; t += 10ms) EXPECT_FALSE(delay.of(vector_of(70s + t), ours + t));
   EXPECT_GT(delay.of(vector_of(100s), ours + 30s + 5ms), 4ms);
 }
 
-TEST(Delay, OfTheNextPublisherHoldsOnIfItsClockIsTheSame) {
+TEST(Delay, IsKeptForTheNextPublisherIfItsClockIsTheSame) {
   Delay delay;
   const Delay::Instant ours{5000s};
   for (auto t = 0ms; t <= 210ms; t += 10ms) (void)delay.of(vector_of(70s + t), ours + t);

@@ -1,6 +1,6 @@
 #pragma once
-/// abbed's stand-in with its abbe-dds, and subscribers, on a DDS domain nobody else uses at the
-/// moment.
+/// abbed's stand-in with its abbe-dds, and subscribers, on a DDS domain that no other process uses
+/// at the moment.
 
 #include <gtest/gtest.h>
 

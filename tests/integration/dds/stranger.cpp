@@ -1,11 +1,12 @@
-// Somebody on the domain who does not belong there, for the tests and `scripts/soak strangers`:
-//   dds_stranger DOMAIN fake [KEYS]   publishes ModelState ACTIVE, Compensation and ErrorGrid of 999 um as
-//   the machine of
-//                                     the tests, with keys of another authority if KEYS is given
-//   dds_stranger DOMAIN types         announces types with a sequence of structs, on a topic of abbe and on
-//   its own dds_stranger DOMAIN garbage       sends malformed RTPS to the ports of the domain's first
-//   participants
-// until it is killed. Prints "started" when it acts.
+// A foreign participant on the domain, for the tests and `scripts/soak strangers`:
+//   dds_stranger DOMAIN fake [KEYS]   publishes ModelState ACTIVE, Compensation and ErrorGrid of
+//                                     999 um under the name of the tests' machine; KEYS: with keys
+//                                     of another authority
+//   dds_stranger DOMAIN types         announces types with a sequence of structs, on a topic of
+//                                     abbe and on a topic of its own
+//   dds_stranger DOMAIN garbage       sends malformed RTPS to the ports of the domain's first
+//                                     participants
+// It runs until it is killed, and prints "started" when it begins to send.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -111,7 +112,7 @@ class Garbage {
  public:
   const std::vector<std::uint8_t>& next() {
     message_.assign({'R', 'T', 'P', 'S', 2, 3, 1, 15});
-    fill(12);  // a participant nobody knows
+    fill(12);  // an unknown participant
     for (int n = 1 + pick(4); n > 0; --n) append_submessage();
     return message_;
   }

@@ -1,5 +1,5 @@
-// Strangers on the domain: a publisher of fakes, one who announces types, one who sends garbage, a
-// reader who has no keys. Each is a process of its own.
+// Foreign participants on the domain: one publishes fakes, one announces types, one sends malformed
+// packets, one reads without keys. Each is a process of its own.
 #include <signal.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 
 constexpr const char* kFake = " 999.000 999.000";  // y and z: x of the feeder is its clock
 
-/// How long strangers act; `scripts/soak strangers` asks for more.
+/// How long the foreign participants act; `scripts/soak strangers` asks for more.
 std::string stranger_seconds() {
   const char* const asked = std::getenv("ABBE_STRANGERS_SECONDS");
   return asked != nullptr ? asked : "3";
@@ -101,7 +101,7 @@ class StrangersWithSecurity : public Strangers {
   Process watcher{watch({"--json", "--security", keys})};
 };
 
-TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
+TEST_F(StrangersWithSecurity, FakesAreIgnoredNoProcessEndsNothingIsLost) {
   for (Process* subscriber : {&fast, &cyclone})
     ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V")) << subscriber->transcript();
   ASSERT_TRUE(watcher.wait_for(R"({"topic":"abbe/v1/Compensation")"));
@@ -140,7 +140,7 @@ TEST_F(StrangersWithSecurity, NothingIsBelievedNobodyDiesNothingIsLost) {
       vectors.seen + vectors.overwritten, gap_ms);
   EXPECT_GT(counted.seen, 0);
   // On a computer busy with other things abbe-dds discards vectors that waited, with and without
-  // strangers.
+  // foreign participants.
   if (std::getenv("ABBE_STRANGERS_SECONDS") != nullptr) {
     EXPECT_EQ(counted.lost, 0);
   }
@@ -200,7 +200,7 @@ TEST_F(StrangersWithoutSecurity, FakesOfALaterPublisherAreIgnoredAndReported) {
 }
 
 /// The successor never sent beside the one before; the foreign did.
-TEST_F(StrangersWithoutSecurity, ARivalDoesNotTakeThePlaceOfARestartedPublisher) {
+TEST_F(StrangersWithoutSecurity, AForeignPublisherDoesNotReplaceARestartedOne) {
   Process fake(stranger("fake"));
   expect_foreign_publisher_reported();
   const auto killed = Clock::now();
@@ -258,9 +258,9 @@ TEST_F(UninvitedWithoutSecurity, GarbageEndsNothingAndMakesNoGap) {
   expect_nothing_ends_and_no_gap_of_half_a_second("garbage");
 }
 
-/// The watcher has model and grid of vmc-3 and waits for its state; the stranger's state is ACTIVE
-/// and its grid has the same model_id.
-TEST_F(Strangers, AFakeGridBesideTheTrueOneIsNotBelieved) {
+/// The watcher has model and grid of vmc-3 and waits for its state; the foreign state is ACTIVE
+/// and the foreign grid has the same model_id.
+TEST_F(Strangers, AFakeGridBesideTheTrueOneIsIgnored) {
   ::setenv("ABBE_FEEDER_STALE", "1", 1);
   start_feeder();
   ::unsetenv("ABBE_FEEDER_STALE");

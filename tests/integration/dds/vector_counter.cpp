@@ -1,8 +1,8 @@
 // Counts the vectors of the feeder that arrive and those that are lost on the way, by their
 // sequence numbers:
-//   dds_vector_counter DOMAIN KEYS     prints "vectors SEEN LOST" five times a second until it is killed.
-// It takes each one on the thread that receives it and keeps 1000, so that none is overwritten by the next,
-// as with a reader that keeps the last one only.
+//   dds_vector_counter DOMAIN KEYS     prints "vectors SEEN LOST" five times a second until killed
+// It takes each vector in the receiving thread, and its reader keeps 1000. With a reader that keeps
+// only the last one, a vector could be overwritten by the next before it is counted.
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>

@@ -80,7 +80,7 @@ struct ArtefactRun : CounterCardRun {
   [[nodiscard]] Outcome calibrate(std::vector<std::string> more = {}) const {
     return run(command(std::move(more)));
   }
-  /// What the daemon says of the touches; asking is looking on.
+  /// The daemon's status of the touches; this request counts as a client that follows the job.
   [[nodiscard]] json touches() const {
     const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "touches"}});
     return answer ? *answer : json{{"running", false}, {"reason", ""}, {"touches", json::array()}};
@@ -150,7 +150,7 @@ TEST_F(ArtefactRun, FindsTheBallsWithinTheStatedUncertainty) {
   }
 }
 
-TEST_F(ArtefactRun, SaysWhyTheMachineRefusedATouchAndKeepsTheOthers) {
+TEST_F(ArtefactRun, ReportsWhyTheMachineRefusedATouchAndKeepsTheOthers) {
   ASSERT_NO_FATAL_FAILURE(start());
   write("nominal.toml",
         replaced(artefact(0.0, 0.0), "number = 3\nx_mm = 120", "number = 3\nx_mm = 150"));
@@ -165,7 +165,7 @@ TEST_F(ArtefactRun, SaysWhyTheMachineRefusedATouchAndKeepsTheOthers) {
   EXPECT_FALSE(std::filesystem::exists(file("calibrator.toml")));
 }
 
-TEST_F(ArtefactRun, SaysThatTheMachineWentAway) {
+TEST_F(ArtefactRun, ReportsThatTheConnectionToTheMachineWasLost) {
   ASSERT_NO_FATAL_FAILURE(start());
   Program running(command({"--points", "100"}), file("artefact"));
   ASSERT_TRUE(eventually([&] { return has_touched(); }));
@@ -194,7 +194,7 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenInterrupted) {
   }
 }
 
-TEST_F(ArtefactRun, EndsTheTouchingWhenWhoeverAskedIsGone) {
+TEST_F(ArtefactRun, EndsTheTouchingWhenTheClientHasEnded) {
   ASSERT_NO_FATAL_FAILURE(start());
   Program running(command({"--points", "100"}), file("artefact"));
   ASSERT_TRUE(eventually([&] { return has_touched(); }));
@@ -203,7 +203,7 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenWhoeverAskedIsGone) {
   (void)running.wait_for_end();
   // To ask how far it is would be to look on; where the machine is may be asked.
   ASSERT_TRUE(eventually([&] { return machine().value("release_awaited", false); }));
-  EXPECT_THAT(touches()["reason"].get<std::string>(), HasSubstr("nobody looked on"));
+  EXPECT_THAT(touches()["reason"].get<std::string>(), HasSubstr("no client requested the touches"));
   expect_standing_until_released();
   EXPECT_GE(touches()["touches"].size(), before);
   EXPECT_LT(touches()["touches"].size(), touches()["asked"].get<std::size_t>());

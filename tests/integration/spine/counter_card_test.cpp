@@ -10,7 +10,7 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-TEST_F(CounterCardRun, StreamsRecordsAndSaysWhatItTakesForGranted) {
+TEST_F(CounterCardRun, StreamsRecordsAndReportsItsAssumptions) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_both());
   ASSERT_TRUE(eventually([&] { return samples("counter_card") > 1000; })) << status().dump(1);
@@ -22,7 +22,7 @@ TEST_F(CounterCardRun, StreamsRecordsAndSaysWhatItTakesForGranted) {
   EXPECT_EQ(recordings().front().extension(), ".mcap");
 }
 
-TEST_F(CounterCardRun, IsRefusedByNameWithAWiringThatCannotBe) {
+TEST_F(CounterCardRun, IsRefusedByNameWithAnImpossibleWiring) {
   write_card_configuration(wiring("port = 3240\nclock_channel = 1\n"));
   const auto checked = run({ABBED_PROGRAM, "--check-config", "-c", file("abbed.toml")});
   EXPECT_NE(checked.code, 0);

@@ -60,7 +60,7 @@ struct CountingRun : CounterCardRun {
   static constexpr double kStands_m = 1e-5;  // the counts of a simulated scale scatter less
 };
 
-TEST_F(CountingRun, TheDatumGoesOnAfterAKillAndAfterAStop) {
+TEST_F(CountingRun, TheDatumIsKeptAfterAKillAndAfterAStop) {
   const double before_m = x_m();
   ASSERT_NO_FATAL_FAILURE(kill_abbed());
   ASSERT_NO_FATAL_FAILURE(start_abbed());
@@ -112,7 +112,7 @@ TEST_F(CountingRun, AfterAnotherBootNothingIsReferenced) {
   EXPECT_THAT(abbed_->err(), HasSubstr("this computer was restarted since"));
 }
 
-TEST_F(CountingRun, ADamagedFileIsKeptAsideAndNothingIsReferenced) {
+TEST_F(CountingRun, ADamagedFileIsRenamedAndNothingIsReferenced) {
   ASSERT_NO_FATAL_FAILURE(kill_abbed());
   const auto text = text_of(kept());
   std::ofstream{kept()} << text.substr(0, text.size() / 2);

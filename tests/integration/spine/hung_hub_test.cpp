@@ -1,4 +1,4 @@
-/// A hub that hangs is waited for by whoever stops abbed: the process ends all the same.
+/// abbed is stopped while its hub hangs: the process still ends.
 
 #include <gmock/gmock.h>
 #include <signal.h>

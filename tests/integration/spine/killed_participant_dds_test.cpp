@@ -1,4 +1,4 @@
-/// abbe-dds dies: abbed starts another and acquires on.
+/// abbe-dds is killed: abbed starts another and continues to acquire.
 
 #include <gmock/gmock.h>
 #include <signal.h>

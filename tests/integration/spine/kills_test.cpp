@@ -1,6 +1,6 @@
 /// SIGKILL at random moments of whole runs: nothing that was finished is lost, and the next start
-/// closes what was left. ABBE_KILLS says how many (scripts/soak kills N); ABBE_KILLS_SEED repeats a
-/// run's moments.
+/// closes the files left open. ABBE_KILLS is the number of kills (scripts/soak kills N);
+/// ABBE_KILLS_SEED repeats a run's moments.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -68,7 +68,7 @@ class Kills : public Spine {
       wait_a_little();
     }
   }
-  /// What abbed has said is done.
+  /// What abbed has reported as done.
   void note(const json& now) {
     if (!now.is_object()) return;
     const json& session = now["session"];
@@ -162,9 +162,9 @@ class Kills : public Spine {
   unsigned seed_;
   std::mt19937 random_;
   std::unique_ptr<Program> calibration_;
-  std::set<std::string> models_;               // that abbed has said are stored
+  std::set<std::string> models_;               // that abbed has reported as stored
   std::map<std::string, std::uint64_t> left_;  // messages by the name a file is to get
-  std::uint64_t recorded_ = 0;                 // in finished chunks, as abbed last said
+  std::uint64_t recorded_ = 0;                 // in finished chunks, as abbed last reported
   std::string recording_;
 };
 

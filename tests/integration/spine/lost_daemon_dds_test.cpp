@@ -1,4 +1,4 @@
-/// The real abbed hangs, comes back and dies, while somebody subscribes: nobody may go on
+/// The real abbed hangs, continues and is killed while a subscriber runs: the subscriber must stop
 /// compensating without it.
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 
 struct LostDaemon : Spine {
-  /// A model of this configuration, in force before abbed starts.
+  /// A model of this configuration, active before abbed starts.
   void put_a_model_in_force() {
     const auto config = daemon::load_config(file("abbed.toml"));
     ASSERT_TRUE(config) << config.error().text;
@@ -47,7 +47,7 @@ struct LostDaemon : Spine {
   std::unique_ptr<Program> watch_;
 };
 
-TEST_F(LostDaemon, IsSaidToItsSubscribersWhetherItHangsOrDies) {
+TEST_F(LostDaemon, IsReportedToItsSubscribersWhetherItHangsOrEnds) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration("child");

@@ -16,11 +16,11 @@ constexpr std::chrono::seconds kPatience{
 constexpr std::chrono::seconds kPatienceForARun{
     180};  ///< for a machine's whole run, on a slow computer too
 
-/// Asks every few milliseconds until `seen` says yes; false when it never did.
+/// Calls `seen` every few milliseconds until it returns true; false after the time limit.
 template <class Condition>
 bool eventually(Condition seen, std::chrono::milliseconds at_most = kPatience);
 
-/// Waits a poll period: the processes under test need time, and tell nobody when they are done.
+/// Waits a poll period: the processes under test need time, and do not report when they are done.
 void wait_a_little();
 
 class Program {

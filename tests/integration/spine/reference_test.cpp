@@ -40,7 +40,7 @@ struct ReferenceRun : CounterCardRun {
   }
 };
 
-TEST_F(ReferenceRun, FindsWhereTheCountersBegan) {
+TEST_F(ReferenceRun, FindsThePositionsAtWhichTheCountersStarted) {
   write_traverses();
   ASSERT_NO_FATAL_FAILURE(start_both(second_card()));
   ASSERT_TRUE(eventually([&] { return samples("counter_card") > 100; })) << status().dump(1);
@@ -49,12 +49,12 @@ TEST_F(ReferenceRun, FindsWhereTheCountersBegan) {
   const auto too_early =
       run({ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")});
   EXPECT_EQ(too_early.code, 5);
-  EXPECT_THAT(too_early.err, HasSubstr("nobody knows the zero of X, Y, Z")) << too_early.out;
+  EXPECT_THAT(too_early.err, HasSubstr("axes X, Y, Z are not referenced")) << too_early.out;
   const auto found = run({ABBE_PROGRAM, "reference", "-c", file("abbed.toml"), "--json"});
   ASSERT_EQ(found.code, 0) << found.out << found.err;
   const json axes = json::parse(found.out)["axes"];
   ASSERT_EQ(axes.size(), 3u);
-  // The counters began while the machine stood at the first vertex.
+  // The counters started while the machine was at the first vertex.
   for (const auto& axis : axes) {
     const double start_mm = axis["axis"] == "Z" ? kStart_mm - 100.0 : kStart_mm;
     EXPECT_NEAR(1e3 * axis["reading_at_zero"].get<double>(), start_mm, 0.05) << axis.dump();

@@ -1,4 +1,4 @@
-/// What abbed says, and with which exit code, when it cannot start.
+/// Message and exit code of abbed when it cannot start.
 
 #include <gmock/gmock.h>
 
@@ -33,7 +33,7 @@ struct Refusals : Spine {
   }
 };
 
-TEST_F(Refusals, GoodConfigurationIsSaidToBeGood) {
+TEST_F(Refusals, ValidConfigurationIsReportedAsValid) {
   EXPECT_EQ(run_abbed("--check-config").code, 0);
 }
 
@@ -43,7 +43,7 @@ TEST_F(Refusals, UnknownOptionIsUsage) {
   EXPECT_THAT(outcome.err, HasSubstr("--no-such-option"));
 }
 
-TEST_F(Refusals, ThreeErrorsOfAConfigurationAreSaidAtOnceWithTheirLines) {
+TEST_F(Refusals, ThreeErrorsOfAConfigurationAreReportedAtOnceWithTheirLines) {
   replace("(axes.X.\nmin_mm = -100\nmax_mm =) 100", "$1 -200");
   replace("point_rate_hz = 500", "point_rate_Hz = 500");
   replace("chunk_kB = 16", "chunk_kB = \"much\"");
@@ -62,7 +62,7 @@ TEST_F(Refusals, MissingConfigurationIsNamed) {
 }
 
 // systemd does not start it again: that takes a person.
-TEST_F(Refusals, UnreadableConfigurationIsThatOfABadOne) {
+TEST_F(Refusals, UnreadableConfigurationHasTheExitCodeOfABadOne) {
   std::filesystem::create_directory(file("folder.toml"));
   const auto outcome = run({ABBED_PROGRAM, "--config", file("folder.toml")});
   EXPECT_EQ(outcome.code, 3);

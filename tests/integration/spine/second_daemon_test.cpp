@@ -16,7 +16,7 @@ constexpr const char* kDds = "child";
 constexpr const char* kDds = "off";
 #endif
 
-TEST_F(Spine, SecondDaemonLeavesAndTheFirstIsUnaffected) {
+TEST_F(Spine, SecondDaemonEndsAndTheFirstIsUnaffected) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration(kDds);

@@ -35,7 +35,7 @@ struct ShortRun : Spine {
 #endif
   }
 
-  /// The line of abbe-watch that says what the received model is worth; null without one.
+  /// The line of abbe-watch with the residual errors of the received model; null without one.
   json comparison() const {
     std::istringstream lines{watch_->out()};
     for (std::string line; std::getline(lines, line);) {
@@ -126,7 +126,7 @@ TEST_F(WrongPath, IsRefusedAndTheDaemonGoesOn) {
   EXPECT_TRUE(goes_on("encoder"));
   EXPECT_EQ(abbed_->stop(), 0);
 
-  // 1: the recording holds no run that could be identified; that much it must tell.
+  // 1: the recording holds no run that could be identified; the command must report it.
   const auto replayed = run({ABBE_PROGRAM, "replay", "--json", recordings().front()});
   EXPECT_EQ(replayed.code, 1) << replayed.err;
   const json said = json::parse(replayed.out, nullptr, false);

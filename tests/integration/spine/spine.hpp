@@ -57,7 +57,7 @@ class Spine : public testing::Test {
   [[nodiscard]] std::uint16_t port(const std::string& name) const;
   void start_abbed();  ///< returns when it answers
   /// Before start_abbed(), when it is to calibrate: at many times real time the standstill at the
-  /// first vertex would be over before anybody could ask for a calibration.
+  /// first vertex would be over before a client could request a calibration.
   void hold_simulator() const;
   /// `abbe calibrate otf` to its end; lets the simulator go on once the session waits for the
   /// machine.
@@ -66,7 +66,7 @@ class Spine : public testing::Test {
   [[nodiscard]] std::unique_ptr<Program> start(std::vector<std::string> command,
                                                const std::string& log) const;
 
-  // What abbed says.
+  // What abbed reports.
   [[nodiscard]] nlohmann::json status() const;  ///< null while it does not answer
   [[nodiscard]] nlohmann::json stream(const std::string& name) const;  ///< of the status
   [[nodiscard]] std::uint64_t samples(const std::string& name) const;

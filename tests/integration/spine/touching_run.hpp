@@ -14,8 +14,8 @@ namespace abbe::test {
 struct TouchingRun : Spine {
   TouchingRun();
 
-  /// Before the simulator starts: the array is warm and off what its file says, a sensor stands on
-  /// it.
+  /// Call before the simulator starts: the array is not at reference temperature, differs from
+  /// its file and carries a temperature sensor.
   void warm_the_array();
   /// Few points: six a ball (two more than a sphere needs), five a block. `more`: options of
   /// abbe-sim evemu.
@@ -30,7 +30,7 @@ struct TouchingRun : Spine {
   void let_machine_go() const { simulator_->signal(SIGUSR1); }
   [[nodiscard]] nlohmann::json session() const;
 
-  /// This machine has errors of 3.3 mm, and nobody references the array's rotation.
+  /// This machine has errors of 3.3 mm, and the array's rotation is not referenced.
   static constexpr const char* kAccepting =
       "max_error_mm = 10\nmax_gradient = 0.5\naccept = [\"evemu-shape-only\"]\n";
   static constexpr const char* kProbe =

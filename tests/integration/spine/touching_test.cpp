@@ -1,5 +1,5 @@
 /// A ball array from the first touch on the wire to the compensation a subscriber receives, and
-/// what is said when touches go wrong.
+/// the messages when touches are wrong.
 
 #include <gmock/gmock.h>
 
@@ -121,7 +121,7 @@ TEST_F(WholeArray, IsGuidedIdentifiedPublishedAndReplayedTheSame) {
   expect_shape_only_without_acceptance();
 }
 
-TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
+TEST_F(TouchingRun, ReportsMissedDoubledAndMisplacedTouchesAndContinues) {
   // Ball 1 is touched by 0 to 5, block 1 by 6 to 10, block 2 by 11 to 15, ball 2 by 16 to 21, ball
   // 3 from 22.
   ASSERT_NO_FATAL_FAILURE(
@@ -148,7 +148,7 @@ TEST_F(TouchingRun, SaysWhatIsMissedDoubledAndAstrayAndGoesOn) {
   EXPECT_EQ(session()["state"], "refused");
 }
 
-TEST_F(TouchingRun, RefusesAnArrayThatGrowsWithoutAThermometer) {
+TEST_F(TouchingRun, RefusesAnExpandingArrayWithoutAThermometer) {
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
   write("grows.toml", replaced(text_of(file("calibrator.toml")), "tip_radius_mm = .*",
                                "$&\nalpha_um_per_m_K = 12\nu_alpha_um_per_m_K = 1"));
@@ -172,7 +172,7 @@ TEST_F(TouchingRun, RefusesTheCalibratorOfAnotherArtefactAtItsFirstBall) {
   EXPECT_TRUE(goes_on("counter_card"));
 }
 
-TEST_F(TouchingRun, RefusesWithoutAProbeAndWithACalibratorThatIsNone) {
+TEST_F(TouchingRun, RefusesWithoutAProbeAndWithAnInvalidCalibratorFile) {
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
   write_touching_configuration(kAccepting, "off", "");
   ASSERT_NO_FATAL_FAILURE(start_abbed());

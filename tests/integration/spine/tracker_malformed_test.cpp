@@ -19,8 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// A web server as far as a tracker driver can tell: whoever connects is answered at once, and hung
-/// up on.
+/// Behaves like a web server: every connection is answered at once and then closed.
 class WebServer {
  public:
   WebServer()
@@ -68,7 +67,7 @@ class WebServer {
   std::thread thread_;
 };
 
-TEST_F(Spine, TrackerThatAnswersNonsenseIsNamedAndTheEncodersGoOn) {
+TEST_F(Spine, TrackerThatSendsMalformedBytesIsNamedAndTheEncodersContinue) {
   const WebServer nonsense;
   write_path("path.csv", path());
 

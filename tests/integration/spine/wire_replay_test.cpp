@@ -1,11 +1,10 @@
 /// The golden recordings on the wire: abbe-sim serves what a device sent to an unmodified daemon on
 /// real sockets, and the daemon must make the checked samples of it once more.
 ///
-/// What a daemon of now cannot make the same as the one of then is when things happened: host
-/// times, and how settled the clock was. Whatever else stands in a line must be the same, and no
-/// line may be missing. There may be more: a device that only answers (encoders a SYNC, Modbus a
-/// question) is asked once more here and there, and when a recording is over a replay stands still
-/// or begins anew.
+/// Host times, and how settled the clock model was, differ from run to run. Everything else in a
+/// line must be the same, and no line may be missing. There may be more: a device that only answers
+/// (encoders a SYNC, Modbus a question) is asked once more here and there, and when a recording is
+/// over a replay stands still or restarts.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -121,7 +120,7 @@ class WireRun {
     EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
     const Lines found = recorded();
 
-    // How often a measuring machine is asked where it is depends on when somebody wants it to
+    // How often the position of a measuring machine is requested depends on when it is told to
     // touch.
     const Lines kinds =
         artefact_ ? Lines{"touch"} : Lines{"point", "weather", "axes", "air", "touch"};

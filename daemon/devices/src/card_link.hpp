@@ -1,6 +1,6 @@
 #pragma once
-/// The USB link of a counter card: of the one that counts the axes and of the one that latches
-/// them on their reference marks.
+/// Creates the USB link of a counter card: of the card that counts the axes, or of the card that
+/// latches them on their reference marks.
 
 #include <memory>
 

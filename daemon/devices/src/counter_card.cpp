@@ -16,7 +16,7 @@ namespace {
 
 using TouchDetectorPointer = std::unique_ptr<drivers::TouchDetector>;
 
-/// Of the probe that is connected to the card; null without [probe].
+/// Touch detector of the probe that is connected to the card; null without [probe].
 TouchDetectorPointer touch_detector_of(const Config& config) {
   if (!config.probe) return nullptr;
   return std::make_unique<drivers::TouchDetector>(

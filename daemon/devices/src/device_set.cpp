@@ -11,9 +11,9 @@ using protocol::HostTime;
 
 struct DeviceSet::State {
   std::vector<std::unique_ptr<RunningDevices>> devices;  // in the order of device_kinds()
-  MachineMotion* motion = nullptr;                       // of one of them
-  TrackerOrders* tracker = nullptr;                      // of one of them
-  /// Samples of each stream at the previous health(), and when that was.
+  MachineMotion* motion = nullptr;                       // of the measuring machine, if any
+  TrackerOrders* tracker = nullptr;                      // of the tracker, if any
+  /// By stream: time of the previous health() and the number of samples then.
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;
 
   StreamHealth health_of(const drivers::DeviceThread& thread, HostTime now) {

@@ -12,13 +12,13 @@
 namespace abbe::daemon {
 namespace {
 
-/// One of the devices of a line.
+/// One device of a line.
 struct OnLine {
   drivers::EnvironmentDevice* device = nullptr;
   const drivers::DeviceThread* thread = nullptr;
 };
 
-/// The devices of the configuration, those of one line together.
+/// Indices of the configured devices, grouped by line.
 std::vector<std::vector<std::size_t>> devices_of_lines(
     const std::vector<EnvironmentConfig>& devices) {
   std::vector<std::vector<std::size_t>> lines;
@@ -75,7 +75,7 @@ class RunningEnvironment final : public RunningDevices {
     std::vector<drivers::EnvironmentDeviceOptions> options;
     for (const std::size_t i : devices)
       options.push_back(device_options(start.config.environment[i], start.config.daemon.speed));
-    // It is read once a second: an ordinary thread is sufficient.
+    // The line is read once a second: a thread without real-time priority is sufficient.
     auto running = run(drivers::EnvironmentLine::create(options, start.time),
                        thread_options(start.config.daemon, "abbe-environ", 0, std::nullopt));
     if (!running) return tl::unexpected(running.error());
@@ -88,7 +88,7 @@ class RunningEnvironment final : public RunningDevices {
 
   std::vector<Running<drivers::EnvironmentLine>> lines_;
   std::vector<OnLine> devices_;  // in the order of the configuration
-  std::size_t first_ = 0;        // place in DeviceNames::all
+  std::size_t first_ = 0;        // index of the first device in DeviceNames::all
   BlockBuffer blocks_;
 };
 

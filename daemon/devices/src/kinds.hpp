@@ -1,5 +1,5 @@
 #pragma once
-/// One line for each kind of device; its file is named as the line.
+/// The kinds of devices, each with the source file that defines it.
 
 #include "abbe/devices/device_kind.hpp"
 

@@ -29,7 +29,9 @@ void write_hold(const std::filesystem::path& file, const drivers::IppMachine& ma
   if (written)
     written = replace_file(file, fmt::format("{}{}", machine.moving ? kMoving : "", machine.held));
   if (!written)
-    fmt::print(stderr, "abbed: {}: after a restart the measuring machine would await no release\n",
+    fmt::print(stderr,
+               "abbed: {}: not saved; after a restart the measuring machine will not await a "
+               "release\n",
                written.error().text);
 }
 
@@ -37,12 +39,13 @@ drivers::IppMachine unreadable(const std::filesystem::path& file, const std::str
   return {fmt::format("{}unknown reason, {} cannot be read: {}", kSince, file.string(), why), true};
 }
 
-/// Only a file that is not there holds nothing.
+/// A missing file means that the machine is not held. An unreadable file means that it is held.
 drivers::IppMachine read_hold(const std::filesystem::path& file) {
   std::error_code failed;
-  const auto there = std::filesystem::status(file, failed);
-  if (there.type() == std::filesystem::file_type::not_found) return {};
+  const auto status = std::filesystem::status(file, failed);
+  if (status.type() == std::filesystem::file_type::not_found) return {};
   if (failed) return unreadable(file, failed.message());
+
   auto content = read_regular_file(file);
   if (!content) return unreadable(file, content.error().text);
   constexpr std::size_t kMost = 4096;

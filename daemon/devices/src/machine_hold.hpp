@@ -1,8 +1,8 @@
 #pragma once
-/// What a restart of the daemon must not forget of a measuring machine: DATA_DIR/machine-hold keeps
-/// the reason for which it awaits a release until a person releases it, and that a motion is under
-/// way until it has ended. A start that finds a motion stops it (AbortE) and awaits a release; so
-/// does one that cannot read the file.
+/// State of a measuring machine that survives a restart of the daemon. DATA_DIR/machine-hold
+/// contains the reason why the machine awaits a release, until the operator releases it, and a flag
+/// while a motion is under way. If the daemon finds the flag at its start, or cannot read the file,
+/// it stops the motion (AbortE) and awaits a release.
 
 #include <filesystem>
 
@@ -10,7 +10,7 @@
 
 namespace abbe::daemon {
 
-/// Sets session.held, session.moving and machine_changed.
+/// Sets session.held and session.moving from the file, and machine_changed to write it.
 void keep_hold(const std::filesystem::path& data_dir, drivers::IppDeviceOptions& options);
 
 }  // namespace abbe::daemon

@@ -17,13 +17,14 @@
 namespace abbe::daemon {
 namespace {
 
-// Wall time: a machine that is ready reports its position ten times in it.
+// Wall time. A position older than this is not used; a machine that is ready reports ten positions
+// in this time.
 constexpr auto kPositionIsOld = std::chrono::seconds{1};
-// How long a request to stop the machine may wait for its thread: 2 mm at 200 mm/s.
-constexpr auto kStopIsHeard = std::chrono::milliseconds{10};
+// Largest delay until the device thread handles a request to stop: 2 mm at 200 mm/s.
+constexpr auto kMostStopDelay = std::chrono::milliseconds{10};
 
-/// A measuring machine behind an I++ DME server. Its touches are those of the probe; its positions
-/// are the axes where the configuration has no other source of axes.
+/// A measuring machine behind an I++ DME server. It delivers the touches, and also the axis samples
+/// if the configuration has no other source of axis readings.
 class RunningMachine final : public RunningDevices, private MachineMotion {
  public:
   RunningMachine(Running<drivers::IppDevice> running, bool is_the_axes, const DeviceStart& start)
@@ -103,13 +104,14 @@ Result<std::array<double, 3>> RunningMachine::position() const {
                     status.last_fault.empty() ? "" : "; its last fault: ", status.last_fault));
   };
 
-  if (release_awaited()) return refused("awaits a release by a person (`abbe machine release`)");
+  if (release_awaited())
+    return refused("awaits a release by the operator (`abbe machine release`)");
   if (status.state != drivers::name_of(drivers::IppState::Ready))
     return refused(fmt::format("is not ready: {}", status.state));
   if (!stands_at_ || time_.now() - stands_at_->head.time > time_.host(kPositionIsOld))
-    return refused("does not say where it stands");
+    return refused("has not reported its position within the last second");
   if (!std::ranges::all_of(place(), [](double p) { return std::isfinite(p); }))
-    return refused("does not say where it stands");
+    return refused("does not report a valid position");
 
   return place();
 }
@@ -120,7 +122,7 @@ Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStar
   auto options = device_options(*config.cmm, config.daemon.speed);
   keep_hold(config.daemon.data_dir, options);
   auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
-  thread.wait_at_most = kStopIsHeard;
+  thread.wait_at_most = kMostStopDelay;
   auto running = run(drivers::IppDevice::create(options, start.time), std::move(thread));
   if (!running) return tl::unexpected(running.error());
   return std::make_unique<RunningMachine>(std::move(*running), config.cmm_reads_axes(), start);
@@ -140,7 +142,7 @@ class MachineDecoder final : public RawDecoders {
     if (block.direction == protocol::RawBlock::Direction::ToDevice)
       return receiver_->sent(bytes, block.time);
 
-    // Lost bytes cut a line in two: decoding begins again with the next connection.
+    // Lost bytes may cut a line in two: decoding restarts with the next connection.
     if (block.lost_before > 0) receiver_->push({}, block.time);
     receiver_->push(bytes, block.time);
     while (const auto message = receiver_->next()) {

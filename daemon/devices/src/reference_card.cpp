@@ -14,7 +14,7 @@ namespace {
 /// The second counter card, which latches the axes on their reference marks.
 class RunningReferenceCard final : public RunningDevices {
  public:
-  /// `start` runs the card with the watcher it feeds.
+  /// `start` starts the card; its argument is the mark watcher to which the card passes its scans.
   template <class Start>
   [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(std::size_t place,
                                                                   const Start& start) {

@@ -1,5 +1,5 @@
 #pragma once
-/// What the kinds of devices have in common: a driver with its thread, and its rings.
+/// Code shared by all kinds of devices: a driver with its thread, and draining of its rings.
 
 #include <array>
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace abbe::daemon {
 
-/// Taken out of a ring at a time: several bursts.
+/// Largest numbers of elements popped from a ring at once: several bursts.
 inline constexpr std::size_t kMostSamples = 1024;
 inline constexpr std::size_t kMostBlocks = 128;
 
@@ -36,7 +36,7 @@ void drain_ring(Ring& ring, std::array<T, N>& buffer, std::vector<T>& out) {
   }
 }
 
-/// The raw blocks of the device of that place in DeviceNames::all.
+/// Drains the raw blocks of a device. `device`: index in DeviceNames::all.
 template <class Ring>
 void drain_raw(Ring& ring, BlockBuffer& buffer, std::size_t device, Batch& batch) {
   for (std::size_t n = buffer.size(); n == buffer.size();) {
@@ -45,7 +45,8 @@ void drain_raw(Ring& ring, BlockBuffer& buffer, std::size_t device, Batch& batch
   }
 }
 
-/// Destroyed in reverse: the thread ends before the driver.
+/// A driver and its thread. Members are destroyed in reverse order: the thread ends before the
+/// driver is destroyed.
 template <class D>
 struct Running {
   std::unique_ptr<D> device;
@@ -53,7 +54,8 @@ struct Running {
 };
 
 template <class D>
-// NOLINTNEXTLINE(performance-unnecessary-value-param): moved, which clang-tidy 14 does not see in a template
+// `options` is moved, which clang-tidy 14 does not see in a template.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 Result<Running<D>> run(drivers::Result<std::unique_ptr<D>> device,
                        drivers::DeviceThreadOptions options) {
   if (!device) return tl::unexpected(error_of(device.error()));

@@ -136,7 +136,7 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
   options.session.home_after_initialize = config.home_after_initialize;
 
   if (config.search) {
-    constexpr double kUnitsPerMetre = 1e3;  // abbe sets mm
+    constexpr double kUnitsPerMetre = 1e3;  // abbe sets the controller's unit to mm
     options.session.search = protocol::emscon::SetSearchParams{
         .radius = kUnitsPerMetre * config.search->radius_m,
         .timeout_ms =

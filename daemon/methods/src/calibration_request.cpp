@@ -15,7 +15,8 @@ namespace {
 
 using nlohmann::json;
 
-// How an attachment begins, and the places for its number.
+// An attachment begins with this key; its number has a fixed width, so that set_from() can replace
+// it.
 constexpr std::string_view kFromKey = R"({"from_ns":)";
 constexpr std::size_t kDigitsOfFrom = 20;
 
@@ -64,7 +65,7 @@ RecordingAttachment to_attachment(const CalibrationTask& task) {
 
 void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept {
   char* const place = attachment.content.data() + kFromKey.size();
-  std::fill_n(place, kDigitsOfFrom, ' ');  // which JSON allows before and behind a number
+  std::fill_n(place, kDigitsOfFrom, ' ');  // JSON allows spaces before and after a number
   (void)std::to_chars(place, place + kDigitsOfFrom, from.time_since_epoch().count());
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 using protocol::HostTime;
 
-/// The operator is guided from touch to touch.
+/// True if the acquisition guides the operator from touch to touch.
 template <class Acquisition>
 constexpr bool kGuided = requires(Acquisition& acquisition) {
   acquisition.next();
@@ -51,7 +51,7 @@ Result<PreparedSession> CalibrationSession::prepare(CalibrationTask task) const 
 
 Result<void> CalibrationSession::start(PreparedSession&& prepared, HostTime from) {
   if (running()) {
-    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is {} already",
+    return fail(ErrorCode::Refused, fmt::format("calibrate {}: a session is already {}",
                                                 prepared.method, name(status_.state)));
   }
 
@@ -99,6 +99,7 @@ void CalibrationSession::follow_acquisition(HostTime now) {
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
+
   std::visit(
       [&](auto& acquisition) {
         if constexpr (kGuided<decltype(acquisition)>) follow_guidance(acquisition, now);
@@ -120,8 +121,8 @@ void CalibrationSession::follow_acquisition(HostTime now) {
   }
 }
 
-/// A note is said, then what to do; both are events, so that whoever listens hears them in this
-/// order.
+/// Adds the notes first and then the next instruction. Both are events, so that subscribers receive
+/// them in this order.
 template <class Guided>
 void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
   const auto notes = acquisition.take_notes();

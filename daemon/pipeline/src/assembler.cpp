@@ -14,7 +14,7 @@
 namespace abbe::daemon {
 namespace {
 
-// Two and a half SYNC periods: one cycle may be lost and the axes are still known.
+// In sample periods. With a gap of one lost cycle the axes are still interpolated.
 constexpr double kMostLostCycles = 2.5;
 
 using protocol::AxisSample;
@@ -22,8 +22,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Axis samples older than this are forgotten. A tracker that stalls delivers its backlog later; ten
-// seconds of 1 kHz are 2 MB.
+// Axis samples older than this are discarded. They are needed for the backlog that a stalled
+// tracker delivers later; ten seconds at 1 kHz take 2 MB.
 constexpr auto kAxisMemory = std::chrono::seconds{10};
 
 bool earlier(const AxisSample& sample, HostTime t) {
@@ -78,9 +78,9 @@ void Assembler::take(const Batch& batch) {
   for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
-/// A bus that went off or began anew may report an instant before that of the last sample, and a
-/// second answer takes one back. Interpolation needs one sample an instant: the one that knows less
-/// stays, whichever came first.
+/// After a bus-off or a restart of the bus, a sample may be earlier than the last one; a second
+/// answer of a node gives a second sample of the same instant. Interpolation needs one sample per
+/// instant: the sample with more missing axes is used, independent of the order of arrival.
 void Assembler::take(const AxisSample& sample) {
   const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
   if (same == axes_.end() || same->head.time != sample.head.time) {
@@ -144,13 +144,13 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
     s.u_position = touch.u_position;
   }
 
-  // What a measuring machine reports is its own affair: no scale of ours was read.
+  // A position reported by a measuring machine is not corrected: it is not a scale reading of abbe.
   if (touch.latch != protocol::TouchLatch::Reported)
     correct_for_temperature(s, options_.environment);
   return s;
 }
 
-/// With the environment in force at that time.
+/// A snapshot with the environment that applies at that time.
 Snapshot Assembler::begin(const protocol::SampleHead& head) const {
   Snapshot s;
   s.head = head;
@@ -163,8 +163,8 @@ Snapshot Assembler::begin(const protocol::SampleHead& head) const {
 }
 
 void Assembler::interpolate(Snapshot& s) const {
-  // Two samples on either side are all that the interpolation looks at; handing over exactly these
-  // keeps a result independent of what else has arrived.
+  // The interpolation uses two samples on either side. Passing only these makes the result
+  // independent of other samples that have arrived.
   const auto after = std::lower_bound(axes_.begin(), axes_.end(), s.head.time, earlier);
   const auto first = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
   const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);

@@ -57,7 +57,7 @@ FoundDatum datum_from(const json& content) {
                     .stated = content.at("stated").get<bool>()};
 }
 
-/// Nothing: more axes than a sample has, or a datum that is none. Throws json::exception.
+/// nullopt: more axes than a sample can have, or an invalid datum. Throws json::exception.
 std::optional<CountingState> state_from(const json& content) {
   CountingState state;
   state.boot_id = content.at("boot_id").get<std::string>();
@@ -99,31 +99,32 @@ json json_of(const CountingState& state) {
 /// Names of the members in which two set-ups differ.
 std::string differences(const std::string& before, const std::string& now) {
   const auto was = parse_json(before, "set-up"), is = parse_json(now, "set-up");
-  if (!was || !is || !was->is_object() || !is->is_object()) return "it cannot be read";
+  if (!was || !is || !was->is_object() || !is->is_object())
+    return "the earlier set-up cannot be read";
   std::string names;
   for (const auto& [name, value] : is->items())
     if (!was->contains(name) || was->at(name) != value) names += (names.empty() ? "" : ", ") + name;
-  return names.empty() ? "another version of abbed wrote it" : names;
+  return names.empty() ? "the file was written by another version of abbed" : names;
 }
 
-/// In its place the next run writes its own.
-std::string renamed_aside(const std::filesystem::path& file) {
-  const std::filesystem::path aside = file.string() + ".damaged";
+/// Renames a damaged file and returns a text about the outcome. The next run writes a new file.
+std::string rename_damaged(const std::filesystem::path& file) {
+  const std::filesystem::path renamed = file.string() + ".damaged";
   std::error_code failed;
-  std::filesystem::rename(file, aside, failed);
-  return failed ? fmt::format("it stays there: {}", failed.message())
-                : fmt::format("it is kept as {}", aside.string());
+  std::filesystem::rename(file, renamed, failed);
+  return failed ? fmt::format("it cannot be renamed: {}", failed.message())
+                : fmt::format("it is kept as {}", renamed.string());
 }
 
-/// Of runs that were killed while they wrote.
+/// Removes the temporary files of runs that were killed while writing.
 void remove_half_written(const std::filesystem::path& file) {
   std::error_code failed;
-  const std::string begins = file.filename().string() + ".";
+  const std::string prefix = file.filename().string() + ".";
   for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end;
        !failed && entry != end; entry.increment(failed)) {
     const auto name = entry->path().filename().string();
     std::error_code ignored;
-    if (name.starts_with(begins) && name.ends_with(".new"))
+    if (name.starts_with(prefix) && name.ends_with(".new"))
       std::filesystem::remove(entry->path(), ignored);
   }
 }
@@ -180,7 +181,7 @@ Result<CountingState> counting_state_from_text(std::string_view text, std::strin
   try {
     if (const auto schema = parsed->at("schema").get<int>(); schema != kCountingSchema)
       return fail(ErrorCode::BadInput,
-                  fmt::format("{}: schema {}, known is {}", what, schema, kCountingSchema));
+                  fmt::format("{}: schema {}, expected {}", what, schema, kCountingSchema));
     const json& content = parsed->at("state");
     if (parsed->at("sha256").get<std::string>() != sha256_hex(content.dump()))
       return fail(ErrorCode::BadInput, fmt::format("{}: its checksum is wrong", what));
@@ -199,13 +200,15 @@ LeftCounting left_counting(const Config& config, const std::string& boot_id) {
   std::error_code failed;
   if (std::filesystem::status(file, failed).type() == std::filesystem::file_type::not_found)
     return {};
+
   const auto refused = [&](const std::string& why) {
     return LeftCounting{.state = {}, .warning = fmt::format("{}: {}", why, kNotReferenced)};
   };
 
   const auto text = read_regular_file(file);
   auto state = text ? counting_state_from_text(*text, file.string()) : tl::unexpected(text.error());
-  if (!state) return refused(fmt::format("{} ({})", state.error().text, renamed_aside(file)));
+  if (!state) return refused(fmt::format("{} ({})", state.error().text, rename_damaged(file)));
+
   const auto because = [&](const std::string& why) {
     return refused(fmt::format("{}: {}", file.string(), why));
   };
@@ -216,7 +219,7 @@ LeftCounting left_counting(const Config& config, const std::string& boot_id) {
     return because(
         fmt::format("the set-up of the card was changed ({})", differences(state->set_up, set_up)));
   if (state->counting.progress.axis_count != config.counter_card->wiring.axes.size())
-    return because("it has another number of axes");
+    return because("its number of axes differs from [counter_card]");
   return {.state = std::move(*state), .warning = {}};
 }
 

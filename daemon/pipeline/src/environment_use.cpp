@@ -24,7 +24,7 @@ void copy_if(EnvironmentMask mask, EnvironmentMask bit, double from, double& to)
   if ((mask & bit) != 0) to = from;
 }
 
-/// The quantities of `mask` from `from`, or NaN if it is too old.
+/// Copies the quantities of `mask` from `from` to `to`; NaN if `from` is too old.
 void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
            EnvironmentSample& to) {
   const auto value = [too_old](double v) { return too_old ? kNotAvailable : v; };
@@ -37,15 +37,15 @@ void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
   if (from.head.time > to.head.time) to.head = from.head;
 }
 
-/// A device whose clock began anew may report an instant before that of its last sample.
+/// Inserts by time: after a restart of a device's clock, a sample may be earlier than the last one.
 void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSample& sample) {
   const auto later = [](HostTime t, const EnvironmentSample& other) { return t < other.head.time; };
   in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later),
                   sample);
 }
 
-/// The last one not after `t`.
-const EnvironmentSample* in_force(const std::deque<EnvironmentSample>& samples, HostTime t) {
+/// The last sample not after `t`; null if there is none.
+const EnvironmentSample* latest_at(const std::deque<EnvironmentSample>& samples, HostTime t) {
   const auto later = [](HostTime at, const EnvironmentSample& sample) {
     return at < sample.head.time;
   };
@@ -104,14 +104,14 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
   bool any = false;
 
-  if (const auto* weather = in_force(weather_, t); weather != nullptr && weather->measured != 0) {
-    // The controller says its weather when it changes: how old it is says nothing.
+  if (const auto* weather = latest_at(weather_, t); weather != nullptr && weather->measured != 0) {
+    // The controller sends its weather only when it changes, so that the age is not checked.
     merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
     any = true;
   }
 
   for (const auto& samples : devices_) {
-    const auto* sample = in_force(samples, t - lag_);
+    const auto* sample = latest_at(samples, t - lag_);
     if (sample == nullptr) continue;
     merge(*sample, sample->measured, t - sample->head.time > max_age_ + lag_, merged);
     any = true;

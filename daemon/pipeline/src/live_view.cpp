@@ -14,7 +14,7 @@ namespace {
 
 using protocol::SampleFlag;
 
-/// Three bursts of a tracker, in wall time.
+/// Wall time for which a tracker point or touch is shown: three bursts of a tracker.
 constexpr std::chrono::seconds kCurrentFor{1};
 }  // namespace
 
@@ -75,7 +75,8 @@ void LiveView::take(const protocol::AxisSample& sample) {
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }
 
-/// Of two samples of one time the later knows less: the other axes stay as they were.
+/// A second sample of the same instant has more axes missing: marks these axes missing and leaves
+/// the others unchanged.
 void LiveView::take_back(const protocol::AxisSample& sample) {
   view_.head.flags |= sample.head.flags;
   view_.missing_mask |= sample.missing_mask;
@@ -86,8 +87,9 @@ void LiveView::take_back(const protocol::AxisSample& sample) {
   previous_ = sample;
 }
 
-/// The message has one instant, that of the axes, and none for the point: of a tracker that lost
-/// its beam or its connection the last point would look as fresh as the axes.
+/// Removes an old tracker point and an old touch. The published message has one instant, that of
+/// the axes. If a tracker has lost its beam or its connection, its last point would appear as new
+/// as the axes.
 bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   bool forgotten = false;
   const auto forget = [&](bool& has, auto& sample) {
@@ -101,7 +103,7 @@ bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   return mark_axes_missing(now) || forgotten;
 }
 
-/// The last positions stay in the view; the mask says that they are not where the axes are now.
+/// The last positions stay in the view; missing_mask shows that they are not current.
 bool LiveView::mark_axes_missing(protocol::HostTime now) {
   if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
   const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);

@@ -11,12 +11,12 @@ using protocol::AxisSample;
 using protocol::HostTime;
 using protocol::SampleFlag;
 
-// Live samples kept: what a crossing that comes late may still ask for.
+// Live samples are kept for this time, for mark crossings that arrive late.
 constexpr auto kMemory = std::chrono::seconds{2};
-// Of a mark's place against the others, what a scale with signals in order stays below.
+// Largest spread of the marks' positions at which the scale signals are taken to be correct.
 constexpr double kMostSpreadPeriods = 0.5;
 
-/// Least and largest live count of the samples around [from, to].
+/// Smallest and largest live count of the samples around [from, to].
 std::pair<std::int64_t, std::int64_t> counts_around(const std::deque<AxisSample>& live,
                                                     std::uint8_t axis, HostTime from, HostTime to) {
   const auto after = [](HostTime t, const AxisSample& s) { return t < s.head.time; };
@@ -61,7 +61,7 @@ void ReferenceSession::take(const AxisSample& live) {
   if (!live_.empty() && live.head.time <= live_.back().head.time) return;
   live_.push_back(live);
   while (live_.front().head.time < live.head.time - kMemory) live_.pop_front();
-  work();
+  process_crossings();
 }
 
 void ReferenceSession::take(const drivers::MarkCrossing& crossing) {
@@ -70,10 +70,10 @@ void ReferenceSession::take(const drivers::MarkCrossing& crossing) {
     for (Axis& axis : axes_) restart(axis);
   }
   waiting_.push_back(crossing);
-  work();
+  process_crossings();
 }
 
-void ReferenceSession::work() {
+void ReferenceSession::process_crossings() {
   while (!waiting_.empty() && !live_.empty() &&
          live_.back().head.time > waiting_.front().head.time + options_.u_alignment) {
     const drivers::MarkCrossing crossing = waiting_.front();
@@ -83,7 +83,8 @@ void ReferenceSession::work() {
   }
 }
 
-/// Positions in the latching card's counts, as far as these are known.
+/// Passes the live positions up to `until` to the traverse, in counts of the latching card. Without
+/// a known difference of the zeros no position is passed.
 void ReferenceSession::follow(Axis& axis, HostTime until) {
   const auto difference = axis.alignment.difference();
   for (const AxisSample& sample : live_) {
@@ -97,7 +98,7 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
   if (axis.result.state != AxisReference::State::Searching) return;
   const HostTime from = crossing.not_before - options_.u_alignment;
   const HostTime to = crossing.head.time + options_.u_alignment;
-  if (live_.front().head.time > from) return;  // nobody knows where the axis was
+  if (live_.front().head.time > from) return;  // no position at that time
   follow(axis, from);
   const auto [low, high] = counts_around(live_, axis.options.live_axis, from, to);
   ++axis.result.marks;
@@ -105,7 +106,7 @@ void ReferenceSession::cross(Axis& axis, const drivers::MarkCrossing& crossing) 
   if (!axis.alignment.add(crossing.count, low, high)) {
     axis.result.state = AxisReference::State::Failed;
     axis.result.reason =
-        axis.options.name + ": the two cards contradict each other: one of them miscounts";
+        axis.options.name + ": the counts of the two cards do not agree: one of them miscounts";
     return;
   }
 
@@ -125,7 +126,7 @@ void ReferenceSession::conclude(Axis& axis) {
   if (axis.result.state != AxisReference::State::Searching || !axis.datum) return;
   if (axis.alignment.half_width() > axis.options.max_half_width_counts) {
     axis.result.reason =
-        axis.options.name + ": the marks agree; drive on, slowly, until the cards are aligned";
+        axis.options.name + ": the marks agree; drive slowly over more marks to align the cards";
     return;
   }
 

@@ -85,8 +85,7 @@ Result<void> check_verification(const Config& config) {
   if (config.axes_compensated())
     return fail(ErrorCode::Refused,
                 "verify: the control already corrects these axes (axes_compensated = true): a "
-                "model speaks of "
-                "readings without its correction");
+                "model applies to readings without this correction");
   return {};
 }
 

@@ -28,11 +28,9 @@ std::optional<std::string> VertexReadings::contradiction() const {
   if (most <= 1.0) return std::nullopt;
 
   return fmt::format(
-      "the scales contradict the path: at vertex {} {} reads {:.3f} mm, the path says {:.3f} mm, "
-      "{:.3f} mm "
-      "allowed "
-      "([gate] path_tolerance_mm): the control drives another path than this one, or it "
-      "compensates",
+      "the scales contradict the path: at vertex {} {} reads {:.3f} mm, the path has {:.3f} mm, "
+      "{:.3f} mm allowed ([gate] path_tolerance_mm): the control drives another path than this "
+      "one, or it compensates errors",
       seen.vertex, "XYZ"[axis], 1e3 * seen.reading_m(axis), 1e3 * seen.path_m(axis),
       1e3 * allowed_m(axis));
 }

@@ -1,8 +1,8 @@
 #pragma once
-/// The turns of the hub in which the live run had the samples of one stream. A driver hands its
-/// bytes over before what it makes of them, and the hub empties a device's samples before its
-/// bytes: so it has bytes in the turn of their sample or earlier, and what a replay decodes from
-/// them waits for that turn.
+/// The hub cycles in which the live run received the samples of one stream. A driver passes on raw
+/// bytes before the sample decoded from them, and the hub drains samples before bytes. The recorded
+/// bytes can therefore be in an earlier cycle than their sample, and the replay holds the decoded
+/// sample until the cycle of the live run.
 
 #include <chrono>
 #include <deque>
@@ -19,11 +19,13 @@ class LiveCycles {
  public:
   using HostTime = protocol::HostTime;
 
-  /// The live run has a sample of the instant `time` in `turn`, which is still to come.
+  /// The live run has a sample of the instant `time` in the cycle `turn`, which is not replayed
+  /// yet.
   void expect(HostTime time, HostTime turn) { turn_of_.emplace(time, turn); }
 
-  /// Leaves in `decoded` what the live run had by the turn `now`. What it never had, because it was
-  /// lost there or the settings were others, waits for nothing but those before it.
+  /// Leaves in `decoded` the samples that the live run had by the cycle `now`, and holds the
+  /// others. A sample that the live run never had (lost, or other settings) waits only for those
+  /// before it.
   void hold(HostTime now, std::vector<Sample>& decoded) {
     for (Sample& sample : decoded) {
       const HostTime turn = turn_of(sample.head.time, now);
@@ -37,8 +39,7 @@ class LiveCycles {
   }
 
  private:
-  // Nothing reaches the hub so long after its instant but the backlog of a tracker, which may pass
-  // at once.
+  // Only the backlog of a tracker reaches the hub later than this; the replay need not hold it.
   static constexpr auto kForgotten = std::chrono::minutes{1};
   struct Waiting {
     HostTime turn;

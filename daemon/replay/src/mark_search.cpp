@@ -44,7 +44,7 @@ template <class Sample>
 void MarkSearch::take(const Sample& sample, HostTime time) {
   if (axes_.empty()) return;
   for (; next_ < requests_.size() && time > requests_[next_]; ++next_) begin();
-  // A batch of now begins elsewhere than one of then.
+  // Replay batches do not begin where live batches did.
   if (!session_ || time <= requests_[next_ - 1] || session_->finished()) return;
   session_->take(sample);
   for (std::size_t i = 0; i < axes_.size(); ++i) note(i);
@@ -70,7 +70,7 @@ std::vector<ReplayedDatum> MarkSearch::compared(const RecordingReader& recording
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kDatumName) continue;
     const auto live = datum_from_attachment(attachment);
-    if (live && live->from < begun) continue;  // found in a former file
+    if (live && live->from < begun) continue;  // found in an earlier file
     for (std::size_t i = 0; live && i < axes_.size(); ++i) {
       if (options_.axes[i].live_axis != live->axis) continue;
       ReplayedDatum& datum = all.emplace_back();

@@ -1,7 +1,7 @@
 #pragma once
-/// The search for the reference marks once more, from the raw bytes of both cards in a recording:
-/// it begins when the live run was asked to (of a turn's bytes at once, which the live run may have
-/// had a turn later), and what it finds stands beside what the live run found. One thread.
+/// Repeats the search for the reference marks from the raw bytes of both cards in a recording, and
+/// compares the result with that of the live run. The search starts at the time of the live
+/// request; it may get the samples of a cycle one cycle earlier than the live run did. One thread.
 
 #include <optional>
 #include <vector>
@@ -19,10 +19,10 @@ class MarkSearch {
   [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
                                              const Config& config);
 
-  /// Before anybody gives the samples their datum.
+  /// Call before the datum is applied to the samples.
   void take(const Batch& batch);
 
-  /// Beside what the live run found, in its order.
+  /// The datums of the live run in their order, each with the replayed value.
   [[nodiscard]] std::vector<ReplayedDatum> compared(const RecordingReader& recording) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// Raw bytes of all devices of a recording into the samples they were decoded to. One thread.
+/// Decodes the raw bytes of all devices in a recording into samples. One thread.
 
 #include <memory>
 #include <optional>

@@ -27,8 +27,8 @@ namespace {
 using protocol::HostTime;
 
 constexpr std::uint64_t kMessagesPerProgress = 256;
-// So far bytes may be ahead of what was made of them: a busy computer's threads at many times real
-// time.
+// Largest delay of a live sample after its raw bytes, in recorded time: threads of a busy computer,
+// with simulated time many times faster than real time.
 constexpr auto kLongestAhead = std::chrono::seconds{10};
 
 /// The calibrations the recording asks for, one after the other.
@@ -42,8 +42,8 @@ class Calibrations {
         options_(options),
         session_(Methods::options(config)) {}
 
-  /// Requests came between two turns. One that came later ends the one before, as it did live (by a
-  /// cancellation).
+  /// Starts the requests made before the cycle `taken`. A later request ends the calibration before
+  /// it, which was cancelled in the live run.
   void begin_cycle(HostTime taken) {
     while (next_ < requests_.size() && requests_[next_].from < taken) begin_next();
   }
@@ -103,7 +103,7 @@ class Calibrations {
   std::vector<ReplayedCalibration> done_;
 };
 
-/// Which of Config::environment it is; none: the tracker's weather.
+/// Index in Config::environment; nullopt if the sample is the tracker's own weather reading.
 std::optional<std::size_t> environment_place(const Config& config, std::string_view device) {
   for (std::size_t i = 0; i < config.environment.size(); ++i) {
     if (config.environment[i].name == device) return i;
@@ -111,7 +111,7 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
   return std::nullopt;
 }
 
-/// What the marks gave in the live run: since when a datum was known is not in the bytes.
+/// The datum of the live run: the raw bytes do not contain the time from which it applies.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   const auto versions = recording.metadata().find("abbe.versions");
   const bool asked =
@@ -135,8 +135,8 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   return datum;
 }
 
-/// A card that was set up while one file was written and spoke in the next: what a replay from the
-/// bytes of this next file cannot see, but the samples of the live run say.
+/// Handles a card that was configured during one recording file and delivered its first sample in
+/// the next. The raw bytes of the next file do not show this restart; the recorded live samples do.
 class SetUpBefore {
  public:
   explicit SetUpBefore(const RecordingReader& recording)
@@ -147,7 +147,7 @@ class SetUpBefore {
   void take_live(const protocol::SampleHead& head) {
     if (has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
   }
-  /// Before `datum` is applied to the samples from the bytes.
+  /// Call before `datum` is applied to the samples from the bytes.
   void apply(const Batch& batch, Datum& datum) {
     const bool seen = std::ranges::any_of(batch.axes, [](const auto& s) {
       return has(s.head.flags, protocol::SampleFlag::Restarted);
@@ -190,7 +190,7 @@ class Pace {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// What the recording was asked to do and told, besides its messages.
+/// Input of the live run from the attachments of the recording.
 struct Attached {
   std::vector<CalibrationRequest> requests;
   Datum datum;
@@ -207,8 +207,8 @@ Result<Attached> attached_to(const RecordingReader& recording, const Config& con
   return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
 }
 
-/// How far an earlier run had left the counters, where this one was told; one that cannot be read
-/// is as good as none: the counters read the same but for whole rounds.
+/// State of the counters at the end of an earlier run, if the live run had it. One that cannot be
+/// read is ignored: the counters then differ only by whole counter periods.
 std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader& recording) {
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kCountingStateName) continue;
@@ -218,7 +218,7 @@ std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader&
   return std::nullopt;
 }
 
-/// Samples from raw bytes, in the turns in which the live run had them.
+/// Decodes samples from raw bytes and gives each in the cycle in which the live run had it.
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
@@ -228,8 +228,8 @@ class FromBytes {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
     sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
     sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
-    // What [[environment]] measures counts only after the watermark: there a turn more or less is
-    // nothing.
+    // Samples of [[environment]] are used only after the watermark, so that a difference of one
+    // cycle has no effect.
     sink_.environment = [this, &config](const auto& e, std::string_view device) {
       if (!environment_place(config, device)) expect(weather_, e);
     };
@@ -251,8 +251,8 @@ class FromBytes {
 
  private:
   template <class Sample>
-  void expect(LiveCycles<Sample>& turns, const Sample& sample) {
-    turns.expect(sample.head.time, next_->taken);
+  void expect(LiveCycles<Sample>& cycles, const Sample& sample) {
+    cycles.expect(sample.head.time, next_->taken);
   }
 
   RawDecoder decoder_;
@@ -316,7 +316,7 @@ class Replay : private PipelineObserver {
     };
     if (set_up_.possible())
       sink_.axis_sample = [this](const auto& s, std::string_view) { set_up_.take_live(s.head); };
-    // The bytes of what a former file handed on are in that file.
+    // A sample carried over from the previous file was decoded from bytes in that file.
     sink_.environment = [this](const auto& e, std::string_view device) {
       if (e.head.time != published_) take(e, device);
     };
@@ -395,7 +395,7 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) 
   }
   if (recording.configuration_check() == MetadataCheck::Unchecked)
     verdict.notes.emplace_back(
-        "the recorded configuration has no checksum: a damaged bit in it would not show");
+        "the recorded configuration has no checksum: damage in it would not be detected");
 }
 
 Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {

@@ -49,20 +49,20 @@ using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
 constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
-constexpr auto kTidyFirst = 10min;  // until then a time server has set a clock that started wrong
-constexpr auto kHubTimeout = 1s;    // thousands of turns; a hub silent for this long hangs
+constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
+constexpr auto kHubTimeout = 1s;    // thousands of cycles; a hub that is silent for this long hangs
 // for the control socket (3 s at most), the journal and the hub to end
 constexpr auto kEndTimeout = 5s;
 constexpr int kHubHangs = 70;  // exit code
 
-/// UTC less host time, both read now; the one constant that ever mentions the wall clock.
+/// UTC minus host time, both read now. The only conversion between the two clocks.
 protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
   const auto utc = std::chrono::system_clock::now().time_since_epoch();
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) -
           time.now().time_since_epoch()};
 }
 
-/// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, and two daemons never meet.
+/// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, unique for each daemon process.
 std::string recording_name() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm utc{};
@@ -141,7 +141,7 @@ struct Abbed::State {
   std::optional<TrackerService> tracker;
   std::optional<Hub> hub;
   WallTime running_since;
-  std::promise<void> hub_may_run;  // or it is broken: abbed was refused
+  std::promise<void> hub_may_run;  // broken if the start of abbed failed
   std::thread hub_thread;
   std::atomic<bool> hub_has_ended{false};
   FileDescriptor control_listener;
@@ -153,13 +153,13 @@ struct Abbed::State {
   LeftCounting left_counting;
   std::optional<CountingStateThread> counting_state;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
-  // The work's own: nothing waits for it at the end.
+  // Owned by the background task, which the end of abbed does not wait for.
   const std::shared_ptr<std::atomic<bool>> stop_closing =
       std::make_shared<std::atomic<bool>>(false);
   std::future<Result<std::vector<LeftRecording>>> closing_left;
   const std::string recording = recording_name();
   ClockSteps clock_steps{read_clocks()};
-  bool tidies = true;  // until the clock was set
+  bool tidies = true;  // false after the clock was set
   WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
@@ -170,7 +170,7 @@ struct Abbed::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
-    if (devices) devices->end_machine();  // first of all: whatever hangs, nothing goes on moving
+    if (devices) devices->end_machine();  // first: the machine must stop even if a later step hangs
     *stop_closing = true;
     end_hub();
     counting_state.reset();  // waits for the disk
@@ -183,7 +183,7 @@ struct Abbed::State {
                     "recorded stays readable in {}.mcap.part\n",
                     std::chrono::seconds{kEndTimeout}.count(), kHubHangs, recording)};
     control.reset();
-    journal.reset();  // these ask the hub once more
+    journal.reset();  // both call the hub a last time
 
     if (control_listener) ::unlink(config.control.socket.c_str());
     if (hub) hub->stop();
@@ -193,8 +193,8 @@ struct Abbed::State {
                         std::memory_order_release);  // pairs with the acquire in look_at_counting()
   }
 
-  /// Asked before anything is opened: a second abbed that got as far as the socket for abbe-dds
-  /// would, merely by trying it, cut the first one off from its abbe-dds.
+  /// Checked before any socket is opened: a second abbed that tried to open the socket for abbe-dds
+  /// would disconnect the first abbed from its abbe-dds.
   Result<void> refuse_second_daemon() {
     if (!is_listened_at(config.control.socket)) return {};
     return fail(ErrorCode::Io, fmt::format("listen {}: another daemon already answers there",
@@ -251,8 +251,8 @@ struct Abbed::State {
     return {};
   }
 
-  /// A warning only: acquisition and recording go on where abbe-dds cannot, and it refuses unusable
-  /// keys itself.
+  /// Warns only: acquisition and recording do not need abbe-dds, and abbe-dds itself refuses
+  /// unusable keys.
   void check_dds_security() {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
@@ -260,11 +260,13 @@ struct Abbed::State {
       const auto identity =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
       if (!identity)
-        warnings.push_back(identity.error().text + "; nothing is published over DDS until then");
+        warnings.push_back(identity.error().text +
+                           "; nothing is published over DDS until this is corrected");
     }
   }
 
-  /// Before the devices are: a processor that sleeps deeply delays their first stamps, too.
+  /// Called before start_devices(): a processor in a deep sleep state would delay the first time
+  /// stamps of the devices.
   Result<void> bound_cpu_latency() {
     if (!config.daemon.cpu_latency) return {};
     auto bound = drivers::CpuLatencyBound::request(*config.daemon.cpu_latency);
@@ -293,8 +295,8 @@ struct Abbed::State {
     return {};
   }
 
-  /// The thread waits until there is a hub to run; whether it may have its priority is known
-  /// before.
+  /// The thread waits until the hub exists. It is started earlier so that a refused priority is
+  /// known before the recorder starts.
   Result<void> start_hub_thread() {
     hub_thread =
         std::thread([this, may_run = hub_may_run.get_future()]() mutable { run_hub(may_run); });
@@ -356,12 +358,13 @@ struct Abbed::State {
     return {};
   }
 
-  /// For a later run; nothing for a card that another could be taken for. Any thread but the hub's.
+  /// Counter state for a later run; nullopt if the card has no serial number that identifies it.
+  /// Any thread except the hub's.
   std::optional<CountingState> look_at_counting(const std::string& set_up) {
     if (boot.empty()) return std::nullopt;
     const auto look = [this] { return std::pair{reference->counting(), reference->carried_on()}; };
 
-    // acquire: pairs with the release in end_hub(); nothing else uses what the hub had any more
+    // acquire: pairs with the release in end_hub(); after it only this thread uses `reference`
     auto seen = hub_has_ended.load(std::memory_order_acquire) ? std::optional{look()}
                                                               : hub->call(look, kHubTimeout);
     if (!seen || !seen->first || seen->first->progress.serial_number().empty()) return std::nullopt;
@@ -376,7 +379,7 @@ struct Abbed::State {
     return CountingState{.boot_id = boot, .set_up = set_up, .counting = std::move(*seen->first)};
   }
 
-  /// What the journal follows; any thread but the hub's.
+  /// The state that the journal follows. Any thread except the hub's.
   Observed observe() {
     auto seen = hub->call(
         [this] {
@@ -437,7 +440,8 @@ struct Abbed::State {
     if (!closed) return fmt::print(stderr, "abbed: {}\n", closed.error().text);
     for (const auto& left : *closed) {
       if (!left.fault.empty())
-        fmt::print(stderr, "abbed: left as it is by a killed abbed: {}\n", left.fault);
+        fmt::print(stderr, "abbed: recording of a killed abbed is left unchanged: {}\n",
+                   left.fault);
       else
         fmt::print(stderr, "abbed: {} {}, left open by a killed abbed\n",
                    left.messages > 0 ? fmt::format("closed, with {} messages,", left.messages)
@@ -456,8 +460,8 @@ struct Abbed::State {
     }
     try {
       hub->run();
-    } catch (const std::exception& defect) {  // it turns no more, which alive() sees
-      fmt::print(stderr, "abbed: the hub ended by a defect: {}\n", defect.what());
+    } catch (const std::exception& error) {  // alive() then returns false
+      fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
     }
   }
 };
@@ -474,8 +478,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   }
 
   using Step = Result<void> (State::*)();
-  // The recorder last of all that may refuse: a start that fails again and again leaves no files
-  // behind.
+  // The recorder is the last step that can fail: repeated failed starts then leave no files.
   for (const Step step :
        {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
         &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,

@@ -32,12 +32,12 @@ std::string verdict_text(const calib::Verdict& verdict) {
   return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
 }
 
-// A full disk or a lock takes a person or a clean-up; what it costs to ask is one small file.
+// A full disk or a lock lasts until an operator acts; one attempt writes one small file.
 constexpr auto kKeepAgain = std::chrono::seconds{5};
-// Longer than a disk needs that is only slow: a model does not wait for its recording.
+// Longer than a slow disk needs. After it the model is stored without the hash of its recording.
 constexpr auto kDigestTimeout = std::chrono::seconds{10};
 
-/// What the recorder has of the run. Never fails: without a recording the digest says so.
+/// Digest of the recording of the run. Never fails: RecordingDigest::gap states why there is none.
 RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomic<bool>& stopped) {
   try {
     for (auto waited = kLookForStop; !stopped && waited < kDigestTimeout; waited += kLookForStop)
@@ -48,8 +48,8 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
   }
 }
 
-/// A recording with a gap is named, but not as what the model can be checked with: its hash stands
-/// behind that of the data.
+/// Adds the recording to `inputs`. The first input is the one with which the model can be checked:
+/// a recording with a gap is therefore added at the end.
 void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   if (recording.bytes == 0) return;
   // The hash is that of the first `bytes` bytes: the recording goes on.
@@ -81,11 +81,12 @@ CalibrationService::~CalibrationService() {
   if (!to_keep_) return;
   if (const auto kept = try_once_more(until); !kept)
     fmt::print(stderr,
-               "abbed: model {} is lost: {}; `abbe identify {} --recording` finds it again\n",
+               "abbed: model {} is lost: {}; identify it again with `abbe identify {} "
+               "--recording`\n",
                to_keep_->id, kept.error().text, to_keep_->document.method);
 }
 
-/// One that had come to its end already is not lost.
+/// Takes the result of an identification that ends before `until`.
 void CalibrationService::stop_identification(WallTime until) {
   if (!identification_.valid() || identification_.wait_until(until) != std::future_status::ready)
     return;
@@ -127,7 +128,7 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
 }
 
 Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) const {
-  if (auto fine = check(task); !fine) return tl::unexpected(fine.error());
+  if (auto valid = check(task); !valid) return tl::unexpected(valid.error());
   RecordingAttachment attachment = to_attachment(task);
   const MethodNeeds needs =
       Methods::visit(task, [this](auto method, const auto&) { return method.needs(config_); });
@@ -193,7 +194,7 @@ std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Sn
   for (const auto& snapshot : snapshots) session_.take(snapshot);
   session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
-  if (auto in_vain = session_.take_discarded()) destroy_in_background(std::move(*in_vain));
+  if (auto discarded = session_.take_discarded()) destroy_in_background(std::move(*discarded));
   if (ready(identification_)) keep(outcome_of(identification_), now);
   if (ready(keeping_)) conclude(outcome_of(keeping_), now);
   if (to_keep_ && !keeping_.valid() && now >= keep_again_at_) begin_keeping(now);
@@ -240,8 +241,8 @@ void CalibrationService::begin_identification(Acquisition acquired) {
   });
 }
 
-/// Whether there is a model to keep: the session was not cancelled meanwhile, and the data allowed
-/// one.
+/// True if there is a model to store: the session was not cancelled and the identification
+/// succeeded.
 bool CalibrationService::sign(Result<Identified> identified, HostTime now) {
   if (session_.status().state != SessionState::Identifying) {
     destroy_in_background(std::move(identified));

@@ -27,11 +27,12 @@ Result<OnHub> status(const HubParts&, const json&) {
   return status_reply;
 }
 
-/// Shown on terminals, written to the journal and kept in the store.
+/// The remark of a client, at most 64 bytes and without control characters: it is shown on
+/// terminals, written to the journal and kept in the store.
 std::string remark_of(std::string who) {
   constexpr std::size_t kMost = 64;
   if (who.size() > kMost) {
-    std::size_t end = kMost;  // between two characters of UTF-8
+    std::size_t end = kMost;  // moved to the start of a UTF-8 character
     while (end > 0 && (static_cast<unsigned char>(who[end]) & 0xc0) == 0x80) --end;
     who.replace(end, std::string::npos, "...");
   }
@@ -40,15 +41,16 @@ std::string remark_of(std::string who) {
   return who;
 }
 
-/// Who asks, as the kernel says; a name the client gives itself is a remark (a person behind a
-/// service).
+/// The user who sent the request, as the kernel reports it. A name that the client states itself
+/// (for example the operator behind a service) is added as a remark.
 std::string who(const json& request) {
-  const auto user = request.value("user", std::string{"somebody"});
-  const auto said = remark_of(request.value("who", std::string{}));
-  return said.empty() || said == user ? user : fmt::format("{} (as {})", user, said);
+  const auto user = request.value("user", std::string{"unknown"});
+  const auto remark = remark_of(request.value("who", std::string{}));
+  return remark.empty() || remark == user ? user : fmt::format("{} (as {})", user, remark);
 }
 
-/// No method uses readings of X, Y or Z without a datum: a run would never get them.
+/// Refused if the method needs readings of X, Y and Z and one of these axes is not referenced: the
+/// run would wait for its readings forever.
 Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
   if (parts.reference == nullptr || !needs.axis_readings) return {};
   auto unknown = parts.reference->unknown();
@@ -62,20 +64,22 @@ Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
   if (unknown.empty()) return {};
   return fail(
       ErrorCode::Refused,
-      fmt::format("calibrate: nobody knows the zero of {}: `abbe reference` finds the marks, `abbe "
-                  "reference --here` says that the axes read their offset",
-                  fmt::join(unknown, ", ")));
+      fmt::format("calibrate: {} {} not referenced: run `abbe reference` to find the reference "
+                  "marks, or `abbe reference --here` to state that the axes read their offset now",
+                  unknown.size() == 1 ? "axis" : "axes",
+                  fmt::format("{} {}", fmt::join(unknown, ", "),
+                              unknown.size() == 1 ? "is" : "are")));
 }
 
-/// Points of before an order do not belong to those after it.
+/// Refused while the tracker executes an order: points before and after an order must not be mixed.
 Result<void> check_tracker_is_free(const HubParts& parts, const MethodNeeds& needs) {
   const auto* order = parts.tracker != nullptr ? parts.tracker->running() : nullptr;
   if (order == nullptr || !needs.tracker) return {};
   return fail(
       ErrorCode::Refused,
       fmt::format(
-          "calibrate: the tracker carries out \"{}\" of {}: wait for its end (`abbe tracker "
-          "status`)",
+          "calibrate: the tracker carries out \"{}\" for {}: wait until it has ended (see `abbe "
+          "tracker status`)",
           drivers::name_of(order->asked.what), order->by));
 }
 
@@ -142,7 +146,7 @@ json point_json(const StandstillPoint& p) {
           {"scatter_m", p.scatter_m}};
 }
 
-/// Standstills from the one on that was asked for.
+/// Standstills of a verification from the requested index on.
 struct SeenPoints {
   std::size_t standing = 0;
   std::vector<StandstillPoint> points;
@@ -175,8 +179,8 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
                             .stopped = service.stopped()}] { return verification_json(seen); };
 }
 
-/// {"step": "begin"} gives a number; {"step": "look" | "end", "number": .., "from": k} the points
-/// from the k-th on, "end" after the standstill that goes on was closed.
+/// {"step": "begin"} returns the number of the verification. {"step": "look" | "end", "number": ..,
+/// "from": k} returns the points from index k on; "end" first closes the present standstill.
 Result<OnHub> verification(const HubParts& parts, const json& request) {
   if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
   const auto step = request.at("step").get<std::string>();
@@ -207,19 +211,20 @@ Result<OnHub> tracker_reflectors(const HubParts&, const json& request) {
   return give_tracker({.what = drivers::TrackerOrder::What::ListReflectors}, who(request));
 }
 
-/// One thing that may be asked. Without a role it does not compile.
+/// One request. The constructor requires a role.
 struct Verb {
   using Task = Result<OnHub> (*)(const HubParts&, const json&);
   constexpr Verb(std::string_view does, std::string_view with, Role needs, Task runs)
       : name(does), member(with), role(needs), task(runs) {}
 
   std::string_view name;
-  std::string_view member;  ///< only where the request says true for it; empty: in every other case
+  std::string_view member;  ///< matches if this member of the request is true; empty: always
   Role role;
   Task task;
 };
 
-// Nothing is run that is not found here: what a request needs and what it does cannot differ.
+// The only table of requests: a request is executed with the task and the role of the same row. The
+// first row that matches applies.
 constexpr std::array kVerbs{
     Verb{"status", "", Role::Look, status},
     Verb{"calibrate", "", Role::Change, calibrate},
@@ -229,10 +234,10 @@ constexpr std::array kVerbs{
     Verb{"reference", "", Role::Change, reference},
     Verb{"verification", "", Role::Look, verification},
     Verb{"touch", "cancel", Role::Look,
-         cancel_touching},  // whoever sees a machine move may stop it
+         cancel_touching},  // a stop needs no more than the role Look
     Verb{"touch", "where", Role::Look, where_it_stands},
     Verb{"touch", "", Role::Move, begin_touching},
-    Verb{"touches", "", Role::Move, look_at_touches},  // without it a movement ends
+    Verb{"touches", "", Role::Move, look_at_touches},  // keeps a motion going
     Verb{"machine", "release", Role::Move, release_machine},
     Verb{"machine", "stop", Role::Look, stop_machine},
     Verb{"machine", "", Role::Look, machine_state},
@@ -257,7 +262,7 @@ Result<const Verb*> verb_of(const json& request) {
               fmt::format("unknown request \"{}\": known are {}", what, known_verbs()));
 }
 
-/// What to run for it, if `peer` may.
+/// The task of the request; Refused if `peer` does not have its role.
 Result<Verb::Task> task_of(const json& request, const ControlPeer& peer,
                            const ControlConfig& control) {
   const auto verb = verb_of(request);
@@ -292,7 +297,7 @@ json answer_request(Hub& hub, const json& request, const ControlPeer& peer,
   const auto answer = hub.call([&hub, run = std::move(*on_hub)] { return run(hub); }, time_out);
   return answer ? (*answer)()
                 : refusal({ErrorCode::Io,
-                           fmt::format("the hub did not answer in {} ms", time_out.count())});
+                           fmt::format("the hub did not answer within {} ms", time_out.count())});
 }
 
 }  // namespace abbe::daemon

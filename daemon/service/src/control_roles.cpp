@@ -70,8 +70,8 @@ std::string remedy(const ControlPeer& peer, const RoleWords& words) {
         "the group \"{}\" ([control] {}) does not exist on this computer: groupadd --system {}",
         words.group, words.key, words.group);
   return fmt::format(
-      "that takes the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in anew", words.group,
-      words.key, peer.user, words.group);
+      "this requires the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in again",
+      words.group, words.key, peer.user, words.group);
 }
 
 }  // namespace

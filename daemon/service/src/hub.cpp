@@ -42,7 +42,7 @@ StreamHealth health_of(const RecorderThread& recorder) {
   return h;
 }
 
-/// The model store, as far as it can be followed and written.
+/// Health of the model store: whether it can be read and written.
 StreamHealth health_of(const ModelAuthority& authority, const CalibrationService& calibration) {
   const std::string& unstored = calibration.not_stored();
   StreamHealth h;
@@ -55,7 +55,7 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
   return h;
 }
 
-/// How abbe-dds fared; nothing while it has never ended.
+/// Restarts and last end of abbe-dds; empty if it has not ended yet.
 std::string report_of(const DdsProcess& process) {
   const auto end = process.last_end();
   if (!end) return {};
@@ -78,7 +78,7 @@ StreamHealth health_of(const Publisher& publisher) {
   return h;
 }
 
-/// Strangers on the domain: kept out by keys, or not.
+/// Whether DDS Security keeps unauthorised participants out of the domain.
 StreamHealth health_of_security(const Publisher& publisher) {
   StreamHealth h;
   h.status.name = "dds_security";
@@ -94,7 +94,7 @@ struct Hub::Call {
   std::function<void()> task;
   std::exception_ptr thrown;
   std::atomic<bool> claimed{
-      false};  // by the hub, which runs it then, or by the caller, who has given up
+      false};  // by the hub, which runs the task, or by the caller after its time-out
   WakeUp done;
 };
 
@@ -153,8 +153,8 @@ void Hub::on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime t
   if (parts_.verification != nullptr) parts_.verification->cycle(snapshots);
 }
 
-/// What the machine said last is asked for only when that matters: its health is not for every
-/// turn.
+/// Collects the last fault of the machine only when a job may have ended: health is too slow for
+/// every cycle.
 void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
   std::string seen;
@@ -193,7 +193,7 @@ void Hub::collect_health(HostTime now) {
 
 void Hub::run() {
   // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a
-  // fifth of the usual period, in every turn.
+  // fifth of the usual period, in every cycle.
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const auto period = parts_.config.daemon.hub_period;
   auto next = std::chrono::steady_clock::now();
@@ -201,7 +201,7 @@ void Hub::run() {
     cycle(std::chrono::steady_clock::now());
     next += period;
     if (const auto now = std::chrono::steady_clock::now(); next < now)
-      next = now;  // late: do not catch up in a rush
+      next = now;  // late: skip the missed cycles
     sleep_until(next);
   }
 }
@@ -213,12 +213,12 @@ bool Hub::run_in_cycle(std::function<void()> task, std::chrono::milliseconds tim
   calls_.put(call.get());
 
   if (!call->done.wait_for(time_out)) {
-    // The hub still has it among its calls.
+    // Not started yet: calls_ still holds the call, and the hub moves it to given_up_.
     if (!call->claimed.exchange(true)) {
       (void)call.release();
       return false;
     }
-    call->done.wait();  // a task that has begun is as good as done
+    call->done.wait();  // the task has begun and is short
   }
 
   if (call->thrown) std::rethrow_exception(call->thrown);

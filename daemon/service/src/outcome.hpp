@@ -1,5 +1,5 @@
 #pragma once
-/// What came of work on another thread, an exception as an Error.
+/// The result of a background task, with an exception converted to an Error.
 
 #include <exception>
 #include <future>
@@ -8,13 +8,13 @@
 
 namespace abbe::daemon {
 
-/// `work` is valid; waits for it, and leaves it invalid.
+/// Waits for `work`, which must be valid, and leaves it invalid.
 template <class T>
 [[nodiscard]] Result<T> outcome_of(std::future<Result<T>>& work) {
   try {
     return work.get();
-  } catch (const std::exception& defect) {
-    return fail(ErrorCode::Io, std::string{"defect: "} + defect.what());
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::Io, std::string{"internal error: "} + error.what());
   }
 }
 

@@ -12,8 +12,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStandsFor = 500ms;
-constexpr double kStill = 2e-6;       // m or rad: drives in control hold their place within this
-constexpr double kStillCounts = 2.0;  // and no count says more than this
+constexpr double kStill = 2e-6;       // m or rad: a drive in position control stays within this
+constexpr double kStillCounts = 2.0;  // an axis at rest may change by this many counts
 
 }  // namespace
 
@@ -54,7 +54,8 @@ void ReferenceService::on_delivered(const Batch& batch) {
   if (running_) look_for_marks(batch);
 }
 
-/// A run that goes on is recorded as a further file is.
+/// Takes over the datum of the earlier run if the counters continued. The datum is recorded in the
+/// same way as at the start of a further recording file.
 void ReferenceService::take_up_left(const protocol::AxisSample& first) {
   const Counting left = *std::exchange(left_, std::nullopt);
   if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
@@ -69,8 +70,8 @@ void ReferenceService::take_up_left(const protocol::AxisSample& first) {
   }
 }
 
-/// Samples come first: one that shows that the counters began anew must be known before what came
-/// after it.
+/// Progress newer than the newest sample waits: a sample that shows that the counters restarted
+/// must be taken before the progress after it.
 void ReferenceService::take(const std::optional<drivers::CounterCardProgress>& progress) {
   if (progress) coming_ = progress;
   if (!coming_ || coming_->head.time > newest_) return;
@@ -90,7 +91,7 @@ void ReferenceService::look_for_marks(const Batch& batch) {
   for (std::size_t i = 0; i < taken_up_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
     if (found && !taken_up_[i]) take_up(i);
-    taken_up_[i] = found;  // not any more if the card began anew
+    taken_up_[i] = found;  // false again if the card restarted
   }
   if (session_->finished()) running_ = false;
 }
@@ -134,25 +135,27 @@ std::vector<std::string> ReferenceService::without_zero() const {
 void ReferenceService::watch_standing(const protocol::AxisSample& sample) {
   if (!config_.counter_card) return;
   const auto& live = config_.counter_card->wiring.axes;
-  const bool anew = standing_.empty() || has(sample.head.flags, protocol::SampleFlag::Restarted);
+  const bool restarted =
+      standing_.empty() || has(sample.head.flags, protocol::SampleFlag::Restarted);
   standing_.resize(live.size());
   for (std::size_t i = 0; i < live.size(); ++i) {
     const double most = std::max(kStillCounts, kStill / std::abs(live[i].scale));
     const double moved = std::abs(static_cast<double>(sample.count[i] - standing_[i].count));
-    if (anew || moved > most) standing_[i] = {sample.count[i], sample.head.time};
+    if (restarted || moved > most) standing_[i] = {sample.count[i], sample.head.time};
   }
 }
 
 Result<void> ReferenceService::check_standing(std::size_t axis) const {
   const auto& name = config_.counter_card->wiring.axes[axis].name;
   if ((latest_->missing_mask >> axis & 1u) != 0)
-    return fail(ErrorCode::Refused, fmt::format("reference: {} is not counted now", name));
+    return fail(ErrorCode::Refused,
+                fmt::format("reference: the counter card does not count axis {} now", name));
   if (newest_ - standing_[axis].since < kStandsFor)
     return fail(
         ErrorCode::Refused,
         fmt::format(
-            "reference: {} moves, or has stood for less than {} ms: where it is is not known", name,
-            kStandsFor.count()));
+            "reference: axis {} moves, or has stood for less than {} ms: wait until it stands",
+            name, kStandsFor.count()));
   return {};
 }
 
@@ -161,18 +164,19 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
   for (const auto& name : here.axes)
     if (std::ranges::find(possible, name) == possible.end())
       return fail(ErrorCode::Usage,
-                  fmt::format("reference: {} has marks, or is not counted by a card", name));
+                  fmt::format("reference: axis {} has marks, or no card counts it", name));
   if (possible.empty())
-    return fail(ErrorCode::Usage, "reference: there is no axis whose zero somebody could know");
+    return fail(ErrorCode::Usage, "reference: no axis without reference marks is configured");
   if (!(here.u > 0.0) || !std::isfinite(here.u))
     return fail(ErrorCode::Usage,
-                "reference: nobody knows a zero exactly: the uncertainty must be positive");
+                "reference: the uncertainty of the datum must be positive");
   if (here.acquiring)
     return fail(
         ErrorCode::Refused,
-        "reference: a calibration takes readings: another zero in the middle would tear them");
+        "reference: a calibration takes readings: a new datum would make them inconsistent; wait "
+        "until it has ended, or cancel it");
   if (!latest_)
-    return fail(ErrorCode::Refused, "reference: the counter card has not said anything yet");
+    return fail(ErrorCode::Refused, "reference: the counter card has not delivered a sample yet");
   if (here.now - newest_ > here.patience)
     return fail(ErrorCode::Refused,
                 fmt::format("reference: the counter card has been silent for {:.1f} s",

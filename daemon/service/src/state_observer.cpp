@@ -8,13 +8,13 @@
 namespace abbe::daemon {
 
 struct ObservedPart {
-  std::string key;    ///< what it is followed under
-  std::string state;  ///< a change of this is a line
+  std::string key;    ///< identifies the part
+  std::string state;  ///< a change gives a journal entry
   std::string message;
   std::string_view message_id;
   Urgency urgency = Urgency::Info;
   std::vector<JournalField> fields = {};
-  std::uint64_t counted = 0;  ///< growth of this is a line, too, but not often
+  std::uint64_t counted = 0;  ///< an increase gives an entry, once per kCountPeriod
 };
 
 namespace {
@@ -42,7 +42,7 @@ StreamKind kind_of(const std::string& stream) {
     return {"", kStoreId, "check the files in models below [daemon] data_dir", Urgency::Error};
   if (stream == "dds")
     return {"link to ", kLinkId,
-            "nothing is published until abbe-dds connects and answers: see its own lines",
+            "nothing is published until abbe-dds connects and answers: see its own log lines",
             Urgency::Warning};
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
@@ -131,8 +131,9 @@ ObservedPart part_of(const ObservedParticipant& participant) {
   } else if (participant.restarts > 0) {
     part.urgency = Urgency::Warning;
     part.message = fmt::format(
-        "abbe-dds: {}started again, {} times since abbed started; its own lines say more", ended(),
-        participant.restarts);
+        "abbe-dds: {}started again, {} times since abbed started; for the reason see its own log "
+        "lines",
+        ended(), participant.restarts);
     part.fields.push_back({"ABBE_FAULT", participant.last_end});
   }
 
@@ -142,7 +143,7 @@ ObservedPart part_of(const ObservedParticipant& participant) {
 ObservedPart part_of_hub(bool answers) {
   return {.key = "hub",
           .state = answers ? "answers" : "hangs",
-          .message = answers ? "hub: cycles"
+          .message = answers ? "hub: running"
                              : "hub: has not answered for a second; systemd restarts abbed",
           .message_id = kHubId,
           .urgency = answers ? Urgency::Info : Urgency::Error,

@@ -63,7 +63,7 @@ const TouchService::Status& TouchService::look() {
   return status_;
 }
 
-/// From here on the machine is asked for nothing: only a person knows the way out.
+/// No further motion is requested after a stop: only the operator can judge which path is free.
 void TouchService::stop(std::string reason) {
   if (std::exchange(stopping_, true)) return;
   devices_.stop_machine();
@@ -102,7 +102,8 @@ void TouchService::ask_next() {
   devices_.measure(next.way);
 }
 
-/// Only from where the last touch was to be: after any other the way out is not known.
+/// Retracts along `leave_`, which begins at the last point of the job. After an earlier end the
+/// machine stands elsewhere, where no free path is known.
 void TouchService::leave() {
   leaving_ = status_.reason.empty() && !leave_.empty();
   status_.running = leaving_;
@@ -120,7 +121,8 @@ void TouchService::cycle(const Batch& batch, std::size_t points_left, const std:
   if (!status_.running) return;
   if (!looked_) looked_ = now;
   if (now - *looked_ > kLongestUnwatched)
-    stop(fmt::format("cancelled: nobody looked on for {} s", kLongestUnwatched.count()));
+    stop(fmt::format("cancelled: no client requested the touches for {} s",
+                     kLongestUnwatched.count()));
   if (stopping_) return stopping(batch, points_left);
 
   if (leaving_) {
@@ -132,10 +134,10 @@ void TouchService::cycle(const Batch& batch, std::size_t points_left, const std:
     if (touch.latch != protocol::TouchLatch::Reported) continue;
     if (has(touch.touch_flags, TouchFlag::NoPosition)) {
       refused_ = true;
-      return;  // why is known when the driver has heard of it, too
+      return;  // the reason follows with the report of the driver
     }
     status_.touches.push_back(touch);
-    return ask_next();  // one at a time is asked for: another one was made by hand
+    return ask_next();  // one touch at a time is requested: a further one was made by hand
   }
 
   if (points_left != 0) return;

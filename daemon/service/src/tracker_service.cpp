@@ -12,7 +12,7 @@ namespace {
 using drivers::TrackerOrder;
 using drivers::TrackerOrderReport;
 
-/// What is wrong with the order itself; empty: nothing.
+/// Why the order is invalid; empty: it is valid.
 std::string order_fault(const TrackerOrder& order) {
   const bool reachable = order.distance_m > 0.0 && order.distance_m <= drivers::kLongestSearch_m;
   if (order.what == TrackerOrder::What::FindReflector && !reachable)
@@ -44,8 +44,8 @@ Result<void> TrackerService::check(const TrackerOrder& order, bool takes_reading
     return not_now(ErrorCode::Refused, "there is no tracker, [tracker] host, in the configuration");
   if (takes_readings)
     return not_now(ErrorCode::Refused,
-                   "a calibration takes readings: wait for its end, or cancel it (`abbe calibrate "
-                   "... --cancel`)");
+                   "a calibration takes readings: wait until it has ended, or cancel it (`abbe "
+                   "calibrate ... --cancel`)");
   if (const Order* other = running(); other != nullptr)
     return not_now(ErrorCode::Refused, fmt::format("\"{}\" of {} is under way",
                                                    drivers::name_of(other->asked.what), other->by));
@@ -76,8 +76,8 @@ void TrackerService::cycle(protocol::HostTime now) {
   report_silence(now);
 }
 
-/// The tracker's thread reports every order, unless it ended or hangs. A report that comes later
-/// counts.
+/// Sets the outcome of an order without a report to Failed: the tracker's thread, which reports
+/// every order, has ended or hangs. A report that arrives later replaces this outcome.
 void TrackerService::report_silence(protocol::HostTime now) {
   const Order* const order = running();
   if (order == nullptr || now - order->since <= longest_order_) return;
@@ -85,7 +85,7 @@ void TrackerService::report_silence(protocol::HostTime now) {
   orders_.back().report = TrackerOrderReport{
       .number = order->asked.number,
       .outcome = TrackerOrderReport::Outcome::Failed,
-      .text = fmt::format("no report in {:g} s: what came of it is not known, look at the "
+      .text = fmt::format("no report in {:g} s: the outcome is not known; look at the "
                           "tracker",
                           waited_s),
       .reflectors = {}};

@@ -26,7 +26,7 @@ Result<void> VerificationService::end(std::uint64_t number) {
 
 Result<const StandstillPoints*> VerificationService::points(std::uint64_t number) const {
   if (number == 0 || number != number_)
-    return fail(ErrorCode::Refused, "verify: somebody else has begun another verification");
+    return fail(ErrorCode::Refused, "verify: superseded by another verification");
   return &points_;
 }
 
@@ -41,7 +41,7 @@ void VerificationService::cycle(std::span<const protocol::Snapshot> snapshots) {
 std::string VerificationService::stopped() const {
   if (points_.points().size() < kMostPoints) return {};
   return fmt::format(
-      "verify: {} standstills are the most one verification holds: later ones are not taken",
+      "verify: the limit of {} standstills is reached: later ones are not taken; begin another one",
       kMostPoints);
 }
 

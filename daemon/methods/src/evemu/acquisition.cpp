@@ -18,16 +18,16 @@ namespace evemu = calib::evemu;
 using protocol::HostTime;
 using protocol::TouchFlag;
 
-/// Why a touch is not used; empty: it is.
+/// Why a touch cannot be used; empty: it can.
 std::string_view fault_of(const protocol::Snapshot& touch) {
   const auto flags = touch.trigger.touch_flags;
   static constexpr std::array<std::pair<TouchFlag, std::string_view>, 6> kFaults{
-      {{TouchFlag::NoPosition, "scans around it were lost, it has no position"},
-       {TouchFlag::Refused, "the measuring machine warned about it"},
+      {{TouchFlag::NoPosition, "it has no position, because scans around it were lost"},
+       {TouchFlag::Refused, "the measuring machine reported a warning for it"},
        {TouchFlag::SpeedTooLow, "the approach was slower than the probe is qualified for"},
        {TouchFlag::SpeedTooHigh, "the approach was faster than the probe is qualified for"},
        {TouchFlag::SpeedUnsteady, "the speed of the approach changed"},
-       {TouchFlag::LatchRefused, "the latched clock contradicts the scans"}}};
+       {TouchFlag::LatchRefused, "the latched clock count is not within its scan interval"}}};
 
   for (const auto& [flag, text] : kFaults) {
     if (has(flags, flag)) return text;
@@ -37,7 +37,7 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
   return {};
 }
 
-/// Empty: it is inside.
+/// Message if a reading is outside the travel; empty: it is inside.
 std::string outside(const calib::Vector3& reading_m,
                     const std::optional<calib::MachineNodes>& travel) {
   constexpr double kTolerance_m = 1e-3;
@@ -47,7 +47,8 @@ std::string outside(const calib::Vector3& reading_m,
   const std::size_t axis = found.front().axis;
   const auto& nodes_m = (*travel)[axis].nodes_m;
   return fmt::format(
-      "{0} {1:.3f} mm is outside its travel, {2:g} to {3:g} mm: [axes.{0}] or the zero of the axis",
+      "{0} {1:.3f} mm is outside its travel, {2:g} to {3:g} mm: check [axes.{0}] and the zero of "
+      "the axis",
       "XYZ"[axis], kMmPerM * reading_m[static_cast<Eigen::Index>(axis)], kMmPerM * nodes_m.front(),
       kMmPerM * nodes_m.back());
 }
@@ -89,8 +90,9 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
   if (phase_ == Phase::Running && options_.zero_is_lost_by_restart &&
       has(snapshot.head.flags, protocol::SampleFlag::Restarted)) {
     phase_ = Phase::Failed;
-    reason_ = fmt::format("{} touch {}: its device began anew, positions have another zero since",
-                          options_.device, snapshot.trigger.touch);
+    reason_ = fmt::format(
+        "{} touch {}: its device restarted, and the axes have another zero; calibrate again",
+        options_.device, snapshot.trigger.touch);
     return;
   }
 
@@ -125,7 +127,7 @@ void EvemuAcquisition::refuse(const protocol::Snapshot& touch, std::string_view 
   note(touch, fmt::format("not used: {}; expected: {}", fault, evemu::name(next.on)));
   if (++refused_in_a_row_ < options_.most_refused || phase_ != Phase::WaitingAtStart) return;
   phase_ = Phase::Failed;
-  reason_ = fmt::format("{} touches one after the other could not be used, the last because {}",
+  reason_ = fmt::format("{} successive touches could not be used; the last one: {}",
                         refused_in_a_row_, fault);
 }
 

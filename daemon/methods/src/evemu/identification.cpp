@@ -20,7 +20,7 @@ evemu::JudgeOptions judge_options(const Config& config) {
   evemu::JudgeOptions options;
   options.limits = gate_limits(config.gate);
   options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
-  // Both words were checked when the configuration was read.
+  // Both names were checked when the configuration was read.
   options.solve.estimator =
       evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
   options.solve.sparse.folds =
@@ -33,12 +33,12 @@ evemu::JudgeOptions judge_options(const Config& config) {
 std::string artefact_temperature_fault(const evemu::Calibrator& calibrator, std::string_view named,
                                        std::string_view thermometer, std::string_view remedy) {
   if (calibrator.expansivity && thermometer.empty())
-    return fmt::format("{} has alpha_um_per_m_K, but nothing says how warm the array is: {}", named,
-                       remedy);
+    return fmt::format("{} has alpha_um_per_m_K, but the temperature of the array is not given: {}",
+                       named, remedy);
   if (!calibrator.expansivity && !thermometer.empty())
     return fmt::format(
-        "{} says how warm the array is, but {} does not say how it grows: add alpha_um_per_m_K and "
-        "u_alpha_um_per_m_K to its file",
+        "{} gives the temperature of the array, but {} has no expansion coefficient: add "
+        "alpha_um_per_m_K and u_alpha_um_per_m_K to its file",
         thermometer, named);
   return {};
 }
@@ -56,7 +56,7 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
 
-  // Marks find the same zero again, people only about.
+  // Marks give the same zero again; a zero stated by the operator is only approximate.
   options.zero_is_lost_by_restart =
       config.probe && config.counter_card &&
       std::ranges::any_of(config.counter_card->wiring.axes,
@@ -65,8 +65,8 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   return options;
 }
 
-/// Every touch is held against every ball, in the daemon's cycle: real arrays have ten balls, eight
-/// positions.
+/// Limits the size of a request, because every touch is compared with every ball in the hub's
+/// cycle. Real arrays have ten balls and eight positions.
 Result<void> check_size(const EvemuRequest& request) {
   constexpr std::size_t kMostBalls = 100, kMostPositions = 100, kMostPoints = 1000;
   const auto& plan = request.plan;
@@ -88,15 +88,16 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (auto fits = check_size(request); !fits) return fits;
   if (!config.probe && !config.cmm) {
     return fail(ErrorCode::Refused,
-                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: no touches "
-                "would come");
+                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: there is no "
+                "source of touches");
   }
 
   if (config.cmm && config.cmm->axes_compensated) {
     return fail(
         ErrorCode::Refused,
-        "calibrate evemu: the measuring machine corrects what it reports ([cmm] axes_compensated = "
-        "true): switch that off first, and say so in the configuration");
+        "calibrate evemu: the measuring machine corrects the positions it reports ([cmm] "
+        "axes_compensated = true): switch the correction off in the machine and set "
+        "axes_compensated = false");
   }
 
   if (const auto given = require_target(config.machine); !given) return given;
@@ -121,12 +122,14 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
                                         const std::function<bool()>& stopped) {
   const auto machine = evemu_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
+
   evemu::ObserveOptions observing;
   observing.order = config.evemu.order;
   observing.positions = static_cast<int>(run.asked.plan.positions.size());
   observing.artefact_temperature = run.artefact;
   auto observations = evemu::observe(run.touches, run.asked.calibrator, *machine, observing);
   if (!observations) return tl::unexpected(error_of(observations.error()));
+
   evemu::JudgeOptions judging = judge_options(config);
   judging.watch.stopped = stopped;
   auto solution = evemu::solve(*observations, judging.solve);
@@ -135,6 +138,7 @@ Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& confi
     solution = evemu::with_rotation_reference(std::move(*solution), {points, sigma_m});
   }
   if (!solution) return tl::unexpected(error_of(solution.error()));
+
   if (stopped && stopped())
     return fail(ErrorCode::DataInsufficient, "identification: stopped before its end");
   auto verdict = evemu::judge(*observations, *solution, active, judging);

@@ -31,9 +31,9 @@ json calibrator_json(const evemu::Calibrator& c) {
   json out{
       {"name", c.name}, {"tip_radius_m", c.tip_radius_m}, {"balls", balls}, {"blocks", blocks}};
 
-  if (const auto& grows = c.expansivity) {
-    out["alpha_per_K"] = grows->alpha_per_K;
-    out["u_alpha_per_K"] = grows->u_alpha_per_K;
+  if (const auto& expansivity = c.expansivity) {
+    out["alpha_per_K"] = expansivity->alpha_per_K;
+    out["u_alpha_per_K"] = expansivity->u_alpha_per_K;
   }
 
   return out;

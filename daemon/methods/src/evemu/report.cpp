@@ -20,45 +20,37 @@ namespace evemu = calib::evemu;
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict) {
   add_verdict(page, verdict, "positions");
   page.paragraph(
-      "Every position was left out once. Each contender had its own best-fit rotation about Ball1 "
-      "there, "
-      "because the direction of a position is known through its blocks alone.");
+      "Every position was left out once. At this position, each compared model was fitted with its "
+      "own rotation about Ball1, because only the blocks determine the orientation of a position.");
 }
 
 void add_rotation(HtmlReport& page, const evemu::Solution& solution) {
-  page.heading("The rotation nobody sees");
+  page.heading("The rotation that touches do not determine");
   const auto& rotation = solution.rotation;
   const double u_urad = kUradPerRad * std::sqrt(rotation.cov_rad2.trace() / 3.0);
   page.paragraph(
       rotation.referenced
-          ? "The rotation of the volume about Ball1 is referenced: it was known from elsewhere."
-          : "The machine measured the blocks of the artefact itself. Where its own errors turn "
-            "them alike at "
-            "all positions, the touches contain nothing of it: the model is right up to one "
-            "rotation about "
-            "Ball1. Compared with an independent measurement as it is, nearly all of the error may "
-            "seem to "
-            "be "
-            "left (for a machine of 3 mm R_resmag near 0.9, whatever the estimator); after the "
-            "best-fit "
-            "rotation about Ball1 only the shape counts. Give a rotation reference, or accept the "
-            "shape by "
-            "name.");
+          ? "The rotation of the volume about Ball1 is referenced by an independent measurement."
+          : "The machine measured the blocks of the artefact itself. A rotation of the blocks by "
+            "the machine's own errors that is the same at all positions is not contained in the "
+            "touches: the model is correct except for one rotation about Ball1. In a direct "
+            "comparison with an independent measurement, nearly all of the error may seem to "
+            "remain (for a machine with errors of 3 mm, R_resmag near 0.9, for every estimator); "
+            "after a best-fit rotation about Ball1 only the shape is compared. Give a rotation "
+            "reference, or accept \"evemu-shape-only\" in [gate].");
 
   if (rotation.reference) {
     page.paragraph(
-        fmt::format("Rotation reference: {} points, {} more outside the volume the balls span were "
-                    "not used; chi-square "
-                    "of the residuals over the uncertainties of reference and model {:.1f} with "
-                    "{:.0f} degrees of "
-                    "freedom.",
+        fmt::format("Rotation reference: {} points; {} more points are outside the volume of the "
+                    "balls and were not used. Chi-square of the residuals over the uncertainties "
+                    "of reference and model: {:.1f} with {:.0f} degrees of freedom.",
                     rotation.reference->points, rotation.reference->outside.size(),
                     rotation.reference->chi2, rotation.reference->dof));
   }
 
   page.facts({{"standard uncertainty of the rotation (in the model's covariance)",
                fmt::format("{:.1f} urad per axis", u_urad)},
-              {"rotation taken out of the estimate",
+              {"rotation removed from the estimate",
                fmt::format("{:.1f}, {:.1f}, {:.1f} urad", kUradPerRad * rotation.removed_rad.x(),
                            kUradPerRad * rotation.removed_rad.y(),
                            kUradPerRad * rotation.removed_rad.z())}});
@@ -73,8 +65,8 @@ std::string range_text(std::span<const double> values, double per_si, const char
 void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
   page.heading("The ball array");
   page.paragraph(
-      "Its own errors are alike at all positions: no touch tells them from those of the machine. "
-      "They are in the model's covariance.");
+      "The errors of the array are the same at all positions: touches do not distinguish them from "
+      "the errors of the machine. They are included in the model's covariance.");
   std::vector<std::pair<std::string, std::string>> facts{
       {"standard uncertainty of a ball centre, per coordinate",
        range_text(artefact.u_ball_m, kUmPerM, "um")},
@@ -88,17 +80,17 @@ void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
                                      e->u_temperature_K)},
          {"thermal expansion", fmt::format("{:.2f} um/(m K), u = {:.2f}", kUmPerM * e->alpha_per_K,
                                            kUmPerM * e->u_alpha_per_K)},
-         {"longer than at 20 C by the factor",
+         {"expansion factor relative to 20 C",
           fmt::format("{:.9f}, u = {:.2g}", calib::expansion_factor(*e),
                       calib::u_expansion_factor(*e))}});
   } else {
-    facts.emplace_back("temperature", "not known; counts as 20 C");
+    facts.emplace_back("temperature", "not known; taken as 20 C");
   }
 
   page.facts(facts);
 }
 
-/// Components of all balls but Ball1, um.
+/// Error components (`before`) or residual components of all balls except Ball1, um.
 std::vector<double> components_um(const evemu::Observations& o, const evemu::Solution& solution,
                                   bool before) {
   std::vector<double> out;
@@ -112,7 +104,7 @@ std::vector<double> components_um(const evemu::Observations& o, const evemu::Sol
 
 void add_residuals(HtmlReport& page, const evemu::Observations& o,
                    const evemu::Solution& solution) {
-  page.heading("What remains at the balls");
+  page.heading("Residuals at the balls");
   const auto row = [](const char* what, const evemu::ResidualFigures& f) {
     return std::vector<std::string>{what, um_text(f.mean_abs_m), um_text(f.rms_m),
                                     um_text(f.max_abs_m)};
@@ -146,9 +138,8 @@ void add_poses(HtmlReport& page, const evemu::Solution& solution) {
   if (solution.pose_rotations_rad.empty()) return;
   page.heading("Rotations of the positions");
   page.paragraph(fmt::format(
-      "Each position may be turned about Ball1 by what its blocks were misread, {:.1f} urad per "
-      "axis as the data "
-      "have it.",
+      "The fit contains a rotation of each position about Ball1, for the measurement error of its "
+      "blocks: {:.1f} urad per axis, estimated from the data.",
       kUradPerRad * solution.statistics.w_rad));
   std::vector<std::vector<std::string>> rows;
 
@@ -200,7 +191,7 @@ void add_coefficients(HtmlReport& page, const evemu::EvemuModel& model,
   page.table({"", "value", "u", "unit"}, rows);
 }
 
-/// Along each axis, inside the hull.
+/// Volumetric error along each axis through the centre, inside the hull.
 void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("V through the middle of the volume");
   const auto& box = model.polynomials()->design().box();

@@ -18,8 +18,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Off its leg for longer than this, the machine is on a later one: the beam was away while it
-// turned a corner. Shorter than that, only the mapping of the tracker's clock moved.
+// If the machine is off its leg for longer than this, it is on a later leg: the beam was
+// interrupted at the corner. A shorter time is caused by a change of the tracker's clock mapping.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
 
@@ -86,7 +86,7 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   if (has_linear_axes(snapshot)) axes_known_at_ = point.time;
   give_up_if_stuck(point.time);
 
-  // Without axis positions the point keeps its place in the sequence, but decides nothing.
+  // A point without axis positions keeps its place in the sequence and is not evaluated further.
   if (!has_linear_axes(snapshot)) {
     if (phase_ == Phase::Running) keep(point);
     return;
@@ -119,7 +119,7 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
   };
 
   const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
-  // Where vertices are that close to each other, nothing says at which the machine stands.
+  // If two vertices are within the tolerance, it is ambiguous at which one the machine is.
   if (!near(vertex) || (vertex == leg_ && near(leg_ + 1)) || (leg_ > 0 && near(leg_ - 1))) return;
   const Vector3& nominal = vertices[vertex];
   const auto effect = effect_of(s, options_.environment);
@@ -144,13 +144,13 @@ void OtfAcquisition::tick(HostTime now) {
   }
 }
 
-/// The identification needs time that ascends.
+/// False: the point is left out, because the identification needs ascending times.
 bool OtfAcquisition::in_order(const RunPoint& point) {
   const auto last = std::exchange(last_device_time_, point.device_time);
   if (!last || point.device_time > *last) return true;
   if (*last - point.device_time > options_.clock_began_anew) {
     before_.clear();
-    if (phase_ == Phase::Running) fail("the tracker's clock began anew in the middle of the run");
+    if (phase_ == Phase::Running) fail("the tracker's clock restarted in the middle of the run");
     return true;
   }
   last_device_time_ = last;
@@ -207,9 +207,8 @@ void OtfAcquisition::keep(const RunPoint& point) {
   points_.push_back(point);
   if (points_.size() < options_.most_points) return;
   fail(
-      fmt::format("the run has {} tracker points and does not end: the machine cycles on its path, "
-                  "or the path is "
-                  "too long for this rate",
+      fmt::format("the run has {} tracker points and does not end: the machine repeats its path, "
+                  "or the path is too long for this rate",
                   points_.size()));
 }
 
@@ -229,7 +228,7 @@ void OtfAcquisition::run(const RunPoint& point, const Vector3& q) {
   trim_end();
   phase_ = Phase::Complete;
   reason_ = fmt::format("path driven, {} tracker points", points_.size());
-  if (disordered_ > 0) reason_ += fmt::format(", {} left out that came out of order", disordered_);
+  if (disordered_ > 0) reason_ += fmt::format(", {} out of order left out", disordered_);
 }
 
 void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
@@ -256,8 +255,8 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
   driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
-/// Of short legs the last ones may have been passed between two points: what is left of the path
-/// lies within its tolerance.
+/// The rest of the path need only be within its tolerance: the machine may have driven the last
+/// short legs between two points.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
   return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&

@@ -14,7 +14,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The stages share one bar: the alignment takes most of the time.
+/// Overall progress, 0 to 1; the alignment takes most of the time.
 double overall(calib::otf::Stage stage, double fraction) {
   switch (stage) {
     case calib::otf::Stage::Observe:
@@ -39,7 +39,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   const auto points = otf_observations(run.points);
   calib::otf::Options options = otf_options(points, machine_config, gate);
 
-  // without them no run begins, and they are compared at the vertices
+  // A run needs scale readings, and they were compared with the path at the vertices.
   options.orientation.scales_agree = true;
   if (watch.progress) {
     options.progress = [&watch](calib::otf::Stage stage, double fraction) {

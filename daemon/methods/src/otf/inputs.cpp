@@ -17,7 +17,7 @@
 namespace abbe::daemon {
 namespace {
 
-// The alignment wants 20 points of standstill at either end of a run
+// The alignment needs 20 points of standstill at either end of a run
 // (calib::otf::Options::standstill_samples).
 constexpr double kStandstillPoints = 20.0;
 
@@ -54,8 +54,8 @@ Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineC
   if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
-  const auto fine = calib::otf::check(otf_path(path_m), known->nodes);
-  if (!fine) return fail(ErrorCode::BadInput, "calibrate otf: " + fine.error().text);
+  const auto valid = calib::otf::check(otf_path(path_m), known->nodes);
+  if (!valid) return fail(ErrorCode::BadInput, "calibrate otf: " + valid.error().text);
   return {};
 }
 

@@ -23,7 +23,7 @@ OtfMethod::Request OtfMethod::request_from(const nlohmann::json& object, const C
 Result<void> OtfMethod::check(const Request& request, const Config& config) {
   if (config.tracker && config.tracker->mode == TrackerModeConfig::Stationary)
     return fail(ErrorCode::Refused,
-                "calibrate otf: [tracker] mode = \"stationary\" gives no points on the fly");
+                "calibrate otf: [tracker] mode = \"stationary\" gives no points during motion");
   return check_otf_path(request.path_m, config.machine);
 }
 

@@ -14,14 +14,14 @@ namespace {
 
 using calib::Vector3;
 
-/// How near to a vertex the machine must come, as in a session.
+/// Largest distance at which a vertex is reached, as in a session.
 const double kNear_m = AcquisitionOptions{}.vertex_tolerance_m;
 
 Vector3 vector(const AxisPosition& q) {
   return {q[0], q[1], q[2]};
 }
 
-/// Of a vertex that was not reached yet.
+/// The reading closest to a vertex that is not reached yet.
 struct Closest {
   double distance_m = std::numeric_limits<double>::infinity();
   double time_s = 0.0;
@@ -40,9 +40,9 @@ double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
   return way.norm() / (readings[after].time_s - readings[before].time_s);
 }
 
-/// False: a neighbour is so near that the readings do not show at which of the two the machine
-/// stands.
-bool stands_alone(std::span<const AxisPosition> path_m, std::size_t i) {
+/// False if a neighbouring vertex is so near that the readings do not show at which of the two the
+/// machine is.
+bool is_isolated(std::span<const AxisPosition> path_m, std::size_t i) {
   const auto far = [&](std::size_t a, std::size_t b) {
     return (vector(path_m[a]) - vector(path_m[b])).norm() > 2.0 * kNear_m;
   };
@@ -53,8 +53,8 @@ Error not_reached(const std::string& file, std::size_t vertex, const AxisPositio
                   const Closest& closest) {
   return {ErrorCode::BadInput,
           fmt::format("{}: the scales do not reach vertex {} of the path, ({:.3f}, {:.3f}, {:.3f}) "
-                      "mm: they come "
-                      "within {:.3f} mm, with ({:.3f}, {:.3f}, {:.3f}) mm at {:.3f} s",
+                      "mm: the closest reading is {:.3f} mm away, ({:.3f}, {:.3f}, {:.3f}) mm at "
+                      "{:.3f} s",
                       file, vertex, 1e3 * q_m[0], 1e3 * q_m[1], 1e3 * q_m[2],
                       1e3 * closest.distance_m, 1e3 * closest.reading_m.x(),
                       1e3 * closest.reading_m.y(), 1e3 * closest.reading_m.z(), closest.time_s)};
@@ -87,7 +87,7 @@ Result<std::size_t> compare_with_path(const std::string& file, std::span<const E
     }
     const std::size_t vertex = next - 1;
     if (next == 0 || (q_m - vector(path_m[vertex])).norm() > kNear_m ||
-        !stands_alone(path_m, vertex))
+        !is_isolated(path_m, vertex))
       continue;
     const double speed = speed_m_per_s(readings, i);
     if (speed <= VertexReadings::kStands_m_per_s) stood.insert(vertex);

@@ -27,7 +27,7 @@ void add_origin(HtmlReport& page, const ModelDocument& document) {
                                     s.unknowns, s.rank, s.condition)},
        {"sigma0", fmt::format("{:.3f} (1: residuals as large as the stated uncertainties explain)",
                               s.sigma0)},
-       {"covariance multiplied with", fmt::format("{:.3f}", s.variance_factor)}});
+       {"variance factor (multiplies the covariance)", fmt::format("{:.3f}", s.variance_factor)}});
 }
 
 void add_residuals(HtmlReport& page, const ModelStatistics& s,
@@ -38,12 +38,13 @@ void add_residuals(HtmlReport& page, const ModelStatistics& s,
   };
   page.table({"", "mean", "rms", "largest"}, {row("before", s.before), row("after", s.after)});
   page.chart(Histogram{
-      "before", "deviation across the path, um", {{"before", in_um(residuals.before_m)}}});
+      "before", "error across the path, um", {{"before", in_um(residuals.before_m)}}});
   page.chart(
-      Histogram{"after", "deviation across the path, um", {{"after", in_um(residuals.after_m)}}});
+      Histogram{"after", "residual across the path, um", {{"after", in_um(residuals.after_m)}}});
 }
 
-/// Errors of one kind (displacements or rotations) along one axis: the last letter of their name.
+/// Errors of one kind (displacements or rotations) along one axis. `axis` is the last letter of
+/// their names.
 LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis, bool angles) {
   LineChart chart;
   chart.title =
@@ -68,10 +69,8 @@ LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis
 void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("Error motions (ISO 230-1)");
   page.paragraph(
-      "Each with twice its standard uncertainty in the stated gauge. A table that is missing "
-      "cannot be told "
-      "from the "
-      "others with one target.");
+      "Each with twice its standard uncertainty in the stated gauge. With one target, a missing "
+      "table cannot be distinguished from the others.");
   const auto parameters = model.parameters();
 
   for (const char axis : {'X', 'Y', 'Z'}) {

@@ -55,8 +55,8 @@ struct NextTouch {
 };
 
 /// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched
-/// before; Doubled: the feature has all its points; NotOnFeature: on no known feature, or not taken (the
-/// guide is complete or has failed, or the feature before was discarded).
+/// before; Doubled: the feature has all its points; NotOnFeature: on no known feature, or not taken
+/// (the guide is complete or has failed, or the feature before was discarded).
 enum class TouchFate { Taken, SamePlace, Doubled, NotOnFeature };
 struct GuidedTouch {
   TouchFate fate = TouchFate::Taken;

@@ -33,9 +33,9 @@ struct DelayOptions {
 struct ProbeDelayFit {
   double delay_s = 0.0;  ///< to be added to the delay with which the touches were compensated
   /// Half width of the 95 % interval divided by 1.96: the standard deviation from the scatter,
-  /// times sqrt(lack_of_fit) if lack_of_fit exceeds 1 [Birge 1932], times Student's t for `dof` divided by
-  /// the normal quantile [GUM] G.3, because scatter and lack_of_fit are estimates (factor 1.25 with nine
-  /// touches; 6.5 if three feeds do not lie on a line).
+  /// times sqrt(lack_of_fit) if lack_of_fit exceeds 1 [Birge 1932], times Student's t for `dof`
+  /// divided by the normal quantile [GUM] G.3, because scatter and lack_of_fit are estimates
+  /// (factor 1.25 with nine touches; 6.5 if three feeds do not lie on a line).
   double u_delay_s = 0.0;
   /// degrees of freedom of u_delay_s: touches - feeds, or feeds - 2 if lack_of_fit exceeds 1
   double dof = 0.0;

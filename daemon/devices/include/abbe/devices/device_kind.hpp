@@ -1,7 +1,7 @@
 #pragma once
-/// The kinds of devices that abbed knows. What one kind needs (driver options, driver, thread,
+/// The kinds of devices that abbed supports. What one kind needs (driver options, driver, thread,
 /// rings, raw decoder, health) is in one file of src; device_kinds() lists them. The device set and
-/// a replay walk over this list; drivers/docs/adding_a_device.md says what a new kind consists of.
+/// a replay iterate over this list; drivers/docs/adding_a_device.md describes how to add a kind.
 
 #include <array>
 #include <memory>
@@ -21,7 +21,8 @@
 
 namespace abbe::daemon {
 
-/// A device that moves and touches by itself. The functions are those of SampleSource.
+/// A device that moves and probes under its own control (a measuring machine). The functions are
+/// described in SampleSource.
 class MachineMotion {
  public:
   MachineMotion() = default;
@@ -31,7 +32,7 @@ class MachineMotion {
 
   virtual void measure(std::span<const drivers::ProbePoint> points) = 0;
   virtual void stop() = 0;
-  /// Any thread, takes no lock: stops the motion and ends the session.
+  /// May be called from any thread; takes no lock. Stops the motion and ends the session.
   virtual void end() = 0;
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const = 0;
   [[nodiscard]] virtual Result<void> release() = 0;
@@ -53,7 +54,7 @@ class TrackerOrders {
   [[nodiscard]] virtual std::vector<drivers::TrackerOrderReport> reports() = 0;
 };
 
-/// The devices of one kind while they run. Used by one thread; the destructor ends their threads.
+/// The running devices of one kind. Used by one thread; the destructor ends the device threads.
 class RunningDevices {
  public:
   RunningDevices() = default;
@@ -61,25 +62,28 @@ class RunningDevices {
   RunningDevices& operator=(const RunningDevices&) = delete;
   virtual ~RunningDevices() = default;
 
-  /// Appends what arrived since the last call: of each device the samples before the raw bytes. A
-  /// driver delivers the bytes first, so bytes are never drained in a later cycle than the samples
-  /// decoded from them; a replay relies on this order.
+  /// Appends what arrived since the last call. Of each device, the samples are drained before the
+  /// raw bytes. A driver delivers the bytes before the samples, so bytes are never drained in a
+  /// later cycle than the samples decoded from them; a replay relies on this order.
   virtual void drain(Batch& batch) = 0;
-  /// One for each line of health, in the order of the configuration.
+  /// One thread for each device in the health report, in the order of the configuration.
   [[nodiscard]] virtual std::vector<const drivers::DeviceThread*> threads() const = 0;
-  /// What the system refused in real-time mode `ignore`, and what the driver assumes.
+  /// Real-time settings that the operating system refused in real-time mode `ignore`, and
+  /// assumptions of the driver.
   [[nodiscard]] virtual std::vector<std::string> warnings() const;
 
-  // What few kinds can do; null or nullopt: this one cannot.
+  // Functions of some kinds only; null or nullopt: this kind does not have the function.
   [[nodiscard]] virtual MachineMotion* motion() noexcept { return nullptr; }
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }
-  /// The latest that drain() met after its samples; at most once each.
+  /// The latest progress that drain() read; its samples are already in the batch. Each progress is
+  /// returned at most once.
   [[nodiscard]] virtual std::optional<drivers::CounterCardProgress> take_progress() {
     return std::nullopt;
   }
 };
 
-/// Decodes the recorded raw bytes of the devices of one kind, by the same receivers as live.
+/// Decodes the recorded raw bytes of the devices of one kind, with the receivers that the live
+/// devices use.
 class RawDecoders {
  public:
   RawDecoders() = default;
@@ -87,21 +91,21 @@ class RawDecoders {
   RawDecoders& operator=(const RawDecoders&) = delete;
   virtual ~RawDecoders() = default;
 
-  /// Appends the samples that the block completes; nothing for a device of another kind.
+  /// Appends the samples that the block completes. Ignores a block from a device of another kind.
   virtual void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) = 0;
 };
 
-/// The devices of a configuration by name, and which of them delivers what.
+/// Names of the configured devices, and which device delivers which data.
 struct DeviceNames {
-  std::vector<std::string> all;  ///< Batch::raw counts them
+  std::vector<std::string> all;  ///< RawFromDevice::device is an index into it
   std::string tracker = "tracker", axes = "encoder", touches = "probe";
   std::vector<std::string> environment;  ///< in the order of Config::environment
 };
 [[nodiscard]] DeviceNames device_names(const Config& config);
 
-/// What devices are started with. `first`: place in DeviceNames::all of the first device of the
-/// kind. `left`: how far an earlier run left the counters of the counter
-/// card, which then go on if the card did.
+/// Arguments of DeviceKind::start. `first`: index in DeviceNames::all of the first device of the
+/// kind. `left`: state of the counters at the end of an earlier run; counting continues from it if
+/// the counter card kept counting.
 struct DeviceStart {
   const Config& config;
   const drivers::TimeSource& time;
@@ -110,17 +114,17 @@ struct DeviceStart {
 };
 
 struct DeviceKind {
-  std::string_view table;  ///< of the configuration
+  std::string_view table;  ///< name of the table in the configuration
   /// Adds the configured devices of this kind.
   void (*name)(const Config& config, DeviceNames& names);
-  /// Null: the configuration has no device of this kind.
+  /// Starts the devices. Null if the configuration has no device of this kind.
   Result<std::unique_ptr<RunningDevices>> (*start)(const DeviceStart& start);
-  /// Null as start().
+  /// Null if the configuration has no device of this kind.
   std::unique_ptr<RawDecoders> (*decoders)(const Config& config,
                                            const std::optional<drivers::CounterCardProgress>& left);
 };
 
-/// In the order in which health names them.
+/// In the order of the health report.
 [[nodiscard]] std::span<const DeviceKind> device_kinds();
 
 }  // namespace abbe::daemon

@@ -1,8 +1,8 @@
 #pragma once
-/// The configuration as the drivers' options: one place, so that a live device and its replay
-/// decode alike. Pure. Time-outs are host time in the drivers; with simulated devices at
-/// `speed` > 1 they are stretched by it, because the peer's answer still takes the operating
-/// system's time.
+/// Converts the configuration to the drivers' options. A live device and its replay use the same
+/// conversion, so that they decode alike. Pure. Time-outs are host time in the drivers; with
+/// simulated devices at `speed` > 1 host time runs faster than wall time, so they are multiplied by
+/// `speed`: the latency of the operating system does not become shorter.
 
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/can/encoder_device.hpp"
@@ -15,7 +15,7 @@ namespace abbe::daemon {
 
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config,
                                                            double speed);
-/// Host time after which an order to the tracker has been reported; 0 without a tracker.
+/// Longest host time until the tracker driver reports the outcome of an order; 0 without a tracker.
 [[nodiscard]] std::chrono::nanoseconds longest_tracker_order(const Config& config);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config,
                                                            double speed);

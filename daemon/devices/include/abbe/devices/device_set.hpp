@@ -1,6 +1,7 @@
 #pragma once
-/// The configured devices with their rings and threads, as one thing the hub can drain. The
-/// devices' threads are theirs; every function here but end_machine() is for the hub's thread.
+/// All configured devices with their rings and threads, as one sample source for the hub. Each
+/// device runs its own thread. All functions except end_machine() must be called from the hub's
+/// thread.
 
 #include <array>
 #include <chrono>
@@ -21,10 +22,10 @@ namespace abbe::daemon {
 
 class DeviceSet final : public SampleSource {
  public:
-  /// Creates the devices and starts their threads. Io when the system refuses what real-time mode
-  /// `enforce` asks for, BadInput for a device that cannot be opened as configured. `time` must
-  /// outlive the set. `left`: how far an earlier run left the counters of [counter_card], which
-  /// then go on if the card did.
+  /// Creates the devices and starts their threads. Io if the operating system refuses a setting
+  /// that real-time mode `enforce` requires, BadInput for a device that cannot be opened as
+  /// configured. `time` must outlive the set. `left`: state of the counters of [counter_card] at
+  /// the end of an earlier run; counting continues from it if the card kept counting.
   [[nodiscard]] static Result<DeviceSet> start(
       const Config& config, const drivers::TimeSource& time,
       const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
@@ -34,15 +35,16 @@ class DeviceSet final : public SampleSource {
 
   void drain(Batch& batch) override;
   [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
-  /// What the system refused in real-time mode `ignore`, one sentence each.
+  /// Real-time settings that the operating system refused in real-time mode `ignore`, and
+  /// assumptions of the drivers; one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
-  /// One of the devices moves and touches by itself.
+  /// True if a device moves and probes under its own control (a measuring machine).
   [[nodiscard]] bool moves() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
   void stop_machine() override;
-  /// Any thread, takes no lock: a motion of the measuring machine is stopped and its session ends,
-  /// whether or not this is ever destroyed. No release is awaited.
+  /// May be called from any thread; takes no lock. Stops a motion of the measuring machine and ends
+  /// its session, also if this object is never destroyed. No release is needed afterwards.
   void end_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;
   [[nodiscard]] Result<void> release_machine() override;

@@ -1,6 +1,6 @@
 #pragma once
-/// What a calibration was asked for, as it comes over the control socket and lies in the recording
-/// beside the samples, so that a replay is asked the same.
+/// The request for a calibration. It arrives over the control socket and is recorded as an
+/// attachment beside the samples, so that a replay uses the same request.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -15,24 +15,25 @@
 
 namespace abbe::daemon {
 
-/// One for every method.
+/// The request of any one method.
 using CalibrationTask = Methods::Request;
 [[nodiscard]] std::string_view method_of(const CalibrationTask& task) noexcept;  ///< "otf", "evemu"
 
 struct CalibrationRequest {
   CalibrationTask task;
-  protocol::HostTime from{};  ///< snapshots before this instant do not belong to it
+  protocol::HostTime from{};  ///< snapshots before this instant are not used
 };
 
-/// {"method": ..., what it needs}; keeps every bit of the numbers.
+/// {"method": ..., members of the method's request}. Numbers are written without loss.
 [[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
-/// BadInput naming what is missing or of the wrong type; Usage for an unknown method. `config`: for
-/// what the object leaves to the configuration; null: the defaults.
+/// BadInput with the member that is missing or of the wrong type; Usage for an unknown method.
+/// `config`: gives the values of optional members that the object does not contain; null: the
+/// defaults.
 [[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
                                                      const Config* config = nullptr);
 
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
-/// The same in two steps, of which only the first grows with the task.
+/// The same in two steps: this one is O(size of the task), set_from() is O(1).
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationTask& task);
 void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept;
 [[nodiscard]] Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment);

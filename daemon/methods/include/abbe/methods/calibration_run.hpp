@@ -1,5 +1,5 @@
 #pragma once
-/// An acquired run and the judged model it gives, whatever the method. Pure functions.
+/// An acquired run and the judged model identified from it, for any method. Pure functions.
 
 #include <functional>
 #include <string>
@@ -16,13 +16,14 @@ namespace abbe::daemon {
 using CalibrationRun = Methods::Run;
 using Candidate = Methods::Candidate;
 
-/// `active` may be null.
+/// Identifies a model from the run and judges it against `active`, the active model; null if there
+/// is none.
 [[nodiscard]] Result<Candidate> identify(const CalibrationRun& run, const Config& config,
                                          const calib::VolumetricModel* active,
                                          const IdentificationWatch& watch = {});
 
-/// What the run consists of, for the model's document: the files that were given, and "points" or
-/// "touches" with the SHA-256 of what entered the identification.
+/// Inputs of the run, as listed in the model document: the given files, and "points" or "touches"
+/// with the SHA-256 of the data used in the identification.
 [[nodiscard]] std::vector<InputFile> inputs_of(const CalibrationRun& run);
 
 [[nodiscard]] std::string_view method_of(const Candidate& candidate) noexcept;  ///< "otf", "evemu"

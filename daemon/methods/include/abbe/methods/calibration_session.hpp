@@ -1,17 +1,25 @@
 #pragma once
-/// One calibration from the command to the verdict, as an explicit state machine. It is driven by
-/// snapshots and by the outcome of the identification that somebody else runs; it reads no clock
-/// and starts no thread, so live and replay go through the same states at the same recorded
-/// instants.
+/// One calibration from the command to the verdict, as an explicit state machine. Its inputs are
+/// snapshots and the outcome of the identification, which the caller runs. It reads no clock and
+/// starts no thread, so that a live run and its replay pass through the same states at the same
+/// recorded instants.
 ///
-///     idle ──start──▶ warming ──the run begins──▶ acquiring ──run complete──▶ identifying ──▶ judged
-///     ──gate──▶ active
-///                        │                            │                          │             │
-///                        └────────────cancel, lost────┴──────data do not allow───┴───gate──────┴──▶ refused
+///     idle --start--> warming --run begins--> acquiring --run complete--> identifying --+
+///                        |                        |                            |        |
+///                     cancel,                  cancel,                      cancel,     |
+///                     failure                  failure                     no model     |
+///                        v                        v                            v        |
+///                     refused                  refused                      refused     |
+///                                                                                       |
+///          +------------------------------model identified------------------------------+
+///          v
+///       judged --gate passed--> active
+///          |
+///          +-----gate failed--> refused
 ///
-/// The same for every method; what differs is the acquisition (OtfAcquisition, EvemuAcquisition).
-/// Where people are guided from touch to touch, every new instruction is an event, too. Ordinary
-/// world; not thread-safe.
+/// The states are the same for every method; only the acquisition differs (OtfAcquisition,
+/// EvemuAcquisition). If the method guides the operator from touch to touch, each new instruction
+/// is also an event. Not for the RT path; not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -32,52 +40,53 @@ namespace abbe::daemon {
 
 using Acquisition = Methods::Acquisition;
 
-/// A task that was checked and made ready to start: what grows with the request is done.
+/// A checked task, ready to start. All work that depends on the size of the request is done.
 struct PreparedSession {
   std::string_view method;
   Acquisition acquisition;
 };
 
-/// What a session had acquired when the run was complete, as the input of the identification. O(n)
-/// in points and vertices.
+/// Converts a complete acquisition to the input of the identification. O(n) in points and vertices.
 [[nodiscard]] CalibrationRun run_of(Acquisition acquired);
 
 class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted move of a variant
  public:
-  /// Options of every method, in the order of Methods.
+  /// `options`: one element for each method, in the order of Methods.
   explicit CalibrationSession(Methods::Options options = {}) : options_(std::move(options)) {}
 
-  /// BadInput for a task that is none. Any thread, also while another uses the session.
+  /// BadInput for an invalid task. May be called from any thread, also while another thread uses
+  /// the session.
   [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
-  /// Refused while a session is running. What the session before left is in `prepared` then:
-  /// whoever prepared it destroys that, too.
+  /// Refused while a session is running. `prepared` may be left with data of the previous session;
+  /// the caller destroys it.
   [[nodiscard]] Result<void> start(PreparedSession&& prepared, protocol::HostTime from);
-  /// Both.
+  /// prepare() and start().
   [[nodiscard]] Result<void> start(CalibrationRequest request);
   /// Ends a running session as refused; what was acquired stays in the recording.
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
-  /// Ends an acquisition that nothing arrives for any more; `now` is host time. Live only: see
+  /// Fails an acquisition that receives no more samples; `now` is host time. Only called live: see
   /// tick() of the acquisitions.
   void tick(protocol::HostTime now);
 
-  /// The acquired run, once, when the state has become Identifying.
+  /// The acquired run, in the state Identifying; nullopt after it was returned once.
   [[nodiscard]] std::optional<Acquisition> take_run();
-  /// What was acquired in vain, once, for whoever has the time to destroy it.
+  /// The acquisition of a refused session, returned once: destroying it may take long, so that the
+  /// caller does it in the background.
   [[nodiscard]] std::optional<Acquisition> take_discarded() {
     return std::exchange(discarded_, std::nullopt);
   }
 
-  /// The identification is done: a model was judged, or the data did not allow one.
+  /// Outcome of the identification: a model was judged, or no model could be identified.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
   void not_identified(const Error& why, protocol::HostTime now);
-  /// A judged model waits for the store; an event whenever the reason changes.
+  /// The judged model is not stored yet. Adds an event whenever the reason changes.
   void not_stored(std::string reason, protocol::HostTime now);
 
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }
   [[nodiscard]] bool running() const noexcept;
-  /// Changes since the last call, in order.
+  /// Events since the last call, in order of time.
   [[nodiscard]] std::vector<SessionEvent> take_events();
 
  private:
@@ -89,7 +98,7 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
 
   Methods::Options options_;
   std::optional<Acquisition> acquisition_, discarded_;
-  std::uint64_t started_ = 0;  ///< how many sessions
+  std::uint64_t started_ = 0;  ///< number of sessions started
   SessionStatus status_;
   std::vector<SessionEvent> events_;
 };

@@ -1,13 +1,13 @@
 #pragma once
-/// A list of calibration methods, and what code that is the same for all of them derives from it. A
-/// method is a struct without members that names its parts and what is done with them:
+/// A list of calibration methods, and the types and functions that method-independent code derives
+/// from it. A method is a struct without data members that defines these types and functions:
 ///
 ///     kName             in commands, files and messages
-///     Request           what the calibration was asked for
+///     Request           the request for a calibration
 ///     Options           of the acquisition, from the configuration: options(Config)
 ///     Acquisition       takes snapshots: begin, take, tick, phase, reason, progress, points;
 ///                       next and take_notes where the operator is guided
-///     Run               what was acquired: run_of(Acquisition)
+///     Run               the acquired data: run_of(Acquisition)
 ///     Candidate         a judged model: solution.model, verdict
 ///     needs(Config)     which devices it reads
 ///     to_json(Request), request_from(json, Config*)
@@ -26,10 +26,10 @@
 
 namespace abbe::daemon {
 
-/// What a method reads in a run.
+/// Devices whose samples a method uses in a run.
 struct MethodNeeds {
   bool tracker = false;
-  bool axis_readings = true;  ///< false: touches bring the positions of their own
+  bool axis_readings = true;  ///< false: each touch contains the position of the axes
 };
 
 template <class M, class Part>
@@ -60,12 +60,12 @@ struct MethodList {
   [[nodiscard]] static Options options(const Configuration& config) {
     return {M::options(config)...};
   }
-  /// act(method) for each method.
+  /// Calls act(method) for each method.
   template <class Act>
   static void for_each(Act&& act) {
     (act(M{}), ...);
   }
-  /// act(method, part) for the Request, Acquisition, Run or Candidate that `parts` holds.
+  /// Returns act(method, part) for the Request, Acquisition, Run or Candidate that `parts` holds.
   template <class Parts, class Act>
   static auto visit(Parts&& parts, Act&& act) {
     return std::visit(

@@ -1,6 +1,6 @@
 #pragma once
-/// The calibration methods of this build: one line each. docs/adding_a_method.md says what a new
-/// one consists of.
+/// The calibration methods of this build, one line each. docs/adding_a_method.md describes how to
+/// add a method.
 
 #include "abbe/methods/evemu/method.hpp"
 #include "abbe/methods/method_list.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-/// How far the acquisition of a run is, whatever the method.
+/// Phase of the acquisition of a run, for any method.
 
 #include <cstdint>
 

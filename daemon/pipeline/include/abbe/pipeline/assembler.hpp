@@ -1,18 +1,18 @@
 #pragma once
 /// Merges the streams of all devices by host time into snapshots, one per tracker point and one per
-/// touch, with the axes interpolated to its instant. A touch that knows the axes itself (latched by
-/// the counter card, reported by a measuring machine) keeps them. Points come in their order,
-/// touches in theirs.
+/// touch, with the axes interpolated to its instant. A touch that contains axis positions (latched
+/// by the counter card, reported by a measuring machine) keeps them. Points keep their order of
+/// arrival, and so do touches.
 ///
-/// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive at once. A
-/// point is assembled as soon as three axis samples at or after its instant are there: the
-/// interpolation uses two on either side, and with the third nobody takes the second back any more.
-/// If they do not come, it is assembled from what there is, flagged AxisMissing if that is not
-/// enough, once any stream has advanced `watermark` beyond it. Both rules look at the times in the
-/// samples only, and an axis or environment sample that comes after a later one is put in its
-/// place, so neither the order of arrival (within the watermark) nor the speed of a replay changes
-/// a result. Tracker points are given back in the order they were taken in. Ordinary world; not
-/// thread-safe.
+/// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive without
+/// delay. A point is assembled as soon as three axis samples at or after its instant have arrived:
+/// the interpolation uses two on either side, and once the third is there the second can no longer
+/// be replaced by another sample of the same instant. If they do not arrive, the point is assembled
+/// from the available samples once any stream has advanced `watermark` beyond it; it is flagged
+/// AxisMissing if they are not enough. Both rules use only the times in the samples, and an axis or
+/// environment sample that arrives late is inserted by its time. Therefore neither the order of
+/// arrival (within the watermark) nor the speed of a replay changes a result. Not for the RT path;
+/// not thread-safe.
 
 #include <chrono>
 #include <deque>
@@ -27,7 +27,7 @@
 namespace abbe::daemon {
 
 struct AssemblerOptions {
-  /// how far a stream may lag behind the others
+  /// largest time by which a stream may lag behind the others
   std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};
   drivers::InterpolationOptions interpolation;
   bool axes_compensated = false;  ///< the readings are already corrected by the control
@@ -41,9 +41,9 @@ class Assembler {
   explicit Assembler(AssemblerOptions options);
 
   void take(const Batch& batch);
-  /// Snapshots that are complete, oldest first; appended to `out`.
+  /// Appends the complete snapshots to `out`, oldest first.
   void emit(std::vector<protocol::Snapshot>& out);
-  /// Everything still held, at the end of a recording.
+  /// Appends the snapshots of all pending points and touches, at the end of a recording.
   void finish(std::vector<protocol::Snapshot>& out);
 
  private:

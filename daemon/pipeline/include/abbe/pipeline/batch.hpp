@@ -1,7 +1,7 @@
 #pragma once
-/// What the hub took out of the rings in one turn, or a replay out of a recording: every stream in
-/// its own order. Reused from turn to turn, so that it stops allocating once it has grown. Pure
-/// data.
+/// The samples that the hub took from the rings in one cycle, or a replay from a recording. Each
+/// stream keeps its order. Reused in each cycle with its capacity, so that it allocates only at
+/// first. Pure data.
 
 #include <cstddef>
 #include <vector>
@@ -11,28 +11,27 @@
 
 namespace abbe::daemon {
 
-/// From the device of that place in Config::environment.
 struct FromEnvironment {
-  std::size_t device = 0;
+  std::size_t device = 0;  ///< index in Config::environment
   protocol::EnvironmentSample sample;
 };
-/// From the device of that place in DeviceNames::all.
 struct RawFromDevice {
-  std::size_t device = 0;
+  std::size_t device = 0;  ///< index in DeviceNames::all
   protocol::RawBlock block;
 };
 
 struct Batch {
-  /// When: a recording keeps it, and a replay gives the same turns again. clear() leaves it.
+  /// Time of the cycle. It is recorded, so that a replay repeats the same cycles. clear() does not
+  /// reset it.
   protocol::HostTime taken{};
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
-  std::vector<protocol::EnvironmentSample> environment;  ///< the weather of the tracker
+  std::vector<protocol::EnvironmentSample> environment;  ///< from the tracker's weather station
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;
-  std::vector<drivers::MarkCrossing>
-      marks;  ///< of the second card: its bytes are recorded, not these
+  /// From the reference card. Its raw bytes are recorded; the crossings are not.
+  std::vector<drivers::MarkCrossing> marks;
   std::vector<RawFromDevice> raw;
 
   void clear() noexcept {

@@ -1,10 +1,10 @@
 #pragma once
-/// What a restart of the daemon must not forget of the card of [counter_card]:
-/// DATA_DIR/counting-state.json keeps how far its counters had come, and the datum of each axis.
-/// The datum belongs to the counters, which count on without the daemon: it goes on if the same
-/// card, with the same set-up, in the same boot of this computer, still counts its clock where it
-/// must (drivers::CounterCardReceiverOptions::resume_from). The file may be seconds old, because
-/// the datum changes only when an axis is referenced. Ordinary world.
+/// State of the counter card that survives a restart of the daemon: DATA_DIR/counting-state.json
+/// contains the counts of the card of [counter_card] and the datum of each axis. The datum refers
+/// to the counters, which continue without the daemon. It stays valid if it is the same card with
+/// the same set-up, the computer was not rebooted, and the clock count of the card shows that the
+/// counters have continued (drivers::CounterCardReceiverOptions::resume_from). The file may be
+/// seconds old, because the datum changes only when an axis is referenced. Not for the RT path.
 
 #include <filesystem>
 #include <optional>
@@ -20,44 +20,46 @@
 
 namespace abbe::daemon {
 
-/// `datum` holds for the counts of `progress`; an axis that is not in it is not referenced.
+/// `datum` applies to the counts of `progress`. An axis without an element in it is not referenced.
 struct Counting {
   drivers::CounterCardProgress progress;
   std::vector<FoundDatum> datum;
 };
 
 struct CountingState {
-  std::string boot_id;  ///< host time begins anew with each boot
-  std::string set_up;   ///< as counting_set_up()
+  std::string boot_id;  ///< host time restarts with each boot
+  std::string set_up;   ///< counting_set_up()
   Counting counting;
 };
 
-/// What gives a count its meaning: axes (name, channel, scale, offset, debounce), clock, probe
-/// channels, width, reference marks, speed of time. JSON in one line. `config.counter_card` is
-/// there.
+/// All settings that determine what a count means: axes (name, channel, scale, offset, debounce),
+/// clock, probe channels, width, reference marks, speed of time. JSON in one line. Requires
+/// `config.counter_card`.
 [[nodiscard]] std::string counting_set_up(const Config& config);
-/// Of the running computer: the kernel's, else the environment variable ABBE_BOOT_ID (abbed.service
-/// sets it, because it hides /proc/sys). Empty: unknown.
+/// Boot id of this computer: from the kernel, else from the environment variable ABBE_BOOT_ID
+/// (abbed.service sets it, because it hides /proc/sys). Empty: unknown.
 [[nodiscard]] std::string boot_id();
 
 [[nodiscard]] std::filesystem::path counting_state_file(const std::filesystem::path& data_dir);
-/// With a checksum: a changed digit must not become another zero.
+/// Text of the file, with a checksum: a corrupted digit would shift the zero of an axis.
 [[nodiscard]] std::string to_text(const CountingState& state);
-/// BadInput, named `what`, for all that to_text() does not write.
+/// BadInput, with the name `what`, for any text that to_text() does not write.
 [[nodiscard]] Result<CountingState> counting_state_from_text(std::string_view text,
                                                              std::string_view what);
 
-/// What the last run left, as far as it may go on: the card has still to show that it counted
-/// meanwhile.
+/// State from the previous run, if it can still be valid. Whether the card has continued counting
+/// is checked later, when it reports its counts.
 struct LeftCounting {
   std::optional<CountingState> state;
-  std::string warning;  ///< why not; empty without a file
+  std::string warning;  ///< why there is no state; empty if there is no file
 };
 /// Reads DATA_DIR/counting-state.json for `config`. A file that cannot be used is renamed to
-/// counting-state.json.damaged; half-written ones are removed. Without [counter_card]: nothing.
+/// counting-state.json.damaged; half-written files are removed. Without [counter_card] the result
+/// is empty and no file is read.
 [[nodiscard]] LeftCounting left_counting(const Config& config, const std::string& boot_id);
 
-/// As it lies in the recording of the run that goes on from it, for a replay from raw bytes.
+/// Name of the attachment in the recording of the run that continues from the state, for a replay
+/// from raw bytes.
 inline constexpr std::string_view kCountingStateName = "counting-state.json";
 [[nodiscard]] RecordingAttachment to_attachment(const CountingState& state);
 

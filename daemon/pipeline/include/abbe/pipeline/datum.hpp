@@ -1,11 +1,14 @@
 #pragma once
-/// Readings of the axes of a counter card. Its counters begin at 0 wherever the axes stand when it
-/// is set up: until the zero of an axis is found from reference marks ([reference]), or somebody
-/// says that the axis stands at its offset (`abbe reference --here`), and again after the counters
-/// began anew, the axis is missing in every sample. [counter_card] zero = "here" says it of the
-/// first set-up only. Decided for each axis. The uncertainty of a datum is the same error in all
-/// readings and is not added to theirs. Deterministic: decided by the samples' own times, so that a
-/// replay from raw bytes is the live run again. Ordinary world; not thread-safe.
+/// Datum of each axis of a counter card: it converts counts to readings. When the card is set up,
+/// its counters start at 0 at the current positions, and the axes are not referenced. An axis gets
+/// its datum from reference marks ([reference]), or when the operator states that the axis is at
+/// its offset (`abbe reference --here`); it loses the datum when the counters restart. Without a
+/// datum the axis is missing in every sample. With [counter_card] zero = "here", axes without
+/// marks are taken to be at their offset at the first set-up, but not after a restart of the
+/// counters. Each axis is treated separately. The uncertainty of a datum is a systematic error
+/// common to all readings of the axis and is not added to theirs. Deterministic: depends on the
+/// times in the samples only, so that a replay from raw bytes gives the readings of the live run.
+/// Not for the RT path; not thread-safe.
 
 #include <cstdint>
 #include <deque>
@@ -21,48 +24,48 @@ namespace abbe::daemon {
 
 /// The reading at count 0 of an axis, for samples later than `from`.
 struct FoundDatum {
-  std::size_t axis = 0;          ///< place in AxisSample
+  std::size_t axis = 0;          ///< index in AxisSample
   double reading_at_zero = 0.0;  ///< m or rad
   double u = 0.0;                ///< standard uncertainty, m or rad
   protocol::HostTime from{};
-  bool stated = false;  ///< somebody said so; else marks did
+  bool stated = false;  ///< true: stated by the operator; false: found from marks
 };
 
 /// Whether [reference] finds the zero of this axis.
 [[nodiscard]] bool has_marks(const Config& config, const std::string& axis);
 
-/// What was known of the axes when a further file of a recording began.
+/// State of the axes at the start of a further file of a recording.
 struct DatumState {
-  protocol::HostTime at{};   ///< of the last sample before
+  protocol::HostTime at{};   ///< time of the last sample before the file
   std::uint8_t unknown = 0;  ///< missing_mask of that sample
 };
 
 class Datum {
  public:
-  /// What is to be done with axes that have no marks. Untouched: recordings from before it was
-  /// asked.
+  /// How axes without marks are treated. NeedAZero: they need a stated datum. Untouched: their
+  /// readings are not changed, for recordings that lack kDatumRule.
   enum class WithoutMarks { NeedAZero, Untouched };
-  /// Without [counter_card] nothing is ever changed.
+  /// Without [counter_card] no sample is changed.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
-  /// Not at the first set-up of the card but where a former file ended; what was found before is
-  /// over.
+  /// Starts from the end of the previous file instead of from the first set-up of the card. Axes in
+  /// `state.unknown` lose every datum found before `state.at`.
   void go_on(const DatumState& state);
-  /// In the order of time.
+  /// Adds a datum. To be called in order of time.
   void found(const FoundDatum& datum);
-  /// Axis samples, touches and the scans around them.
+  /// Sets the readings of axis samples, of touches and of the scans around touches.
   void apply(Batch& batch);
 
   [[nodiscard]] bool known(std::size_t axis) const;
-  /// As of the newest sample applied.
+  /// The datum of each referenced axis after the newest sample.
   [[nodiscard]] std::vector<FoundDatum> in_force() const;
 
  private:
   struct Axis {
     std::size_t place = 0;
     double step = 0.0;
-    double offset = 0.0;        // the driver's own
-    bool zero_is_here = false;  // at the first set-up
+    double offset = 0.0;        // used by the driver
+    bool zero_is_here = false;  // the datum is known at the first set-up
     std::deque<FoundDatum> coming;
     std::optional<FoundDatum> in_force;
   };
@@ -73,20 +76,22 @@ class Datum {
   void apply_to_counts(Counted& sample) const;
 
   std::vector<Axis> axes_;
-  bool begun_ = false;  // a sample was seen: what begins anew now is not the first set-up
+  bool begun_ = false;  // a sample was applied: a restart is not the first set-up
 };
 
-/// As it lies in the recording, for a replay from raw bytes.
+/// Name of the attachment of a FoundDatum in the recording, for a replay from raw bytes.
 inline constexpr std::string_view kDatumName = "datum.json";
-/// Among the versions of a recording: axes without marks needed a zero, too.
+/// Key in the versions of a recording. If present, axes without marks needed a datum, too
+/// (WithoutMarks::NeedAZero).
 inline constexpr const char* kDatumRule = "datum";
-/// Since when the marks were searched for: crossings and samples later than this.
+/// Name of the attachment with the start of the search for marks: crossings and samples later than
+/// this time are used.
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);
 [[nodiscard]] Result<protocol::HostTime> reference_request_from(
     const RecordingAttachment& attachment);
-/// At the front of every further file; what was found before it and is still in force lies beside
-/// it.
+/// Name of the attachment of a DatumState at the start of each further file. Every datum found
+/// before that and still valid is attached, too.
 inline constexpr std::string_view kDatumStateName = "datum-state.json";
 [[nodiscard]] RecordingAttachment to_attachment(const DatumState& state);
 [[nodiscard]] Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment);

@@ -1,8 +1,9 @@
 #pragma once
-/// What the environment does to measurements: many devices' samples merged into what is in force at
-/// an instant, scale readings corrected for the temperature of the scale, raw tracker distances for
-/// the index of the air. Composition only: the formulas are calib's. Deterministic, so that a
-/// replay is the live run again. Ordinary world; not thread-safe.
+/// Environmental corrections of measurements. Merges the samples of all environment devices into
+/// the values that apply at an instant, corrects scale readings for the temperature of the scale,
+/// and raw tracker distances for the refractive index of the air. The formulas are in calib.
+/// Deterministic, so that a replay gives the results of the live run. Not for the RT path; not
+/// thread-safe.
 
 #include <array>
 #include <chrono>
@@ -18,14 +19,14 @@
 
 namespace abbe::daemon {
 
-/// A [[thermal]] with the place of its axis in AxisSample.
+/// A [[thermal]] with the index of its axis in AxisSample.
 struct ThermalAxis {
   std::size_t axis = 0;
   ThermalConfig config;
 };
 
 struct EnvironmentUseOptions {
-  /// by the devices of [[environment]]: not taken from the tracker then
+  /// quantities measured by the devices of [[environment]]; the tracker's values are not used then
   protocol::EnvironmentMask measured = 0;
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
@@ -36,27 +37,27 @@ struct EnvironmentUseOptions {
 
 [[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
 
-/// What the environment of an instant did to what was measured then.
+/// Effect of the environment on the measurements of one instant.
 struct EnvironmentEffect {
-  std::array<double, 3> expansion_factor{1.0, 1.0,
-                                         1.0};  ///< of the scales of X, Y, Z; 1 without [[thermal]]
-  std::array<double, 3>
-      u_expansion_factor{};  ///< relative standard uncertainty of it; 0 without [[thermal]]
-  /// Relative standard uncertainty all distances have in common: of the index they were corrected
-  /// with, and the tracker's own.
+  /// of the scales of X, Y, Z; 1 without [[thermal]]
+  std::array<double, 3> expansion_factor{1.0, 1.0, 1.0};
+  /// relative standard uncertainty of expansion_factor; 0 without [[thermal]]
+  std::array<double, 3> u_expansion_factor{};
+  /// Relative standard uncertainty common to all distances: of the refractive index used for the
+  /// correction, and TrackerConfig::u_scale.
   double u_scale = 0.0;
 };
-/// None: what is configured was not available then.
+/// nullopt: a configured quantity was not available at that instant.
 [[nodiscard]] std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& snapshot,
                                                          const EnvironmentUseOptions& options);
 
-/// Readings of X, Y, Z as true positions, as correct_for_temperature() makes them.
+/// Readings of X, Y, Z corrected to true positions, as in correct_for_temperature().
 [[nodiscard]] std::array<double, 3> at_temperature(std::array<double, 3> reading_m,
                                                    const EnvironmentEffect& effect,
                                                    const EnvironmentUseOptions& options);
 
-/// Mean over a run: temperatures of scales drift by less than what they are uncertain, or it is no
-/// run.
+/// Mean effect over a run. Assumption: the temperatures of the scales drift by less than their
+/// uncertainty during a run.
 class MeanEffect {
  public:
   void take(const EnvironmentEffect& effect);
@@ -67,24 +68,24 @@ class MeanEffect {
   std::size_t count_ = 0;
 };
 
-/// Every quantity from the device that measures it: at most one of [[environment]], else the
-/// tracker. A value of a device that has been silent for longer than max_age is NaN. Air that a
-/// tracker assumes is not merged.
+/// Takes every quantity from the device that measures it: at most one of [[environment]], else the
+/// tracker. If a device has sent nothing for longer than max_age, its values are NaN. Air values
+/// that a tracker assumes without measuring are not merged.
 class EnvironmentMerge {
  public:
-  /// A sample of [[environment]] is in force from `lag` after its instant: by then it has come,
-  /// whatever the order of arrival, and an environment that is half a second old is as good.
+  /// A sample of [[environment]] applies from `lag` after its instant. By then it has arrived, so
+  /// that the order of arrival does not matter; the delay of half a second is negligible.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);
-  /// What is in force at `t`; nothing yet: none.
+  /// The merged values that apply at `t`; nullopt before the first sample.
   [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t) const;
-  /// Nobody will ask for an instant before this one.
+  /// Removes samples that at() needs only for instants before `oldest`.
   void forget(protocol::HostTime oldest);
   [[nodiscard]] protocol::HostTime newest() const noexcept { return newest_; }
 
  private:
-  using Samples = std::deque<protocol::EnvironmentSample>;  // by time
+  using Samples = std::deque<protocol::EnvironmentSample>;  // in order of time
 
   protocol::EnvironmentMask measured_;
   std::chrono::nanoseconds max_age_;
@@ -94,17 +95,17 @@ class EnvironmentMerge {
   protocol::HostTime newest_{};
 };
 
-/// Readings become true positions (and velocities), their uncertainty is added in quadrature. An
-/// axis whose scale temperature is not known has no known position: it is set in missing_mask, and
+/// Corrects readings to true positions and velocities, and adds the uncertainty of the correction
+/// in quadrature. An axis whose scale temperature is not known is set in missing_mask, and
 /// AxisMissing is flagged.
 void correct_for_temperature(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
 
-/// The index of the air of the sample, or why there is none (a quantity not available).
+/// Refractive index of the air of the sample. DataInsufficient if a quantity is not available.
 [[nodiscard]] Result<calib::RefractiveIndex> index_of_air(
     const protocol::EnvironmentSample& environment, const AirConfig& config);
 
-/// With [air] assumed_index: the tracker point's distance is corrected; without a known index the
-/// point is flagged PointInvalid. Else nothing.
+/// With [air] assumed_index: corrects the distance of the tracker point; if the refractive index is
+/// not known, the point is flagged PointInvalid. Without assumed_index the snapshot is not changed.
 void correct_for_air(protocol::Snapshot& snapshot, const EnvironmentUseOptions& options);
 
 }  // namespace abbe::daemon

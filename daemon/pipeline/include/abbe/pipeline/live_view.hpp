@@ -1,7 +1,7 @@
 #pragma once
-/// The newest of everything, for those who want to see now rather than exactly: the axes as of the
-/// latest SYNC, the latest tracker point (up to a third of a second older) and the latest
-/// environment. Identification never uses it. Ordinary world; not thread-safe.
+/// The latest samples of all streams, for displays: the axes at the latest SYNC, the latest tracker
+/// point (up to a third of a second older) and the latest environment. They are not interpolated to
+/// one instant, and identification does not use them. Not for the RT path; not thread-safe.
 
 #include <chrono>
 #include <optional>
@@ -18,23 +18,25 @@ namespace abbe::daemon {
 /// not known.
 inline constexpr std::chrono::milliseconds kAxesTimeout{500};
 
-/// X, Y and Z stand where a live view says, at its instant: all answered, from a bus and nodes
-/// without a fault. Else the positions are the last known ones, however fresh the instant looks.
+/// True if the positions of X, Y and Z in a live view are valid at its instant: all axes have sent
+/// a sample, and neither the bus nor a node has a fault. Else the positions are the last known
+/// ones, although the instant of the view may be later.
 [[nodiscard]] bool axes_known(const protocol::Snapshot& view) noexcept;
 
 class LiveView {
  public:
   LiveView(const AssemblerOptions& options, const drivers::TimeSource& time);
 
-  /// True if anything new came, or something shown is no longer current at `batch.taken`: after 1 s
-  /// the tracker point and the touch are forgotten, after kAxesTimeout all axes are missing.
+  /// True if the view has changed: new samples have arrived, or a value in it has become too old at
+  /// `batch.taken`. The tracker point and the touch are removed after 1 s, and all axes are set
+  /// missing after kAxesTimeout.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
-  /// The instant of the latest axis sample, whatever was missing in it.
+  /// Instant of the latest axis sample, even if axes are missing in it.
   [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {
     return previous_ ? std::optional{previous_->head.time} : std::nullopt;
   }
-  /// The latest instant at which axes_known() held; none yet: nothing.
+  /// Latest instant at which axes_known() was true; nullopt: never yet.
   [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept {
     return axes_known_at_;
   }

@@ -1,15 +1,16 @@
 #pragma once
-/// What is done with the samples of one cycle, live (the hub) and in a replay alike:
+/// Processing steps for the samples of one cycle, the same live (in the hub) and in a replay:
 ///
 ///   1. observers see the batch as the devices delivered it (search for reference marks)
 ///   2. every axis reading gets its datum; an axis that is not referenced is marked missing
 ///   3. observers see the samples (live view, publisher, recorder)
-///   4. samples are assembled to snapshots: axes interpolated to the instant of each tracker point
-///      and touch, corrected for the temperature of the scales, ranges for the index of the air
+///   4. samples are assembled to snapshots: axes are interpolated to the instant of each tracker
+///      point and touch, axis readings are corrected for the temperature of the scales, ranges for
+///      the refractive index of the air
 ///   5. observers see the snapshots (calibration session, verification)
 ///
-/// The order of the steps is written here only. Deterministic: reads no clock, so that a replay of
-/// the same batches gives the same snapshots. Ordinary world; one thread.
+/// The order of the steps is defined in this class only. Deterministic: reads no clock, so that a
+/// replay of the same batches gives the same snapshots. Not for the RT path; one thread.
 
 #include <span>
 #include <vector>
@@ -21,14 +22,14 @@
 
 namespace abbe::daemon {
 
-/// Implements the steps that interest it. Within a step, observers are called in the order in which
-/// they were added.
+/// Overrides the functions of the steps it needs. Within a step, observers are called in the order
+/// in which they were added.
 class PipelineObserver {
  public:
   PipelineObserver() = default;
   virtual ~PipelineObserver() = default;
 
-  /// Step 1. A datum that is found now applies to the samples of this batch, too.
+  /// Step 1. A datum found in this step applies to the samples of this batch, too.
   virtual void on_delivered(const Batch&) {}
   /// Step 3. Called in every cycle, also with an empty batch.
   virtual void on_samples(const Batch&) {}
@@ -44,15 +45,15 @@ class PipelineObserver {
 
 class Pipeline {
  public:
-  /// `datum`: null if the samples have their datum already, as those of a recording.
+  /// `datum`: null if the datum was already applied to the samples, as in a recording.
   Pipeline(AssemblerOptions options, Datum* datum);
 
-  /// The observer outlives the pipeline.
+  /// The observer must outlive the pipeline.
   void add(PipelineObserver& observer) { observers_.push_back(&observer); }
 
   /// Steps 1 to 5. Changes the readings in `batch` (step 2).
   void cycle(Batch& batch);
-  /// Step 5 with the snapshots of all samples that still wait for others, at the end of a recording.
+  /// Steps 4 and 5 for all pending samples, at the end of a recording.
   void finish(protocol::HostTime taken);
 
  private:

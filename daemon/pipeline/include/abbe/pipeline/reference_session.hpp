@@ -1,13 +1,14 @@
 #pragma once
-/// Datum of each axis from its distance-coded marks, with two cards: one counts the axes live, the
-/// other latches them on their marks. Fed with both streams while somebody drives the axes over a
-/// few marks; ends axis by axis. Reads no clock and starts no thread: live and replayed alike.
-/// Ordinary world; not thread-safe.
+/// Finds the datum of each axis from its distance-coded marks, with two cards: one counts the axes
+/// live, the other latches them on their marks. Takes the samples of both cards while the operator
+/// drives the axes over a few marks; each axis ends separately. Reads no clock and starts no
+/// thread, so that a replay gives the results of the live run. Not for the RT path; not
+/// thread-safe.
 ///
-/// The cards' scans lie beside each other in host time, known to `u_alignment` (each card maps its
-/// counted clock to it). At a mark the live counter was somewhere between its least and largest
-/// value around that time; every mark narrows the difference of the two counters' zeros. Drive
-/// slowly: at 1 mm/s and 1 ms a mark gives it to 2 um.
+/// Each card maps its counted clock to host time, with which the scans of the two cards are aligned
+/// to `u_alignment`. At a mark, the live count is between its smallest and largest value around
+/// that time. Every mark therefore narrows the interval of the difference between the zeros of the
+/// two counters. Drive slowly: at 1 mm/s and 1 ms, one mark gives the difference to 2 um.
 
 #include <cstdint>
 #include <deque>
@@ -25,12 +26,13 @@ namespace abbe::daemon {
 
 struct ReferenceAxis {
   std::string name;               ///< "X"
-  std::uint8_t live_axis = 0;     ///< place in the live card's samples
-  std::uint8_t latched_axis = 0;  ///< place in the latching card's
-  drivers::MarkTraverseOptions
-      marks;              ///< `counts_per_period` with the sign of the live card's step
+  std::uint8_t live_axis = 0;     ///< index in the live card's samples
+  std::uint8_t latched_axis = 0;  ///< index in the latching card's samples
+  /// `counts_per_period` has the sign of the live card's step
+  drivers::MarkTraverseOptions marks;
   double period = 20e-6;  ///< of the scale's signal, m or rad
-  double max_half_width_counts = 0.75;  ///< how well the difference of the zeros must be known
+  /// largest half width of the interval of the zeros' difference with which an axis is Found
+  double max_half_width_counts = 0.75;
 };
 
 struct ReferenceOptions {
@@ -45,7 +47,7 @@ struct AxisReference {
   /// m or rad: the reading at the live counter's zero, relative to the scale's zero mark
   double offset = 0.0;
   double u_offset = 0.0;
-  std::string reason;  ///< of the latest refusal, or why it failed
+  std::string reason;  ///< why the latest mark gave no datum, or why the search failed
 };
 
 class ReferenceSession {
@@ -66,10 +68,10 @@ class ReferenceSession {
     drivers::CounterAlignment alignment;
     std::optional<drivers::MarkDatum> datum;
     AxisReference result;
-    protocol::HostTime followed{};  ///< positions until then went to the traverse
+    protocol::HostTime followed{};  ///< the traverse has the positions up to this time
   };
 
-  void work();
+  void process_crossings();
   void cross(Axis& axis, const drivers::MarkCrossing& crossing);
   void follow(Axis& axis, protocol::HostTime until);
   void conclude(Axis& axis);
@@ -81,24 +83,24 @@ class ReferenceSession {
   std::deque<drivers::MarkCrossing> waiting_;
 };
 
-/// What a session looks for, from the two cards' wiring.
+/// Options of a session, from the wiring of the two cards.
 [[nodiscard]] ReferenceOptions reference_options(const ReferenceConfig& config,
                                                  const CounterCardConfig& live);
 
-/// What a found axis says of count 0. m or rad.
+/// Reading at count 0 of an axis in state Found, m or rad.
 [[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
 
-/// The request to take the present place of axes without marks as the one where they read their
-/// offset.
+/// Request to set the datum of axes without marks: their current position is the one at which they
+/// read their offset.
 struct SetDatumHere {
-  static constexpr double kByEye = 100e-6;
+  static constexpr double kByEye = 100e-6;  ///< m or rad; for a position set by eye
 
-  std::vector<std::string> axes;  ///< none: all that have no marks
-  double u = kByEye;              ///< standard uncertainty of that, m or rad
+  std::vector<std::string> axes;  ///< empty: all axes without marks
+  double u = kByEye;              ///< standard uncertainty of the position, m or rad
   protocol::HostTime now{};
-  std::chrono::nanoseconds patience{
-      std::chrono::milliseconds{500}};  ///< an older sample is not where they are
-  bool acquiring = false;               ///< a calibration takes readings
+  /// largest age of the axis sample that is used as the current position
+  std::chrono::nanoseconds patience{std::chrono::milliseconds{500}};
+  bool acquiring = false;  ///< true: a calibration is taking readings
 };
 
 }  // namespace abbe::daemon

@@ -1,5 +1,5 @@
 #pragma once
-/// Where the hub's samples come from: the devices, or what a test puts in their place. The hub's
+/// Source of the hub's samples: the devices, or a substitute in a test. To be used from the hub's
 /// thread only.
 
 #include <array>
@@ -20,7 +20,7 @@
 
 namespace abbe::daemon {
 
-/// Where a measuring machine reported its tip last, and how long ago (host time).
+/// Latest tip position reported by a measuring machine, and its age (host time).
 struct TipPlace {
   std::array<double, 3> at_m{};
   std::chrono::nanoseconds age{};
@@ -31,47 +31,48 @@ class SampleSource {
   SampleSource() = default;
   virtual ~SampleSource() = default;
 
-  /// Appends everything that came since the last call to `batch`.
+  /// Appends everything that arrived since the last call to `batch`.
   virtual void drain(Batch& batch) = 0;
-  /// Rates are those since the previous call.
+  /// Rates are over the time since the previous call.
   [[nodiscard]] virtual std::vector<StreamHealth> health(protocol::HostTime now) = 0;
 
-  /// Moves the measuring machine and touches; the touches come with drain(). Without one: nothing.
+  /// Starts to touch the points with the measuring machine; the touches arrive in drain(). No
+  /// effect without a measuring machine.
   virtual void measure(std::span<const drivers::ProbePoint>) {}
-  /// Stops a motion of the measuring machine (AbortE) and forgets all points that were asked for.
+  /// Stops a motion of the measuring machine (AbortE) and discards all requested points.
   virtual void stop_machine() {}
-  /// Why nothing moves before a person has released the measuring machine; none: it needs no
-  /// release.
+  /// Reason why the measuring machine does not move until the operator releases it; nullopt: no
+  /// release is needed.
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }
-  /// Errors are cleared and the session begins anew. Refused when no release is awaited.
+  /// Clears the errors and starts a new session. Refused if no release is awaited.
   [[nodiscard]] virtual Result<void> release_machine() {
     return fail(ErrorCode::Refused,
                 "machine: there is no measuring machine, [cmm], in the configuration");
   }
-  /// Also while the machine is not ready; none: it never reported it.
+  /// Available also while the machine is not ready; nullopt: no position was reported yet.
   [[nodiscard]] virtual std::optional<TipPlace> tip_place() const { return std::nullopt; }
-  /// How many of those points are neither done nor given up. 0: the touches of all that were begun
-  /// come with the next drain().
+  /// Number of requested points that are neither touched nor discarded. At 0, the next drain()
+  /// returns the last touches.
   [[nodiscard]] virtual std::size_t points_left() const { return 0; }
-  /// Where the measuring machine stands, m, as it said within the last second. Refused, with the
-  /// reason, while it is not ready to move.
+  /// Position of the measuring machine, m, reported within the last second. Refused, with the
+  /// reason, if there is none or the machine is not ready to move.
   [[nodiscard]] virtual Result<std::array<double, 3>> machine_position() const {
     return fail(ErrorCode::Refused, "there is no measuring machine");
   }
 
-  /// How far the counter card had come, the latest that drain() met after its samples; at most once
-  /// each.
+  /// Latest state of the counter card's counters that drain() read; its samples are already in the
+  /// batch. Each state is returned at most once.
   [[nodiscard]] virtual std::optional<drivers::CounterCardProgress> card_progress() {
     return std::nullopt;
   }
 
-  /// As it is now; none: no tracker is configured.
+  /// Current status; nullopt: no tracker is configured.
   [[nodiscard]] virtual std::optional<drivers::DeviceStatus> tracker_status() const {
     return std::nullopt;
   }
-  /// What comes of it is among the tracker_reports(). Without a tracker: nothing.
+  /// The outcome is reported in tracker_reports(). No effect without a tracker.
   virtual void order_tracker(drivers::TrackerOrder) {}
-  /// Since the last call.
+  /// Reports since the last call.
   [[nodiscard]] virtual std::vector<drivers::TrackerOrderReport> tracker_reports() { return {}; }
 
  protected:

@@ -1,5 +1,5 @@
 #pragma once
-/// What a calibration session is in, as it is recorded, published and shown. Pure data.
+/// State of a calibration session, as recorded, published and shown. Pure data.
 
 #include <cstddef>
 #include <cstdint>
@@ -24,7 +24,7 @@ enum class SessionState : std::uint8_t {
   Refused
 };
 [[nodiscard]] std::string_view name(SessionState state) noexcept;
-/// Whatever devices measure now may belong to the run.
+/// True if samples of the devices in this state may be used in the run.
 [[nodiscard]] constexpr bool takes_readings(SessionState state) noexcept {
   return state == SessionState::Warming || state == SessionState::Acquiring;
 }
@@ -34,14 +34,14 @@ struct SessionStatus {
   SessionState state = SessionState::Idle;
   std::string method = "otf";
   std::string reason;  ///< why it is in this state, or what to do now
-  /// Refused: by what, for the exit code of who asked
+  /// in state Refused: the kind of error, for the exit code of the client
   ErrorCode refused_as = ErrorCode::DataInsufficient;
-  double progress = 0.0;  ///< 0 to 1 of what the state is busy with
+  double progress = 0.0;  ///< of the work in this state, 0 to 1
   std::size_t points = 0;
-  std::string model_id;  ///< of the model this session ended in, active or refused
-  std::optional<calib::evemu::NextTouch> next;  ///< of a guided acquisition
-  std::vector<std::string> notes;               ///< what was noticed, the latest kMostNotes
-  std::size_t noted = 0;                        ///< how many there were
+  std::string model_id;  ///< model that this session identified, active or refused
+  std::optional<calib::evemu::NextTouch> next;  ///< touch requested by a guided acquisition
+  std::vector<std::string> notes;               ///< remarks on touches, the latest kMostNotes
+  std::size_t noted = 0;                        ///< number of all remarks of the session
 
   static constexpr std::size_t kMostNotes = 50;
 };

@@ -1,9 +1,10 @@
 #pragma once
-/// Where the machine stood still, and where the tracker saw the reflector then: the points of a
-/// verification ([Li OMM] section 5.4). For a tracker in stationary mode (one mean after the other)
-/// as for one that measures continuously. What is nearer than `settle` to either end of a
-/// standstill is left out: there the machine may still swing, or a mean may reach into the motion.
-/// Decided from snapshots alone, never from a clock. Ordinary world; not thread-safe.
+/// Mean axis readings and mean tracker position of each standstill of the machine: the points of a
+/// verification ([Li OMM] section 5.4). For a tracker in stationary mode, which delivers mean
+/// values, and for one that measures continuously. Tracker points nearer than `settle` to either
+/// end of a standstill are left out: the machine may still vibrate, or the averaging time of a mean
+/// value may include motion. The result depends on snapshots only, not on a clock. Not for the RT
+/// path; not thread-safe.
 
 #include <chrono>
 #include <cstddef>
@@ -17,18 +18,19 @@
 namespace abbe::daemon {
 
 struct StandstillOptions {
-  double tolerance_m = 50e-6;  ///< of an axis about where the standstill began: noise and swinging
+  /// Largest change of an axis reading from the start of the standstill: noise and vibration.
+  double tolerance_m = 50e-6;
   /// At least the averaging time of a stationary tracker, which is 0.5 s unless configured
   /// otherwise.
   std::chrono::nanoseconds settle = std::chrono::milliseconds{500};
 };
 
-/// Means over one standstill.
+/// Mean values of one standstill.
 struct StandstillPoint {
   calib::verify::MeasuredPoint mean;
   protocol::HostTime from{}, until{};  ///< first and last tracker point in it
   std::size_t tracker_points = 0;
-  double scatter_m = 0.0;  ///< of single tracker points, rms about their mean
+  double scatter_m = 0.0;  ///< rms deviation of single tracker points from their mean
 };
 
 class StandstillPoints {
@@ -36,11 +38,11 @@ class StandstillPoints {
   explicit StandstillPoints(StandstillOptions options = {}) : options_(options) {}
 
   void take(const protocol::Snapshot& snapshot);
-  /// The standstill that still goes on ends now.
+  /// Ends the current standstill.
   void finish();
 
   [[nodiscard]] const std::deque<StandstillPoint>& points() const noexcept { return points_; }
-  /// Tracker points of the present standstill that count so far.
+  /// Number of tracker points used so far in the current standstill.
   [[nodiscard]] std::size_t standing() const noexcept { return taken_; }
 
  private:
@@ -52,20 +54,20 @@ class StandstillPoints {
   void add(const Sample& sample);
 
   StandstillOptions options_;
-  std::deque<StandstillPoint> points_;  // one more never copies those before
+  std::deque<StandstillPoint> points_;  // a deque: push_back() never copies earlier points
   bool running_ = false;
-  Sample first_;                // of the standstill; sums are relative to it
-  std::deque<Sample> pending_;  // nearer than `settle` to the newest
+  Sample first_;                // of the standstill; the sums are relative to it
+  std::deque<Sample> pending_;  // samples nearer than `settle` to the newest one
   StandstillPoint open_;
   std::size_t taken_ = 0;
   calib::Vector3 reading_sum_m_ = calib::Vector3::Zero(), tracker_sum_m_ = calib::Vector3::Zero();
   double tracker_squares_m2_ = 0.0;
 };
 
-/// Of this tracker.
+/// `settle` is at least the averaging time of the configured tracker.
 [[nodiscard]] StandstillOptions standstill_options(const Config& config);
-/// Refused where readings at standstills say nothing of a model: no tracker, or axes that the
-/// control already corrects.
+/// Refused if readings at standstills cannot verify a model: there is no tracker, or the control
+/// already corrects the axes.
 [[nodiscard]] Result<void> check_verification(const Config& config);
 
 }  // namespace abbe::daemon

@@ -1,11 +1,11 @@
 #pragma once
-/// What a stream is in, for status, journal and Health. Pure data.
+/// Status of a stream, for the status command, the journal and the Health topic. Pure data.
 
 #include "abbe/drivers/device.hpp"
 
 namespace abbe::daemon {
 
-/// Health of one stream, device or not.
+/// Health of one stream; its source need not be a device.
 struct StreamHealth {
   drivers::DeviceStatus status;
   double rate_hz = 0.0;

@@ -1,7 +1,7 @@
 #pragma once
-/// What the scales read while the machine stands at the vertices of its path. A path file that is
-/// not the one the control drives would become an error of the machine in the model. Ordinary
-/// world; not thread-safe.
+/// Compares the scale readings at the vertices of the path with the path. If the path file is not
+/// the path that the control drives, the difference would appear in the model as an error of the
+/// machine. Not for the RT path; not thread-safe.
 
 #include <cstddef>
 #include <optional>
@@ -14,27 +14,28 @@ namespace abbe::daemon {
 struct VertexReading {
   std::size_t vertex = 0;
   calib::Vector3 reading_m = calib::Vector3::Zero();
-  calib::Vector3 path_m = calib::Vector3::Zero();  ///< what the scales should read there
+  calib::Vector3 path_m = calib::Vector3::Zero();  ///< expected reading at the vertex
   calib::Vector3 u_m = calib::Vector3::Zero();     ///< standard uncertainty of the reading
   double speed_m_per_s = 0.0;
 };
 
 class VertexReadings {
  public:
-  /// Between two points. A machine that is faster does not stand: a control that rounds the corners
-  /// has no reading there.
+  /// Largest speed between two points at standstill. If the control rounds a corner, the machine is
+  /// faster and the vertex has no reading.
   static constexpr double kStands_m_per_s = 1e-3;
 
-  /// `tolerance_m`: by which a standing machine may miss its command (following error, in-position
-  /// window).
+  /// `tolerance_m`: largest difference between the position of a machine at standstill and the
+  /// commanded position (following error, in-position window).
   explicit VertexReadings(double tolerance_m) : tolerance_m_(tolerance_m) {}
 
-  /// Readings near a vertex, in the order of time; the slowest and latest of a vertex counts.
-  /// Returns what the vertex before contradicts, once this is another one.
+  /// Takes a reading near a vertex, in order of time. Of each vertex, the reading with the lowest
+  /// speed is used, the latest of several. On the first reading of another vertex, returns the
+  /// contradiction() of the previous one.
   [[nodiscard]] std::optional<std::string> take(const VertexReading& reading);
-  /// The machine stands elsewhere now, and its run has not begun.
+  /// Discards the reading: the machine has moved before its run began.
   void forget() { slowest_.reset(); }
-  /// Of the last vertex.
+  /// Message if the reading of the last vertex differs from the path by more than is allowed.
   [[nodiscard]] std::optional<std::string> contradiction() const;
 
  private:

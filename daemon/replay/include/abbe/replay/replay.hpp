@@ -1,7 +1,8 @@
 #pragma once
-/// A recording goes once more through the same receivers, assembler, session and identification as
-/// it did live. From the decoded samples or from the raw device bytes, at recorded speed or as fast
-/// as possible; the model's hash comes out the same. Reads no clock but to pace itself.
+/// Replays a recording through the same receivers, assembler, session and identification as in the
+/// live run, and gives a model with the same hash. The input is either the decoded samples or the
+/// raw device bytes; the speed is the recorded one, a multiple of it, or as fast as possible. The
+/// clock is read only to keep that speed.
 
 #include <chrono>
 #include <cstdint>
@@ -24,56 +25,60 @@ enum class ReplaySource { Samples, RawBytes };
 struct ReplayOptions {
   ReplaySource source = ReplaySource::Samples;
   double speed = 0.0;  ///< recorded seconds per second; 0: as fast as possible
-  /// what the gate compares with; null: no compensation alone
+  /// Model with which the gate compares the new one; null: the gate compares with no compensation
+  /// only.
   const calib::VolumetricModel* active = nullptr;
   std::function<void(double share)> progress;
-  /// Sees every turn as the assembler gets it, with the time at which the recording's first message
-  /// was taken.
+  /// Called for every cycle with the batch that the assembler gets, and with the time at which the
+  /// first message of the recording was taken.
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
-  /// Sees every snapshot, in order.
+  /// Called for every snapshot, in order.
   std::function<void(const protocol::Snapshot&)> snapshots;
-  /// Gets every complete run instead of its being identified again.
+  /// Called with every complete run; if set, replay() itself identifies no run.
   std::function<void(CalibrationRun)> runs;
 };
 
-/// One calibration of the recording, done again.
+/// One calibration of the recording, replayed.
 struct ReplayedCalibration {
-  SessionStatus ended;  ///< state Identifying: the run was complete; else why it was not
+  SessionStatus ended;  ///< state Identifying: the run was complete; else the reason why not
   std::optional<Result<Candidate>>
-      outcome;             ///< of a complete run; none if ReplayOptions::runs got it
+      outcome;             ///< of a complete run; nullopt if it was passed to ReplayOptions::runs
   std::string model_hash;  ///< empty without a model
   std::string model_id;
   std::string points_sha256;  ///< of the points or touches that entered the identification
 };
 
-/// The datum of one axis, found once more from the marks in the raw bytes of both cards.
+/// The datum of one axis: as found live, and as found again from the reference marks in the raw
+/// bytes of both cards.
 struct ReplayedDatum {
   std::string axis;
-  double live = 0.0;  ///< m or rad: the reading at count 0, as the recording's own attachment says
-  std::optional<double> again;  ///< nothing: the marks in the recording do not give it
+  double live = 0.0;  ///< reading at count 0, m or rad, from the attachment of the recording
+  std::optional<double> again;  ///< the same, replayed; nullopt: not found from the recorded marks
 };
 
 struct ReplayReport {
   std::vector<ReplayedCalibration> calibrations;
   std::vector<ReplayedDatum> datums;        ///< from raw bytes only
-  std::vector<std::string> live_model_ids;  ///< as the recording's own events name them
+  std::vector<std::string> live_model_ids;  ///< from the calibration events in the recording
   std::uint64_t snapshots = 0;
-  std::uint64_t undecodable = 0;
+  std::uint64_t undecodable = 0;            ///< messages that could not be decoded
   std::chrono::nanoseconds recorded{};  ///< from the first to the last message
 };
 
-/// The rule: a claim may never be surer than the data. What is damaged inside a recording is
-/// missing in what is identified from it, so the gate refuses such a model, by name; a recorded
-/// configuration without a checksum is a note.
+/// Adds the damage of `recording` to the verdict on a model that was identified from it. Data of a
+/// damaged part are missing in the identification, so a damaged recording makes the verdict a
+/// refusal with the reason "damage". A recorded configuration without a checksum adds a note only.
 void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
 
-/// The recorded configuration. BadInput if its checksum is wrong, or what parse_config() says.
+/// The recorded configuration. BadInput if its checksum is wrong; else the errors of
+/// parse_config().
 [[nodiscard]] Result<Config> recorded_config(const RecordingReader& recording,
                                              const std::string& file);
 
-/// `config` is the one the recording was made with (RecordingInfo::configuration). BadInput for a
-/// recording whose calibration request cannot be read. The verdicts have gone through
-/// judge_recording().
+/// `config` is the configuration the recording was made with (RecordingInfo::configuration).
+/// BadInput if an attachment of the recording that the replay needs cannot be read: a calibration
+/// request, a search for reference marks, or a datum. judge_recording() is already applied to the
+/// verdicts.
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                                           const ReplayOptions& options);
 

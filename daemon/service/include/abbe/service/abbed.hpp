@@ -1,6 +1,6 @@
 #pragma once
-/// The daemon put together: devices, recorder, hub, calibration, publisher and control API, from
-/// one configuration. Nothing here but the wiring and the order of starting and stopping.
+/// Builds the daemon from one configuration: devices, recorder, hub, calibration, publisher and
+/// control API. Contains only the connections between them and the order of start and stop.
 
 #include <filesystem>
 #include <memory>
@@ -15,25 +15,27 @@ namespace abbe::daemon {
 
 /// How abbed was started.
 struct AbbedOptions {
-  std::string configuration_text;  ///< the file as it was read; goes into the recording
-  std::string dds_program;         ///< abbe-dds, started as a child if the configuration says so
+  std::string configuration_text;  ///< text of the configuration file; stored in the recording
+  std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child
 };
 
 class Abbed {
  public:
-  /// Takes up everything or nothing. Io for what the system refuses (socket, directory, real-time
-  /// priority).
+  /// Starts all parts; after an error none is left running. Io for what the system refuses (socket,
+  /// directory, real-time priority).
   [[nodiscard]] static Result<std::unique_ptr<Abbed>> start(Config config, AbbedOptions options);
   Abbed(const Abbed&) = delete;
   Abbed& operator=(const Abbed&) = delete;
-  /// Stops in the reverse order; the recording is closed cleanly.
+  /// Stops the parts in reverse order and closes the recording.
   ~Abbed();
 
-  /// Call at least every 50 ms from the thread that started it: supervises abbe-dds.
+  /// Call at least every 50 ms from the thread that called start(). Supervises abbe-dds, removes
+  /// old recordings in the background and logs which recordings of a killed daemon were closed.
   void cycle();
-  /// The hub has turned within the last second: what the watchdog may be told.
+  /// True if the hub began a cycle within the last second. The caller notifies the watchdog of
+  /// systemd only then.
   [[nodiscard]] bool alive() const;
-  /// What is worth a line in the log at start.
+  /// Warnings of the start, one log line each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
-/// Long work started from a thread that may not wait. To start a thread takes locks and memory, and
-/// the new one inherits policy and affinity: work of the hub would run at the hub's real-time
-/// priority and on the hub's processor. So the work is handed over without a lock to a dispatcher,
-/// an ordinary thread, which runs it on another ordinary thread. A thread that has nothing to do is
-/// used again.
+/// Runs long tasks for threads that must not wait, such as the hub. A real-time thread must not
+/// start a thread itself: that takes locks and memory, and the new thread inherits scheduling
+/// policy and affinity, so that its work would run at the hub's real-time priority and on the hub's
+/// processor. Instead the task is passed, without a lock, to a dispatcher thread, which runs it on
+/// a worker thread. Dispatcher and workers are ordinary threads; idle workers are reused.
 
 #include <exception>
 #include <functional>
@@ -15,22 +15,22 @@
 
 namespace abbe::daemon {
 
-/// The calling thread from now on: SCHED_OTHER, and every processor the main thread may use (in
-/// abbed all the process was given: only device threads and the hub are pinned). What the kernel
-/// refuses stays as it is.
+/// Gives the calling thread the policy SCHED_OTHER and all processors of the main thread. (In abbed
+/// these are all processors of the process: only device threads and the hub are pinned.) A setting
+/// that the kernel refuses is left unchanged.
 void become_ordinary_thread() noexcept;
 
-/// Starts the dispatcher if it does not run yet. To be called before a thread that may not wait
-/// starts work.
+/// Starts the dispatcher if it is not running yet. Call this before a thread that must not wait
+/// starts its first task.
 void prepare_background_tasks();
 
-/// Runs `work`, which must not throw, on an ordinary thread. All of it is done before the program
-/// ends.
+/// Runs `work`, which must not throw, on an ordinary thread. At a normal exit the program waits for
+/// all such tasks.
 void run_background_task(std::function<void()> work);
 
-/// `work` on an ordinary thread, where it is destroyed before the future is ready: never by who
-/// takes the outcome. An exception goes into the future, which does not wait when it is destroyed:
-/// `work` owns what it uses, or its owner waits.
+/// Runs `work` on an ordinary thread and destroys it there before the future is ready, so never on
+/// the thread that takes the result. An exception is stored in the future. The destructor of the
+/// future does not wait: `work` must own all it uses, or the caller must wait for the future.
 template <class Work>
 [[nodiscard]] auto run_in_background(Work work) -> std::future<std::invoke_result_t<Work&>> {
   struct Job {
@@ -54,14 +54,14 @@ template <class Work>
   return result;
 }
 
-/// Destroys `object` on an ordinary thread: to give back much memory takes long.
+/// Destroys `object` on an ordinary thread: freeing much memory takes long.
 template <class T>
 void destroy_in_background(T object) {
   run_background_task([held = std::make_shared<T>(std::move(object))] {});
 }
 
 namespace detail {
-/// Counts while it lives.
+/// Counted by background_tasks_running() during its lifetime.
 class RunningWork {
  public:
   RunningWork() noexcept;
@@ -71,7 +71,8 @@ class RunningWork {
 };
 }  // namespace detail
 
-/// run_in_background() of work that may not end in time, and refers to nothing but what it owns.
+/// As run_in_background(), for work that may still run when the program exits. `work` must refer
+/// only to objects that it owns.
 template <class Work>
 [[nodiscard]] auto run_abandonable(Work work) -> std::future<std::invoke_result_t<Work&>> {
   return run_in_background(
@@ -80,8 +81,8 @@ template <class Work>
       });
 }
 
-/// Whether such work still runs. A process that ends with it ends by _exit(): what it uses must not
-/// be destroyed under it.
+/// Whether work of run_abandonable() still runs. Then the process must exit by _exit(): normal exit
+/// would destroy static objects that this work uses.
 [[nodiscard]] bool background_tasks_running() noexcept;
 
 }  // namespace abbe::daemon

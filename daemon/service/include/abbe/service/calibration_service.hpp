@@ -1,11 +1,14 @@
 #pragma once
-/// Runs calibrations in the daemon: feeds the session, identifies and keeps the judged model in the
-/// store on a thread of its own, and puts it in force if the gate accepted it. A model that the
-/// store does not take (disk full, read-only, locked) stays in memory, is tried again every five
-/// seconds and reported until it is stored or its session is cancelled; there is one at most,
-/// because its session goes on. Used by the hub's thread only, but for prepare(); no call waits for
-/// anything, and none does work that grows with path, points or model: that is done where a task is
-/// prepared, where a run is identified, and where a model is stored.
+/// Runs calibrations in the daemon: passes snapshots to the session, identifies the model and
+/// stores it with its verdict on background threads, and activates it if the gate accepted it.
+///
+/// A model that cannot be stored (disk full, read-only, locked) stays in memory. Storing is tried
+/// again every five seconds, and the fault is reported, until the model is stored or its session is
+/// cancelled. There is at most one such model, because its session lasts until then.
+///
+/// Used by the hub's thread only, except prepare(). No call waits, and no call of the hub's thread
+/// takes longer for a longer path, more points or a larger model: such work is done in prepare()
+/// and on the background threads.
 
 #include <atomic>
 #include <chrono>
@@ -25,76 +28,80 @@
 
 namespace abbe::daemon {
 
-/// A task that was checked and is ready to start.
+/// A calibration task that is checked and ready to start.
 struct PreparedCalibration {
   PreparedSession session;
-  RecordingAttachment attachment;  ///< of the recording
+  RecordingAttachment attachment;  ///< the request, for the recording
   MethodNeeds needs;
 };
 
 class CalibrationService {
  public:
-  /// `recorder` may be null: nothing is recorded then, and models name no recording.
+  /// `recorder` may be null: then nothing is recorded, and a model names no recording.
   CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
                      protocol::UtcOffset utc);
-  /// Stops a running identification, and tries once more to store a model that waits for the store.
-  /// Takes kStopTimeout at most: what does not end until then is left running, with nothing of
-  /// this object; see background_tasks_running(). A model that is lost is reported on stderr.
+  /// Stops a running identification, and tries once more to store a model that is not stored yet.
+  /// Takes kStopTimeout at most. A background task that is still running then continues without
+  /// access to this object; see background_tasks_running(). A lost model is reported on stderr.
   ~CalibrationService();
   static constexpr std::chrono::seconds kStopTimeout{4};
-  static constexpr std::chrono::seconds kLastTry{1};  ///< of kStopTimeout, for the store's lock
-  static constexpr std::size_t kEndedKept = 4;
+  /// Part of kStopTimeout for the lock of the store.
+  static constexpr std::chrono::seconds kLastTry{1};
+  static constexpr std::size_t kEndedKept = 4;  ///< length of ended()
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
-  /// Refused or BadInput for a task of which no calibration could come with this configuration. Any
-  /// thread but the hub's.
+  /// Refused or BadInput for a task that cannot give a calibration with this configuration. Any
+  /// thread except the hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
-  /// The id of the session. Refused while there is one. The caller destroys `prepared`.
+  /// Starts a session and returns its id. Refused while another session runs. The caller destroys
+  /// `prepared`.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
                                             protocol::HostTime now);
-  /// Both, for who has no real-time thread.
+  /// prepare() and start() in one call, for callers without a real-time thread.
   [[nodiscard]] Result<std::uint64_t> start(CalibrationTask task, const std::string& who,
                                             protocol::HostTime now);
-  /// Refused without a session, and while the model is being put into a store that may still answer
-  /// within kStoreTimeout of the authority. An identification is asked to stop; until it has, no
-  /// other session starts. Discards a model that the store does not take; of a store that does not
-  /// answer the session's reason says that the model may still come into it. It is not activated
-  /// then, unless that had begun.
+  /// Cancels the session.
+  /// - Refused without a session, and while the model is being stored, unless the store has not
+  ///   answered for ModelAuthority::kStoreTimeout.
+  /// - A running identification gets a request to stop. Until it ends, no other session starts.
+  /// - A model that could not be stored is discarded.
+  /// - If the store does not answer, the reason of the session states that the store may still take
+  ///   the model. That model is not activated, unless its activation had already begun.
   [[nodiscard]] Result<void> cancel(const std::string& who, protocol::HostTime now);
 
-  /// Every turn: new snapshots, and the outcome of what has ended on the other thread. Returns
-  /// changes of state, in order.
+  /// Call in every cycle. Takes the new snapshots and the results of finished background tasks.
+  /// Returns the changes of state, in order.
   std::vector<SessionEvent> cycle(std::span<const protocol::Snapshot> snapshots,
                                   protocol::HostTime now);
 
   [[nodiscard]] SessionStatus status() const;
-  /// The last kEndedKept sessions before this one, oldest first: whoever asked for one finds its
-  /// verdict.
+  /// The last kEndedKept sessions before the present one, oldest first, so that a client can still
+  /// read the verdict on its session.
   [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
-  /// Why an identified model is still in memory only: "model 0123...: write ...: No space left on
-  /// device". Empty: there is none.
+  /// Why an identified model is not stored yet: "model 0123... is not stored: write ...: No space
+  /// left on device". Empty: there is no such model.
   [[nodiscard]] const std::string& not_stored() const noexcept { return not_stored_; }
-  /// The verdict of the last identification, for people; none yet: nothing.
+  /// Held-out residuals of the last identified model; nullopt before the first.
   [[nodiscard]] const std::optional<calib::HeldOutFigures>& held_out() const noexcept {
     return held_out_;
   }
 
  private:
-  /// A judged model on its way into the store.
+  /// An identified model with its verdict, to be stored.
   struct ToKeep {
     std::string id;
     ModelDocument document;
     calib::Verdict verdict;
     StoreActor actor;
-    std::atomic<bool> discarded{false};  ///< cancelled: not to be stored
+    std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
   };
-  /// Made where the run was identified; the hub adds who and when.
+  /// Result of the thread that identifies; the hub's thread adds the user and the time.
   struct Identified {
     std::shared_ptr<ToKeep> model;
     std::string recording_gap;
   };
-  /// What the thread of an identification shares with this object, and outlives it with.
+  /// Shared with the thread of an identification, which may outlive this object.
   struct Watch {
     std::atomic<double> share{0.0};
     std::atomic<bool> stopped{false};
@@ -113,7 +120,7 @@ class CalibrationService {
   [[nodiscard]] Result<void> try_once_more(WallTime until);
 
   const Config& config_;
-  std::shared_ptr<const Config> shared_config_;  // the same, for the threads of identifications
+  std::shared_ptr<const Config> shared_config_;  // copy, for the threads of identifications
   ModelAuthority& authority_;
   RecorderThread* recorder_;
   protocol::UtcOffset utc_;
@@ -125,9 +132,10 @@ class CalibrationService {
   protocol::HostTime keeping_from_{};
   protocol::HostTime keep_again_at_{};
   std::string not_stored_;
-  std::uint64_t keeping_since_ = 0;  // revision of the authority when the keeping began
-  calib::Verdict verdict_;           // of the model being kept
-  bool active_left_out_ = false;     // it was made for another machine configuration
+  std::uint64_t keeping_since_ = 0;  // revision of the authority when storing began
+  calib::Verdict verdict_;           // of the model being stored
+  // The gate did not compare with the active model: that is for another machine configuration.
+  bool active_left_out_ = false;
   std::shared_ptr<Watch> watch_ = std::make_shared<Watch>();  // of the last identification
   std::deque<SessionStatus> ended_;
   protocol::HostTime latest_cycle_{};

@@ -1,24 +1,32 @@
 #pragma once
-/// What a person or program may ask a running daemon, request by request:
+/// The requests of the control socket:
+///
 ///     {"do": "status"}
-///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}: gives "session", its
-///     number; "status" has it as "id" of "session" and of the "ended_sessions"
+///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}
 ///     {"do": "cancel", "who": REMARK}
 ///     {"do": "touch", "where": true}
-///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z], "normal": [i, j, k]}, ...],
+///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z],
+///                                 "normal": [i, j, k]}, ...],
 ///      "leave": [[x, y, z], ...]}
 ///     {"do": "touch", "cancel": true}
-///     {"do": "touches"}: at least every 2 s, else the touching is stopped
+///     {"do": "touches"}
 ///     {"do": "machine"}; with "stop": true, "release": true
 ///     {"do": "tracker", "order": "initialize" | "home"}
 ///     {"do": "tracker", "order": "find", "distance_m": 2.5}
 ///     {"do": "tracker", "order": "reflector set", "reflector": NAME or ID}
-///     {"do": "tracker_reflectors"}: these four give "order", its number; "status" has it among the "orders"
-///     of "tracker", with "outcome" "running", "done", "refused" or "failed" and its "text"
-/// Who asked is "user", which the server sets; the first 64 bytes of "who", if it says something else, are
-/// kept beside it. Lengths m. Models are activated and rolled back in the store; the daemon follows it. A
-/// request is read and its answer written on the asking thread; in between Hub::call() runs what has to run
-/// on the hub's thread, which does not grow with the request.
+///     {"do": "tracker_reflectors"}
+///
+/// "calibrate" returns "session", the number of the session; "status" contains it as "id" of
+/// "session" and of the "ended_sessions". "touches" must be repeated at least every 2 s, else the
+/// touching is stopped. "tracker" and "tracker_reflectors" return "order", the number of the order;
+/// "status" contains it in the "orders" of "tracker", with "outcome" "running", "done", "refused"
+/// or "failed" and its "text".
+///
+/// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
+/// differs from "user", are kept beside it. Lengths in m. Models are activated and rolled back in
+/// the model store; the daemon follows the store. The calling thread reads the request and writes
+/// the answer. Hub::call() runs the part that needs the hub's thread; the duration of this part
+/// does not depend on the size of the request.
 
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -31,7 +39,7 @@
 
 namespace abbe::daemon {
 
-/// {"do": name}, or {"do": name, member: true}, and the role it takes.
+/// A request {"do": name}, or {"do": name, member: true}, and the role it requires.
 struct ControlVerb {
   std::string name;
   std::string member;
@@ -39,13 +47,13 @@ struct ControlVerb {
 };
 [[nodiscard]] std::vector<ControlVerb> control_verbs();
 
-/// The answer to one request of `peer`, which is refused without the role the request takes; from
-/// any thread but the hub's; a hub that does not answer in `time_out` is said so.
+/// The answer to one request of `peer`. Refused if `peer` does not have the required role; Io if
+/// the hub does not answer within `time_out`. Any thread except the hub's.
 [[nodiscard]] nlohmann::json answer_request(
     Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
     std::chrono::milliseconds time_out = std::chrono::seconds{3});
 
-/// The same, all steps in this thread, where the hub has none.
+/// The same, with all steps on the calling thread, for a hub without a thread of its own.
 [[nodiscard]] nlohmann::json answer_on_hub(const Hub& hub, const nlohmann::json& request,
                                            const ControlPeer& peer);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Who may ask what on the control socket. Roles are given by Unix groups that [control] names;
-/// root and the daemon's own user have all of them. Who may change or move may look, too; neither
-/// includes the other.
+/// Permissions for requests on the control socket. Each role is given to the members of a Unix
+/// group that [control] names; root and the user of the daemon have all roles. The roles Change and
+/// Move each include Look; neither includes the other.
 
 #include <string_view>
 
@@ -12,13 +12,13 @@
 namespace abbe::daemon {
 
 enum class Role {
-  Look,    ///< changes nothing, or stops a movement
-  Change,  ///< changes what is in force, or may end in that
+  Look,    ///< reads state, or stops a motion
+  Change,  ///< changes the active model or the datum of an axis, or may lead to such a change
   Move,    ///< moves a machine or a tracker, or keeps it moving
 };
 
-/// Refused, naming role, group and what to do, unless `peer` has the role. Reads the group
-/// database. Any thread.
+/// Refused unless `peer` has the role; the error names the role, the group and the remedy. Reads
+/// the group database. Any thread.
 [[nodiscard]] Result<void> check_role(const ControlPeer& peer, Role role, std::string_view request,
                                       const ControlConfig& control);
 

@@ -1,8 +1,8 @@
 #pragma once
-/// An ordinary thread that keeps DATA_DIR/counting-state.json: looks once a second, writes when the
-/// datum of an axis changed, else every 5 s, and at the end. A disk that hangs holds up nothing but
-/// this thread, and not the end: a thread that still waits for it after kEndTimeout is left
-/// running, see background_tasks_running().
+/// An ordinary thread that writes DATA_DIR/counting-state.json. It reads the state once a second
+/// and writes the file when the datum of an axis changed, else every 5 s, and at the end. A disk
+/// that does not answer blocks only this thread. It does not block the end of the daemon: a thread
+/// that still waits for the disk after kEndTimeout is left running, see background_tasks_running().
 
 #include <chrono>
 #include <filesystem>
@@ -20,20 +20,21 @@ class CountingStateThread {
  public:
   static constexpr std::chrono::seconds kEndTimeout{3};
 
-  /// `look` runs on the new thread; nothing: the file stays as it is. `report` gets each new fault
-  /// of the file once, on the new thread, too; a disk that does not answer at the end on the thread
-  /// that destroys this. Neither is called after the end.
+  /// `look` returns the state to write and runs on the new thread; nullopt leaves the file
+  /// unchanged. `report` is called once for each new fault of the file, also on the new thread. If
+  /// the disk does not answer at the end, the destructor calls `report` on its own thread. Neither
+  /// function is called after the destructor has returned.
   CountingStateThread(std::filesystem::path file,
                       std::function<std::optional<CountingState>()> look,
                       std::function<void(const std::string&)> report,
                       std::chrono::milliseconds period = std::chrono::seconds{1});
-  ~CountingStateThread();  ///< looks and writes once more, within kEndTimeout
+  ~CountingStateThread();  ///< reads the state and writes the file a last time; see kEndTimeout
   CountingStateThread(const CountingStateThread&) = delete;
   CountingStateThread& operator=(const CountingStateThread&) = delete;
 
  private:
   struct Work;
-  std::shared_ptr<Work> work_;  // with the thread, which may outlive this
+  std::shared_ptr<Work> work_;  // shared with the thread, which may outlive this object
   std::thread thread_;
 };
 

@@ -1,9 +1,11 @@
 #pragma once
-/// The loop of the ordinary world: every `hub_period` it empties the rings and hands what came to
-/// the recorder, the assembler (and so to the calibration), the live view and the publisher. It
-/// says "alive" to abbe-dds first thing in every turn, so that a hung hub falls silent. Other
-/// threads reach it through call(). In a turn it takes no lock that an ordinary thread may hold,
-/// and no disk is read or written.
+/// The main loop of the daemon. In every cycle, each `hub_period`, the hub empties the sample rings
+/// of the devices and passes the samples to the live view, the publisher, the recorder, and the
+/// assembler with the calibration behind it. It sends a beat to abbe-dds in every cycle, so that
+/// abbe-dds detects a hung hub by the missing beat.
+///
+/// Other threads run short tasks on the hub's thread through call(). A cycle takes no lock that an
+/// ordinary thread may hold, and neither reads nor writes a disk.
 
 #include <atomic>
 #include <chrono>
@@ -34,8 +36,8 @@
 
 namespace abbe::daemon {
 
-/// Everything the hub's turn works on. Owned by abbed; `publisher`, `recorder` and the services
-/// behind them may be null.
+/// The objects that a cycle of the hub uses. Owned by Abbed. `publisher` and the pointers after it
+/// may be null.
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
@@ -59,18 +61,18 @@ class Hub : private PipelineObserver {
   Hub& operator=(const Hub&) = delete;
   ~Hub() override;
 
-  /// One turn; the hub's thread.
+  /// Runs one cycle. The hub's thread.
   void cycle(WallTime wall);
-  /// Turns every hub_period until stop() is called.
+  /// Runs a cycle every hub_period until stop() is called.
   void run();
   void stop() noexcept { stopping_ = true; }
-  /// Wall time at which the last turn began; any thread. The watchdog looks at it.
+  /// Wall time at which the last cycle began, for the watchdog. Any thread.
   [[nodiscard]] WallTime last_cycle() const noexcept;
 
-  /// Runs `task` on the hub's thread at its next turn and gives back its result; from any other
-  /// thread. Nothing if the hub does not get round to it in `time_out`; it never runs then. What
-  /// `task` holds is destroyed on the calling thread. It is to be short: parse before, format
-  /// after.
+  /// Runs `task` on the hub's thread in its next cycle and returns the result. Any other thread.
+  /// Returns nullopt if the hub does not start the task within `time_out`; then the task never
+  /// runs. `task` must be short: parse requests before the call and format answers after it.
+  /// Objects that `task` owns are destroyed on the calling thread.
   template <class Task>
   [[nodiscard]] auto call(Task task, std::chrono::milliseconds time_out)
       -> std::optional<std::invoke_result_t<Task&>> {
@@ -79,7 +81,7 @@ class Hub : private PipelineObserver {
     return result;
   }
 
-  // For tasks that run on the hub's thread.
+  // The following may be called only by tasks on the hub's thread.
   [[nodiscard]] const LiveView& live() const noexcept { return live_; }
   [[nodiscard]] const std::vector<StreamHealth>& health() const noexcept { return health_; }
   [[nodiscard]] ModelStanding standing() const;
@@ -106,8 +108,10 @@ class Hub : private PipelineObserver {
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};
-  drivers::Mailbox<Call*> calls_;     // owned by who calls, unless given up
-  drivers::Mailbox<Call*> given_up_;  // by callers, seen by the hub: freed by the next caller
+  drivers::Mailbox<Call*> calls_;  // each owned by its caller, until the caller timed out
+  // Calls whose caller timed out and that the hub has taken out of calls_; the next caller frees
+  // them.
+  drivers::Mailbox<Call*> given_up_;
 };
 
 }  // namespace abbe::daemon

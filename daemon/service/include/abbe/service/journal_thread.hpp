@@ -1,7 +1,7 @@
 #pragma once
-/// An ordinary thread that looks at the daemon four times a second and writes what has changed into
-/// the journal. Neither a slow journal nor this thread holds up the hub: it only answers what it is
-/// asked.
+/// An ordinary thread that reads the state of the daemon four times a second and writes changes to
+/// the journal. A slow journal delays only this thread: the hub only answers the short request for
+/// its state.
 
 #include <condition_variable>
 #include <functional>
@@ -16,11 +16,11 @@ namespace abbe::daemon {
 
 class JournalThread {
  public:
-  /// `look` runs on the new thread.
+  /// `look` returns the present state and runs on the new thread.
   JournalThread(std::string machine, std::unique_ptr<JournalSink> sink,
                 std::function<Observed()> look,
                 std::chrono::milliseconds period = std::chrono::milliseconds{250});
-  ~JournalThread();  ///< looks once more
+  ~JournalThread();  ///< reads the state a last time and writes the changes
   JournalThread(const JournalThread&) = delete;
   JournalThread& operator=(const JournalThread&) = delete;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// The slow half of the model authority: puts judged models into the store and reads which one is
-/// active, with all the waiting for disk and locks that takes. For any thread but the hub's; a copy
-/// for each. Ordinary world.
+/// The blocking part of the model authority: stores models with their verdicts, and reads the
+/// active model. The calls wait for disk and locks, so they are for any thread except the hub's;
+/// each thread uses its own copy. Not real-time.
 
 #include <atomic>
 #include <chrono>
@@ -19,10 +19,11 @@
 
 namespace abbe::daemon {
 
-/// What the store says is active, read, checked and encoded. Without a model `fault` says why; both
-/// empty: nothing is active. The model is shared with an identification that compares with it.
+/// The active model of the store: read, checked and encoded. If `model` is null, `fault` is the
+/// cause; if that is empty, too, no model is active. An identification whose result is compared
+/// with the model shares it.
 struct ActiveModel {
-  StoreEvent activation;  ///< default: nothing was ever activated
+  StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const ModelInForce> model;
   ModelPublication publication;  ///< of `model`
   bool made_for_this_machine = false;
@@ -30,43 +31,45 @@ struct ActiveModel {
   std::string fault;
 };
 
-/// A model that is in the store now.
+/// Result of storing a model.
 struct KeptModel {
   std::string id;
-  std::optional<ActiveModel> active;  ///< if the gate accepted it
+  std::optional<ActiveModel> active;  ///< the model now active; nullopt: the gate refused this one
 };
 
 class ModelKeeper {
  public:
-  /// Does not touch the disk.
+  /// Does not access the disk.
   ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
               protocol::UtcOffset utc);
 
-  /// For the start of the daemon: removes what killed processes left in the store and sets a
-  /// damaged state aside. Best effort; what does not work out is an error of read_active().
+  /// For the start of the daemon: removes files that killed processes left in the store, and
+  /// renames a damaged state file. Ignores errors; read_active() returns them.
   void tidy_store(protocol::HostTime now);
 
-  /// See ModelStore.
+  /// As ModelStore::set_lock_timeout().
   void set_lock_timeout(std::chrono::nanoseconds patience) noexcept {
     store_.set_lock_timeout(patience);
   }
-  /// Keeps a judged model, activates it if the gate accepted it, and reads it back. May be repeated
-  /// with the same `actor` after an error: what the store has of it already is not entered again.
-  /// Refused, and nothing further done, once `discarded` is true; null: never.
+  /// Stores a model with its verdict, activates it if the gate accepted it, and returns the active
+  /// model of the store. After an error the call may be repeated with the same `actor`: entries
+  /// that the store already has are not made twice. Stops with Refused as soon as it sees that
+  /// `discarded` is true; `discarded` may be null.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now,
                                        const std::atomic<bool>* discarded = nullptr);
-  /// An error only if the store itself cannot be read; a damaged model is a `fault`.
+  /// An error only if the store itself cannot be read; a damaged model is reported in
+  /// ActiveModel::fault.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
-  /// The same; a state that is damaged is set aside first. Waits for the store's lock at most
-  /// kRenameTimeout.
+  /// The same. If that fails, renames a damaged state file and reads again. Waits for the store's
+  /// lock at most kRenameTimeout.
   [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
   static constexpr std::chrono::seconds kRenameTimeout{1};
-  /// Whether read_active() may say something else than when this was the same. One system call.
+  /// While the stamp is unchanged, read_active() gives the same result. One system call.
   [[nodiscard]] StoreStamp stamp() const noexcept { return store_.stamp(); }
 
  private:
-  /// The model of `document`, activated as `activation` says, checked and encoded.
+  /// The model of `document` with the data of its `activation`, checked and encoded.
   [[nodiscard]] ActiveModel active_of(const StoreEvent& activation, ModelDocument document,
                                       protocol::HostTime now) const;
   [[nodiscard]] Result<void> activate_once(const std::string& id, const StoreActor& actor);

@@ -1,7 +1,7 @@
 #pragma once
-/// `abbe reference` in the daemon: runs a ReferenceSession over the live samples and the marks of
-/// the second card, and gives every reading its datum. The hub's thread only; no call waits for
-/// anything.
+/// `abbe reference` in the daemon: runs a ReferenceSession with the live samples and the reference
+/// marks of the second card, and keeps the datum of every axis. The hub's thread only; no call
+/// waits.
 
 #include <chrono>
 #include <cstdint>
@@ -23,40 +23,42 @@ class ReferenceService : public PipelineObserver {
   struct AxisStatus {
     std::string name;
     AxisReference found;           ///< of the running session, or of the latest
-    double reading_at_zero = 0.0;  ///< with state Found: m or rad, what the datum says of count 0
-    bool known = false;            ///< readings have a datum now
+    double reading_at_zero = 0.0;  ///< in state Found: reading at count 0, m or rad
+    bool known = false;            ///< the axis is referenced now
   };
 
-  /// `recorder` may be null. `left`: the datum of an earlier run, taken up if the first sample
-  /// shows that the counters went on, else dropped.
+  /// `recorder` may be null. `left`: the datum of an earlier run; used if the first sample shows
+  /// that the counters continued, else discarded.
   ReferenceService(const Config& config, RecorderThread* recorder,
                    std::optional<Counting> left = {});
 
-  /// Refused without [reference] and while one runs. Axes that are known already stay so until the
-  /// new datum.
+  /// Starts a search for the marks. Refused without [reference] and while a search runs. A
+  /// referenced axis keeps its datum until the new one is found.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
-  /// Usage for an axis that has marks or is not counted, and for an uncertainty that is not
-  /// positive. Refused while a calibration takes readings, without a fresh sample, and unless the
-  /// axes have stood for half a second.
+  /// Sets the datum of axes without marks: they read their offset now. Usage for an axis that has
+  /// marks or is not counted, and for an uncertainty that is not positive. Refused while a
+  /// calibration takes readings, without a recent sample, and unless the axes have stood for half a
+  /// second.
   [[nodiscard]] Result<void> set_datum_here(const SetDatumHere& here);
   /// Searches the marks while a search is running.
   void on_delivered(const Batch& batch) override;
   /// The datum of every axis, for the pipeline.
   [[nodiscard]] Datum& datum() noexcept { return datum_; }
-  /// After on_delivered(): the progress of the card, as the devices report it.
+  /// Takes the progress of the card as the devices report it. Call after on_delivered().
   void take(const std::optional<drivers::CounterCardProgress>& progress);
 
-  /// What a later run would have to know; nothing while the counters just began anew.
+  /// State of the counters and datums for a later run; nullopt until the first progress after a
+  /// restart of the counters.
   [[nodiscard]] std::optional<Counting> counting() const;
-  /// Axes whose datum of an earlier run was taken up.
+  /// Axes whose datum was taken over from an earlier run.
   [[nodiscard]] const std::vector<std::string>& carried_on() const noexcept { return carried_on_; }
   [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
-  /// Axes of the counter card whose readings have no datum now.
+  /// Axes of the counter card that are not referenced now.
   [[nodiscard]] std::vector<std::string> unknown() const;
-  /// Those of them without marks.
+  /// Axes of unknown() that have no reference marks.
   [[nodiscard]] std::vector<std::string> without_zero() const;
 
  private:
@@ -72,21 +74,21 @@ class ReferenceService : public PipelineObserver {
   const Config& config_;
   RecorderThread* recorder_;
   Datum datum_;
-  std::optional<ReferenceSession> session_;  ///< the latest
+  std::optional<ReferenceSession> session_;  ///< the latest search
   std::vector<bool> taken_up_;
   bool running_ = false;
   struct Standing {
     std::int64_t count = 0;
     protocol::HostTime since{};
   };
-  std::vector<Standing> standing_;  ///< as the axes of [counter_card]
-  protocol::HostTime newest_{};     ///< of the live samples
+  std::vector<Standing> standing_;  ///< in the order of the axes of [counter_card]
+  protocol::HostTime newest_{};     ///< time of the newest live sample
   std::optional<protocol::AxisSample> latest_;
-  protocol::HostTime from_{};  ///< what came later belongs to the search
+  protocol::HostTime from_{};  ///< start of the search: only later marks are used
   std::optional<Counting> left_;
   std::vector<std::string> carried_on_;
-  protocol::HostTime restarted_at_{};  ///< the counters; of the sample that showed it
-  std::optional<drivers::CounterCardProgress> coming_;  ///< later than the newest sample
+  protocol::HostTime restarted_at_{};  ///< time of the sample that showed a counter restart
+  std::optional<drivers::CounterCardProgress> coming_;  ///< newer than the newest sample
   std::optional<drivers::CounterCardProgress> progress_;
 };
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Turns what the daemon's parts are in, looked at again and again, into one journal entry a
-/// change: devices, recorder, model store, link, session, model, abbe-dds, the hub itself. It reads
-/// no clock and writes nothing. A part that changes more often than kBurst times gets one line in
-/// kRefill, with the count of changes that were left out.
+/// Compares successive states of the daemon's parts and gives one journal entry for each change.
+/// Parts: devices, recorder, model store, DDS link, session, model, abbe-dds and the hub. Reads no
+/// clock and writes nothing. The rate is limited: each part may have kBurst entries at once, then
+/// one entry per kRefill, with the number of changes that were not logged.
 
 #include <chrono>
 #include <cstdint>
@@ -22,8 +22,8 @@ namespace abbe::daemon {
 /// abbe-dds as a child of abbed.
 struct ObservedParticipant {
   std::uint64_t restarts = 0;
-  std::string last_end;     ///< "signal 9 (Killed) at 2026-11-22T16:58:22Z"; empty: never
-  std::string start_fault;  ///< why it cannot be started; empty: it runs, or will
+  std::string last_end;     ///< "signal 9 (Killed) at 2026-11-22T16:58:22Z"; empty: none
+  std::string start_fault;  ///< why it cannot be started; empty: no fault
 };
 
 struct ObservedModel {
@@ -40,7 +40,7 @@ struct Observed {
   std::optional<ObservedParticipant> participant;
 };
 
-struct ObservedPart;  ///< one of them at one moment
+struct ObservedPart;  ///< state of one part at one time
 
 class StateObserver {
  public:
@@ -48,7 +48,7 @@ class StateObserver {
   static constexpr double kBurst = 5.0;
   static constexpr std::chrono::seconds kRefill{10};
   static constexpr std::chrono::seconds kCountPeriod{
-      60};  ///< of lines that only say that a count has grown
+      60};  ///< shortest period of entries that report only an increased count
 
   explicit StateObserver(std::string machine) : machine_(std::move(machine)) {}
 
@@ -56,9 +56,9 @@ class StateObserver {
 
  private:
   struct Reported {
-    std::string logged = {}, seen = {};  // what the part was in: last logged, last looked at
-    std::uint64_t counted = 0;           // faults and losses, when last logged
-    std::uint64_t suppressed = 0;        // changes since that were not logged
+    std::string logged = {}, seen = {};  // state of the part: last logged, last observed
+    std::uint64_t counted = 0;           // faults and losses at the last entry
+    std::uint64_t suppressed = 0;        // changes since the last entry, not logged
     double lines_left = kBurst;
     WallTime refilled_at{}, logged_at{};
   };

@@ -1,10 +1,11 @@
 #pragma once
-/// Touches with the measuring machine of [cmm], one after the other, and what came of them: the
-/// daemon's part of `abbe calibrate artefact`. It ends at the first touch or way that the machine
-/// refuses, or when the machine goes away: then nobody knows any more what stands where. When it is
-/// cancelled, or nobody looks on any more, the motion is stopped where it is (AbortE) and nothing
-/// moves after it; the reason says where the tip stands. The touches until then are kept. The hub's
-/// thread only; no call waits for anything.
+/// Touches points with the measuring machine of [cmm], one after the other, and keeps the results:
+/// the daemon's part of `abbe calibrate artefact`. A job ends at the first touch or approach move
+/// that the machine refuses, or when the connection to the machine is lost, because the position is
+/// not known then. When the job is cancelled, or the client has not called look() for
+/// kLongestUnwatched, the motion is stopped at once (AbortE) and no further motion is requested;
+/// the reason states the position of the tip. The touches made before the end are kept. The hub's
+/// thread only; no call waits.
 
 #include <array>
 #include <chrono>
@@ -19,54 +20,54 @@
 
 namespace abbe::daemon {
 
-/// Where to go first, one place after the other, and then to touch.
+/// One touch: the places of the approach path, in order, then the point to touch.
 struct TouchRequest {
   std::vector<drivers::ProbePoint> way;  ///< `touch` is false
   drivers::ProbePoint point;
 };
 
-/// Touches that are ready to be asked for.
+/// A checked job of touches.
 struct TouchJob {
-  /// Of one job; an artefact of ten balls takes some hundred touches.
+  /// Limits of one job; an artefact of ten balls takes some hundred touches.
   static constexpr std::size_t kMostTouches = 5'000, kMostPlaces = 20'000;
 
   std::vector<TouchRequest> touches;
-  std::vector<drivers::ProbePoint> leave;    ///< where to go when all were touched
-  std::vector<protocol::ProbeTrigger> made;  ///< empty: room for what comes of them
+  std::vector<drivers::ProbePoint> leave;    ///< retract path after the last touch
+  std::vector<protocol::ProbeTrigger> made;  ///< empty, with capacity for the results
 };
-/// Usage with nothing to touch, or with more than one job may hold. Any thread.
+/// Usage without a touch, and above the limits of TouchJob. Any thread.
 [[nodiscard]] Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
                                          std::vector<drivers::ProbePoint> leave = {});
 
 class TouchService {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
-  /// A machine that nobody watches any more must not go on moving.
+  /// A machine must not continue to move if no client has called look() for this time.
   static constexpr std::chrono::seconds kLongestUnwatched{2};
 
   struct Status {
     bool running = false;
     std::size_t asked = 0;
     std::vector<protocol::ProbeTrigger> touches;  ///< with a position, in the order asked
-    std::string reason;  ///< why it ended before the last one; empty: it did not
+    std::string reason;  ///< why it ended before the last touch; empty: it did not
   };
 
-  /// `configured`: there is a [cmm].
+  /// `configured`: the configuration has [cmm].
   TouchService(SampleSource& devices, bool configured)
       : devices_(devices), configured_(configured) {}
 
-  /// Where the machine stands, m; refused without [cmm] and while it is not ready.
+  /// Position of the machine, m. Refused without [cmm] and while the machine is not ready.
   [[nodiscard]] Result<std::array<double, 3>> where() const;
-  /// Refused without [cmm], while touches are under way, and while the machine is not ready. What
-  /// the job before left is in `job` then: whoever made it destroys that, too.
+  /// Starts a job. Refused without [cmm], while another job runs, and while the machine is not
+  /// ready. Afterwards `job` holds the memory of the previous job, which the caller destroys.
   [[nodiscard]] Result<void> start(TouchJob&& job);
-  /// Stops the motion that is under way; runs until the machine stands.
+  /// Stops the present motion. The job keeps running until the machine stands.
   [[nodiscard]] Result<void> cancel();
-  /// Every turn. `points_left` as it was before the batch was drained; `seen` is what the machine
-  /// said last. As cancel() when nobody has looked for kLongestUnwatched.
+  /// Call in every cycle. `points_left`: value before the batch was drained. `seen`: the last fault
+  /// that the machine reported. Acts as cancel() if look() was not called for kLongestUnwatched.
   void cycle(const Batch& batch, std::size_t points_left, const std::string& seen, WallTime now);
 
-  /// For whoever asked for the touches, and watches the machine.
+  /// The status, for the client that started the job. Resets the time of kLongestUnwatched.
   [[nodiscard]] const Status& look();
   [[nodiscard]] const Status& status() const noexcept { return status_; }
 
@@ -82,12 +83,12 @@ class TouchService {
   SampleSource& devices_;
   bool configured_;
   std::vector<TouchRequest> requests_;
-  std::size_t next_ = 0;  ///< of them; those before were asked for
+  std::size_t next_ = 0;  ///< index of the first request that is not sent yet
   std::vector<drivers::ProbePoint> leave_;
   bool leaving_ = false;
   bool stopping_ = false;
-  bool refused_ = false;            ///< the one that is under way
-  std::optional<WallTime> looked_;  ///< empty: since the last turn
+  bool refused_ = false;            ///< the machine refused the present touch
+  std::optional<WallTime> looked_;  ///< time of the last look(); nullopt: since the last cycle
   Status status_;
 };
 

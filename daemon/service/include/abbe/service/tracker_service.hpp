@@ -1,7 +1,7 @@
 #pragma once
-/// Orders of people to the laser tracker of [tracker], one at a time, and what came of them: the
-/// daemon's part of `abbe tracker`. An order is handed to the tracker's thread; its report is what
-/// the tracker answered, or that no answer came. The hub's thread only; no call waits for anything.
+/// Passes orders of an operator to the laser tracker of [tracker], one at a time, and keeps their
+/// outcomes: the daemon's part of `abbe tracker`. The thread of the tracker executes an order and
+/// reports the answer of the tracker, or that there was none. The hub's thread only; no call waits.
 
 #include <chrono>
 #include <cstddef>
@@ -19,19 +19,19 @@ namespace abbe::daemon {
 
 class TrackerService {
  public:
-  /// The orders that are remembered, the one under way among them.
+  /// Number of orders that are kept, including the running one.
   static constexpr std::size_t kKept = 4;
 
   struct Order {
     drivers::TrackerOrder asked;
-    std::string by;  ///< who asked
+    std::string by;  ///< user who sent the order
     protocol::HostTime since{};
-    std::optional<drivers::TrackerOrderReport> report;  ///< none: under way
+    std::optional<drivers::TrackerOrderReport> report;  ///< nullopt: the order runs
   };
-  /// What start() has to know besides the order.
+  /// Input of start() besides the order.
   struct Asked {
     std::string by;
-    bool takes_readings = false;  ///< a calibration does
+    bool takes_readings = false;  ///< a calibration takes readings
     protocol::HostTime now{};
   };
 
@@ -39,16 +39,16 @@ class TrackerService {
   TrackerService(SampleSource& devices, std::chrono::nanoseconds longest_order)
       : devices_(devices), longest_order_(longest_order) {}
 
-  /// The number of the order. Usage for a distance or a name that cannot be. Refused without a
-  /// tracker, while a calibration takes readings, while another order is under way, and while the
-  /// tracker is not connected.
+  /// Starts an order and returns its number. Usage for an invalid distance or reflector name.
+  /// Refused without a tracker, while a calibration takes readings, while another order runs, and
+  /// while the tracker is not connected.
   [[nodiscard]] Result<std::uint64_t> start(drivers::TrackerOrder order, Asked asked);
-  /// Every turn: takes the reports.
+  /// Takes the reports of the tracker's thread. Call in every cycle.
   void cycle(protocol::HostTime now);
 
   /// Oldest first.
   [[nodiscard]] const std::deque<Order>& orders() const noexcept { return orders_; }
-  /// The order under way; null: none.
+  /// The running order; null: none.
   [[nodiscard]] const Order* running() const noexcept;
 
  private:

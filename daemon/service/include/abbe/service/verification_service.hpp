@@ -1,7 +1,8 @@
 #pragma once
-/// Collects the points of a verification in the running daemon, for `abbe verify --live`: begun and
-/// ended over the control socket, one at a time. Whoever begins later takes over, so that nobody
-/// who went away blocks it. One nobody ends stops at kMostPoints. Used by the hub's thread only.
+/// Collects the points of a verification in the running daemon, for `abbe verify --live`. Clients
+/// begin and end a verification over the control socket. There is one at a time: a new one
+/// supersedes the one before, so that a client that exited blocks no other. A verification that is
+/// not ended stops at kMostPoints. Used by the hub's thread only.
 
 #include <cstdint>
 #include <optional>
@@ -16,18 +17,18 @@ namespace abbe::daemon {
 
 class VerificationService {
  public:
-  /// Standstills of one verification: four hours of one every 1.5 s, 1.2 MB.
+  /// Most standstills of one verification: four hours with one every 1.5 s; 1.2 MB.
   static constexpr std::size_t kMostPoints = 10'000;
 
   explicit VerificationService(const Config& config) : config_(config) {}
 
-  /// The number by which whoever began it asks for it.
+  /// Begins a verification and returns its number, which end() and points() require.
   [[nodiscard]] Result<std::uint64_t> begin();
-  /// The standstill that goes on is its last point.
+  /// Ends the verification. The present standstill becomes its last point.
   [[nodiscard]] Result<void> end(std::uint64_t number);
-  /// Refused once somebody else has begun another.
+  /// Refused after another verification was begun.
   [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
-  /// Why no more points come although it was not ended; empty: they do.
+  /// Why no more points are taken before end(); empty: points are taken.
   [[nodiscard]] std::string stopped() const;
 
   void cycle(std::span<const protocol::Snapshot> snapshots);

@@ -1,9 +1,9 @@
 #pragma once
-/// Which touches belong to one calibration with a ball array, and what comes next. The places are
-/// judged by calib's TouchGuide; here touches become usable or not, with device and reason, and
-/// nothing arriving any more ends the run. Decided from snapshots alone, so that a replay takes the
-/// very same touches; only tick() knows a clock. Ordinary world; not thread-safe; m, scale
-/// readings.
+/// Collects the touches of one calibration with a ball array, and states the next one. calib's
+/// TouchGuide assigns touches to balls and blocks. This class rejects unusable touches, with device
+/// and reason, and ends the run when touches stop arriving. The decisions depend on snapshots only,
+/// so that a replay takes exactly the same touches; only tick() is given the time. Not for the RT
+/// path; not thread-safe. Positions are scale readings in m.
 
 #include <chrono>
 #include <optional>
@@ -20,69 +20,69 @@
 
 namespace abbe::daemon {
 
-/// V known independently at some readings, for the rotation no touch of the array can see.
+/// Volumetric error V, known from another measurement at some readings. It determines the rotation
+/// about Ball1, which touches of the array do not determine.
 struct RotationPoints {
   std::vector<calib::evemu::BallError> points;
   double sigma_m = 1e-6;  ///< standard uncertainty of V, per component
 };
 
-/// What a calibration with a ball array is asked for.
+/// Request for a calibration with a ball array.
 struct EvemuRequest {
   calib::evemu::Calibrator calibrator;
   calib::evemu::TouchPlan plan;
   std::optional<RotationPoints> reference;
-  std::vector<InputFile> sources;  ///< the files all this came from
+  std::vector<InputFile> sources;  ///< files from which the request was read
 };
 
 struct EvemuRun {
   EvemuRequest asked;
   std::vector<calib::evemu::Touch> touches;
-  std::optional<calib::evemu::ArtefactTemperature>
-      artefact;  ///< over the touches; none: nobody knows
+  /// temperature of the array during the touches; nullopt: unknown
+  std::optional<calib::evemu::ArtefactTemperature> artefact;
 };
 
 struct EvemuAcquisitionOptions {
-  std::string device = "probe";  ///< its name, for what is said about touches
-  /// A counter card that begins anew counts from where the axes stand; with [reference] the zero is
-  /// found again.
+  std::string device = "probe";  ///< name of the probing device, for messages
+  /// True: a restart of the device during the run fails the run, because the counters of a counter
+  /// card restart at 0 at the current position. With [reference] the same zero is found again.
   bool zero_is_lost_by_restart = true;
-  /// Host time without a touch that ends the run: the artefact is turned and clamped by hand in
-  /// between.
+  /// Longest host time between two touches; the run fails after it. The operator turns and clamps
+  /// the artefact by hand between positions.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
-  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less. None:
-  /// no limit.
+  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less.
+  /// nullopt: no limit.
   std::optional<calib::MachineNodes> travel{};
-  std::size_t most_refused =
-      20;  ///< touches in a row that cannot be used end a run that has none yet
-  /// How warm the array is. A touch at which its sensor has no valid value ends the run: the model
-  /// would need it.
+  /// A run without a usable touch fails after this many successive unusable ones.
+  std::size_t most_refused = 20;
+  /// Source of the temperature of the array. A touch is not used if its sensor has no valid value
+  /// then, because the identification needs the temperature.
   std::optional<ArtefactTemperatureConfig> artefact{};
-  std::string artefact_sensor{};  ///< its name
+  std::string artefact_sensor{};  ///< name of the temperature
 };
 
 class EvemuAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// BadInput for a calibrator or plan that is none.
+  /// BadInput for an invalid calibrator or plan.
   [[nodiscard]] static Result<EvemuAcquisition> create(EvemuRequest request,
                                                        EvemuAcquisitionOptions options = {});
 
-  /// Before the first snapshot. Touches before `from` do not count.
+  /// To be called before the first take(). Touches before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
 
   void take(const protocol::Snapshot& snapshot);
   void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
-  [[nodiscard]] const std::string& reason() const noexcept {
-    return reason_;
-  }                                                ///< what to do now, or why not
-  [[nodiscard]] double progress() const noexcept;  ///< 0 to 1 of the points
+  /// Instruction for the operator, or the reason of the failure.
+  [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+  [[nodiscard]] double progress() const noexcept;  ///< fraction of the planned points, 0 to 1
   [[nodiscard]] std::size_t points() const { return guide_.taken(); }
-  /// Nothing once the last point is there.
+  /// nullopt once the run is complete or failed.
   [[nodiscard]] std::optional<calib::evemu::NextTouch> next() const;
-  /// What was noticed since the last call, a sentence each.
+  /// Remarks on touches since the last call, one sentence each.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] EvemuRun release();
 

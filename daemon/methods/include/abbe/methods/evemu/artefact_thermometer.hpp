@@ -1,7 +1,7 @@
 #pragma once
-/// How warm the ball array was over a run, by a temperature of [[environment]] or by what the
-/// configuration says. From snapshots alone: a replay finds the same bits. Ordinary world; not
-/// thread-safe.
+/// Mean temperature of the ball array over a run, from a sensor of [[environment]] or from a fixed
+/// value in the configuration. Depends on snapshots only, so that a replay gives bit-identical
+/// results. Not for the RT path; not thread-safe.
 
 #include <cstddef>
 #include <optional>
@@ -16,12 +16,14 @@ class ArtefactThermometer {
  public:
   explicit ArtefactThermometer(std::optional<ArtefactTemperatureConfig> config) : config_(config) {}
 
-  /// False: the sensor has no valid value at this touch.
+  /// False if the sensor has no valid value at this touch.
   [[nodiscard]] bool take(const protocol::Snapshot& touch);
 
-  /// Mean of the sensor's values. u: half their range as a rectangular distribution, (max -
-  /// min) / (2 sqrt
-  /// 3) ([GUM] 4.3.7), and the configured one. None: nobody knows.
+  /// Mean of the sensor's values. Its standard uncertainty is the root sum of squares of the
+  /// configured one and of
+  ///     (max - min) / (2 sqrt(3)),
+  /// a rectangular distribution over the range of the values ([GUM] 4.3.7). nullopt: the
+  /// temperature is not known.
   [[nodiscard]] std::optional<calib::evemu::ArtefactTemperature> over_the_run() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-/// The model document of a ball array's solution. Pure.
+/// The model document of a solution of the ball array method. Pure.
 
 #include <vector>
 

@@ -1,8 +1,8 @@
 #pragma once
-/// Touches of a ball array become a judged model: observe, solve, judge in a row, with the
-/// estimator of [evemu], the same for a live session and its replay. Pure and deterministic. A
-/// tenth of a second with the default estimator, seconds with lasso, mcp, scad; runs on a thread of
-/// its own in the daemon.
+/// Identifies a model from touches of a ball array and judges it: observe, solve and judge, with
+/// the estimator of [evemu]. A live session and its replay use the same function. Pure and
+/// deterministic. It takes a tenth of a second with the default estimator, seconds with lasso, mcp
+/// or scad; the daemon runs it in a separate thread.
 
 #include <functional>
 #include <string>
@@ -21,20 +21,23 @@ struct EvemuCandidate {
   calib::Verdict verdict;
 };
 
-/// `active` may be null. DataInsufficient or BadInput, with what is wrong with the touches, by
-/// position and number. `stopped`: as in IdentificationWatch, asked while the run is judged. A run
-/// without rotation reference is judged "shape only" unless [gate] accepts that by name.
+/// `active`: the active model; null if there is none. DataInsufficient or BadInput, with the
+/// position and number of the wrong touches. `stopped`: as in IdentificationWatch, polled while the
+/// model is judged. A model without rotation reference is refused as "shape only" unless [gate]
+/// accepts "evemu-shape-only".
 [[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
                                                       const calib::VolumetricModel* active,
                                                       const std::function<bool()>& stopped = {});
 
 [[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
-/// Refused or BadInput if no model would come of it: no probe, a machine that has corrected its
-/// positions, an array that grows nobody knows how far.
+/// Refused or BadInput if the request cannot give a model: no probe is configured, the measuring
+/// machine already corrects its positions, or the thermal expansion of the array is not known
+/// although its temperature is (or the reverse).
 [[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
-/// How the array grows and how warm it is: one without the other cannot be meant. What is wrong,
-/// else empty. `named`: the calibrator, for people. `thermometer`: what says how warm it is; empty:
-/// nothing does. `remedy`: how to have it said.
+/// Checks that the expansion coefficient and the temperature of the array are given both or not at
+/// all. Returns a message, empty if the check passed. `named`: the calibrator in the message.
+/// `thermometer`: the source of the temperature in the message; empty: there is none. `remedy`: how
+/// to give the temperature.
 [[nodiscard]] std::string artefact_temperature_fault(const calib::evemu::Calibrator& calibrator,
                                                      std::string_view named,
                                                      std::string_view thermometer,

@@ -1,5 +1,5 @@
 #pragma once
-/// Calibration with a ball array as the session, a replay and the control API use it; see
+/// The interface of the ball array method to the session, the replay and the control API; see
 /// method_list.hpp.
 
 #include <nlohmann/json_fwd.hpp>
@@ -24,13 +24,14 @@ struct EvemuMethod {
   using Run = EvemuRun;
   using Candidate = EvemuCandidate;
 
-  /// A measuring machine reports the position of each touch.
+  /// No axis readings are needed with a measuring machine: it reports the position of each touch.
   [[nodiscard]] static MethodNeeds needs(const Config& config) {
     return {.axis_readings = !config.cmm};
   }
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
-  /// What the object does not name of the plan comes from [evemu] of `config`; null: the defaults.
+  /// Members of the plan that are not in the object are taken from [evemu] of `config`; null: the
+  /// defaults.
   /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);

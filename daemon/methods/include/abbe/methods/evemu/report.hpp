@@ -1,6 +1,6 @@
 #pragma once
-/// What a metrologist looks at first after a calibration with a ball array: the verdict, what the
-/// method cannot see, what remains at the balls, the coefficients. Pure.
+/// The HTML report of a calibration with a ball array: the verdict, the rotation that the method
+/// does not determine, the residuals at the balls, the coefficients. Pure.
 
 #include <string>
 
@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// report.html, self-contained. `document` is the one made from `solution`.
+/// Content of report.html, self-contained. `document`: made from `solution`.
 [[nodiscard]] std::string evemu_report(const ModelDocument& document,
                                        const calib::evemu::Observations& observations,
                                        const calib::evemu::Solution& solution,

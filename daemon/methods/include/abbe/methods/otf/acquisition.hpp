@@ -1,8 +1,8 @@
 #pragma once
-/// Which tracker points belong to one on-the-fly run: from the standstill at the first vertex of
-/// the path to the standstill at the last. Decided from snapshots alone, never from a clock, so
-/// that a replay takes the very same points. Ordinary world; not thread-safe; lengths m, axis
-/// positions as scale readings in the order X, Y, Z.
+/// Collects the tracker points of one on-the-fly run: from the standstill at the first vertex of
+/// the path to the standstill at the last. The decisions depend on snapshots only, not on a clock,
+/// so that a replay takes exactly the same points. Not for the RT path; not thread-safe. Lengths in
+/// m; axis positions are scale readings in the order X, Y, Z.
 
 #include <array>
 #include <chrono>
@@ -24,17 +24,16 @@
 
 namespace abbe::daemon {
 
-/// One point of the run as identification sees it.
+/// One point of the run, as the identification uses it.
 struct RunPoint {
   protocol::HostTime time{};
   protocol::DeviceTime device_time{};
   std::array<double, 3> p_tracker_m{};
-  bool usable =
-      /// false: too fast, prism error or trigger violation; it holds its place in the sequence
-      true;
+  /// false: too fast, prism error or trigger violation; the point keeps its place in the sequence
+  bool usable = true;
 };
 
-/// Points of a run in blocks: one more never copies those before.
+/// Points of a run, stored in blocks: push_back() never copies earlier points.
 class RunPoints {
  public:
   void push_back(const RunPoint& point);
@@ -42,7 +41,7 @@ class RunPoints {
   [[nodiscard]] const RunPoint& back() const noexcept { return blocks_.back().back(); }
   [[nodiscard]] bool empty() const noexcept { return blocks_.empty(); }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  /// All of them, O(n).
+  /// All points in one vector; O(n).
   [[nodiscard]] std::vector<RunPoint> joined() const;
 
  private:
@@ -51,35 +50,37 @@ class RunPoints {
 };
 
 struct AcquisitionOptions {
-  double stand_tolerance_m = 0.2e-3;  ///< a machine that moves less than this is standing
-  /// how near to the first and last vertex the machine must stand
+  /// A machine that stays within this distance of one place is at standstill.
+  double stand_tolerance_m = 0.2e-3;
+  /// largest distance of the machine from the first and last vertex at its standstill there
   double vertex_tolerance_m = 2e-3;
   double reading_tolerance_m = 20e-6;  ///< see VertexReadings
-  /// farther from every leg than this means another path is being driven
+  /// A machine farther than this from every leg is driving another path; the run fails.
   double path_tolerance_m = 10e-3;
-  /// 20 points at 100 Hz, see [calib] alignment
+  /// shortest standstill before the run: 20 points at 100 Hz, see [calib] alignment
   std::chrono::nanoseconds stand_before = std::chrono::milliseconds{200};
-  /// standstill kept in front of the run
+  /// length of the standstill before the run that is kept
   std::chrono::nanoseconds keep_before = std::chrono::milliseconds{400};
-  /// longer than any dwell at a vertex
+  /// shortest standstill at the end; longer than any dwell at a vertex
   std::chrono::nanoseconds stand_after = std::chrono::milliseconds{1000};
-  std::chrono::nanoseconds keep_after =
-      std::chrono::milliseconds{400};  ///< standstill kept behind the run
-  /// Inside the run: between two tracker points, or without axis positions, for longer ends it.
+  /// length of the standstill after the run that is kept
+  std::chrono::nanoseconds keep_after = std::chrono::milliseconds{400};
+  /// Longest time inside the run between two tracker points, or without axis positions; the run
+  /// fails after it.
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
-  /// Host time for which no point need have arrived: `silence` and the backlog a stalled tracker
-  /// delivers.
+  /// Host time without an arriving point after which tick() fails the run: `silence` and the delay
+  /// of a backlog that a stalled tracker delivers later.
   std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
-  /// for the machine to stand at P0 and leave
+  /// longest time until the machine has stopped at the first vertex and left it
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
-  std::chrono::nanoseconds longest_stop =
-      std::chrono::minutes{15};  ///< on the path: a longer one ends the run
-  /// Of a run: 67 min at 1000 points a second, 200 MB. A machine that cycles on its path would fill
-  /// the memory.
+  /// longest standstill on the path; the run fails after it
+  std::chrono::nanoseconds longest_stop = std::chrono::minutes{15};
+  /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. It limits the
+  /// memory if the machine drives its path again and again.
   std::size_t most_points = 4'000'000;
-  EnvironmentUseOptions environment;  ///< what snapshots were corrected with
-  /// A packet out of order goes back by a burst (a third of a second); a clock that began anew by
-  /// more.
+  EnvironmentUseOptions environment;  ///< with which the snapshots were corrected
+  /// A step back of the tracker's clock by more than this means that the clock restarted. Packets
+  /// out of order step back by one burst at most (a third of a second).
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
 
@@ -87,30 +88,29 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path_m`: vertices of the polyline, at least two. O(n): everything that grows with the path, but
-  /// release(), is done here.
+  /// `path_m`: vertices of the polyline, at least two. O(n): all work that depends on the number of
+  /// vertices is done here, except release().
   explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {});
 
-  /// Before the first snapshot. Those before `from` are not looked at.
+  /// To be called before the first take(). Snapshots before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { from_ = from; }
-  /// Points whose device time does not ascend are left out and counted.
+  /// Points whose device time is not later than that of the point before are left out and counted.
   void take(const protocol::Snapshot& snapshot);
-  /// Fails what nothing arrives for any more; `now` is host time. Never needed for a replay: what
-  /// it fails has no points that could complete it.
+  /// Fails a run that receives no more points; `now` is host time. A replay does not need it: such
+  /// a run has no points that could complete it.
   void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
-  [[nodiscard]] const std::string& reason() const noexcept {
-    return reason_;
-  }                                                ///< why Failed, or what is waited for
-  [[nodiscard]] double progress() const noexcept;  ///< 0 to 1 of the path length driven
+  /// Reason of the failure, or the event that is awaited.
+  [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+  [[nodiscard]] double progress() const noexcept;  ///< driven fraction of the path length, 0 to 1
   [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
   /// The points of the run; O(n).
   [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
   /// The path of the request; O(1).
   [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
   [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
-  /// Mean over the run.
+  /// Mean of the environment's effect over the run.
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
  private:
@@ -121,7 +121,7 @@ class OtfAcquisition {
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
   void follow_path(const RunPoint& point, const calib::Vector3& q);
-  /// Fails where the scales read something else than the path says.
+  /// Fails the run if the scale readings at a vertex differ from the path.
   void compare_with_path(const protocol::Snapshot& snapshot, const calib::Vector3& q);
   [[nodiscard]] bool complete(protocol::HostTime now, const calib::Vector3& q) const;
   void trim_end();
@@ -129,23 +129,23 @@ class OtfAcquisition {
 
   std::vector<AxisPosition> path_m_;
   calib::otf::PathIndex path_;
-  std::vector<double> driven_at_m_;  // every vertex
+  std::vector<double> driven_at_m_;  // length along the path up to each vertex
   protocol::HostTime from_{};
   AcquisitionOptions options_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
-  std::deque<RunPoint> before_;  // standstill at the first vertex, the last keep_before of it
+  std::deque<RunPoint> before_;  // the last keep_before of the standstill at the first vertex
   RunPoints points_;
   MeanEffect environment_;
   VertexReadings readings_{options_.reading_tolerance_m};
-  std::optional<std::pair<protocol::HostTime, calib::Vector3>>
-      before_q_;                                      // the last known positions
-  calib::Vector3 stand_at_ = calib::Vector3::Zero();  // where the current standstill began
+  // time and readings at the last point with axis positions
+  std::optional<std::pair<protocol::HostTime, calib::Vector3>> before_q_;
+  calib::Vector3 stand_at_ = calib::Vector3::Zero();  // position where the standstill began
   protocol::HostTime stand_since_{};
   bool stand_known_ = false;
-  std::size_t leg_ = 0;             // the machine is on, or just before, this leg
-  protocol::HostTime on_leg_at_{};  // when it was last seen there
-  double driven_m_ = 0.0;           // along the path, up to the machine
+  std::size_t leg_ = 0;             // leg on which the machine is, or which it is about to enter
+  protocol::HostTime on_leg_at_{};  // time of the last point on this leg
+  double driven_m_ = 0.0;           // length along the path up to the machine
   protocol::HostTime axes_known_at_{};
   protocol::HostTime last_time_{};
   std::optional<protocol::DeviceTime> last_device_time_;

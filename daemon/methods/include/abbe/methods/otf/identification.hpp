@@ -1,7 +1,7 @@
 #pragma once
-/// An acquired run becomes a judged model: observe, solve, judge in a row, the same for a live
-/// session and its replay. Pure and deterministic: equal points give equal bits. About a second;
-/// runs on a thread of its own in the daemon.
+/// Identifies a model from an acquired run and judges it: observe, solve and judge. A live session
+/// and its replay use the same function. Pure and deterministic: equal points give bit-identical
+/// results. It takes about a second; the daemon runs it in a separate thread.
 
 #include <array>
 #include <functional>
@@ -21,14 +21,15 @@
 namespace abbe::daemon {
 
 struct OtfRun {
-  /// The path as snapshots see it: grown with the scales where [[thermal]] is configured. The model
-  /// is of corrected positions then; what a scale grew by is not in it a second time.
+  /// Vertices in the coordinates of the snapshots: with [[thermal]], corrected for the thermal
+  /// expansion of the scales. The model then refers to corrected positions and does not contain the
+  /// thermal expansion of the scales a second time.
   std::vector<AxisPosition> path_m;
   std::vector<RunPoint> points;
   double u_scale = 0.0;                  ///< see calib::otf::Noise
   std::array<double, 3> u_axis_scale{};  ///< see calib::otf::Noise
-  /// Note of the verdict: the air the ranges were corrected for without measuring it. None: it was
-  /// measured.
+  /// Note in the verdict if the air was not measured: states the air for which the ranges were
+  /// corrected. nullopt: the air was measured.
   std::optional<std::string> unmeasured_air;
 };
 
@@ -37,15 +38,14 @@ struct OtfCandidate {
   calib::Verdict verdict;
 };
 
-/// `active` may be null.
-/// DataInsufficient when the run does not determine the model, with what is missing.
+/// `active`: the active model; null if there is none. DataInsufficient if the run does not
+/// determine the model, with what is missing.
 [[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine,
                                                 const GateConfig& gate,
                                                 const calib::VolumetricModel* active,
                                                 const IdentificationWatch& watch = {});
 
-/// SHA-256 in hex over the points as they entered the identification: times, positions and whether
-/// usable.
+/// SHA-256 in hex over the points used in the identification: times, positions and `usable`.
 [[nodiscard]] std::string points_sha256(std::span<const RunPoint> points);
 
 }  // namespace abbe::daemon

@@ -1,5 +1,6 @@
 #pragma once
-/// The on-the-fly method as the session, a replay and the control API use it; see method_list.hpp.
+/// The interface of the on-the-fly method to the session, the replay and the control API; see
+/// method_list.hpp.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
@@ -33,11 +34,10 @@ struct OtfMethod {
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
   /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
-  /// Refused or BadInput if no model would come of it: a stationary tracker, or what
-  /// check_otf_path() names.
+  /// Refused if the tracker is configured for stationary mode; BadInput as check_otf_path().
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
   [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);
-  /// The points in one piece and the path at the temperature of the scales. O(n).
+  /// The points in one vector, and the path corrected for the temperature of the scales. O(n).
   [[nodiscard]] static Run run_of(Acquisition&& acquisition);
   [[nodiscard]] static Result<Candidate> identify(const Run& run, const Config& config,
                                                   const calib::VolumetricModel* active,

@@ -1,6 +1,6 @@
 #pragma once
-/// Readings of the scales along a driven path, from a file, against the vertices of the path: what
-/// the daemon does live (VertexReadings), for `identify otf --encoder`.
+/// Compares scale readings along a driven path, from a file, with the vertices of the path, for
+/// `identify otf --encoder`. The daemon makes the same comparison live (VertexReadings).
 
 #include <cstddef>
 #include <span>
@@ -12,10 +12,10 @@
 
 namespace abbe::daemon {
 
-/// How many vertices the machine stood at, where the readings come within 2 mm of every vertex, in
-/// order, and miss none at which it stands by more than `tolerance_m`. BadInput with vertex, axis
-/// and time otherwise. `file`: as messages name it. Readings before the first vertex and after the
-/// last do not count.
+/// Returns the number of vertices at which the machine stood still. Conditions: the readings come
+/// within 2 mm of every vertex, in order, and at each standstill they differ from the vertex by at
+/// most `tolerance_m`. Otherwise BadInput with the vertex and the axis or the time. `file`: name in
+/// messages. Readings before the first vertex and after the last are not used.
 [[nodiscard]] Result<std::size_t> compare_with_path(const std::string& file,
                                                     std::span<const EncoderRow> readings,
                                                     std::span<const AxisPosition> path_m,

@@ -1,6 +1,6 @@
 #pragma once
-/// What a metrologist looks at first after an on-the-fly calibration: the verdict, what remains,
-/// the error tables with their uncertainty. Pure.
+/// The HTML report of an on-the-fly calibration: the verdict, the residuals, the error tables with
+/// their uncertainty. Pure.
 
 #include <string>
 
@@ -10,7 +10,8 @@
 
 namespace abbe::daemon {
 
-/// report.html, self-contained. `document` is the one made from `solution`.
+/// Content of report.html, self-contained. `document`, `residuals` and `verdict` are of one
+/// solution.
 [[nodiscard]] std::string otf_report(const ModelDocument& document,
                                      const calib::otf::Residuals& residuals,
                                      const calib::Verdict& verdict);

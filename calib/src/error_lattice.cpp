@@ -64,9 +64,8 @@ Result<ErrorLattice> ErrorLattice::create(std::span<const LatticeNode> nodes) {
     }
 
     if (seen[index]) {
-      return failure(
-          ErrorCode::DegenerateGeometry,
-          message("lattice: the node at (", node.position_m.transpose(), ") m occurs twice"));
+      return failure(ErrorCode::DegenerateGeometry,
+                     message("lattice: the node at ", mm_text(node.position_m), " occurs twice"));
     }
 
     seen[index] = true;

@@ -13,4 +13,11 @@ template <class... Pieces>
   return out.str();
 }
 
+/// "(20, -15, -120) mm" of a vector in metres.
+template <class Vector>
+[[nodiscard]] std::string mm_text(const Vector& v_m) {
+  constexpr double kMmPerM = 1e3;
+  return message("(", kMmPerM * v_m[0], ", ", kMmPerM * v_m[1], ", ", kMmPerM * v_m[2], ") mm");
+}
+
 }  // namespace abbe::calib

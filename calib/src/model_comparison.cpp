@@ -89,8 +89,8 @@ Result<ModelDifference> rigid_free_difference(const VolumetricModel& a, const Vo
                                               std::span<const Vector3> axis_positions_m) {
   if (!a.holds_for_tool(tool_offset_m) || !b.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
-                   message("comparison for tool offset (", tool_offset_m.transpose(),
-                           ") m: one of the models is not valid for it"));
+                   message("comparison for tool offset ", mm_text(tool_offset_m),
+                           ": one of the models is not valid for it"));
   }
   std::vector<Vector3> points, difference;
   for (const Vector3& q : axis_positions_m) {

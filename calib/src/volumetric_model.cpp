@@ -425,10 +425,9 @@ Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& too
 Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
                                                        const Vector3& tool_offset_m) const {
   if (!holds_for_tool(tool_offset_m)) {
-    return failure(
-        ErrorCode::NotApplicable,
-        message("correction for tool offset (", tool_offset_m.transpose(),
-                ") m: the model is valid for (", tool_offsets_m_.front().transpose(), ") m"));
+    return failure(ErrorCode::NotApplicable,
+                   message("correction for tool offset ", mm_text(tool_offset_m),
+                           ": the model is valid for ", mm_text(tool_offsets_m_.front())));
   }
 
   if (!nominal_m.allFinite()) {

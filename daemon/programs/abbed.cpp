@@ -13,6 +13,7 @@
 #include <string>
 
 #include "abbe/base/service_manager.hpp"
+#include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/service/abbed.hpp"
@@ -58,6 +59,20 @@ Result<void> check_dds_keys(const std::filesystem::path& security) {
       find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
   if (!identity) return tl::unexpected(identity.error());
   return {};
+}
+
+/// --check-config: prints all faults, or what was understood and what is improbable.
+int check(const std::string& file) {
+  const auto checked = check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
+  if (!checked) return refuse({ErrorCode::BadInput, checked.error().text, checked.error().details});
+  if (auto usable = check_dds_keys(checked->config.dds.security); !usable)
+    return refuse(usable.error());
+
+  fmt::print("{}: valid\n", file);
+  for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", line);
+  if (!checked->warnings.empty()) fmt::print("warnings:\n");
+  for (const auto& warning : checked->warnings) fmt::print("  {}\n", warning);
+  return kDone;
 }
 
 /// Blocks the signals before any thread is started, so that only the main thread receives them.
@@ -108,22 +123,19 @@ int abbed_main(int argc, char** argv) {
   bool check_only = false;
   app.add_option("-c,--config", file, "configuration file")->capture_default_str();
   app.add_flag("--check-config", check_only,
-               "only check the configuration, print all of its errors and exit");
+               "only check the configuration, print all of its errors, or what was understood and "
+               "what is improbable, and exit");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
   }
 
+  if (check_only) return check(file);
   auto config = load_config(file);
   // BadInput also if the file cannot be read: with Io systemd would restart abbed again and again,
   // although only a person can repair the file.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
-  if (check_only) {
-    if (auto usable = check_dds_keys(config->dds.security); !usable) return refuse(usable.error());
-    fmt::print("{}: valid\n", file);
-    return kDone;
-  }
 
   const sigset_t stop = block_stop_signals();
   // At a file size limit (RLIMIT_FSIZE, LimitFSIZE=) the write of the recorder fails with EFBIG,

@@ -1,8 +1,10 @@
 /// abbe-sim: a machine with known errors and the instruments around it, on real sockets.
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstdio>
 #include <exception>
+#include <string>
 #include <vector>
 
 #include "commands.hpp"
@@ -31,13 +33,36 @@ constexpr const char* kFooter =
     "the daemon's abbed.toml. Also read from it: [tracker] port, [encoder] peer_port and nodes,\n"
     "[daemon] speed.";
 
+struct Example {
+  const char* command;
+  const char* arguments;
+};
+
+constexpr std::array kExamples{
+    Example{"run", "--machine machine.toml --path path.csv --truth-out truth.csv"},
+    Example{"truth", "--machine machine.toml --points points.csv -o truth.csv"},
+    Example{"machine", "--machine machine.toml --seed 3 -o errors.csv"},
+    Example{"replay", "run.mcap --speed 10"},
+    Example{"evemu", "--machine machine.toml --calibrator-out calibrator.toml"}};
+
+/// Puts an example before the footer of every subcommand.
+void add_examples(CLI::App& app) {
+  for (const Example& example : kExamples) {
+    CLI::App* sub = app.get_subcommand(example.command);
+    sub->footer(std::string("Example: abbe-sim ") + example.command + " " + example.arguments +
+                "\n" + sub->get_footer());
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known",
                "abbe-sim"};
   app.require_subcommand(1);
   app.footer(kFooter);
+  app.set_version_flag("--version", "abbe-sim " ABBE_VERSION);
   const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app),
                                          add_replay(app), add_evemu(app)};
+  add_examples(app);
 
   try {
     app.parse(argc, argv);

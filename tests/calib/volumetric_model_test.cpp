@@ -127,6 +127,14 @@ TEST(VolumetricModel, CorrectionBringsAPoorMachineToTheNominalPoint) {
   EXPECT_GT(correction->evaluations, 2);
 }
 
+TEST(VolumetricModel, CorrectionNamesAnotherToolInMillimetres) {
+  const auto refused =
+      model_of(random_model(1e-4)).command_correction({0, 0, 0}, {0.02, -0.015, -0.12});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().text.find("correction for tool offset (20, -15, -120) mm"), 0u)
+      << refused.error().text;
+}
+
 TEST(VolumetricModel, CorrectionRefusesAnotherToolAndNonsenseTables) {
   EXPECT_EQ(model_of(random_model(1e-4)).command_correction({0, 0, 0}, {0, 0, 0}).error().code,
             ErrorCode::NotApplicable);

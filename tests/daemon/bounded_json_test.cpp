@@ -52,5 +52,21 @@ TEST(BoundedJson, ASyntaxErrorNamesTheByte) {
   EXPECT_NE(refusal_of(""), "");
 }
 
+TEST(BoundedJson, ASyntaxErrorNamesLineColumnAndWhatWasExpected) {
+  const std::string refusal = refusal_of("{\n \"a\" 1}");
+  EXPECT_NE(refusal.find("line 2, column 6: syntax error"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("expected ':'"), std::string::npos) << refusal;
+}
+
+TEST(BoundedJson, NoRefusalNamesAnExceptionOfTheLibrary) {
+  for (const auto& text : {"{\"a\": tru}", "[1e999]", ""})
+    EXPECT_EQ(refusal_of(text).find("json.exception"), std::string::npos) << refusal_of(text);
+  try {
+    (void)nlohmann::json::object().at("events");
+  } catch (const nlohmann::json::exception& missing) {
+    EXPECT_EQ(cause_of(missing), "key 'events' not found");
+  }
+}
+
 }  // namespace
 }  // namespace abbe::daemon

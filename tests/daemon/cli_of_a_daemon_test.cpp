@@ -150,6 +150,35 @@ TEST_F(CliOfADaemon, ReferencePrintsEachAxisInItsUnits) {
                              HasSubstr("at 0.012500000 rad, u = 2.000 urad")));
 }
 
+nlohmann::json status_with_positions() {
+  return {{"ok", true},
+          {"machine", "mill"},
+          {"model", {{"state", "INVALID"}, {"reason", "no model is active"}}},
+          {"session",
+           {{"state", "idle"},
+            {"progress", 0.0},
+            {"points", 0},
+            {"reason", ""},
+            {"notes", nlohmann::json::array()}}},
+          {"streams", nlohmann::json::array()},
+          {"position_m", {0.01, nullptr, 0.5}},
+          {"axes",
+           {{{"axis", "X"}, {"kind", "linear"}},
+            {{"axis", "Y"}, {"kind", "linear"}},
+            {{"axis", "C"}, {"kind", "rotary"}}}}};
+}
+
+TEST_F(CliOfADaemon, StatusShowsThePositionsOfTheAxes) {
+  const auto socket = folder_.path() / "positions.sock";
+  const auto daemon = ControlServer::open(
+      socket, [](const nlohmann::json&, const ControlPeer&) { return status_with_positions(); });
+  ASSERT_TRUE(daemon);
+  const auto ran =
+      test::run_abbe(folder_.path(), fmt::format("status --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("position   X 10.0000 mm  Y -  C 28.6479 deg\n"));
+}
+
 TEST_F(CliOfADaemon, ADaemonThatRestartedLosesTheReferenceSearch) {
   const auto socket = folder_.path() / "search.sock";
   std::atomic<int> asked = 0;

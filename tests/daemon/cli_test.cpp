@@ -415,6 +415,111 @@ TEST_F(Cli, HelpNamesTheExitCodesAndEnds0) {
               AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
 }
 
+TEST_F(Cli, NamesTheNearestCommand) {
+  const auto ran = abbe("identfy otf");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"identfy\" is not a command"),
+                             HasSubstr("the nearest one is `abbe identify`")));
+  EXPECT_THAT(abbe("model lst").err, HasSubstr("the nearest one is `abbe model list`"));
+  EXPECT_THAT(abbe("wacth").err, HasSubstr("the nearest one is `abbe watch`"));
+  EXPECT_THAT(abbe("frobnicate").err, HasSubstr("known: status, "));
+}
+
+TEST_F(Cli, HelpIsACommand) {
+  const auto help = abbe("help");
+  EXPECT_EQ(help.exit, 0);
+  EXPECT_EQ(help.out, abbe("--help").out);
+  EXPECT_EQ(abbe("help model show").out, abbe("model show --help").out);
+}
+
+TEST_F(Cli, TheHelpOfEveryCommandHasAnExample) {
+  for (const std::string command : {"status",
+                                    "calibrate",
+                                    "calibrate otf",
+                                    "calibrate evemu",
+                                    "calibrate probe",
+                                    "calibrate artefact",
+                                    "reference",
+                                    "machine",
+                                    "machine where",
+                                    "machine stop",
+                                    "machine release",
+                                    "tracker",
+                                    "tracker status",
+                                    "tracker initialize",
+                                    "tracker home",
+                                    "tracker find",
+                                    "tracker reflector",
+                                    "tracker reflector list",
+                                    "tracker reflector set",
+                                    "replay",
+                                    "identify",
+                                    "identify otf",
+                                    "identify evemu",
+                                    "identify artefact",
+                                    "verify",
+                                    "model",
+                                    "model eval",
+                                    "model compare",
+                                    "model list",
+                                    "model show",
+                                    "model activate",
+                                    "model rollback",
+                                    "dds",
+                                    "dds keys"}) {
+    EXPECT_THAT(abbe(command + " --help").out,
+                AllOf(HasSubstr("Example: abbe " + command), HasSubstr("Exit codes: 0 done")));
+  }
+}
+
+TEST_F(Cli, ShowsAModelFile) {
+  const auto ran = abbe("model show out/model.json");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("file        out/model.json"), HasSubstr("EXX,")));
+}
+
+TEST_F(Cli, AModelFileWithASyntaxErrorIsNamedWithLineAndColumn) {
+  const auto file = write("broken.json", "{\n \"schema\" 1}");
+  const auto ran = abbe(fmt::format("model show '{}'", file.string()));
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("broken.json: line 2, column 11: "),
+                             HasSubstr("expected ':'"), Not(HasSubstr("json.exception"))));
+}
+
+TEST_F(Cli, SaysThatAFolderIsNoModelStore) {
+  const auto missing = abbe("model list --store nowhere");
+  EXPECT_EQ(missing.exit, 4);
+  EXPECT_THAT(missing.err, HasSubstr("nowhere: there is no such folder"));
+  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
+
+  fs::create_directories(folder_ / "empty");
+  const auto empty = abbe("model list --store empty");
+  EXPECT_EQ(empty.exit, 3);
+  EXPECT_THAT(empty.err, HasSubstr("empty: is not a model store"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "empty"));
+}
+
+TEST_F(Cli, SaysThatAStoreHasNoModelsAndNoActiveOne) {
+  ASSERT_TRUE(ModelStore::open(folder_ / "new_store"));
+  const auto list = abbe("model list --store new_store");
+  EXPECT_EQ(list.exit, 0);
+  EXPECT_THAT(list.out, HasSubstr("the store has no models"));
+
+  const auto show = abbe("model show active --store new_store");
+  EXPECT_EQ(show.exit, 5);
+  EXPECT_THAT(show.err, HasSubstr("no model is active"));
+}
+
+TEST_F(Cli, ActivateAsksForFourCharacters) {
+  const auto folder = folder_ / "short_ids";
+  auto store = ModelStore::open(folder).value();
+  const auto id = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
+  const auto ran =
+      abbe(fmt::format("model activate {} --store '{}'", id.substr(0, 3), folder.string()));
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("give at least 4 characters"), HasSubstr("  " + id)));
+}
+
 TEST_F(Cli, ListsActivatesAndRollsBackModelsOfAStore) {
   const auto folder = folder_ / "store";
   auto store = ModelStore::open(folder).value();

@@ -46,6 +46,21 @@ TEST(ConfigEncoder, RefusesTwoNodesOnOneId) {
       ElementsAre(HasSubstr("encoder.nodes[1].node: node id 5 is used twice")));
 }
 
+TEST(ConfigEncoder, RefusesStepsThatNoScaleHas) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [
+  {axis = "X", node = 1, step_nm = 1e7}, {axis = "Y", node = 2, step_nm = 1e6},
+  {axis = "Z", node = 3}, {axis = "B", node = 4, step_nrad = 2e8}]
+[axes.B]
+kind = "rotary"
+min_rad = -1
+max_rad = 1
+)"),
+              ElementsAre(AllOf(HasSubstr("encoder.nodes[0].step_nm: one count is 10 mm"),
+                                HasSubstr("at most 1 mm")),
+                          AllOf(HasSubstr("encoder.nodes[3].step_nrad: one count is 0.2 rad"),
+                                HasSubstr("at most 0.1 rad"))));
+}
+
 TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
   const std::string by_kernel = "sync = \"kernel\"\n" + kNodes;
   const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");

@@ -247,13 +247,66 @@ TEST(Config, SuggestsTheKeyWithItsUnit) {
                           AllOf(HasSubstr("axes.X.min: unknown key"), HasSubstr("\"min_mm\""))));
 }
 
-TEST(Config, ShowsAtMostTwentyFaults) {
+std::string unknown_keys(int count) {
   std::string text = kMachine + "[daemon]\n";
-  for (int i = 0; i < 30; ++i) text += "nonsense_" + std::to_string(i) + " = 1\n";
-  const auto faults = faults_of(text);
-  EXPECT_THAT(faults, SizeIs(21));
+  for (int i = 0; i < count; ++i) text += "nonsense_" + std::to_string(i) + " = 1\n";
+  return text;
+}
+
+TEST(Config, ReportsAllFaults) {
+  const auto faults = faults_of(unknown_keys(30));
+  EXPECT_THAT(faults, SizeIs(30));
   EXPECT_THAT(faults.front(), HasSubstr("nonsense_0"));
-  EXPECT_THAT(faults.back(), HasSubstr("and 10 more"));
+  EXPECT_THAT(faults.back(), HasSubstr("nonsense_29"));
+}
+
+TEST(Config, CountsTheFaultsBeyondAThousand) {
+  const auto faults = faults_of(unknown_keys(1100));
+  EXPECT_THAT(faults, SizeIs(1001));
+  EXPECT_THAT(faults.back(), HasSubstr("and 100 more"));
+}
+
+// Each of the three axes reads the spacing.
+TEST(Config, ReportsARepeatedFaultOnceWithItsCount) {
+  auto text = kMachine;
+  text.replace(text.find("node_spacing_mm = 50"), 20, "node_spacing_mm = -5");
+  const auto config = parse_config(text, "abbed.toml");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().text, "abbed.toml: 1 fault");
+  EXPECT_THAT(config.error().details,
+              ElementsAre(AllOf(HasSubstr("model.node_spacing_mm"), HasSubstr("(3 times)"))));
+}
+
+TEST(Config, RefusesATravelThatNoMachineHas) {
+  auto text = kMachine;
+  text.replace(text.find("max_mm = 300"), 12, "max_mm = -299.7");
+  EXPECT_THAT(faults_of(text),
+              ElementsAre(AllOf(HasSubstr("abbed.toml:6:"), HasSubstr("axes.X.max_mm"),
+                                HasSubstr("only 0.3 mm"), HasSubstr("at least 1 mm"))));
+}
+
+TEST(Config, RefusesAHostThatCannotBeOne) {
+  for (const std::string host :
+       {"192.168.0.300", "10.0.0", "10.0.0.7:700", "http://tracker", "a b", "-a", "a..b", "::g:"})
+    EXPECT_THAT(faults_of(kMachine + "[tracker]\nhost = \"" + host + "\"\n"),
+                ElementsAre(AllOf(StartsWith("abbed.toml:19:8: tracker.host:"), HasSubstr(host))));
+}
+
+TEST(Config, TakesNamesAndAddressesAsHosts) {
+  for (const std::string host :
+       {"192.168.0.255", "tracker", "at960.shop-floor.local", "fd00::7", "fe80::1%eth0", "7a."})
+    EXPECT_THAT(faults_of(kMachine + "[tracker]\nhost = \"" + host + "\"\n"), SizeIs(0)) << host;
+}
+
+TEST(Config, ChecksTheHostsOfAllDevices) {
+  const std::string bad = "host = \"10.0.0.256\"\n";
+  EXPECT_THAT(faults_of(kMachine + "[cmm]\n" + bad), ElementsAre(HasSubstr("cmm.host")));
+  EXPECT_THAT(
+      faults_of(kMachine + "[encoder]\ntransport = \"udp\"\npeer_port = 9\npeer_" + bad + kNodes),
+      ElementsAre(HasSubstr("encoder.peer_host")));
+  EXPECT_THAT(faults_of(kMachine + "[[environment]]\nname = \"a\"\n" + bad +
+                        "map = \"vaisala-indigo520-hmp\"\n"),
+              ElementsAre(HasSubstr("environment[0].host")));
 }
 
 TEST(Config, NamesThePlaceOfASyntaxFault) {
@@ -316,7 +369,7 @@ TEST(Config, TakesThePointRatesATrackerHas) {
   EXPECT_EQ(rate("500"), 500.0);
   EXPECT_DOUBLE_EQ(rate("333"), 1e3 / 3.0);
   EXPECT_THAT(faults_of(kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = 300\n"),
-              ElementsAre(AllOf(HasSubstr("tracker.point_rate_hz"), HasSubstr("250 and 333.3"))));
+              ElementsAre(AllOf(HasSubstr("tracker.point_rate_hz"), HasSubstr("250 or 333.3"))));
 }
 
 TEST(Config, ReadsBothModesOfATracker) {

@@ -67,6 +67,11 @@ TEST(CounterCardConfig, RefusesAnAxisScaleOfZero) {
               Contains(HasSubstr("axis X (channel 0): scale 0 per count")));
 }
 
+TEST(CounterCardConfig, RefusesAStepThatNoScaleHas) {
+  EXPECT_THAT(faults_of(card(R"({axis = "X", channel = 0, step_nm = 1e7})")),
+              Contains(HasSubstr("counter_card.axes[0].step_nm: one count is 10 mm")));
+}
+
 TEST(CounterCardConfig, RefusesTwoChannelsForOneAxis) {
   EXPECT_THAT(
       faults_of(card(

@@ -60,6 +60,21 @@ TEST_F(DamagedRun, UndamagedItGivesAModelThatTheGateAccepts) {
   EXPECT_THAT(test::text_of(folder_ / "out" / "model.json"), Not(HasSubstr("recording_gap")));
 }
 
+TEST_F(DamagedRun, CutInTheRunItDoesNotShowACalibrationThatGoesOn) {
+  const auto bytes = bytes_of_file(whole_);
+  const auto cut = folder_ / "cut.mcap.part";
+  write_file(cut, bytes, bytes.size() / 2);
+
+  const auto replayed = abbe(fmt::format("replay '{}'", cut.string()));
+  EXPECT_EQ(replayed.exit, 1);
+  EXPECT_THAT(replayed.out, HasSubstr("the recording ends before the calibration is complete"));
+  EXPECT_THAT(replayed.out, Not(HasSubstr("calibration  acquiring")));
+
+  const auto identified = identify(cut);
+  EXPECT_EQ(identified.exit, 1);
+  EXPECT_THAT(identified.err, HasSubstr("contains no complete calibration: the recording ends"));
+}
+
 // node_spacing_mm = 60 becomes 20: the model would be another.
 TEST_F(DamagedRun, WithADamagedConfigurationIsRefusedUnlessAConfigurationIsGiven) {
   const auto file = damaged(place_of("node_spacing_mm = 60") + 18, 4);

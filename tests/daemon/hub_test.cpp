@@ -156,6 +156,13 @@ TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
       << "no sample for longer than the axes are known";
 }
 
+TEST_F(HubTest, StatusNamesTheAxesOfItsPositions) {
+  cycle_with_axes();
+  const json status = ask({{"do", "status"}});
+  ASSERT_EQ(status["axes"].size(), status["position_m"].size());
+  EXPECT_EQ(status["axes"][0], json({{"axis", "X"}, {"kind", "linear"}}));
+}
+
 TEST_F(HubTest, RunsATaskOfAnotherThreadInItsNextCycle) {
   auto answer = std::async(std::launch::async, [this] {
     return hub_->call([] { return json{{"n", 3}}; }, 60s);

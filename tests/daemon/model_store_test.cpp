@@ -296,5 +296,14 @@ TEST_F(ModelStoreTest, FindsByPrefixOrReportsTheNumberOfMatches) {
   EXPECT_EQ(open().find("active").value(), id);
 }
 
+TEST_F(ModelStoreTest, AShortPrefixListsTheIdsThatBeginWithIt) {
+  const auto id = add(1);
+  const auto refused = open().find(id.substr(0, 3));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Usage);
+  EXPECT_NE(refused.error().text.find("at least 4 characters"), std::string::npos);
+  EXPECT_EQ(refused.error().details, std::vector<std::string>{id});
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -61,6 +61,17 @@ TEST_F(Program, HelpNamesItsCommandsAndExitCodes) {
   EXPECT_THAT(help.output, HasSubstr("Exit codes"));
 }
 
+TEST_F(Program, TellsItsVersion) {
+  const Outcome version = run("--version");
+  EXPECT_EQ(version.code, 0);
+  EXPECT_THAT(version.output, testing::StartsWith("abbe-sim "));
+}
+
+TEST_F(Program, TheHelpOfEveryCommandHasAnExample) {
+  for (const std::string command : {"run", "truth", "machine", "replay", "evemu"})
+    EXPECT_THAT(run(command + " --help").output, HasSubstr("Example: abbe-sim " + command));
+}
+
 /// The TOML parser recurses, and so do the copies of its result.
 TEST_F(Program, RefusesATomlFileThatNestsTooDeepOrIsTooLarge) {
   std::string key = "a";

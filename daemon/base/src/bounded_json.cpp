@@ -44,15 +44,6 @@ Result<void> check_structure(std::string_view text, std::string_view what,
   return {};
 }
 
-/// Removes the prefix of a parser message:
-///   "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error ..."
-/// becomes "syntax error ...".
-std::string_view cause_of(std::string_view text) {
-  const std::size_t place = text.find("column ");
-  const std::size_t colon = text.find(": ", place == std::string_view::npos ? 0 : place);
-  return colon == std::string_view::npos ? text : text.substr(colon + 2);
-}
-
 }  // namespace
 
 Result<void> check_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
@@ -62,15 +53,24 @@ Result<void> check_json(std::string_view text, std::string_view what, const Json
   return check_structure(text, what, bounds);
 }
 
+std::string cause_of(const json::exception& exception) {
+  constexpr std::string_view kSyntax = "parse error at ";
+  std::string_view text = exception.what();
+  if (const auto end = text.find("] "); text.starts_with('[') && end != std::string_view::npos)
+    text.remove_prefix(end + 2);
+  if (text.starts_with(kSyntax)) text.remove_prefix(kSyntax.size());
+  return std::string{text};
+}
+
 Result<json> parse_json(std::string_view text, std::string_view what, const JsonBounds& bounds) {
   if (auto valid = check_json(text, what, bounds); !valid) return tl::unexpected(valid.error());
   try {
     return json::parse(text);
   } catch (const json::parse_error& error) {
-    return fail(ErrorCode::BadInput, fmt::format("{}: not JSON at byte {}: {}", what, error.byte,
-                                                 cause_of(error.what())));
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: not JSON at byte {}: {}", what, error.byte, cause_of(error)));
   } catch (const json::exception& error) {  // a number too large for a double
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, error.what()));
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, cause_of(error)));
   }
 }
 

@@ -259,7 +259,11 @@ class Server final : public ControlServer {
     request["user"] = peer.user;  // overwrites a "user" sent by the client
     try {
       return handler_(request, peer);
-    } catch (const std::exception& e) {  // nlohmann::json: a member has the wrong type
+    } catch (const nlohmann::json::exception& e) {  // a member is missing or has the wrong type
+      return refusal(
+          {ErrorCode::Usage,
+           fmt::format("request \"{}\": {}", request["do"].get<std::string>(), cause_of(e))});
+    } catch (const std::exception& e) {
       return refusal({ErrorCode::Usage, fmt::format("request \"{}\": {}",
                                                     request["do"].get<std::string>(), e.what())});
     }

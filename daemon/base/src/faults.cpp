@@ -12,18 +12,38 @@ void Faults::add(std::size_t line, std::size_t column, std::string_view key,
   auto text =
       fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
   const auto later = [](std::size_t l, const Fault& f) { return l < f.line; };
-  faults_.insert(std::upper_bound(faults_.begin(), faults_.end(), line, later),
-                 Fault{line, column, std::move(text)});
-  if (faults_.size() > kShown) faults_.pop_back();
+  const auto next_line = std::upper_bound(faults_.begin(), faults_.end(), line, later);
+
+  for (auto same = next_line; same != faults_.begin() && (same - 1)->line == line; --same) {
+    if ((same - 1)->text != text) continue;
+    ++(same - 1)->times;
+    return;
+  }
+
+  faults_.insert(next_line, Fault{line, column, std::move(text)});
+  if (faults_.size() > most_shown_) faults_.pop_back();
+}
+
+std::size_t Faults::dropped() const {
+  std::size_t kept = 0;
+  for (const auto& fault : faults_) kept += fault.times;
+  return count_ - kept;
+}
+
+std::vector<std::string> Faults::lines() const {
+  std::vector<std::string> lines;
+  for (const auto& fault : faults_)
+    lines.push_back(fault.times == 1 ? fault.text
+                                     : fmt::format("{} ({} times)", fault.text, fault.times));
+  if (const auto more = dropped(); more > 0)
+    lines.push_back(fmt::format("{}: and {} more", file_, more));
+  return lines;
 }
 
 Error Faults::to_error() const {
-  Error error{ErrorCode::BadInput,
-              fmt::format("{}: {} fault{}", file_, count_, count_ == 1 ? "" : "s")};
-  for (const auto& fault : faults_) error.details.push_back(fault.text);
-  if (count_ > faults_.size())
-    error.details.push_back(fmt::format("{}: and {} more", file_, count_ - faults_.size()));
-  return error;
+  const std::size_t different = faults_.size() + dropped();
+  return {ErrorCode::BadInput,
+          fmt::format("{}: {} fault{}", file_, different, different == 1 ? "" : "s"), lines()};
 }
 
 namespace {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/exit_codes.hpp"
 #include "daemon_socket.hpp"
 #include "interruption.hpp"
 
@@ -19,14 +20,14 @@ using nlohmann::json;
 constexpr auto kStatusPollPeriod = 200ms;  // also the period of the progress bar
 
 int print_how_to_cancel(const Following& following) {
-  constexpr int kInterrupted = 128 + SIGINT;  // the exit code that a shell reports for SIGINT
+  static_assert(number(ExitCode::Interrupted) == 128 + SIGINT);
   if (following.cancel.empty()) {
     fmt::print(stderr, "abbe: {} continues; no command ends it\n", following.what);
   } else {
     fmt::print(stderr, "abbe: {} continues; to end it: {} --socket {}\n", following.what,
                following.cancel, following.socket.string());
   }
-  return kInterrupted;
+  return number(ExitCode::Interrupted);
 }
 
 /// Detects a restart of the daemon: compares the process of each status with that of the first.

@@ -66,18 +66,24 @@ int list(const ModelStoreArguments& arguments) {
     nlohmann::json array = nlohmann::json::array();
     for (const auto& entry : *entries) array.push_back(to_json(entry));
     fmt::print("{}\n", array.dump(1));
+  } else if (entries->empty()) {
+    fmt::print(
+        "the store has no models; `abbe calibrate` and `abbe identify ... --keep DIR` add "
+        "them\n");
   } else {
     print_table(*entries);
   }
   return 0;
 }
 
-void print_model(const ModelDocument& document, const StoreEntry& entry) {
-  const auto& s = document.statistics;
+void print_entry(const StoreEntry& entry) {
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
              to_text(entry.added));
-
   for (const auto& reason : entry.reasons) fmt::print("            {}\n", reason);
+}
+
+void print_model(const ModelDocument& document) {
+  const auto& s = document.statistics;
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
              to_text(document.created), document.machine, document.model.layout().chain().text(),
              document.method, document.estimator, name(document.model.gauge()));
@@ -100,10 +106,25 @@ Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
   return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
 }
 
+/// The file need not be in a store: state and verdict are then not known.
+int show_file(const ModelStoreArguments& arguments) {
+  const auto document = read_model(arguments.id);
+  if (!document) return report(document.error());
+
+  if (arguments.json) {
+    fmt::print("{}", to_json(*document));
+  } else {
+    fmt::print("id          {}\nfile        {}\n", model_id(*document), arguments.id);
+    print_model(*document);
+  }
+  return 0;
+}
+
 int show(const ModelStoreArguments& arguments) {
+  if (names_a_file(arguments.id)) return show_file(arguments);
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
-  const auto id = store->find(arguments.id);
+  const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
   const auto document = store->load(*id);
   if (!document) return report(document.error());
@@ -115,7 +136,8 @@ int show(const ModelStoreArguments& arguments) {
 
   const auto entry = entry_of(*store, *id);
   if (!entry) return report(entry.error());
-  print_model(*document, *entry);
+  print_entry(*entry);
+  print_model(*document);
 
   return 0;
 }
@@ -123,7 +145,7 @@ int show(const ModelStoreArguments& arguments) {
 int activate(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
-  const auto id = store->find(arguments.id);
+  const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
   if (const auto done = store->activate(*id, actor(arguments), arguments.force); !done)
     return report(done.error());
@@ -154,7 +176,10 @@ void add_model_show(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command =
       parent.add_subcommand("show", "Show a model: its origin, its quality and its tables");
-  command->add_option("ID", arguments->id, "model id, the beginning of an id, or \"active\"")
+  command
+      ->add_option("ID", arguments->id,
+                   "model id, the beginning of an id (at least 4 characters), \"active\", or the "
+                   "path of a model.json")
       ->required();
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "print the whole model.json");
@@ -165,7 +190,10 @@ void add_model_activate(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command =
       parent.add_subcommand("activate", "Activate a model; the store records user and reason");
-  command->add_option("ID", arguments->id, "model id, or the beginning of an id")->required();
+  command
+      ->add_option("ID", arguments->id,
+                   "model id, or the beginning of an id (at least 4 characters)")
+      ->required();
   add_store_options(*command, arguments->store);
   command->add_option("--why", arguments->why, "reason, for the record; required with --force");
   command->add_flag("--force", arguments->force, "activate a model that the gate refused");

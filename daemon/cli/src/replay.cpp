@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/replay/replay.hpp"
 #include "commands.hpp"
 #include "sample_lines.hpp"
@@ -120,7 +121,7 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
 /// With another configuration (-c) the model may differ from the live one.
 int exit_code_of(const RecordingReader& recording, const ReplayReport& report,
                  const ReplayArguments& arguments) {
-  constexpr int kDone = 0, kNoAnswer = 1;
+  constexpr int kDone = number(ExitCode::Done), kNoAnswer = number(ExitCode::DataInsufficient);
   const bool all_identified = std::all_of(report.calibrations.begin(), report.calibrations.end(),
                                           [](const auto& c) { return c.outcome && *c.outcome; });
   const bool sound = recording.damage().empty() && report.undecodable == 0;
@@ -186,8 +187,7 @@ void add_replay(CLI::App& parent, int& exit) {
                       "use this configuration instead of the recorded one");
   auto* as_json = command->add_flag("--json", arguments->json, "print one JSON object");
   command
-      ->add_flag("--samples", arguments->samples,
-                 "print one line per sample instead of the report")
+      ->add_flag("--samples", arguments->samples, "print one line per sample instead of the report")
       ->excludes(as_json);
   command->callback([arguments, &exit] { exit = run(*arguments); });
 }

@@ -11,24 +11,37 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "abbe/base/exit_codes.hpp"
 #include "commands.hpp"
 #include "dds_keys.hpp"
+#include "examples.hpp"
+#include "known_commands.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 
 namespace {
 
-constexpr std::string_view kFooter =
-    "Separate programs: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n"
-    "Exit codes: 0 done; 1 the data do not allow an answer (rank, alignment, too few points), or\n"
-    "a replay gave another model; 2 usage; 3 invalid input file; 4 input or output failed;\n"
-    "5 refused by the gate, or because of the state of the daemon; 130 interrupted while\n"
-    "following a calibration, which continues.\n"
-    "Units: lengths mm, small errors um, angles rad or urad, times s; every column and key names\n"
-    "its unit.";
+std::string footer() {
+  return "Separate programs: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n" +
+         exit_codes_text(
+             {{ExitCode::Done},
+              {ExitCode::DataInsufficient,
+               "the data do not allow an answer (rank, alignment, too few points), or a replay "
+               "gave another model"},
+              {ExitCode::Usage},
+              {ExitCode::BadInput},
+              {ExitCode::Io},
+              {ExitCode::Refused,
+               "refused by the gate, or because of the state of the daemon or of the model store"},
+              {ExitCode::Interrupted,
+               "interrupted while following a calibration, which continues"}}) +
+         "\nUnits: lengths mm, small errors um, angles rad or urad, times s; every column and key\n"
+         "names its unit.";
+}
 
 /// Subcommands that are separate programs, as with git.
 constexpr std::array<std::string_view, 2> kPrograms{"sim", "watch"};
@@ -39,11 +52,10 @@ std::filesystem::path own_folder() {
 }
 
 /// Replaces this process by the program. Returns only if the program cannot be run.
-Error exec_program(std::string_view name, int argc, const char* const* argv) {
-  const auto program = fmt::format("abbe-{}", name);
+/// words[0] is its name without "abbe-".
+Error exec_program(std::vector<std::string> words) {
+  const auto program = words[0] = fmt::format("abbe-{}", words[0]);
   const auto beside = (own_folder() / program).string();
-  std::vector<std::string> words{program};
-  for (int i = 2; i < argc; ++i) words.emplace_back(argv[i]);
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (auto& word : words) arguments.push_back(word.data());
@@ -56,8 +68,7 @@ Error exec_program(std::string_view name, int argc, const char* const* argv) {
 
 void add_commands(CLI::App& app, int& exit) {
   add_status(app, exit);
-  auto* calibrate =
-      app.add_subcommand("calibrate", "Calibrate the machine of the running daemon");
+  auto* calibrate = app.add_subcommand("calibrate", "Calibrate the machine of the running daemon");
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_evemu(*calibrate, exit);
@@ -74,8 +85,8 @@ void add_commands(CLI::App& app, int& exit) {
   add_identify_evemu(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);
-  auto* model = app.add_subcommand(
-      "model", "Evaluate models, and manage the model store of a machine");
+  auto* model =
+      app.add_subcommand("model", "Evaluate models, and manage the model store of a machine");
   model->require_subcommand(1);
   add_model_eval(*model, exit);
   add_model_compare(*model, exit);
@@ -88,22 +99,26 @@ void add_commands(CLI::App& app, int& exit) {
   add_dds_keys(*dds, exit);
 }
 
-int parse_and_run(int argc, const char* const* argv) {
+int parse_and_run(const std::vector<std::string>& words) {
   int exit = 0;
   CLI::App app{
       "abbe identifies the geometric errors of machine tools and measuring machines, and stores "
       "the models."};
   app.name("abbe");
   app.set_version_flag("--version", "abbe " ABBE_VERSION);
-  app.footer(std::string{kFooter});
+  app.footer(footer());
   app.require_subcommand(1);
   add_commands(app, exit);
+  add_examples(app);
 
   try {
-    app.parse(argc, argv);
+    // CLI11 takes the words in reverse order.
+    app.parse(std::vector<std::string>{words.rbegin(), words.rend()});
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
+    if (const auto unknown = unknown_command(app, words, {kPrograms.begin(), kPrograms.end()}))
+      return report(*unknown);
     return report(
         {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help after any command"}});
   }
@@ -115,10 +130,11 @@ int parse_and_run(int argc, const char* const* argv) {
 
 int run_cli(int argc, const char* const* argv) {
   try {
-    const std::string_view first = argc > 1 ? argv[1] : "";
-    if (std::find(kPrograms.begin(), kPrograms.end(), first) != kPrograms.end())
-      return report(exec_program(first, argc, argv));
-    return parse_and_run(argc, argv);
+    auto words = command_line(argc, argv);
+    if (!words.empty() &&
+        std::find(kPrograms.begin(), kPrograms.end(), words.front()) != kPrograms.end())
+      return report(exec_program(std::move(words)));
+    return parse_and_run(words);
   } catch (const std::exception& exception) {
     return report({ErrorCode::Io, exception.what()});
   }

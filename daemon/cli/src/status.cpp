@@ -7,9 +7,11 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/units.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "terminal.hpp"
@@ -64,6 +66,28 @@ void print_reference(const json& reference) {
   fmt::print("\n");
 }
 
+/// An axis without a current position is shown as "-".
+std::string position_text(const json& axis, const json& position) {
+  constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
+  const bool rotary = axis["kind"] == "rotary";
+  if (!position.is_number()) return fmt::format("{} -", axis["axis"].get<std::string>());
+  return fmt::format("{} {:.4f} {}", axis["axis"].get<std::string>(),
+                     position.get<double>() * (rotary ? kDegreesPerRad : kMmPerM),
+                     rotary ? "deg" : "mm");
+}
+
+/// Older versions of abbed send no "axes".
+void print_positions(const json& status) {
+  const json axes = status.value("axes", json::array());
+  const json positions = status.value("position_m", json::array());
+  if (axes.empty() || axes.size() != positions.size()) return;
+
+  fmt::print("position   ");
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    fmt::print("{}{}", i == 0 ? "" : "  ", position_text(axes[i], positions[i]));
+  fmt::print("\n");
+}
+
 void print_next(const json& next) {
   fmt::print("next       {} of position {}, {} of {} points touched\n",
              next["on"].get<std::string>(), next["position"].get<int>(),
@@ -111,6 +135,7 @@ void print_status(const json& status) {
              session["reason"].get<std::string>());
   if (session.contains("next")) print_next(session["next"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
+  print_positions(status);
   if (status.contains("reference")) print_reference(status["reference"]);
 
   if (const json axes = status.value("axes_without_zero", json::array()); !axes.empty()) {
@@ -151,9 +176,8 @@ int status(const DaemonSocket& where, bool as_json) {
 void add_status(CLI::App& parent, int& exit) {
   auto where = std::make_shared<DaemonSocket>();
   auto as_json = std::make_shared<bool>(false);
-  auto* command =
-      parent.add_subcommand("status",
-                            "Show model, session, devices and DDS state of the running daemon");
+  auto* command = parent.add_subcommand(
+      "status", "Show model, session, devices and DDS state of the running daemon");
   add_socket_options(*command, *where);
   command->add_flag("--json", *as_json, "print one JSON object");
   command->callback([where, as_json, &exit] { exit = status(*where, *as_json); });

@@ -1,11 +1,26 @@
 #include "store_option.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <system_error>
 
 #include "abbe/config/config.hpp"
 
 namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<fs::path> folder_of(const StoreOption& where) {
+  if (where.config.empty()) return fs::path{where.folder};
+  const auto config = load_config(where.config);
+  if (!config) return tl::unexpected(config.error());
+  return config->daemon.models_dir();
+}
+
+}  // namespace
 
 void add_store_options(CLI::App& command, StoreOption& where) {
   auto* store =
@@ -15,20 +30,47 @@ void add_store_options(CLI::App& command, StoreOption& where) {
 }
 
 Result<ModelStore> open_store(const StoreOption& where) {
-  if (where.config.empty()) return ModelStore::open(where.folder);
-  const auto config = load_config(where.config);
-  if (!config) return tl::unexpected(config.error());
-  return ModelStore::open(config->daemon.models_dir());
+  const auto folder = folder_of(where);
+  if (!folder) return tl::unexpected(folder.error());
+
+  std::error_code seen;
+  const bool exists = fs::is_directory(*folder, seen);
+  if (!exists && (!seen || seen == std::errc::no_such_file_or_directory))
+    return fail(ErrorCode::Io,
+                fmt::format("{}: there is no such folder; give the folder of a model store with "
+                            "--store, or the abbed.toml with -c",
+                            folder->string()));
+  if (exists && !fs::exists(*folder / "models", seen) && !seen)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: is not a model store: it has no folder \"models\"; the store of "
+                    "abbed is DATA_DIR/models, and `abbe identify ... --keep DIR` makes one",
+                    folder->string()));
+  return ModelStore::open(*folder);
+}
+
+Result<std::string> id_named(const ModelStore& store, const std::string& name) {
+  if (name != "active") return store.find(name);
+
+  const auto active = store.active_id();
+  if (!active) return tl::make_unexpected(active.error());
+  if (*active) return **active;
+  return fail(ErrorCode::Refused,
+              "no model is active; `abbe model list` lists the models, `abbe model activate ID` "
+              "makes one active");
+}
+
+bool names_a_file(const std::string& name) {
+  std::error_code ignored;
+  const fs::path file = name;
+  return file.has_parent_path() || file.has_extension() || fs::exists(file, ignored);
 }
 
 Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
-  std::error_code ignored;
-  const std::filesystem::path file = name;
-  if (file.has_parent_path() || file.has_extension() || std::filesystem::exists(file, ignored))
-    return read_model(file);
+  if (names_a_file(name)) return read_model(name);
   const auto store = open_store(where);
   if (!store) return tl::make_unexpected(store.error());
-  const auto id = store->find(name);
+  const auto id = id_named(*store, name);
   if (!id) return tl::make_unexpected(id.error());
   return store->load(*id);
 }

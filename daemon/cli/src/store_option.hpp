@@ -14,7 +14,14 @@ struct StoreOption {
 };
 
 void add_store_options(CLI::App& command, StoreOption& where);
+/// An existing store; creates nothing. Io if the folder does not exist, BadInput if it is no store.
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
+
+/// The id that `name` stands for: "active" or the beginning of an id. Refused if no model is
+/// active; else as ModelStore::find().
+[[nodiscard]] Result<std::string> id_named(const ModelStore& store, const std::string& name);
+/// True for a path, a name with an extension, and a file that exists.
+[[nodiscard]] bool names_a_file(const std::string& name);
 
 /// Reads a model file, or a model of the store by its id, the beginning of its id, or "active". A
 /// name that looks like a path is never looked up in the store.

@@ -8,7 +8,6 @@
 #include "abbe/base/units.hpp"
 
 namespace abbe::daemon {
-namespace {}  // namespace
 
 Result<calib::Vector3> parse_mm(const std::string& option, const std::string& text) {
   const auto malformed = [&] {
@@ -40,10 +39,12 @@ Result<calib::Vector3> tool_of(const std::string& text, const calib::VolumetricM
     tool_m = *given;
   }
   if (!model.holds_for_tool(tool_m))
-    return fail(ErrorCode::DataInsufficient,
-                fmt::format("tool offset {}, {}, {} mm: the model was identified with another tool "
-                            "offset and is not valid for it",
-                            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
+    return fail(
+        ErrorCode::DataInsufficient,
+        fmt::format(
+            "tool offset ({:.6g}, {:.6g}, {:.6g}) mm: the model was identified with another tool "
+            "offset and is not valid for it",
+            tool_m[0] * kMmPerM, tool_m[1] * kMmPerM, tool_m[2] * kMmPerM));
   return tool_m;
 }
 

@@ -11,8 +11,6 @@
 
 namespace abbe::daemon {
 
-namespace {
-
 Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
   read_machine(root, config.machine);
@@ -35,6 +33,17 @@ Config read_all(Section& root, const std::filesystem::path& base) {
 
   return config;
 }
+
+Result<std::string> read_configuration_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
+  if (in.bad() || !in.is_open())
+    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  return text.str();
+}
+
+namespace {
 
 std::string reading_text(const EncoderConfig& encoder) {
   std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
@@ -68,7 +77,7 @@ std::string reading_text(const ReferenceConfig& reference) {
 Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
   const auto table = parse_toml(text, file.string());
   if (!table) return tl::make_unexpected(table.error());
-  Faults faults(file.string());
+  Faults faults(file.string(), kMostConfigFaults);
   Section root(&*table, "", {1, 1}, faults);
   auto config = read_all(root, file.parent_path());
   if (faults.any()) return tl::make_unexpected(faults.to_error());
@@ -76,12 +85,9 @@ Result<Config> parse_config(std::string_view text, const std::filesystem::path& 
 }
 
 Result<Config> load_config(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in && in.peek() != std::ifstream::traits_type::eof()) text << in.rdbuf();
-  if (in.bad() || !in.is_open())
-    return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
-  return parse_config(text.str(), file);
+  const auto text = read_configuration_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_config(*text, file);
 }
 
 std::vector<std::string> Config::connected_axes() const {

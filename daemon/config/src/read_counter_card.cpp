@@ -5,6 +5,7 @@
 
 #include "machine_order.hpp"
 #include "message_bounds.hpp"
+#include "plausible.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -19,7 +20,7 @@ void read_transport(Section& card, CounterCardConfig& out) {
   card.get_word<CardTransport>("transport", out.transport,
                                {{"usb", CardTransport::Usb}, {"usbip", CardTransport::Usbip}},
                                Need::Required);
-  card.get("host", out.host);
+  get_host(card, "host", out.host);
   card.get_integer("port", out.port, 1, 65535);
   card.get("bus_id", out.bus_id);
   if (out.transport == CardTransport::Usbip) return;
@@ -76,6 +77,7 @@ drivers::CounterAxis read_axis(Section& section, const MachineConfig& machine) {
   const bool linear = known == nullptr || known->kind == AxisKind::Linear;
   section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
   section.get(linear ? "step_nm" : "step_nrad", axis.scale, kNano, kNotNegative, Need::Required);
+  check_step(section, axis.scale, linear);
   section.get(linear ? "offset_mm" : "offset_rad", axis.offset, linear ? kMilli : kPlain, kAny);
   section.get("latch_on_index", axis.latch_on_index);
   read_debounce(section, "debounce_code", axis.debounce);

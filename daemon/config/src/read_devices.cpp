@@ -7,6 +7,7 @@
 #include "abbe/drivers/tracker/order.hpp"
 #include "machine_order.hpp"
 #include "message_bounds.hpp"
+#include "plausible.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -134,7 +135,7 @@ void read_transport(Section& encoder, EncoderConfig& out) {
     refuse(encoder, {"local_port", "peer_host", "peer_port"}, "socketcan");
   } else {
     encoder.get_integer("local_port", out.local_port, 0, 65535);
-    encoder.get("peer_host", out.peer_host, Need::Required);
+    get_host(encoder, "peer_host", out.peer_host, Need::Required);
     encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);
     encoder.get_word<SyncConfig>(
         "sync", out.sync, {{"daemon", SyncConfig::Daemon}, {"external", SyncConfig::External}});
@@ -174,6 +175,7 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
   section.get_integer("node", node.node, 1, 127, Need::Required);
   const bool linear = node.kind == AxisKind::Linear;
   section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive);
+  check_step(section, node.step, linear);
   section.get(linear ? "offset_mm" : "offset_rad", node.offset, linear ? kMilli : kPlain, kAny);
   bool invert = false;
   if (section.get("invert", invert) && invert) node.step = -node.step;
@@ -222,7 +224,7 @@ void read_tracker(Section& root, Config& out) {
   read_noise(tracker, out.machine);
   read_placement(tracker, out.machine);
   TrackerConfig config;
-  const bool has_host = tracker.get("host", config.host);
+  const bool has_host = get_host(tracker, "host", config.host);
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
   tracker.get_integer("port", config.port, 1, 65535);
   read_mode(tracker, config);

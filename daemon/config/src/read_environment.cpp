@@ -7,6 +7,7 @@
 #include "abbe/drivers/environment/known_maps.hpp"
 #include "abbe/drivers/environment/link.hpp"
 #include "message_bounds.hpp"
+#include "plausible.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -44,7 +45,7 @@ void read_address(Section& device, drivers::ModbusAddress& out) {
 
   if (!serial) {
     drivers::ModbusTcp tcp;
-    device.get("host", tcp.host);
+    get_host(device, "host", tcp.host);
     device.get_integer("port", tcp.port, 1, 65535);
     for (const auto key : {"baud", "parity", "stop_bits"})
       if (device.has(key)) device.fault(key, "has no meaning without serial");

@@ -9,6 +9,7 @@
 #include "abbe/calib/parameter_layout.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "message_bounds.hpp"
+#include "plausible.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -34,6 +35,7 @@ void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& o
 
   if (has_range && config.min >= config.max)
     axis.fault(max_key, fmt::format("must exceed {}", min_key));
+  if (has_range) check_travel_length(axis, max_key, config);
   config.reference = config.min <= 0.0 && config.max >= 0.0 ? 0.0 : config.min;
   const bool has_reference = axis.get(reference_key, config.reference, unit, kAny);
   if (has_reference && has_range &&

@@ -1,5 +1,6 @@
 #include "abbe/config/touch_options.hpp"
 #include "message_bounds.hpp"
+#include "plausible.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -58,7 +59,7 @@ void read_cmm(Section& root, Config& out) {
   if (!cmm.present()) return;
   CmmConfig config;
   get_bounded(cmm, "name", config.name, bound_of<v1::ProbeTrigger>("device"));
-  cmm.get("host", config.host, Need::Required);
+  get_host(cmm, "host", config.host, Need::Required);
   cmm.get_integer("port", config.port, 1, 65535);
   cmm.get("tool", config.tool);
   cmm.get("home", config.home);

@@ -7,6 +7,14 @@
 
 namespace abbe::daemon {
 
+/// All faults of a file that a person wrote; the limit is for a file that is no configuration.
+inline constexpr std::size_t kMostConfigFaults = 1000;
+
+/// Io if the file cannot be read.
+[[nodiscard]] Result<std::string> read_configuration_text(const std::filesystem::path& file);
+/// All tables. `base`: folder of the file, for relative paths.
+[[nodiscard]] Config read_all(Section& root, const std::filesystem::path& base);
+
 void read_machine(Section& root, MachineConfig& out);
 void read_tracker(Section& root, Config& out);
 void read_encoder(Section& root, Config& out);

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
@@ -26,12 +27,21 @@ using abbe::daemon::DdsFeed;
 using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 
-constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
+using abbe::daemon::ExitCode;
 
-constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT, or the parent process has ended; 2 usage;\n"
-    "3 the configuration or the profile cannot be used; 4 no participant or writer can be\n"
-    "created; 70 internal error.";
+constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
+              kBadInput = number(ExitCode::BadInput), kIo = number(ExitCode::Io),
+              kInternal = number(ExitCode::Internal);
+
+std::string footer() {
+  return "Example: abbe-dds -c /etc/abbe/abbed.toml\n" +
+         abbe::daemon::exit_codes_text(
+             {{ExitCode::Done, "stopped by SIGTERM or SIGINT, or the parent process has ended"},
+              {ExitCode::Usage},
+              {ExitCode::BadInput, "the configuration or the profile cannot be used"},
+              {ExitCode::Io, "no participant or writer can be created"},
+              {ExitCode::Internal}});
+}
 
 volatile sig_atomic_t stop_requested = 0;
 
@@ -164,7 +174,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Publishes over DDS the data that abbed sends over its local socket, and publishes "
       "ModelState INVALID when abbed is lost."};
-  app.footer(kExitCodes);
+  app.footer(footer());
+  app.set_version_flag("--version", "abbe-dds " ABBE_VERSION);
   Options options;
   options.participant.role = abbe::daemon::DdsRole::Daemon;
   auto* const socket =

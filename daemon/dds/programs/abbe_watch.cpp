@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -14,7 +15,9 @@
 #include <string>
 #include <utility>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/known_errors.hpp"
+#include "abbe/config/config.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/dds/participant.hpp"
@@ -33,12 +36,35 @@ using daemon::Result;
 using daemon::Topic;
 using WallClock = std::chrono::steady_clock;
 
-constexpr int kDone = 0, kNoAnswer = 1, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
+using daemon::ExitCode;
 
-constexpr const char* kExitCodes =
-    "Exit codes: 0 done; 1 no model that may be applied arrived in time (stderr has the reason);\n"
-    "2 usage; 3 a file or profile cannot be used; 4 no participant or output file can be created;\n"
-    "70 internal error.";
+constexpr int kDone = number(ExitCode::Done), kNoAnswer = number(ExitCode::DataInsufficient),
+              kUsage = number(ExitCode::Usage), kBadInput = number(ExitCode::BadInput),
+              kIo = number(ExitCode::Io), kInternal = number(ExitCode::Internal);
+
+std::string footer() {
+  return "Examples:\n"
+         "  abbe watch -c /etc/abbe/abbed.toml\n"
+         "  abbe watch --domain 7 --machine mill --grid-csv grid.csv --timeout 60\n" +
+         daemon::exit_codes_text(
+             {{ExitCode::Done},
+              {ExitCode::DataInsufficient,
+               "no model that may be applied arrived in time (stderr has the reason)"},
+              {ExitCode::Usage},
+              {ExitCode::BadInput, "a file or profile cannot be used"},
+              {ExitCode::Io, "no participant or output file can be created"},
+              {ExitCode::Internal}});
+}
+
+/// In the order in which they are read. ModelState first: Readers::take() goes topic by topic, so
+/// every other sample is judged by the latest state.
+constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
+                             Topic::Snapshot,        Topic::Health,     Topic::Compensation,
+                             Topic::CalibrationEvent};
+
+/// Without any sample for so long, the user learns what is waited for. ModelState is repeated every
+/// second.
+constexpr std::chrono::seconds kReportedSilence{5};
 
 /// A publisher is not alive if its last ModelState is older. ModelState is repeated every second,
 /// even if nothing changes.
@@ -47,6 +73,7 @@ constexpr std::chrono::milliseconds kLongestSilence{1500};
 volatile sig_atomic_t stop_requested = 0;
 
 struct Options {
+  std::string config;  ///< empty: the options below apply
   dds::ParticipantOptions participant;
   std::string machine;  ///< empty: all machines
   bool json = false;
@@ -61,6 +88,7 @@ struct Options {
 
 int exit_code_of(const Error& error) {
   std::fprintf(stderr, "abbe-watch: %s\n", error.text.c_str());
+  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
   switch (error.code) {
     case ErrorCode::DataInsufficient:
       return kNoAnswer;
@@ -94,7 +122,11 @@ class Watch {
         const dds::ParticipantAddresses& addresses)
       : options_(options), readers_(readers), addresses_(addresses) {}
 
+  /// True once a sample of any machine has arrived.
+  [[nodiscard]] bool received() const { return received_; }
+
   void take(const dds::Arrival& arrival) {
+    received_ = true;
     using Verdict = dds::PublisherPin::Verdict;
     const auto key = daemon::payload_key(arrival.topic, arrival.payload);
 
@@ -335,6 +367,7 @@ class Watch {
   const Options& options_;
   const dds::Readers& readers_;
   const dds::ParticipantAddresses& addresses_;
+  bool received_ = false;
   const bool on_terminal_ = ::isatty(STDOUT_FILENO) != 0;
   std::map<std::string, Machine> machines_;
   std::map<std::pair<std::string, std::string>, std::string> health_;  // by machine and stream
@@ -388,15 +421,52 @@ Result<void> use_model(const Options& options, const dds::ReceivedModel& model,
   return {};
 }
 
+/// Reports once, on stderr, that nothing arrives, with the possible causes.
+void report_silence(const Options& options) {
+  std::string topics;
+  for (const auto topic : kTopics)
+    topics += fmt::format("{}{}", topics.empty() ? "" : ", ", daemon::traits(topic).name);
+  fmt::print(stderr,
+             "abbe-watch: nothing received for {} s in DDS domain {}; waiting for the topics {}\n"
+             "  check that abbed and abbe-dds run (abbe status), and that domain, profile and "
+             "security are those of [dds] in abbed.toml (-c FILE takes them from it)\n",
+             kReportedSilence.count(), options.participant.domain, topics);
+}
+
+/// The keys of the daemon allow publishing, and only abbed may read them: those of subscriber-1
+/// beside them are used.
+std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) {
+  return daemon_keys.filename() == "daemon" ? daemon_keys.parent_path() : daemon_keys;
+}
+
+/// --security on the command line takes precedence.
+Result<void> take_from_config(Options& options) {
+  auto config = daemon::load_config(options.config);
+  if (!config) return tl::make_unexpected(config.error());
+
+  options.participant.domain = config->dds.domain;
+  options.participant.profiles = config->dds.profile;
+  if (options.participant.security.empty())
+    options.participant.security = subscriber_keys(config->dds.security);
+  return {};
+}
+
 int watch(const Options& options, dds::Readers& readers, const dds::ParticipantAddresses& addresses,
           const std::optional<daemon::KnownErrorsFile>& known) {
   Watch watch(options, readers, addresses);
   const auto start = WallClock::now();
+  bool silence_reported = false;
   while (stop_requested == 0 &&
          std::chrono::duration<double>(WallClock::now() - start).count() < options.timeout_s) {
     readers.wait(std::chrono::milliseconds{100});
     readers.take([&](const dds::Arrival& arrival) { watch.take(arrival); });
     watch.notice_losses();
+
+    if (!watch.received() && !silence_reported && WallClock::now() - start >= kReportedSilence) {
+      silence_reported = true;
+      report_silence(options);
+    }
+
     if (!options.ends_with_model()) continue;
     if (const auto* model = watch.applicable()) {
       const auto used = use_model(options, *model, known);
@@ -420,11 +490,6 @@ int run(const Options& options) {
   auto participant = dds::Participant::create(options.participant);
   if (!participant) return exit_code_of(participant.error());
 
-  // ModelState first: Readers::take() goes topic by topic, so every other sample is judged by the
-  // latest state.
-  constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
-                               Topic::Snapshot,        Topic::Health,     Topic::Compensation,
-                               Topic::CalibrationEvent};
   if (!participant->is_secure())
     std::fprintf(stderr, "abbe-watch: %s\n",
                  daemon::dds_security_is_off(options.participant.domain).c_str());
@@ -444,16 +509,23 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Shows the data that abbe publishes over DDS, and whether the correction may be applied by "
       "the rule of abbe_v1.idl: apply or not."};
-  app.footer(kExitCodes);
+  app.footer(footer());
+  app.set_version_flag("--version", "abbe-watch " ABBE_VERSION);
   Options options;
-  app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
-      ->capture_default_str();
-  app.add_option(
+  auto* const domain =
+      app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
+          ->capture_default_str();
+  auto* const profile = app.add_option(
       "--profile", options.participant.profiles,
       "XML file with a participant profile \"abbe\" (default: built in, UDP on every interface)");
   app.add_option("--security", options.participant.security,
                  "folder of keys from the same `abbe dds keys` as the publisher's (default: DDS "
                  "Security is off)");
+  app.add_option("-c,--config", options.config,
+                 "take domain, profile and security from [dds] of this abbed.toml; instead of keys "
+                 "in daemon/ those in subscriber-1/ beside it are used")
+      ->excludes(domain)
+      ->excludes(profile);
   app.add_option("--machine", options.machine, "only this machine (default: all)");
   app.add_flag("--json", options.json, "print one line with a JSON object per sample");
   app.add_flag("--until-model", options.until_model,
@@ -474,6 +546,9 @@ int main(int argc, char** argv) {
   }
 
   try {
+    if (!options.config.empty()) {
+      if (const auto taken = take_from_config(options); !taken) return exit_code_of(taken.error());
+    }
     return run(options);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "abbe-watch: internal error: %s\n", e.what());

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "abbe/base/bounded_json.hpp"
 #include "abbe/messages/attachment_content.hpp"
 
 namespace abbe::daemon {
@@ -45,7 +46,7 @@ Result<CalibrationTask> task_from_json(const json& object, const Config* config)
     return fail(ErrorCode::Usage, fmt::format("calibrate: unknown method \"{}\", known: \"{}\"",
                                               name, fmt::join(Methods::kNames, "\", \"")));
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("calibrate: {}", e.what()));
+    return fail(ErrorCode::BadInput, fmt::format("calibrate: {}", cause_of(e)));
   }
 }
 
@@ -85,7 +86,8 @@ Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment
     request.from = from;
     return request;
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("attachment {}: {}", attachment.name, cause_of(e)));
   }
 }
 

@@ -66,6 +66,34 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
+constexpr std::size_t kShortestPrefix = 4;
+
+/// Why `prefix` does not name one of `candidates`, the ids that begin with it.
+Error not_found(const std::string& prefix, const std::vector<std::string>& candidates,
+                const fs::path& folder) {
+  constexpr std::size_t kMostListed = 10;
+  Error error{ErrorCode::Usage, fmt::format("model \"{}\": ", prefix)};
+
+  if (prefix.size() < kShortestPrefix)
+    error.text += fmt::format("give at least {} characters of the id; ", kShortestPrefix);
+  if (candidates.empty()) {
+    error.text += fmt::format("no id in {} begins with it", folder.string());
+    return error;
+  }
+  error.text += fmt::format("{} {} in {} {} with it", candidates.size(),
+                            candidates.size() == 1 ? "id" : "ids", folder.string(),
+                            candidates.size() == 1 ? "begins" : "begin");
+  if (candidates.size() > 1 && prefix.size() >= kShortestPrefix)
+    error.text += ": give more characters";
+
+  for (const auto& id : candidates) {
+    if (error.details.size() < kMostListed) error.details.push_back(id);
+  }
+  if (candidates.size() > kMostListed)
+    error.details.push_back(fmt::format("and {} more", candidates.size() - kMostListed));
+  return error;
+}
+
 }  // namespace
 
 Result<ModelStore> ModelStore::open(const fs::path& folder) {
@@ -222,19 +250,14 @@ Result<std::string> ModelStore::find(const std::string& prefix) const {
     return *active ? Result<std::string>{**active} : fail(ErrorCode::Usage, "no model is active");
   }
 
-  constexpr std::size_t kShortest = 4;
+  const auto ids = ids_on_disk(folder_);
+  if (!ids) return tl::make_unexpected(ids.error());
   std::vector<std::string> found;
-  if (prefix.size() >= kShortest) {
-    const auto ids = ids_on_disk(folder_);
-    if (!ids) return tl::make_unexpected(ids.error());
-    for (const auto& id : *ids)
-      if (id.starts_with(prefix)) found.push_back(id);
-  }
+  for (const auto& id : *ids)
+    if (id.starts_with(prefix)) found.push_back(id);
 
-  if (found.size() == 1) return found.front();
-  return fail(ErrorCode::Usage,
-              fmt::format("model \"{}\": {} of the ids in {} begin with it", prefix,
-                          found.empty() ? "none" : std::to_string(found.size()), folder_.string()));
+  if (found.size() == 1 && prefix.size() >= kShortestPrefix) return found.front();
+  return tl::make_unexpected(not_found(prefix, found, folder_));
 }
 
 }  // namespace abbe::daemon

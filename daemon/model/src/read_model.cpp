@@ -325,7 +325,7 @@ Result<ModelDocument> parse_model(std::string_view text, const std::string& file
     Reader reader(root, file);
     return read_document(reader);
   } catch (const Json::exception& exception) {
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, exception.what()));
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, cause_of(exception)));
   }
 }
 

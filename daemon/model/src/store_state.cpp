@@ -119,7 +119,7 @@ Result<StoreState> store_state_from_text(std::string_view text, const std::strin
     }
     return state;
   } catch (const json::exception& exception) {
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, exception.what()));
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, cause_of(exception)));
   }
 }
 

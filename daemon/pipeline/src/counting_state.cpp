@@ -189,7 +189,7 @@ Result<CountingState> counting_state_from_text(std::string_view text, std::strin
     if (!state) return fail(ErrorCode::BadInput, fmt::format("{}: a number is out of range", what));
     return std::move(*state);
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, e.what()));
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", what, cause_of(e)));
   }
 }
 

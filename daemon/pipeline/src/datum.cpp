@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/bounded_json.hpp"
 #include "abbe/messages/attachment_content.hpp"
 
 namespace abbe::daemon {
@@ -141,7 +142,8 @@ Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attach
         .at = protocol::HostTime{std::chrono::nanoseconds{content.at("at_ns").get<std::int64_t>()}},
         .unknown = content.at("unknown").get<std::uint8_t>()};
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("attachment {}: {}", attachment.name, cause_of(e)));
   }
 }
 
@@ -158,7 +160,8 @@ Result<protocol::HostTime> reference_request_from(const RecordingAttachment& att
     const auto ns = content->at("from_ns").get<std::int64_t>();
     return protocol::HostTime{std::chrono::nanoseconds{ns}};
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("attachment {}: {}", attachment.name, cause_of(e)));
   }
 }
 
@@ -175,7 +178,8 @@ Result<FoundDatum> datum_from_attachment(const RecordingAttachment& attachment) 
             protocol::HostTime{std::chrono::nanoseconds{content.at("from_ns").get<std::int64_t>()}},
         .stated = content.value("stated", false)};
   } catch (const json::exception& e) {
-    return fail(ErrorCode::BadInput, fmt::format("attachment {}: {}", attachment.name, e.what()));
+    return fail(ErrorCode::BadInput,
+                fmt::format("attachment {}: {}", attachment.name, cause_of(e)));
   }
 }
 

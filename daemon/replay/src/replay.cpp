@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <span>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -57,21 +58,30 @@ class Calibrations {
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
     while (next_ < requests_.size()) begin_next();
-    end();
+    end("the recording ends before the calibration is complete");
     return std::move(done_);
   }
 
  private:
   void begin_next() {
-    end();
+    end("another calibration was requested before this one was complete");
     session_ = CalibrationSession{Methods::options(config_)};
     (void)session_.start(requests_[next_]);
     identified_ = false;
     ++next_;
   }
-  void end() {
-    if (next_ > 0 && !identified_) done_.push_back({.ended = session_.status()});
+  /// `cause` is the reason if the session still takes readings: it has no state of its own then.
+  void end(std::string_view cause) {
+    if (next_ > 0 && !identified_) done_.push_back({.ended = ended(session_.status(), cause)});
     identified_ = true;
+  }
+  static SessionStatus ended(SessionStatus status, std::string_view cause) {
+    if (!takes_readings(status.state)) return status;
+    status.reason = fmt::format("{} (last state: {}, {})", cause, name(status.state),
+                                status.reason.empty() ? "no reason" : status.reason);
+    status.state = SessionState::Refused;
+    status.refused_as = ErrorCode::DataInsufficient;
+    return status;
   }
   void hand_over(CalibrationRun run) {
     done_.push_back({.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256});

@@ -22,6 +22,7 @@
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/unix_socket.hpp"
@@ -53,7 +54,7 @@ constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clo
 constexpr auto kHubTimeout = 1s;    // thousands of cycles; a hub that is silent for this long hangs
 // for the control socket (3 s at most), the journal and the hub to end
 constexpr auto kEndTimeout = 5s;
-constexpr int kHubHangs = 70;  // exit code
+constexpr int kHubHangs = number(ExitCode::Internal);
 
 /// UTC minus host time, both read now. The only conversion between the two clocks.
 protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <deque>
@@ -162,6 +163,16 @@ json positions_json(const protocol::Snapshot& live, bool old) {
   return positions;
 }
 
+/// Names and kinds of the axes that "position_m" has, in its order.
+json axes_json(const MachineConfig& machine, std::size_t count) {
+  json axes = json::array();
+  for (std::size_t i = 0; i < std::min(count, machine.axes.size()); ++i) {
+    const bool rotary = machine.axes[i].kind == AxisKind::Rotary;
+    axes.push_back({{"axis", machine.axes[i].name}, {"kind", rotary ? "rotary" : "linear"}});
+  }
+  return axes;
+}
+
 struct SeenLink {
   explicit SeenLink(const Publisher& publisher)
       : state(publisher.link().state()),
@@ -251,6 +262,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
   json& ended = out["ended_sessions"] = json::array();
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
+  out["axes"] = axes_json(config.machine, seen.live.axis_count);
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
   if (const auto air =
           config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)

@@ -99,6 +99,17 @@ TEST_F(AbbeDds, HelpListsTheExitCodes) {
   EXPECT_NE(help.transcript().find("Exit codes: 0 stopped"), std::string::npos);
 }
 
+TEST_F(AbbeDds, WatchTakesItsDomainFromTheConfigurationAndReportsSilence) {
+  write_config("systemd");
+  Process watch({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "-c", config,
+                 "--timeout", "6"});
+  EXPECT_EQ(watch.wait_for_end(), 0);
+  EXPECT_NE(watch.transcript().find("nothing received for 5 s in DDS domain " + domain_.text() +
+                                    "; waiting for the topics abbe/v1/ModelState"),
+            std::string::npos)
+      << watch.transcript();
+}
+
 /// What a process reports to the service manager.
 class NotifySocket {
  public:

@@ -7,6 +7,7 @@
 namespace abbe::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 struct Refusals : Spine {
@@ -33,8 +34,19 @@ struct Refusals : Spine {
   }
 };
 
-TEST_F(Refusals, ValidConfigurationIsReportedAsValid) {
-  EXPECT_EQ(run_abbed("--check-config").code, 0);
+TEST_F(Refusals, ValidConfigurationIsReportedAsValidWithItsContent) {
+  const auto outcome = run_abbed("--check-config");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("abbed.toml: valid\n"), HasSubstr("axis X "),
+                                 HasSubstr("127.0.0.1:1"), HasSubstr(file("data") + "/models")));
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("warnings:\n"), HasSubstr("daemon.simulated")));
+}
+
+TEST_F(Refusals, DataDirectoryThatIsAFileIsAFaultOfTheConfiguration) {
+  write("data", "");
+  const auto outcome = run_abbed("--check-config");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("abbed.toml:" + line_of("data_dir") + ":"));
 }
 
 TEST_F(Refusals, UnknownOptionIsUsage) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <string_view>
 
 #include "abbe/base/error.hpp"
@@ -24,9 +25,13 @@ struct JsonBounds {
 
 /// The parsed value, or BadInput with one of the texts
 ///   "WHAT: nested deeper than 32 at byte 33"
-///   "WHAT: not JSON at byte 17: unexpected ..."
+///   "WHAT: not JSON at byte 17: line 2, column 5: syntax error ...; expected ..."
 /// Pure; allocates; throws only std::bad_alloc.
 [[nodiscard]] Result<nlohmann::json> parse_json(std::string_view text, std::string_view what,
                                                 const JsonBounds& bounds = {});
+
+/// What the library reports, without the name of its exception type: "key 'events' not found", or
+/// for a syntax error "line 2, column 5: syntax error ...".
+[[nodiscard]] std::string cause_of(const nlohmann::json::exception& exception);
 
 }  // namespace abbe::daemon

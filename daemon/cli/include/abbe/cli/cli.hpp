@@ -1,8 +1,7 @@
 #pragma once
 /// The command line program `abbe`. Each subcommand has its own file in cli/src;
 /// cli/src/run_cli.cpp joins them. Results go to stdout, everything else to stderr; progress and
-/// colour only to a terminal (NO_COLOR switches colour off). Exit codes: 0 done, 1 the data do not
-/// allow an answer, 2 usage, 3 invalid input file, 4 input or output failed, 5 refused by the gate.
+/// colour only to a terminal (NO_COLOR switches colour off). Exit codes: abbe/base/exit_codes.hpp.
 
 namespace abbe::daemon {
 

@@ -405,7 +405,7 @@ struct Config {
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in
-/// Error::details, at most 20, each "file:line:column: key: what is wrong". A file with a fault
+/// Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with a fault
 /// is not used at all.
 [[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
 

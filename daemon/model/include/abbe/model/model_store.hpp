@@ -113,7 +113,7 @@ class ModelStore {
   [[nodiscard]] StoreStamp stamp() const noexcept;
 
   /// The id that begins with `prefix` (at least 4 digits); for "active" the active id. Usage if no
-  /// id or several ids match.
+  /// id or several ids match, or if `prefix` is shorter; the details list the ids that match.
   [[nodiscard]] Result<std::string> find(const std::string& prefix) const;
   [[nodiscard]] std::filesystem::path model_path(const std::string& id) const;
 

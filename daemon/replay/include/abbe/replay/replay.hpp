@@ -40,7 +40,9 @@ struct ReplayOptions {
 
 /// One calibration of the recording, replayed.
 struct ReplayedCalibration {
-  SessionStatus ended;  ///< state Identifying: the run was complete; else the reason why not
+  /// State Identifying: the run was complete. Refused: why it was not, for example because the
+  /// recording ends before.
+  SessionStatus ended;
   std::optional<Result<Candidate>>
       outcome;             ///< of a complete run; nullopt if it was passed to ReplayOptions::runs
   std::string model_hash;  ///< empty without a model

@@ -1,0 +1,82 @@
+#include "examples.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace abbe::daemon {
+namespace {
+
+struct Example {
+  std::string_view command;  ///< without "abbe "
+  std::string_view arguments;
+};
+
+constexpr std::array kExamples{
+    Example{"status", "-c /etc/abbe/abbed.toml"},
+    Example{"calibrate", "otf --path path.csv"},
+    Example{"calibrate otf", "--path path.csv"},
+    Example{"calibrate evemu", "--calibrator calibrator.toml"},
+    Example{"calibrate probe", "--recording run.mcap"},
+    Example{"calibrate artefact", "--calibrator nominal.toml --at 100,50,20 -o calibrator.toml"},
+    Example{"reference", "--here --axis X"},
+    Example{"machine", "where"},
+    Example{"machine where", ""},
+    Example{"machine stop", ""},
+    Example{"machine release", ""},
+    Example{"tracker", "status"},
+    Example{"tracker status", ""},
+    Example{"tracker initialize", ""},
+    Example{"tracker home", ""},
+    Example{"tracker find", "--distance-m 2.5"},
+    Example{"tracker reflector", "list"},
+    Example{"tracker reflector list", ""},
+    Example{"tracker reflector set", "7"},
+    Example{"replay", "run.mcap --raw"},
+    Example{"identify", "otf --recording run.mcap -o result"},
+    Example{"identify otf",
+            "--machine machine.toml --path path.csv --tracker tracker.csv -o result"},
+    Example{"identify evemu",
+            "--machine machine.toml --touches touches.csv --calibrator calibrator.toml -o result"},
+    Example{"identify artefact",
+            "--touches touches.csv --name array-1 --tip-radius-mm 2.5 -o calibrator.toml"},
+    Example{"verify", "active --recording run.mcap -o result"},
+    Example{"model", "list"},
+    Example{"model eval", "active --points points.csv"},
+    Example{"model compare", "active model.json"},
+    Example{"model list", "--store /var/lib/abbe/models"},
+    Example{"model show", "result/model.json"},
+    Example{"model activate", "6ad1 --why \"verified with the step gauge\""},
+    Example{"model rollback", "--why \"parts out of tolerance\""},
+    Example{"dds", "keys -o dds-keys"},
+    Example{"dds keys", "-o dds-keys --subscribers 2"},
+};
+
+const Example* example_of(std::string_view command) {
+  for (const auto& example : kExamples) {
+    if (example.command == command) return &example;
+  }
+  return nullptr;
+}
+
+void add_example(CLI::App& app, const std::string& command) {
+  if (const auto* example = example_of(command); example != nullptr)
+    app.footer(fmt::format("Example: abbe {}{}{}\n{}", command,
+                           example->arguments.empty() ? "" : " ", example->arguments,
+                           app.get_footer()));
+
+  for (auto* sub : app.get_subcommands([](const CLI::App*) { return true; }))
+    add_example(*sub, command.empty() ? sub->get_name() : command + " " + sub->get_name());
+}
+
+}  // namespace
+
+void add_examples(CLI::App& app) {
+  add_example(app, "");
+}
+
+}  // namespace abbe::daemon

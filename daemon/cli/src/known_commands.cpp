@@ -1,0 +1,93 @@
+#include "known_commands.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <numeric>
+
+namespace abbe::daemon {
+namespace {
+
+/// Insertions, deletions and replacements of one character that make `b` from `a` [Levenshtein].
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+std::vector<std::string> names_of(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const auto* sub : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(sub->get_name());
+  return names;
+}
+
+/// At most a third of the characters may differ, and two of a short word (two that are swapped
+/// count twice); with more, the guess is of no use.
+std::optional<std::string> nearest(const std::string& word, const std::vector<std::string>& names) {
+  const auto distance = [&](const std::string& name) { return edit_distance(word, name); };
+  const auto best = std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
+    return distance(a) < distance(b);
+  });
+  if (best == names.end()) return std::nullopt;
+
+  const std::size_t longest = std::max(word.size(), best->size());
+  const std::size_t most = std::min(longest / 2, std::max<std::size_t>(2, longest / 3));
+  return distance(*best) <= most ? std::optional{*best} : std::nullopt;
+}
+
+Error unknown_word(const std::string& word, const std::string& before,
+                   const std::vector<std::string>& names) {
+  Error error{ErrorCode::Usage, fmt::format("\"{}{}\" is not a command", before, word)};
+  if (const auto name = nearest(word, names)) {
+    error.text += fmt::format("; the nearest one is `abbe {}{}`", before, *name);
+  } else {
+    error.text += fmt::format("; known: {}", fmt::join(names, ", "));
+  }
+  error.details = {before.empty() ? "see `abbe --help`"
+                                  : fmt::format("see `abbe {}--help`", before)};
+  return error;
+}
+
+}  // namespace
+
+std::vector<std::string> command_line(int argc, const char* const* argv) {
+  std::vector<std::string> words;
+  for (int i = 1; i < argc; ++i) words.emplace_back(argv[i]);
+  if (words.empty() || words.front() != "help") return words;
+  words.erase(words.begin());
+  words.emplace_back("--help");
+  return words;
+}
+
+std::optional<Error> unknown_command(const CLI::App& app, const std::vector<std::string>& words,
+                                     const std::vector<std::string>& programs) {
+  const CLI::App* at = &app;
+  std::string before;  // the commands up to here, each with a space
+
+  for (const auto& word : words) {
+    auto names = names_of(*at);
+    if (names.empty() || word.starts_with('-')) return std::nullopt;
+    if (std::find(names.begin(), names.end(), word) == names.end()) {
+      if (at == &app) names.insert(names.end(), programs.begin(), programs.end());
+      return unknown_word(word, before, names);
+    }
+    at = at->get_subcommand(word);
+    before += word + " ";
+  }
+  return std::nullopt;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,188 @@
+#include "abbe/config/check_config.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <system_error>
+#include <utility>
+
+#include "abbe/base/units.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "readers.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---- What the configuration refers to on this computer ----
+
+/// `folder` if it exists, else the nearest parent that exists. Empty if it cannot be determined.
+fs::path existing_part(const fs::path& folder) {
+  std::error_code error;
+  auto part = fs::absolute(folder, error).lexically_normal();
+  while (!error && !fs::exists(part, error) && !error && part.has_relative_path())
+    part = part.parent_path();
+  return error ? fs::path{} : part;
+}
+
+/// A folder that exists, or that abbed can create.
+void check_folder(Section section, std::string_view key, const fs::path& folder) {
+  std::error_code error;
+  const auto part = existing_part(folder);
+  if (part.empty() || fs::is_directory(part, error) || error) return;
+  section.fault(key, fmt::format("{} cannot be a folder: {} is a file. Give another folder",
+                                 folder.string(), part.string()));
+}
+
+void check_dds_files(Section dds, const DdsConfig& config) {
+  std::error_code error;
+  if (!config.profile.empty() && !fs::is_regular_file(config.profile, error))
+    dds.fault("profile", fmt::format("there is no file {}. Without this key the built-in profile "
+                                     "is used",
+                                     config.profile.string()));
+  if (!config.security.empty() && !fs::is_directory(config.security, error))
+    dds.fault("security", fmt::format("there is no folder {}. `abbe dds keys` makes the keys",
+                                      config.security.string()));
+}
+
+void check_paths(Section& root, const Config& config) {
+  Section daemon = root.child("daemon");
+  check_folder(daemon, "data_dir", config.daemon.data_dir);
+  check_folder(daemon, "runtime_dir", config.daemon.runtime_dir);
+  if (Section recording = root.child("recording"); recording.has("dir"))
+    check_folder(recording, "dir", config.recording.dir);
+  check_dds_files(root.child("dds"), config.dds);
+}
+
+// ---- The improbable ----
+
+constexpr double kLongTravel_m = 50.0;
+constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;  // 62.8: a range of 90 is in degrees
+constexpr double kLongTarget_m = 2.0;
+constexpr double kCoarseStep_m = 10e-6, kCoarseStep_rad = 1e-3;
+
+void doubt_axis(Section axis, const AxisConfig& config) {
+  const double range = config.max - config.min;
+  if (config.kind == AxisKind::Linear && range > kLongTravel_m)
+    axis.fault("max_mm", fmt::format("the travel is {:g} m. min_mm and max_mm are in mm", range));
+  if (config.kind == AxisKind::Rotary && range > kManyTurns_rad)
+    axis.fault("max_rad", fmt::format("the range is {:.3g} revolutions. min_rad and max_rad are in "
+                                      "rad, not in degrees",
+                                      range / (2.0 * std::numbers::pi)));
+}
+
+void doubt_target(Section target, const MachineConfig& machine) {
+  if (!machine.target_given) {
+    target.fault("offset_mm", "missing: no calibration is possible without it");
+    return;
+  }
+  for (const double offset_m : machine.target_offset_m) {
+    if (std::abs(offset_m) <= kLongTarget_m) continue;
+    target.fault("offset_mm", fmt::format("the reflector is {:g} m from the tool reference point. "
+                                          "offset_mm is in mm",
+                                          std::abs(offset_m)));
+    return;
+  }
+}
+
+void doubt_nodes(Section model, const MachineConfig& machine) {
+  for (const auto& [axis, nodes_m] : machine.nodes_m) {
+    if (nodes_m.size() > 2) continue;
+    model.fault("node_spacing_mm",
+                fmt::format("axis {} has only {} nodes: the model of its errors is a straight line",
+                            axis, nodes_m.size()));
+  }
+}
+
+void doubt_machine(Section& root, const MachineConfig& machine) {
+  Section axes = root.child("axes");
+  for (const auto& axis : machine.axes) doubt_axis(axes.child(axis.name), axis);
+  doubt_target(root.child("target"), machine);
+  doubt_nodes(root.child("model"), machine);
+}
+
+/// `table`.`list`: the axes of a device, each with a step per count.
+void doubt_steps(Section& root, const char* table, const char* list, const MachineConfig& machine) {
+  for (auto& section : root.child(table).children(list)) {
+    std::string name;
+    section.get("axis", name);
+    const AxisConfig* axis = machine.find_axis(name);
+    const bool linear = axis == nullptr || axis->kind == AxisKind::Linear;
+    const char* const key = linear ? "step_nm" : "step_nrad";
+    double step = 0.0;
+
+    if (!section.get(key, step, kNano, kAny) || step <= (linear ? kCoarseStep_m : kCoarseStep_rad))
+      continue;
+    section.fault(key, linear ? fmt::format("one count is {:g} um", step * kUmPerM)
+                              : fmt::format("one count is {:g} urad", step * kUradPerRad));
+  }
+}
+
+void doubt_cpus(Section daemon, const DaemonConfig& config, int cpus) {
+  for (const auto& [key, cpu] :
+       {std::pair{"tracker_cpu", config.tracker_cpu}, std::pair{"encoder_cpu", config.encoder_cpu},
+        std::pair{"hub_cpu", config.hub_cpu}})
+    if (cpu && *cpu >= cpus)
+      daemon.fault(key, fmt::format("CPU {}: this computer has the CPUs 0 to {}", *cpu, cpus - 1));
+}
+
+/// No shell expands "~" or "$HOME" in the file: a folder with this name would be created.
+void doubt_paths(Section& root, const Config& config) {
+  const auto doubt = [&](const char* table, const char* key, const fs::path& path) {
+    const bool shell = std::ranges::any_of(path, [](const fs::path& part) {
+      return part.string().starts_with('~') || part.string().starts_with('$');
+    });
+    if (shell) root.child(table).fault(key, fmt::format("{} is used as written", path.string()));
+  };
+
+  doubt("daemon", "data_dir", config.daemon.data_dir);
+  doubt("daemon", "runtime_dir", config.daemon.runtime_dir);
+  if (root.child("recording").has("dir")) doubt("recording", "dir", config.recording.dir);
+}
+
+void doubt_devices(Section& root, const Config& config) {
+  if (!config.encoder && !config.counter_card && !config.cmm)
+    root.fault("", "no [encoder], [counter_card] or [cmm]: no device reads the axes");
+  if (!config.tracker && !config.probe && !config.cmm)
+    root.fault("", "no [tracker] host, [probe] or [cmm]: no device measures the errors");
+  if (config.daemon.simulated)
+    root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
+}
+
+/// "file:line:column: key: what" for everything that is possible but improbable.
+std::vector<std::string> warnings_of(const toml::table& table, const Config& config, int cpus,
+                                     const std::string& file) {
+  Faults warnings(file, kMostConfigFaults);
+  Section root(&table, "", {1, 1}, warnings);
+  doubt_machine(root, config.machine);
+  doubt_steps(root, "encoder", "nodes", config.machine);
+  doubt_steps(root, "counter_card", "axes", config.machine);
+  doubt_devices(root, config);
+  doubt_cpus(root.child("daemon"), config.daemon, cpus);
+  doubt_paths(root, config);
+  return warnings.lines();
+}
+
+}  // namespace
+
+Result<CheckedConfig> check_config(const fs::path& file, int cpus) {
+  const auto text = read_configuration_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  const auto table = parse_toml(*text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
+  Faults faults(file.string(), kMostConfigFaults);
+  Section root(&*table, "", {1, 1}, faults);
+
+  CheckedConfig checked{.config = read_all(root, file.parent_path()), .warnings = {}};
+  check_paths(root, checked.config);
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+
+  checked.warnings = warnings_of(*table, checked.config, cpus, file.string());
+  return checked;
+}
+
+}  // namespace abbe::daemon

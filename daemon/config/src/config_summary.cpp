@@ -1,0 +1,125 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <system_error>
+
+#include "abbe/base/units.hpp"
+#include "abbe/config/check_config.hpp"
+
+namespace abbe::daemon {
+
+namespace {
+
+using Lines = std::vector<std::string>;
+
+std::string line(std::string_view what, std::string_view text) {
+  return fmt::format("{:<13} {}", what, text);
+}
+
+/// The folder that a relative path means, whatever the current folder is later.
+std::string full(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(path, error);
+  return (error ? path : absolute).lexically_normal().string();
+}
+
+std::string axis_text(const AxisConfig& axis, const MachineConfig& machine) {
+  if (axis.kind == AxisKind::Rotary) return fmt::format("{:g} to {:g} rad", axis.min, axis.max);
+  const auto nodes = machine.nodes_m.find(axis.name);
+  return fmt::format("{:g} to {:g} mm, travel {:g} mm, {} nodes", axis.min * kMmPerM,
+                     axis.max * kMmPerM, (axis.max - axis.min) * kMmPerM,
+                     nodes == machine.nodes_m.end() ? 0 : nodes->second.size());
+}
+
+void add_machine(const MachineConfig& machine, Lines& out) {
+  out.push_back(line("machine", fmt::format("\"{}\", chain {}", machine.name, machine.chain)));
+  for (const auto& axis : machine.axes)
+    out.push_back(line("axis " + axis.name, axis_text(axis, machine)));
+  const auto& t = machine.target_offset_m;
+  out.push_back(line("target", machine.target_given
+                                   ? fmt::format("{:g}, {:g}, {:g} mm from the tool reference "
+                                                 "point",
+                                                 t[0] * kMmPerM, t[1] * kMmPerM, t[2] * kMmPerM)
+                                   : "not given"));
+}
+
+std::string step_text(double step, bool linear) {
+  return fmt::format("{:g} {}", step * 1e9, linear ? "nm" : "nrad");
+}
+
+std::string tracker_text(const TrackerConfig& tracker) {
+  const auto mode = tracker.mode == TrackerModeConfig::Stationary
+                        ? std::string{"stationary"}
+                        : fmt::format("{:g} points per second", tracker.point_rate_hz);
+  return fmt::format("{}:{}, {}", tracker.host, tracker.port, mode);
+}
+
+std::string encoder_text(const EncoderConfig& encoder) {
+  Lines nodes;
+  for (const auto& node : encoder.nodes)
+    nodes.push_back(fmt::format("{} node {} step {}", node.axis, node.node,
+                                step_text(node.step, node.kind == AxisKind::Linear)));
+  const auto address = encoder.transport == EncoderTransport::SocketCan
+                           ? encoder.interface
+                           : fmt::format("{}:{} (UDP)", encoder.peer_host, encoder.peer_port);
+  return fmt::format("{}, {}", address, fmt::join(nodes, "; "));
+}
+
+std::string card_text(const CounterCardConfig& card, const MachineConfig& machine) {
+  Lines axes;
+  for (const auto& axis : card.wiring.axes) {
+    const AxisConfig* known = machine.find_axis(axis.name);
+    const bool linear = known == nullptr || known->kind == AxisKind::Linear;
+    axes.push_back(fmt::format("{} channel {} step {}", axis.name, axis.channel,
+                               step_text(axis.scale, linear)));
+  }
+
+  const auto address = card.transport == CardTransport::Usb
+                           ? std::string{"USB"}
+                           : fmt::format("{}:{} (USB/IP) {}", card.host, card.port, card.bus_id);
+  const auto serial =
+      card.serial_number.empty() ? std::string{} : " serial number " + card.serial_number;
+  return fmt::format("{}{}, {}", address, serial, fmt::join(axes, "; "));
+}
+
+void add_devices(const Config& config, Lines& out) {
+  if (config.tracker) out.push_back(line("tracker", tracker_text(*config.tracker)));
+  if (config.encoder) out.push_back(line("encoder", encoder_text(*config.encoder)));
+  if (config.counter_card)
+    out.push_back(line("counter_card", card_text(*config.counter_card, config.machine)));
+  if (config.reference)
+    out.push_back(line("reference", card_text(config.reference->card, config.machine)));
+  if (config.probe)
+    out.push_back(line("probe", fmt::format("id {}, on counter_card", config.probe->delay.id)));
+  if (config.cmm)
+    out.push_back(line("cmm", fmt::format("{}:{}", config.cmm->host, config.cmm->port)));
+  for (const auto& device : config.environment)
+    out.push_back(line("environment", fmt::format("\"{}\" ({}) at {}", device.name, device.map.name,
+                                                  text_of(device.address))));
+}
+
+void add_folders(const Config& config, Lines& out) {
+  out.push_back(line("recordings", full(config.recording.dir)));
+  out.push_back(line("models", full(config.daemon.models_dir())));
+  out.push_back(line("control", full(config.control.socket)));
+  if (config.dds.supervise == Supervise::Off) {
+    out.push_back(line("DDS", "off"));
+    return;
+  }
+  out.push_back(
+      line("DDS", fmt::format("domain {}, profile {}, keys {}", config.dds.domain,
+                              config.dds.profile.empty() ? "built in" : full(config.dds.profile),
+                              config.dds.security.empty() ? "none" : full(config.dds.security))));
+}
+
+}  // namespace
+
+std::vector<std::string> summary_of(const Config& config) {
+  Lines lines;
+  add_machine(config.machine, lines);
+  add_devices(config, lines);
+  add_folders(config, lines);
+  return lines;
+}
+
+}  // namespace abbe::daemon

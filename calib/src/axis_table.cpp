@@ -38,9 +38,9 @@ BasisRow basis_row(std::span<const double> nodes_m, double position_m) {
 
 Result<AxisNodes> equidistant_nodes(double min_m, double max_m, double spacing_m) {
   if (!(min_m < max_m) || !(spacing_m > 0) || !std::isfinite(max_m - min_m)) {
-    return failure(ErrorCode::BadInput, message("nodes from ", min_m, " to ", max_m, " m, spacing ",
-                                                spacing_m,
-                                                " m: needs min < max and a positive spacing"));
+    return failure(ErrorCode::BadInput,
+                   message("nodes from ", min_m, " to ", max_m, " m, spacing ", spacing_m,
+                           " m: needs min < max and a positive spacing"));
   }
 
   // A whole number of cells. 1e-9: rounding must not add a cell if the range is a multiple of the
@@ -48,9 +48,9 @@ Result<AxisNodes> equidistant_nodes(double min_m, double max_m, double spacing_m
   const double cells = std::max(1.0, std::ceil((max_m - min_m) / spacing_m - 1e-9));
   constexpr double kMostCells = 1e5;
   if (cells > kMostCells) {
-    return failure(ErrorCode::BadInput, message("nodes from ", min_m, " to ", max_m, " m every ",
-                                                spacing_m, " m: ", cells,
-                                                " cells, at most ", kMostCells, " are allowed"));
+    return failure(ErrorCode::BadInput,
+                   message("nodes from ", min_m, " to ", max_m, " m every ", spacing_m,
+                           " m: ", cells, " cells, at most ", kMostCells, " are allowed"));
   }
 
   AxisNodes axis;

@@ -33,8 +33,8 @@ inline std::string with_effect(const std::string& cause, double bias_m, double u
   if (std::isnan(bias_m)) {
     return cause;  // the effect on the model is not known
   }
-  return message(cause, ": it changes the model by ", 1e6 * bias_m,
-                 " um rms, the uncertainty is ", 1e6 * u_m, " um");
+  return message(cause, ": it changes the model by ", 1e6 * bias_m, " um rms, the uncertainty is ",
+                 1e6 * u_m, " um");
 }
 
 }  // namespace abbe::calib

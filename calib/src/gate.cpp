@@ -156,8 +156,8 @@ struct ScaleDifference {
 };
 
 /// Scale of the candidate relative to the active model, inside both validity volumes.
-ScaleDifference scale_difference(const VolumetricModel& candidate,
-                                 const VolumetricModel& active, const Vector3& t) {
+ScaleDifference scale_difference(const VolumetricModel& candidate, const VolumetricModel& active,
+                                 const Vector3& t) {
   constexpr std::size_t kEnough = 1000;
   const std::vector<Vector3> all = points_inside(active.validity());
   std::vector<Vector3> at, difference_m;
@@ -185,8 +185,7 @@ ScaleDifference scale_difference(const VolumetricModel& candidate,
 /// model does.
 void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
                     const VolumetricModel& active, const GateLimits& limits) {
-  const ScaleDifference g =
-      scale_difference(candidate, active, candidate.tool_offsets_m().front());
+  const ScaleDifference g = scale_difference(candidate, active, candidate.tool_offsets_m().front());
   constexpr double kCoverage = 2.0;
 
   // This form of the condition refuses NaN.
@@ -213,10 +212,9 @@ void note_what_was_compared(Verdict& verdict, bool holds_for_tool) {
     verdict.notes.emplace_back(
         "not compared with the active model: it is valid for another tool offset");
   } else if (h.observations_beside_active < h.observations) {
-    verdict.notes.push_back(
-        message("compared with the active model on ", h.observations_beside_active, " of ",
-                h.observations,
-                " held-out observations: the others are outside its validity volume"));
+    verdict.notes.push_back(message(
+        "compared with the active model on ", h.observations_beside_active, " of ", h.observations,
+        " held-out observations: the others are outside its validity volume"));
   }
 }
 

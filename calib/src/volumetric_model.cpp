@@ -99,9 +99,9 @@ constexpr double kSameNode_m = 1e-9;
 Result<void> check_parameters(const std::vector<Parameter>& stored,
                               const std::vector<Parameter>& expected) {
   if (stored.size() != expected.size()) {
-    return failure(ErrorCode::BadInput,
-                   message("model: ", stored.size(), " parameters; tables and nodes need ",
-                           expected.size()));
+    return failure(
+        ErrorCode::BadInput,
+        message("model: ", stored.size(), " parameters; tables and nodes need ", expected.size()));
   }
 
   for (std::size_t i = 0; i < stored.size(); ++i) {
@@ -110,11 +110,10 @@ Result<void> check_parameters(const std::vector<Parameter>& stored,
         actual.position_m.has_value() == wanted.position_m.has_value() &&
         (!actual.position_m || std::abs(*actual.position_m - *wanted.position_m) < kSameNode_m);
     if (actual.name != wanted.name || !same_node) {
-      return failure(
-          ErrorCode::BadInput,
-          message("model: parameter ", i, " is ", actual.name, " at ",
-                  actual.position_m.value_or(kNaN), " m, should be ", wanted.name, " at ",
-                  wanted.position_m.value_or(kNaN), " m"));
+      return failure(ErrorCode::BadInput,
+                     message("model: parameter ", i, " is ", actual.name, " at ",
+                             actual.position_m.value_or(kNaN), " m, should be ", wanted.name,
+                             " at ", wanted.position_m.value_or(kNaN), " m"));
     }
     if (!std::isfinite(actual.value)) {
       return failure(ErrorCode::NotFinite,

@@ -393,9 +393,9 @@ TEST_F(EvemuCli, AcceptsShapeOnlyWhenTheConfigurationNamesIt) {
 TEST_F(EvemuCli, ExplainsInItsReportWhatIsNotEstimable) {
   ASSERT_EQ(identify(touches()).exit, kRefused);
   const auto page = text_of(folder_ / "out/report.html");
-  EXPECT_THAT(page, AllOf(HasSubstr("rotation that touches do not determine"),
-                          HasSubstr("shape only"), HasSubstr("Rotations of the positions"),
-                          HasSubstr("k_ezz3")));
+  EXPECT_THAT(page,
+              AllOf(HasSubstr("rotation that touches do not determine"), HasSubstr("shape only"),
+                    HasSubstr("Rotations of the positions"), HasSubstr("k_ezz3")));
   EXPECT_THAT(page, ::testing::Not(HasSubstr("http://")));
 }
 

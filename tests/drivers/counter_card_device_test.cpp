@@ -262,8 +262,7 @@ TEST(CounterCardDevice, ReportsAClockThatRunsTooFast) {
   ASSERT_TRUE(bench.streams());
   bench.cycles_for(12s);
   EXPECT_THAT(bench.device->status().last_fault, HasSubstr("the clock of channel 5 runs "));
-  EXPECT_THAT(bench.device->status().last_fault,
-              HasSubstr(" ppm fast, the limit is 200 ppm"));
+  EXPECT_THAT(bench.device->status().last_fault, HasSubstr(" ppm fast, the limit is 200 ppm"));
   EXPECT_EQ(bench.device->status().faults, 1u);
   EXPECT_EQ(bench.device->status().state, "streaming");
   EXPECT_TRUE(has(bench.take_samples().back().head.flags, SampleFlag::ClockUnsettled));

@@ -162,10 +162,9 @@ Result<RefractiveIndex> refractive_index(const Air& air, double vacuum_wavelengt
     return failure(ErrorCode::BadInput,
                    message("refractive index: wavelength of ", vacuum_wavelength_m,
                            " m; valid for 0.35e-6 to 1.2e-6"));
-  const bool valid_u = within(air.u_temperature_K, 0.0, 50.0) &&
-                       within(air.u_pressure_Pa, 0.0, 1e5) &&
-                       within(air.u_relative_humidity, 0.0, 1.0) &&
-                       within(air.u_co2_ppm, 0.0, 2000.0);
+  const bool valid_u =
+      within(air.u_temperature_K, 0.0, 50.0) && within(air.u_pressure_Pa, 0.0, 1e5) &&
+      within(air.u_relative_humidity, 0.0, 1.0) && within(air.u_co2_ppm, 0.0, 2000.0);
   if (!valid_u)
     return failure(ErrorCode::BadInput,
                    "refractive index: an uncertainty of the air is negative, too large or not a "

@@ -142,9 +142,9 @@ Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
   }
 
   if (found < count) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("tracker blocks: ", found, " valid samples, the standstill needs ",
-                           count));
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("tracker blocks: ", found, " valid samples, the standstill needs ", count));
   }
 
   return Vector3(sum / static_cast<double>(count));

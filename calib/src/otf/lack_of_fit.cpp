@@ -211,9 +211,8 @@ Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
   e.d(0) = of_data_m;
   return Alternative{
       .cause = Cause::RangeOffset,
-      .text =
-          message(columns.text(added, e.d), "; its stated uncertainty is ",
-                  1e6 * fit.o.u_range_offset_m, " um"),
+      .text = message(columns.text(added, e.d), "; its stated uncertainty is ",
+                      1e6 * fit.o.u_range_offset_m, " um"),
       .explained = std::clamp(e.drop / std::max(fit.excess(), e.drop), 0.0, 1.0),
       .bias_m = fit.norm.rms_m(e.dU),
       .u_m = root_sum_of_squares(fit.u_white_m, fit.norm.rms_of_columns_m(e.root_cov_dU)) *
@@ -459,14 +458,14 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   constexpr double kHalf = 0.5;
   if (fit->noise.correlation > kSuspicious && fit->noise.variance_factor() > kSuspicious &&
       (found.empty() || found.front().explained < kHalf)) {
-    found.insert(found.begin(),
-                 {.cause = Cause::CorrelatedNoise,
-                  .text = message(
-                      "the residuals are correlated over ", fit->noise.correlation,
-                      " blocks: air turbulence, vibration, or an effect that is not modelled"),
-                  .explained = 1.0,
-                  .bias_m = 0.0,
-                  .u_m = fit->u_white_m * std::sqrt(fit->noise.variance_factor())});
+    found.insert(
+        found.begin(),
+        {.cause = Cause::CorrelatedNoise,
+         .text = message("the residuals are correlated over ", fit->noise.correlation,
+                         " blocks: air turbulence, vibration, or an effect that is not modelled"),
+         .explained = 1.0,
+         .bias_m = 0.0,
+         .u_m = fit->u_white_m * std::sqrt(fit->noise.variance_factor())});
   }
 
   return found;

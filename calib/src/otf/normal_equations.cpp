@@ -44,10 +44,9 @@ Result<void> check_observed(const Eigen::MatrixXd& H, const ParameterLayout& lay
   const Eigen::VectorXd unobserved =
       H.diagonal().unaryExpr([](double d) { return d > 0 ? 0.0 : 1.0; });
   if (unobserved.sum() > 0) {
-    return failure(ErrorCode::RankDeficient,
-                   message("adjustment: ", unobserved.sum(),
-                           " parameters have no data, among them ",
-                           named_parameters(unobserved, layout)));
+    return failure(ErrorCode::RankDeficient, message("adjustment: ", unobserved.sum(),
+                                                     " parameters have no data, among them ",
+                                                     named_parameters(unobserved, layout)));
   }
   return {};
 }

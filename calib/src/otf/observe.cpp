@@ -105,12 +105,11 @@ Result<void> check_travel(const BlockSeries& series, const Options& options) {
   }
 
   const double most = 2.0 * options.corner_m / *middle * static_cast<double>(options.block_samples);
-  return failure(
-      ErrorCode::BadInput,
-      message("tracker blocks: ", options.block_samples, " samples travel ", 1e3 * *middle,
-              " mm, more than twice the corner exclusion of ", 1e3 * options.corner_m,
-              " mm: use at most ", std::floor(most),
-              " samples per block, or increase the exclusion"));
+  return failure(ErrorCode::BadInput,
+                 message("tracker blocks: ", options.block_samples, " samples travel ",
+                         1e3 * *middle, " mm, more than twice the corner exclusion of ",
+                         1e3 * options.corner_m, " mm: use at most ", std::floor(most),
+                         " samples per block, or increase the exclusion"));
 }
 
 PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,

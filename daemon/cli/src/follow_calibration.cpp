@@ -79,11 +79,11 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
     const auto found = session_in(status, id);
     if (!found) {
       bar.clear();
-      return report({ErrorCode::Io,
-                     fmt::format("calibration {} has ended, but the daemon has discarded its "
-                                 "verdict, because later calibrations have ended since: `abbe "
-                                 "model list` shows its model, if it gave one",
-                                 id)});
+      return report(
+          {ErrorCode::Io, fmt::format("calibration {} has ended, but the daemon has discarded its "
+                                      "verdict, because later calibrations have ended since: `abbe "
+                                      "model list` shows its model, if it gave one",
+                                      id)});
     }
 
     const json& session = *found;
@@ -111,8 +111,7 @@ void add_follow_options(CLI::App& command, FollowOptions& options, CLI::Option* 
   add_socket_options(command, options.where);
   command.add_flag("--detach", options.detach,
                    "return as soon as the daemon has begun the calibration");
-  command.add_flag("--cancel", options.cancel, "end the running calibration")
-      ->excludes(excluded);
+  command.add_flag("--cancel", options.cancel, "end the running calibration")->excludes(excluded);
   command.add_flag("--json", options.json, "print the verdict as JSON");
 }
 

@@ -101,9 +101,8 @@ void add_identify_artefact(CLI::App& parent, int& exit) {
       ->check(CLI::NonNegativeNumber)
       ->required();
   command
-      ->add_option(
-          "--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
-          "tip radius on the machine to be calibrated; default: that of --tip-radius-mm")
+      ->add_option("--machine-tip-radius-mm", arguments->machine_tip_radius_mm,
+                   "tip radius on the machine to be calibrated; default: that of --tip-radius-mm")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option(

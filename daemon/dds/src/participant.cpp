@@ -68,10 +68,10 @@ bool has_security(const fast::DomainParticipantQos& qos) {
 Result<void> add_security(const ParticipantOptions& options, fast::DomainParticipantQos& qos) {
   if (options.security.empty()) return {};
   if (has_property(qos, "dds.sec.auth.plugin") || has_property(qos, "dds.sec.access.plugin")) {
-    return fail(ErrorCode::BadInput,
-                options.profiles.string() +
-                    ": the profile has dds.sec properties, and security = " +
-                    options.security.string() + " names keys, too: remove one of the two");
+    return fail(ErrorCode::BadInput, options.profiles.string() +
+                                         ": the profile has dds.sec properties, and security = " +
+                                         options.security.string() +
+                                         " names keys, too: remove one of the two");
   }
   const auto identity =
       daemon::find_dds_identity(options.security, options.role, std::chrono::system_clock::now());

@@ -119,9 +119,9 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
 
   while (!complete_ && whole_until_ < size_) {
     if (stop)
-      return fail(ErrorCode::Io,
-                  fmt::format("{}: not closed: abbed was stopped while it read the file",
-                              part_.string()));
+      return fail(
+          ErrorCode::Io,
+          fmt::format("{}: not closed: abbed was stopped while it read the file", part_.string()));
     const auto record = head_at(whole_until_);
     if (!record) return tl::unexpected(record.error());
     if (!*record) break;

@@ -145,10 +145,10 @@ void collect_by_scan(mcap::Bytes file, Collector& collector) {
   const std::size_t end = scan.whole_until();
   collector.contents.closed_cleanly = scan.complete();
   if (scan.complete()) {
-    collector.lost(end, file.size() - end,
-                   fmt::format("the indexes at byte {} are damaged: all records were read instead",
-                               end),
-                   false);
+    collector.lost(
+        end, file.size() - end,
+        fmt::format("the indexes at byte {} are damaged: all records were read instead", end),
+        false);
   } else if (end < file.size() && !cut_chunk) {
     collector.lost(end, file.size() - end, fmt::format("cut off or damaged from byte {} on", end),
                    collector.cut_is_damage || !is_truncated_end(file.subspan(end)));

@@ -64,11 +64,11 @@ Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
   if (unknown.empty()) return {};
   return fail(
       ErrorCode::Refused,
-      fmt::format("calibrate: {} {} not referenced: run `abbe reference` to find the reference "
-                  "marks, or `abbe reference --here` to state that the axes read their offset now",
-                  unknown.size() == 1 ? "axis" : "axes",
-                  fmt::format("{} {}", fmt::join(unknown, ", "),
-                              unknown.size() == 1 ? "is" : "are")));
+      fmt::format(
+          "calibrate: {} {} not referenced: run `abbe reference` to find the reference "
+          "marks, or `abbe reference --here` to state that the axes read their offset now",
+          unknown.size() == 1 ? "axis" : "axes",
+          fmt::format("{} {}", fmt::join(unknown, ", "), unknown.size() == 1 ? "is" : "are")));
 }
 
 /// Refused while the tracker executes an order: points before and after an order must not be mixed.

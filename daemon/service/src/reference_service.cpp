@@ -168,8 +168,7 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
   if (possible.empty())
     return fail(ErrorCode::Usage, "reference: no axis without reference marks is configured");
   if (!(here.u > 0.0) || !std::isfinite(here.u))
-    return fail(ErrorCode::Usage,
-                "reference: the uncertainty of the datum must be positive");
+    return fail(ErrorCode::Usage, "reference: the uncertainty of the datum must be positive");
   if (here.acquiring)
     return fail(
         ErrorCode::Refused,

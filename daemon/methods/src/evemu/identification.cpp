@@ -93,11 +93,10 @@ Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   }
 
   if (config.cmm && config.cmm->axes_compensated) {
-    return fail(
-        ErrorCode::Refused,
-        "calibrate evemu: the measuring machine corrects the positions it reports ([cmm] "
-        "axes_compensated = true): switch the correction off in the machine and set "
-        "axes_compensated = false");
+    return fail(ErrorCode::Refused,
+                "calibrate evemu: the measuring machine corrects the positions it reports ([cmm] "
+                "axes_compensated = true): switch the correction off in the machine and set "
+                "axes_compensated = false");
   }
 
   if (const auto given = require_target(config.machine); !given) return given;

@@ -37,8 +37,8 @@ void add_residuals(HtmlReport& page, const ModelStatistics& s,
     return std::vector<std::string>{what, um(f.mean_abs_m), um(f.rms_m), um(f.max_abs_m)};
   };
   page.table({"", "mean", "rms", "largest"}, {row("before", s.before), row("after", s.after)});
-  page.chart(Histogram{
-      "before", "error across the path, um", {{"before", in_um(residuals.before_m)}}});
+  page.chart(
+      Histogram{"before", "error across the path, um", {{"before", in_um(residuals.before_m)}}});
   page.chart(
       Histogram{"after", "residual across the path, um", {{"after", in_um(residuals.after_m)}}});
 }

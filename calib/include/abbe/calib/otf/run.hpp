@@ -62,7 +62,7 @@ struct OrientationEvidence {
   /// Direction of the z axis of a levelled tracker: unit vector in machine coordinates.
   std::optional<Vector3> up{};
   std::optional<Vector3> tracker_m{};  ///< tracker position, machine coordinates, within 0.5 m
-  bool accepted = false;  ///< the configuration accepts a path without evidence
+  bool accepted = false;               ///< the configuration accepts a path without evidence
 };
 
 enum class Stage { Observe, Align, Solve, Judge };

@@ -27,7 +27,7 @@ LatencyHistogram::Counts LatencyHistogram::read() const noexcept {
 std::chrono::nanoseconds LatencyHistogram::Counts::quantile(double share) const noexcept {
   const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(total)));
   std::uint64_t seen = 0;
-  for (std::size_t i = 0; i + 1 < kBuckets; ++i) {  // the last bucket has no bound but `largest`
+  for (std::size_t i = 0; i + 1 < kBuckets; ++i) {  // the last bucket has no upper limit
     seen += of_bucket[i];
     if (seen >= wanted && seen != 0) return std::min(upper_bound(i), largest);
   }

@@ -85,7 +85,7 @@ Result<Rows> rows_of(const Observations& o, const ScaledDesign& design, const So
 struct Refit {
   HyperParameters hyper;
   Eigen::VectorXd c_m, d_m;
-  Eigen::MatrixXd covariance_m2;  ///< of c
+  Eigen::MatrixXd covariance_m2;  ///< of the coefficients c_m
 };
 
 Result<Refit> refit_to(const Eigen::VectorXd& y, const Rows& rows, const ScaledDesign& design,

@@ -41,7 +41,7 @@ struct Frame {
   std::span<const std::byte> payload;
 };
 
-/// The payload may be changed in place before it is forwarded.
+/// `payload` is a part of the reader's buffer: the caller may change it before it forwards it.
 struct ReceivedFrame {
   FrameKind kind = FrameKind::Beat;
   Topic topic = Topic::Snapshot;

@@ -82,7 +82,7 @@ class VolumetricModel {
   /// BadInput or NotFinite if the parameters are wrong (unknown or repeated name, missing node,
   /// wrong size); the text names the first wrong parameter.
   [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
-  /// `U` and `covariance` over model_size() parameters.
+  /// `U`: the model_size() parameters of the layout; `covariance`: theirs.
   [[nodiscard]] static Result<VolumetricModel> from_vector(const ParameterLayout&, Gauge,
                                                            std::span<const Vector3> tool_offsets_m,
                                                            const Eigen::VectorXd& U,

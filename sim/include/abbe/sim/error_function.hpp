@@ -20,7 +20,7 @@ class ErrorFunction {
   ErrorFunction(std::vector<double> nodes_m, std::vector<double> values,
                 Shape shape = Shape::Linear);
 
-  /// sum of coefficient[k] position^k, SI. Has no nodes.
+  /// sum of coefficient[k] position^k, SI. A polynomial has no nodes of a table.
   [[nodiscard]] static ErrorFunction polynomial(std::vector<double> coefficients);
   /// This function plus amplitude sin(2 pi position / period).
   [[nodiscard]] ErrorFunction with_wave(double amplitude, double period_m) const;

@@ -26,7 +26,7 @@ using ParallelFor =
 void serial_for(std::size_t count, const std::function<void(std::size_t)>& task);
 
 struct CrossValidation {
-  Path path;  ///< fitted to all rows
+  Path path;  ///< regularisation path, fitted to all rows
   /// Mean squared held-out error, unit of y squared, lambda.size(); NaN: missing.
   Eigen::VectorXd error;
   /// Of `error`, with rows taken as independent (too small when rows share noise).

@@ -231,7 +231,7 @@ class EncoderReceiver {
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
   bool time_widened_ = false;       ///< for the SYNC or an answer of the open cycle
-  std::uint32_t lost_pending_ = 0;  ///< SYNCs that were not sent
+  std::uint32_t lost_pending_ = 0;  ///< SYNCs not sent; the next sample reports them as lost
   protocol::AxisSample current_;    ///< counts and positions are kept between cycles
   std::array<protocol::AxisSample, 4> out_{};
   std::size_t out_count_ = 0;

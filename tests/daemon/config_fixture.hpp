@@ -22,7 +22,9 @@ inline const std::string kNodes =
 
 inline std::vector<std::string> faults_of(const std::string& text) {
   const auto config = parse_config(text, "abbed.toml");
-  return config ? std::vector<std::string>{} : config.error().details;
+  if (config) return {};
+  if (config.error().details.empty()) return {config.error().text};
+  return config.error().details;
 }
 
 }  // namespace abbe::daemon

@@ -169,7 +169,7 @@ TEST_F(EvemuCli, ReportsThatFilesHoldNoTemperaturesOfScales) {
   expect_refused(
       abbe("identify evemu --machine warm.toml --touches touches.csv --calibrator calibrator.toml "
            "-o out"),
-      3, "give touches corrected for the temperature of the scales and say --scales-corrected");
+      3, "give touches corrected for the temperature of the scales and add --scales-corrected");
   EXPECT_EQ(from_errors("--scales-corrected").exit, kRefused);  // by the gate: the model is written
   EXPECT_TRUE(read_model(folder_ / "out/model.json"));
 }

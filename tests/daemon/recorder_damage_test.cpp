@@ -116,7 +116,7 @@ TEST_F(DamagedRecording, AFlippedBitLosesOneChunkAndIsReported) {
   EXPECT_TRUE(reader->closed_cleanly());
   EXPECT_EQ(texts(reader->losses()),
             std::vector<std::string>{"chunk 2 at byte " + std::to_string(chunk_starts_[1]) +
-                                     ": its checksum is wrong, passed over"});
+                                     ": its checksum is wrong, skipped"});
 }
 
 TEST_F(DamagedRecording, ADamagedSummaryLosesNothing) {

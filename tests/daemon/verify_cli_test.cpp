@@ -138,7 +138,7 @@ TEST_F(VerifyCli, GivesNoRatioForAGoodModelOnACoarseGrid) {
   const auto ran = abbe("verify tables.json --points points.csv");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(StartsWith("verdict     better with the model: 0.0"),
-                             HasSubstr("\nR_resmag    not given: interpolating"),
+                             HasSubstr("\nR_resmag    not given: the error of interpolating"),
                              Not(HasSubstr("above 1"))));
 }
 

@@ -121,7 +121,8 @@ int show_file(const ModelStoreArguments& arguments) {
 }
 
 int show(const ModelStoreArguments& arguments) {
-  if (names_a_file(arguments.id)) return show_file(arguments);
+  const std::filesystem::path named = arguments.id;  // an id has neither folder nor extension
+  if (named.has_parent_path() || named.has_extension()) return show_file(arguments);
   const auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = id_named(*store, arguments.id);

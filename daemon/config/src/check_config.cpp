@@ -38,13 +38,21 @@ void check_folder(Section section, std::string_view key, const fs::path& folder)
                                  folder.string(), part.string()));
 }
 
-void check_dds_files(Section dds, const DdsConfig& config) {
+/// A folder above that may not be searched hides the file: then nothing is reported.
+bool is_missing(const fs::path& path, bool folder) {
   std::error_code error;
-  if (!config.profile.empty() && !fs::is_regular_file(config.profile, error))
+  const auto status = fs::status(path, error);
+  if (error && status.type() != fs::file_type::not_found) return false;
+  return folder ? !fs::is_directory(status) : !fs::is_regular_file(status);
+}
+
+void check_dds_files(Section dds, const DdsConfig& config) {
+  if (config.supervise == Supervise::Off) return;  // abbed does not read them
+  if (!config.profile.empty() && is_missing(config.profile, false))
     dds.fault("profile", fmt::format("there is no file {}. Without this key the built-in profile "
                                      "is used",
                                      config.profile.string()));
-  if (!config.security.empty() && !fs::is_directory(config.security, error))
+  if (!config.security.empty() && is_missing(config.security, true))
     dds.fault("security", fmt::format("there is no folder {}. `abbe dds keys` makes the keys",
                                       config.security.string()));
 }

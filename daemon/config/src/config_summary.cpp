@@ -24,9 +24,9 @@ std::string full(const std::filesystem::path& path) {
 }
 
 std::string axis_text(const AxisConfig& axis, const MachineConfig& machine) {
-  if (axis.kind == AxisKind::Rotary) return fmt::format("{:g} to {:g} rad", axis.min, axis.max);
+  if (axis.kind == AxisKind::Rotary) return fmt::format("{:.9g} to {:.9g} rad", axis.min, axis.max);
   const auto nodes = machine.nodes_m.find(axis.name);
-  return fmt::format("{:g} to {:g} mm, travel {:g} mm, {} nodes", axis.min * kMmPerM,
+  return fmt::format("{:.9g} to {:.9g} mm, travel {:.9g} mm, {} nodes", axis.min * kMmPerM,
                      axis.max * kMmPerM, (axis.max - axis.min) * kMmPerM,
                      nodes == machine.nodes_m.end() ? 0 : nodes->second.size());
 }
@@ -36,11 +36,12 @@ void add_machine(const MachineConfig& machine, Lines& out) {
   for (const auto& axis : machine.axes)
     out.push_back(line("axis " + axis.name, axis_text(axis, machine)));
   const auto& t = machine.target_offset_m;
-  out.push_back(line("target", machine.target_given
-                                   ? fmt::format("{:g}, {:g}, {:g} mm from the tool reference "
-                                                 "point",
-                                                 t[0] * kMmPerM, t[1] * kMmPerM, t[2] * kMmPerM)
-                                   : "not given"));
+  out.push_back(
+      line("target", machine.target_given
+                         ? fmt::format("{:.9g}, {:.9g}, {:.9g} mm from the tool reference "
+                                       "point",
+                                       t[0] * kMmPerM, t[1] * kMmPerM, t[2] * kMmPerM)
+                         : "not given"));
 }
 
 std::string step_text(double step, bool linear) {

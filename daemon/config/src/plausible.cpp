@@ -1,6 +1,5 @@
 #include "plausible.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,55 +32,42 @@ void check_step(Section& section, double step, bool linear) {
 
 namespace {
 
-// [RFC 1123] 2.1: length of a host name, and of one label between its dots.
-constexpr std::size_t kLongestHost = 253, kLongestLabel = 63;
-
-// Not std::isalnum(), which depends on the locale.
 bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-bool is_host_character(char c) {
-  return is_digit(c) || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
-}
-
-bool is_ipv4(const std::string& host) {
-  in_addr address{};
-  return ::inet_pton(AF_INET, host.c_str(), &address) == 1;
-}
-
-/// With an interface behind '%' if it is a link-local address: "fe80::1%eth0".
-bool is_ipv6(const std::string& host) {
-  in6_addr address{};
-  return ::inet_pton(AF_INET6, host.substr(0, host.find('%')).c_str(), &address) == 1;
-}
-
-bool is_label(std::string_view label) {
-  return !label.empty() && label.size() <= kLongestLabel && label.front() != '-' &&
-         label.back() != '-' && std::ranges::all_of(label, is_host_character);
-}
-
-bool is_name(std::string_view host) {
-  if (host.ends_with('.')) host.remove_suffix(1);
-  if (host.size() > kLongestHost) return false;
-
-  for (;;) {
-    const auto dot = host.find('.');
-    if (!is_label(host.substr(0, dot))) return false;
-    if (dot == std::string_view::npos) return true;
-    host.remove_prefix(dot + 1);
+/// Numbers with dots, one of them larger than 255: 192.168.0.300. A name never consists of digits
+/// and dots only.
+bool has_number_over_255(std::string_view host) {
+  constexpr int kMost = 255;
+  int number = 0;
+  for (const char c : host) {
+    number = c == '.' ? 0 : 10 * number + (c - '0');
+    if (number > kMost) return true;
   }
+  return false;
 }
 
-/// What is wrong with a host; empty if it can be an address or a name.
+/// What no resolver accepts; empty: an address or a name. The resolver judges the rest: zeros in
+/// front of a number, names in /etc/hosts, mDNS.
 std::string fault_of_host(const std::string& host) {
   const auto digit_or_dot = [](char c) { return is_digit(c) || c == '.'; };
-  if (std::ranges::all_of(host, digit_or_dot))
-    return is_ipv4(host) ? "" : "is no IPv4 address: it must be four numbers of 0 to 255";
+  const auto not_printable = [](char c) { return c == ' ' || c == '\x7f' || (c >= 0 && c < ' '); };
+  const bool dots = host.find('.') != std::string::npos;
+
+  if (std::ranges::any_of(host, not_printable)) return "contains a blank or a control character";
   if (host.find("://") != std::string::npos) return "is a URL: give only the name or address";
   if (std::ranges::count(host, ':') == 1) return "contains a port: give it as a key of its own";
-  if (host.find(':') != std::string::npos) return is_ipv6(host) ? "" : "is no IPv6 address";
-  return is_name(host) ? "" : "is no host name: only letters, digits, '-' and '.' are possible";
+  if (dots && std::ranges::all_of(host, digit_or_dot) && has_number_over_255(host))
+    return "is no IPv4 address: its numbers must be 0 to 255";
+  return "";
+}
+
+/// A terminal would execute control characters.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; }, '?');
+  return text;
 }
 
 }  // namespace
@@ -89,7 +75,7 @@ std::string fault_of_host(const std::string& host) {
 bool get_host(Section& section, std::string_view key, std::string& out, Need need) {
   if (!section.get(key, out, need)) return false;
   const std::string fault = fault_of_host(out);
-  if (!fault.empty()) section.fault(key, fmt::format("\"{}\" {}", out, fault));
+  if (!fault.empty()) section.fault(key, fmt::format("\"{}\" {}", printable(out), fault));
   return true;
 }
 

@@ -122,15 +122,15 @@ class Watch {
         const dds::ParticipantAddresses& addresses)
       : options_(options), readers_(readers), addresses_(addresses) {}
 
-  /// True once a sample of any machine has arrived.
+  /// True once a sample of a machine that is watched has arrived.
   [[nodiscard]] bool received() const { return received_; }
 
   void take(const dds::Arrival& arrival) {
-    received_ = true;
     using Verdict = dds::PublisherPin::Verdict;
     const auto key = daemon::payload_key(arrival.topic, arrival.payload);
 
     if (!key || (!options_.machine.empty() && key->machine != options_.machine)) return;
+    received_ = true;
     const std::string name(key->machine);
     auto& machine = machines_[name];
     const auto from = dds::participant_of(arrival.writer);
@@ -433,10 +433,12 @@ void report_silence(const Options& options) {
              kReportedSilence.count(), options.participant.domain, topics);
 }
 
-/// The keys of the daemon allow publishing, and only abbed may read them: those of subscriber-1
-/// beside them are used.
+/// The keys of the daemon allow publishing, and only abbed may read them: those of subscriber-1 in
+/// the folder above are used. `abbe dds keys` makes both.
 std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) {
-  return daemon_keys.filename() == "daemon" ? daemon_keys.parent_path() : daemon_keys;
+  if (daemon_keys.empty()) return {};
+  const auto folder = daemon_keys.lexically_normal();
+  return folder.has_filename() ? folder.parent_path() : folder.parent_path().parent_path();
 }
 
 /// --security on the command line takes precedence.

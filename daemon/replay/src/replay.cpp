@@ -58,7 +58,7 @@ class Calibrations {
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
     while (next_ < requests_.size()) begin_next();
-    end("the recording ends before the calibration is complete");
+    end("it was cancelled, or the recording ends before the calibration is complete");
     return std::move(done_);
   }
 

@@ -163,13 +163,22 @@ json positions_json(const protocol::Snapshot& live, bool old) {
   return positions;
 }
 
-/// Names and kinds of the axes that "position_m" has, in its order.
-json axes_json(const MachineConfig& machine, std::size_t count) {
+/// Names and kinds of the axes that "position_m" has, in its order: those with an encoder or a
+/// counter; else those of a measuring machine, which are the first of the machine.
+json axes_json(const Config& config, std::size_t count) {
+  const auto& axes_of_machine = config.machine.axes;
+  auto names = config.connected_axes();
+  if (names.empty())
+    for (const AxisConfig& axis : axes_of_machine) names.push_back(axis.name);
+  names.resize(std::min(names.size(), count));
+
   json axes = json::array();
-  for (std::size_t i = 0; i < std::min(count, machine.axes.size()); ++i) {
-    const bool rotary = machine.axes[i].kind == AxisKind::Rotary;
-    axes.push_back({{"axis", machine.axes[i].name}, {"kind", rotary ? "rotary" : "linear"}});
+  for (const std::string& name : names) {
+    const auto axis = std::ranges::find(axes_of_machine, name, &AxisConfig::name);
+    const bool rotary = axis != axes_of_machine.end() && axis->kind == AxisKind::Rotary;
+    axes.push_back({{"axis", name}, {"kind", rotary ? "rotary" : "linear"}});
   }
+
   return axes;
 }
 
@@ -262,7 +271,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
   json& ended = out["ended_sessions"] = json::array();
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
-  out["axes"] = axes_json(config.machine, seen.live.axis_count);
+  out["axes"] = axes_json(config, seen.live.axis_count);
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
   if (const auto air =
           config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)

@@ -201,7 +201,7 @@ std::vector<BadCase> bad_cases() {
           {"LambdaNegative", good, {}, {.lambda = {0.1, -0.2}}, BadInput, "negative"},
           {"LambdaNan", good, {}, {.lambda = {std::nan("")}}, NotFinite, "lambda 0"},
           {"Tolerance", good, {}, {.lambda = {}, .tolerance = 0.0}, BadInput, "tolerance"},
-          {"Budget", good, {}, {.lambda = {}, .max_sweeps = 0}, BadInput, "budget"}};
+          {"Budget", good, {}, {.lambda = {}, .max_sweeps = 0}, BadInput, "max_sweeps"}};
 }
 
 class SparsePathRefuses : public testing::TestWithParam<BadCase> {};

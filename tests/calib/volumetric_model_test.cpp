@@ -129,9 +129,9 @@ TEST(VolumetricModel, CorrectionBringsAPoorMachineToTheNominalPoint) {
 
 TEST(VolumetricModel, CorrectionNamesAnotherToolInMillimetres) {
   const auto refused =
-      model_of(random_model(1e-4)).command_correction({0, 0, 0}, {0.02, -0.015, -0.12});
+      model_of(random_model(1e-4)).command_correction({0, 0, 0}, {0.02, -0.015, -0.2});
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().text.find("correction for tool offset (20, -15, -120) mm"), 0u)
+  EXPECT_EQ(refused.error().text.find("correction for tool offset (20, -15, -200) mm"), 0u)
       << refused.error().text;
 }
 

@@ -340,7 +340,7 @@ TEST(CalibrationSession, LeavesOutPointsThatCameOutOfOrder) {
   for (std::size_t i = 2; i < kPath.size(); ++i) drive.move(kPath[i]);
   drive.stand(kPath.back(), 2s);
 
-  EXPECT_NE(session.status().reason.find("25 left out"), std::string::npos)
+  EXPECT_NE(session.status().reason.find("25 out of order left out"), std::string::npos)
       << session.status().reason;
   auto acquired = session.take_run();
   ASSERT_TRUE(acquired);

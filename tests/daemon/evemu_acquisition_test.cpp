@@ -117,7 +117,7 @@ TEST_F(EvemuAcquisitionTest, EndsWhenTheFirstTouchesCannotBeUsed) {
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::WaitingAtStart);
   acquisition.take(blind);
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Failed);
-  EXPECT_THAT(acquisition.reason(), HasSubstr("20 touches one after the other"));
+  EXPECT_THAT(acquisition.reason(), HasSubstr("20 successive touches"));
   EXPECT_THAT(acquisition.reason(), HasSubstr("an axis was not known"));
 }
 

@@ -157,6 +157,7 @@ TEST_F(HubTest, StatusShowsNoPositionThatIsNotCurrent) {
 }
 
 TEST_F(HubTest, StatusNamesTheAxesOfItsPositions) {
+  for (const std::string name : {"X", "Y", "Z"}) config_.machine.axes.push_back({.name = name});
   cycle_with_axes();
   const json status = ask({{"do", "status"}});
   ASSERT_EQ(status["axes"].size(), status["position_m"].size());

@@ -179,7 +179,7 @@ TEST_F(ModelStoreTest, RefusesAModelUnderAnotherName) {
   fs::copy_file(open().model_path(a), open().model_path(b), fs::copy_options::overwrite_existing);
   const auto document = open().load(b);
   ASSERT_FALSE(document);
-  EXPECT_THAT(document.error().text, HasSubstr("another model"));
+  EXPECT_THAT(document.error().text, HasSubstr("the id of the model differs from the file name"));
 }
 
 TEST_F(ModelStoreTest, IsNotDisturbedByAHalfWrittenFile) {

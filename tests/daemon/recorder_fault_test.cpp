@@ -89,8 +89,9 @@ TEST_F(RecorderFault, StaysAsTheLastFaultWhenRecordingGoesOn) {
   recorder_.tick(WallTime{106s});
   EXPECT_EQ(recorder_.status().state, State::Recording);
   EXPECT_THAT(recorder_.status().fault, IsEmpty());
-  EXPECT_EQ(recorder_.status().last_fault, "recorder: out of memory; over: recording goes on in " +
-                                               recorder_.status().file.filename().string());
+  EXPECT_EQ(recorder_.status().last_fault,
+            "recorder: out of memory; over: recording continues in " +
+                recorder_.status().file.filename().string());
   EXPECT_EQ(recorder_.status().faults, 1u);
 }
 

@@ -199,7 +199,7 @@ TEST(IppDevice, ChecksItsOptions) {
   const auto refused = IppDevice::create(options, time);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, drivers::ErrorCode::BadConfiguration);
-  EXPECT_NE(refused.error().text.find("10 times a second"), std::string::npos);
+  EXPECT_NE(refused.error().text.find("10 reports a second"), std::string::npos);
 }
 
 }  // namespace

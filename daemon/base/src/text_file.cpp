@@ -126,16 +126,15 @@ void inherit_ownership(int fd, const std::filesystem::path& folder) noexcept {
   if (const auto ownership = ownership_in_folder(folder)) set_ownership(fd, *ownership);
 }
 
-Result<void> create_folder(const std::filesystem::path& folder) {
+namespace {
+
+Result<void> create_missing(const std::filesystem::path& folder, NewFolder kind) {
   std::error_code error;
   if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
-  if (auto above = create_folder(folder.parent_path()); !above) return above;
-  if (::mkdir(folder.c_str(), 0777) != 0) {
-    const int why = errno;
-    if (why == EEXIST && std::filesystem::is_directory(folder, error)) return {};
-    errno = why;
-    return io_failure("create", folder);
-  }
+  if (auto above = create_missing(folder.parent_path(), kind); !above) return above;
+  if (::mkdir(folder.c_str(), 0777) != 0)
+    return errno == EEXIST ? Result<void>{} : io_failure("create", folder);
+  if (kind == NewFolder::OfTheCaller) return {};
 
   struct stat above {};
   const auto parent = folder.parent_path();
@@ -147,6 +146,16 @@ Result<void> create_folder(const std::filesystem::path& folder) {
     set_ownership(fd.get(), {above.st_uid, above.st_gid, above.st_mode & 0777U});
 
   return {};
+}
+
+}  // namespace
+
+Result<void> create_folder(const std::filesystem::path& folder, NewFolder kind) {
+  if (auto made = create_missing(folder, kind); !made) return made;
+  std::error_code error;
+  if (folder.empty() || std::filesystem::is_directory(folder, error)) return {};
+  errno = ENOTDIR;
+  return io_failure("create", folder);
 }
 
 Result<void> replace_file(const std::filesystem::path& file, std::string_view text) {

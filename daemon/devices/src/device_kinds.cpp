@@ -11,6 +11,11 @@ std::span<const DeviceKind> device_kinds() {
   return kinds;
 }
 
+std::span<const std::size_t> start_order() {
+  static constexpr std::array<std::size_t, 6> kOrder{1, 2, 3, 0, 4, 5};
+  return kOrder;
+}
+
 DeviceNames device_names(const Config& config) {
   DeviceNames names;
   for (const DeviceKind& kind : device_kinds()) kind.name(config, names);

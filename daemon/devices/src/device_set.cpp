@@ -10,7 +10,7 @@ namespace abbe::daemon {
 using protocol::HostTime;
 
 struct DeviceSet::State {
-  std::vector<std::unique_ptr<RunningDevices>> devices;  // in the order of device_kinds()
+  std::vector<std::unique_ptr<RunningDevices>> devices;  // as device_kinds(); null: none
   MachineMotion* motion = nullptr;                       // of the measuring machine, if any
   TrackerOrders* tracker = nullptr;                      // of the tracker, if any
   /// By stream: time of the previous health() and the number of samples then.
@@ -38,15 +38,21 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
                                    const std::optional<drivers::CounterCardProgress>& left) {
   auto state = std::make_unique<State>();
   DeviceNames names;
+  std::vector<std::size_t> first;
   for (const DeviceKind& kind : device_kinds()) {
-    const std::size_t first = names.all.size();
+    first.push_back(names.all.size());
     kind.name(config, names);
-    auto running = kind.start({.config = config, .time = time, .first = first, .left = left});
+  }
+
+  state->devices.resize(device_kinds().size());
+  for (const std::size_t k : start_order()) {
+    auto running =
+        device_kinds()[k].start({.config = config, .time = time, .first = first[k], .left = left});
     if (!running) return tl::unexpected(running.error());
     if (*running == nullptr) continue;
     if (auto* const motion = (*running)->motion()) state->motion = motion;
     if (auto* const tracker = (*running)->orders()) state->tracker = tracker;
-    state->devices.push_back(std::move(*running));
+    state->devices[k] = std::move(*running);
   }
 
   return DeviceSet{std::move(state)};
@@ -58,12 +64,14 @@ DeviceSet::DeviceSet(DeviceSet&&) noexcept = default;
 DeviceSet& DeviceSet::operator=(DeviceSet&&) noexcept = default;
 
 void DeviceSet::drain(Batch& batch) {
-  for (const auto& running : state_->devices) running->drain(batch);
+  for (const auto& running : state_->devices)
+    if (running) running->drain(batch);
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   std::vector<StreamHealth> out;
   for (const auto& running : state_->devices) {
+    if (!running) continue;
     for (const auto* const thread : running->threads())
       out.push_back(state_->health_of(*thread, now));
   }
@@ -74,6 +82,7 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
 std::vector<std::string> DeviceSet::warnings() const {
   std::vector<std::string> out;
   for (const auto& running : state_->devices) {
+    if (!running) continue;
     for (auto& warning : running->warnings()) out.push_back(std::move(warning));
   }
 
@@ -82,6 +91,7 @@ std::vector<std::string> DeviceSet::warnings() const {
 
 std::optional<drivers::CounterCardProgress> DeviceSet::card_progress() {
   for (const auto& running : state_->devices) {
+    if (!running) continue;
     if (auto progress = running->take_progress()) return progress;
   }
 

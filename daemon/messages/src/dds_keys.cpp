@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "abbe/base/file_descriptor.hpp"
+#include "abbe/base/text_file.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "credentials.hpp"
 #include "documents.hpp"
@@ -34,14 +35,6 @@ Result<void> write_new(const fs::path& file, std::string_view text, mode_t mode)
   const auto size = static_cast<ssize_t>(text.size());
   if (!fd || ::write(fd.get(), text.data(), text.size()) != size || ::fsync(fd.get()) != 0)
     return fail(ErrorCode::Io, fmt::format("write {}: {}", file.string(), std::strerror(errno)));
-  return {};
-}
-
-Result<void> make_new_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    return fail(ErrorCode::Io, fmt::format("create {}: {}", folder.string(), error.message()));
   return {};
 }
 
@@ -72,7 +65,7 @@ Result<void> make_identity(const Issuer& issuer, const std::string& name, DdsRol
 
   const fs::path folder = issuer.folder / name;
   const std::string authority_pem = issuer.authority.certificate_pem();
-  return make_new_folder(folder)
+  return create_folder(folder, NewFolder::OfTheCaller)
       .and_then([&] { return write_new(folder / "identity.key", identity->key_pem(), kOwnerOnly); })
       .and_then([&] {
         return write_new(folder / "identity.crt", identity->certificate_pem(), kWorldReadable);
@@ -102,7 +95,7 @@ Result<Issuer> make_issuer(const DdsKeysOptions& options,
 
 Result<void> make_all(const Issuer& issuer, int subscribers) {
   auto made =
-      make_new_folder(issuer.folder)
+      create_folder(issuer.folder, NewFolder::OfTheCaller)
           .and_then([&] {
             return write_new(issuer.folder / "ca.key", issuer.authority.key_pem(), kOwnerOnly);
           })

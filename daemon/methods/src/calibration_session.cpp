@@ -22,7 +22,7 @@ constexpr bool kGuided = requires(Acquisition& acquisition) {
 std::optional<calib::evemu::NextTouch> next_of(const Acquisition& acquisition) {
   return std::visit(
       [](const auto& of_method) -> std::optional<calib::evemu::NextTouch> {
-        if constexpr (requires { of_method.next(); }) return of_method.next();
+        if constexpr (kGuided<std::remove_cvref_t<decltype(of_method)>>) return of_method.next();
         return std::nullopt;
       },
       acquisition);

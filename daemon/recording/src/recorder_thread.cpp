@@ -350,8 +350,13 @@ void RecorderThread::hand_over(const Batch& batch) {
   append(waiting.touches, taken, batch.touches, unreported.touches);
   append(waiting.touch_scans, taken, batch.touch_scans, unreported.touch_scans);
   if (!names.raw) return;
-  for (const auto& [device, block] : batch.raw)
-    waiting.raw.append(taken, names.devices.at(device), block, entry_of(unreported.raw, device));
+  for (const auto& [device, block] : batch.raw) {
+    if (device >= names.devices.size()) {  // no name: no stream to record it in
+      state_->dropped.fetch_add(1, std::memory_order_relaxed);
+    } else {
+      waiting.raw.append(taken, names.devices[device], block, entry_of(unreported.raw, device));
+    }
+  }
 }
 
 void RecorderThread::hand_over(v1::CalibrationEvent event, protocol::HostTime taken) {

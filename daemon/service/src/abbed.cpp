@@ -475,7 +475,8 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {
-    if (auto made = create_folder(directory); !made) return tl::unexpected(made.error());
+    if (auto made = create_folder(directory, NewFolder::OfTheCaller); !made)
+      return tl::unexpected(made.error());
   }
 
   using Step = Result<void> (State::*)();

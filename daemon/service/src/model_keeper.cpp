@@ -41,6 +41,7 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
   const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
+  const bool is_stored_already = store_.load(model_id(document)).has_value();
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id) return tl::unexpected(id.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
@@ -49,7 +50,8 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
 
   const auto activation = store_.activation();
   if (!activation) return tl::unexpected(activation.error());
-  if (*activation && (*activation)->id == *id)  // as stored: nothing is read back and parsed
+  // What was written just now is not read back. An older file of the same id can have another date.
+  if (*activation && (*activation)->id == *id && !is_stored_already)
     return KeptModel{*id, active_of(**activation, document, now)};
   auto active = read_active(now);
   if (!active) return tl::unexpected(active.error());

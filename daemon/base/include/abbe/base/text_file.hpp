@@ -23,9 +23,13 @@ namespace abbe::daemon {
 /// can read what root writes there.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
 
-/// Creates `folder` and its missing parents. If root calls it, each new folder gets owner and mode
-/// of its parent.
-[[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder);
+/// What a new folder gets if root creates it. LikeItsParent: owner and mode of the parent, so that
+/// the owner of the parent can use it. OfTheCaller: owner and umask of the process.
+enum class NewFolder { LikeItsParent, OfTheCaller };
+
+/// Creates `folder` and its missing parents.
+[[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder,
+                                         NewFolder kind = NewFolder::LikeItsParent);
 
 /// Gives the newly created file `fd` the owner and mode of the folder that contains it. Best
 /// effort: only root may change the owner.

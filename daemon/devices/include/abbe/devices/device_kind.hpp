@@ -126,5 +126,8 @@ struct DeviceKind {
 
 /// In the order of the health report.
 [[nodiscard]] std::span<const DeviceKind> device_kinds();
+/// Indices of device_kinds(): devices that only measure start before those that move or are sent
+/// orders, and end after them.
+[[nodiscard]] std::span<const std::size_t> start_order();
 
 }  // namespace abbe::daemon

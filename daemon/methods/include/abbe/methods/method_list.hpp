@@ -21,6 +21,7 @@
 #include <cstddef>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -48,6 +49,15 @@ consteval auto method_with_part() {
 
 template <class... M>
 struct MethodList {
+  /// How many methods have this part.
+  template <class Part>
+  static constexpr int kOwners = (int{HasPart<M, Part>} + ...);
+  static_assert(((kOwners<typename M::Request> == 1) && ...) &&
+                    ((kOwners<typename M::Acquisition> == 1) && ...) &&
+                    ((kOwners<typename M::Run> == 1) && ...) &&
+                    ((kOwners<typename M::Candidate> == 1) && ...),
+                "each method needs types of its own");
+
   using Request = std::variant<typename M::Request...>;
   using Options = std::tuple<typename M::Options...>;
   using Acquisition = std::variant<typename M::Acquisition...>;

@@ -58,7 +58,7 @@ class Calibrations {
 
   [[nodiscard]] std::vector<ReplayedCalibration> finish() {
     while (next_ < requests_.size()) begin_next();
-    end("it was cancelled, or the recording ends before the calibration is complete");
+    end("the recording ends before the calibration is complete, or it was cancelled");
     return std::move(done_);
   }
 

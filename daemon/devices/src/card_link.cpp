@@ -1,5 +1,7 @@
 #include "card_link.hpp"
 
+#include <utility>
+
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 
@@ -14,6 +16,12 @@ std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
       drivers::UsbipOptions{
           .host = config.host, .port = config.port, .bus_id = config.bus_id, .identity = identity},
       time);
+}
+
+std::vector<std::string> with_assumption(std::vector<std::string> warnings,
+                                         const drivers::CounterCardDevice& card) {
+  if (auto assumed = card.assumption(); !assumed.empty()) warnings.push_back(std::move(assumed));
+  return warnings;
 }
 
 }  // namespace abbe::daemon

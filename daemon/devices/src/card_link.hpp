@@ -3,8 +3,11 @@
 /// latches them on their reference marks.
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "abbe/config/config.hpp"
+#include "abbe/drivers/counter_card/device.hpp"
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/drivers/usb/usb_link.hpp"
 
@@ -13,5 +16,9 @@ namespace abbe::daemon {
 [[nodiscard]] std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
                                                           const drivers::UsbIdentity& identity,
                                                           const drivers::TimeSource& time);
+
+/// `warnings` and what the driver assumes of the card.
+[[nodiscard]] std::vector<std::string> with_assumption(std::vector<std::string> warnings,
+                                                       const drivers::CounterCardDevice& card);
 
 }  // namespace abbe::daemon

@@ -45,10 +45,7 @@ class RunningCard final : public RunningDevices {
     return {running_.thread.get()};
   }
   [[nodiscard]] std::vector<std::string> warnings() const override {
-    auto out = RunningDevices::warnings();
-    if (auto assumed = running_.device->assumption(); !assumed.empty())
-      out.push_back(std::move(assumed));
-    return out;
+    return with_assumption(RunningDevices::warnings(), *running_.device);
   }
   [[nodiscard]] std::optional<drivers::CounterCardProgress> take_progress() override {
     return std::exchange(progress_, std::nullopt);
@@ -149,8 +146,7 @@ drivers::CounterCardOptions device_options(const CounterCardConfig& config, doub
   return options;
 }
 
-const DeviceKind kCounterCard{.table = "counter_card",
-                              .name = &name_counter_card,
+const DeviceKind kCounterCard{.name = &name_counter_card,
                               .start = &start_counter_card,
                               .decoders = &decoders_of_counter_card};
 

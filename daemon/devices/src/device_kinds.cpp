@@ -1,4 +1,4 @@
-#include <functional>
+#include <array>
 #include <vector>
 
 #include "kinds.hpp"
@@ -9,11 +9,6 @@ std::span<const DeviceKind> device_kinds() {
   static const std::array kinds{kTracker,       kEncoder,     kCounterCard,
                                 kReferenceCard, kEnvironment, kMeasuringMachine};
   return kinds;
-}
-
-std::span<const std::size_t> start_order() {
-  static constexpr std::array<std::size_t, 6> kOrder{1, 2, 3, 0, 4, 5};
-  return kOrder;
 }
 
 DeviceNames device_names(const Config& config) {

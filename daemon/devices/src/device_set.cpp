@@ -1,5 +1,7 @@
 #include "abbe/devices/device_set.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -10,11 +12,20 @@ namespace abbe::daemon {
 using protocol::HostTime;
 
 struct DeviceSet::State {
-  std::vector<std::unique_ptr<RunningDevices>> devices;  // as device_kinds(); null: none
+  std::vector<std::unique_ptr<RunningDevices>> started;  // in the order of starting
+  std::vector<RunningDevices*> devices;                  // the same, in the order of device_kinds()
   MachineMotion* motion = nullptr;                       // of the measuring machine, if any
   TrackerOrders* tracker = nullptr;                      // of the tracker, if any
   /// By stream: time of the previous health() and the number of samples then.
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;
+
+  State() = default;
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  /// In reverse order: a machine that moves ends first.
+  ~State() {
+    while (!started.empty()) started.pop_back();
+  }
 
   StreamHealth health_of(const drivers::DeviceThread& thread, HostTime now) {
     StreamHealth h{.status = thread.status()};
@@ -44,17 +55,23 @@ Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSour
     kind.name(config, names);
   }
 
-  state->devices.resize(device_kinds().size());
-  for (const std::size_t k : start_order()) {
-    auto running =
-        device_kinds()[k].start({.config = config, .time = time, .first = first[k], .left = left});
-    if (!running) return tl::unexpected(running.error());
-    if (*running == nullptr) continue;
-    if (auto* const motion = (*running)->motion()) state->motion = motion;
-    if (auto* const tracker = (*running)->orders()) state->tracker = tracker;
-    state->devices[k] = std::move(*running);
+  std::vector<RunningDevices*> by_kind(device_kinds().size());
+  for (const bool moves : {false, true}) {
+    for (std::size_t k = 0; k < by_kind.size(); ++k) {
+      const DeviceKind& kind = device_kinds()[k];
+      if (kind.moves != moves) continue;
+      auto running = kind.start({.config = config, .time = time, .first = first[k], .left = left});
+      if (!running) return tl::unexpected(running.error());
+      if (*running == nullptr) continue;
+      if (auto* const motion = (*running)->motion()) state->motion = motion;
+      if (auto* const tracker = (*running)->orders()) state->tracker = tracker;
+      by_kind[k] = running->get();
+      state->started.push_back(std::move(*running));
+    }
   }
 
+  std::ranges::copy_if(by_kind, std::back_inserter(state->devices),
+                       [](const RunningDevices* running) { return running != nullptr; });
   return DeviceSet{std::move(state)};
 }
 
@@ -64,14 +81,12 @@ DeviceSet::DeviceSet(DeviceSet&&) noexcept = default;
 DeviceSet& DeviceSet::operator=(DeviceSet&&) noexcept = default;
 
 void DeviceSet::drain(Batch& batch) {
-  for (const auto& running : state_->devices)
-    if (running) running->drain(batch);
+  for (auto* const running : state_->devices) running->drain(batch);
 }
 
 std::vector<StreamHealth> DeviceSet::health(HostTime now) {
   std::vector<StreamHealth> out;
-  for (const auto& running : state_->devices) {
-    if (!running) continue;
+  for (auto* const running : state_->devices) {
     for (const auto* const thread : running->threads())
       out.push_back(state_->health_of(*thread, now));
   }
@@ -81,8 +96,7 @@ std::vector<StreamHealth> DeviceSet::health(HostTime now) {
 
 std::vector<std::string> DeviceSet::warnings() const {
   std::vector<std::string> out;
-  for (const auto& running : state_->devices) {
-    if (!running) continue;
+  for (auto* const running : state_->devices) {
     for (auto& warning : running->warnings()) out.push_back(std::move(warning));
   }
 
@@ -90,8 +104,7 @@ std::vector<std::string> DeviceSet::warnings() const {
 }
 
 std::optional<drivers::CounterCardProgress> DeviceSet::card_progress() {
-  for (const auto& running : state_->devices) {
-    if (!running) continue;
+  for (auto* const running : state_->devices) {
     if (auto progress = running->take_progress()) return progress;
   }
 

@@ -129,9 +129,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   return options;
 }
 
-const DeviceKind kEncoder{.table = "encoder",
-                          .name = &name_encoder,
-                          .start = &start_encoder,
-                          .decoders = &decoders_of_encoder};
+const DeviceKind kEncoder{
+    .name = &name_encoder, .start = &start_encoder, .decoders = &decoders_of_encoder};
 
 }  // namespace abbe::daemon

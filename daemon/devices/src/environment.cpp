@@ -144,9 +144,7 @@ drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config
   return options;
 }
 
-const DeviceKind kEnvironment{.table = "environment",
-                              .name = &name_environment,
-                              .start = &start_environment,
-                              .decoders = &decoders_of_environment};
+const DeviceKind kEnvironment{
+    .name = &name_environment, .start = &start_environment, .decoders = &decoders_of_environment};
 
 }  // namespace abbe::daemon

@@ -192,7 +192,7 @@ drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) 
   return options;
 }
 
-const DeviceKind kMeasuringMachine{.table = "cmm",
+const DeviceKind kMeasuringMachine{.moves = true,
                                    .name = &name_measuring_machine,
                                    .start = &start_measuring_machine,
                                    .decoders = &decoders_of_measuring_machine};

@@ -36,10 +36,7 @@ class RunningReferenceCard final : public RunningDevices {
     return {running_.thread.get()};
   }
   [[nodiscard]] std::vector<std::string> warnings() const override {
-    auto out = RunningDevices::warnings();
-    if (auto assumed = running_.device->assumption(); !assumed.empty())
-      out.push_back(std::move(assumed));
-    return out;
+    return with_assumption(RunningDevices::warnings(), *running_.device);
   }
 
  private:
@@ -100,8 +97,7 @@ std::unique_ptr<RawDecoders> decoders_of_reference_card(
 
 }  // namespace
 
-const DeviceKind kReferenceCard{.table = "reference",
-                                .name = &name_reference_card,
+const DeviceKind kReferenceCard{.name = &name_reference_card,
                                 .start = &start_reference_card,
                                 .decoders = &decoders_of_reference_card};
 

@@ -41,7 +41,11 @@ template <class Ring>
 void drain_raw(Ring& ring, BlockBuffer& buffer, std::size_t device, Batch& batch) {
   for (std::size_t n = buffer.size(); n == buffer.size();) {
     n = ring.pop(buffer);
-    for (std::size_t i = 0; i < n; ++i) batch.raw.push_back({device, buffer[i]});
+    for (std::size_t i = 0; i < n; ++i) {
+      RawFromDevice& raw = batch.raw.emplace_back();
+      raw.device = device;
+      raw.block = buffer[i];
+    }
   }
 }
 

@@ -152,7 +152,7 @@ std::chrono::nanoseconds longest_tracker_order(const Config& config) {
   return drivers::longest_order(device_options(*config.tracker, config.daemon.speed).session);
 }
 
-const DeviceKind kTracker{.table = "tracker",
+const DeviceKind kTracker{.moves = true,
                           .name = &name_tracker,
                           .start = &start_tracker,
                           .decoders = &decoders_of_tracker};

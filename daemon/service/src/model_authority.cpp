@@ -93,7 +93,7 @@ void ModelAuthority::begin_to_look(HostTime now) {
                               now]() mutable -> Result<Look> {
     Look look{.stamp = keeper.stamp()};
     if (look.stamp == seen && !read_anyway) return look;
-    // Not at the first sight: somebody may be writing it in place.
+    // Only at the second look: another process may be writing the file now.
     auto active =
         look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
     if (active)

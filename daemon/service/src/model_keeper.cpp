@@ -41,18 +41,12 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
   const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
-  const bool is_stored_already = store_.load(model_id(document)).has_value();
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id) return tl::unexpected(id.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
   if (!verdict.accepted) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
 
-  const auto activation = store_.activation();
-  if (!activation) return tl::unexpected(activation.error());
-  // What was written just now is not read back. An older file of the same id can have another date.
-  if (*activation && (*activation)->id == *id && !is_stored_already)
-    return KeptModel{*id, active_of(**activation, document, now)};
   auto active = read_active(now);
   if (!active) return tl::unexpected(active.error());
   return KeptModel{*id, std::move(*active)};
@@ -71,9 +65,9 @@ Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now
   auto active = read_active(now);
   if (active) return active;
   store_.set_lock_timeout(kRenameTimeout);
-  if (const auto aside = store_.rename_damaged_state(utc_.to_utc(now)); !aside)
+  if (const auto renamed = store_.rename_damaged_state(utc_.to_utc(now)); !renamed)
     return fail(active.error().code,
-                fmt::format("{}; {}", active.error().text, aside.error().text));
+                fmt::format("{}; {}", active.error().text, renamed.error().text));
   return read_active(now);
 }
 

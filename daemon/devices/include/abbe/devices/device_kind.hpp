@@ -114,7 +114,9 @@ struct DeviceStart {
 };
 
 struct DeviceKind {
-  std::string_view table;  ///< name of the table in the configuration
+  /// It moves, or is sent orders that move it: starts after the devices that only measure, and ends
+  /// before them.
+  bool moves = false;
   /// Adds the configured devices of this kind.
   void (*name)(const Config& config, DeviceNames& names);
   /// Starts the devices. Null if the configuration has no device of this kind.
@@ -126,8 +128,5 @@ struct DeviceKind {
 
 /// In the order of the health report.
 [[nodiscard]] std::span<const DeviceKind> device_kinds();
-/// Indices of device_kinds(): devices that only measure start before those that move or are sent
-/// orders, and end after them.
-[[nodiscard]] std::span<const std::size_t> start_order();
 
 }  // namespace abbe::daemon

@@ -296,6 +296,30 @@ TEST_F(ModelAuthorityTest, AModelIsEncodedInTheThreadThatReadsIt) {
             grid_messages(*standing.model, {.machine = "mill"}).size());
 }
 
+TEST_F(ModelAuthorityTest, TheKeptModelEqualsTheModelOfTheStoreBitForBit) {
+  auto authority = open();
+  const auto written = document(1);
+  const auto kept =
+      authority.keeper().keep(written, {.accepted = true}, actor("calibrate otf"), kNow).value();
+  const auto read = authority.keeper().read_active(kNow).value();
+  EXPECT_EQ(to_json(store().load(kept.id).value()), to_json(written));
+  EXPECT_EQ(kept.active->publication.model, read.publication.model);
+  EXPECT_EQ(kept.active->publication.slices, read.publication.slices);
+  EXPECT_EQ(kept.active->activation, read.activation);
+}
+
+/// The file of a model is never changed: a second calibration may give the same model.
+TEST_F(ModelAuthorityTest, AModelThatTheStoreHoldsWithAnotherDateIsReturnedAsStored) {
+  auto authority = open();
+  auto earlier = document(1), later = document(1);
+  later.created = earlier.created + 1h;
+  ASSERT_TRUE(authority.keeper().keep(earlier, {.accepted = true}, actor("first"), kNow));
+  const auto kept = authority.keeper().keep(later, {.accepted = true}, actor("second"), kNow);
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->active->model->created, earlier.created);
+  EXPECT_EQ(kept->active->activation.actor.why, "second");
+}
+
 TEST_F(ModelAuthorityTest, ThePreviousModelIsDestroyedOnAnotherThread) {
   auto authority = open();
   const auto destroyed = std::make_shared<std::promise<std::thread::id>>();

@@ -123,6 +123,18 @@ TEST_F(UnstoredModel, AModelTheStoreDoesNotTakeIsKeptTriedAgainAndReported) {
   EXPECT_EQ(authority_->in_force()->id, model_id(stored()));
 }
 
+TEST_F(UnstoredModel, OneBackgroundTaskIdentifiesStoresAndActivatesTheModel) {
+  start();
+  drive();
+  while (background_tasks_running()) std::this_thread::yield();
+  const auto activation = ModelStore::open(folder_ / "models").value().activation().value();
+  ASSERT_TRUE(activation) << "stored without a further cycle of the hub";
+  EXPECT_EQ(activation->actor.who, "anna");
+  (void)service_->cycle({}, now_);
+  EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
+  EXPECT_EQ(authority_->in_force()->id, activation->id);
+}
+
 TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {
   start();
   block_store();

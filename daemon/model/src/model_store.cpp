@@ -243,6 +243,11 @@ Result<ModelDocument> ModelStore::load(const std::string& id) const {
   return document;
 }
 
+bool ModelStore::holds(const std::string& id, const ModelDocument& document) const {
+  const auto text = read_regular_file(model_path(id));
+  return text && *text == to_json(document);
+}
+
 Result<std::string> ModelStore::find(const std::string& prefix) const {
   if (prefix == "active") {
     const auto active = active_id();

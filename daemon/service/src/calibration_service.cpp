@@ -11,14 +11,13 @@
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/service/background_tasks.hpp"
+#include "identification_task.hpp"
 #include "outcome.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using protocol::HostTime;
-
-constexpr std::chrono::milliseconds kLookForStop{100};
 
 std::string verdict_text(const calib::Verdict& verdict) {
   const auto& h = verdict.held_out;
@@ -33,31 +32,7 @@ std::string verdict_text(const calib::Verdict& verdict) {
 }
 
 // A full disk or a lock lasts until an operator acts; one attempt writes one small file.
-constexpr auto kKeepAgain = std::chrono::seconds{5};
-// Longer than a slow disk needs. After it the model is stored without the hash of its recording.
-constexpr auto kDigestTimeout = std::chrono::seconds{10};
-
-/// Digest of the recording of the run. Never fails: RecordingDigest::gap states why there is none.
-RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomic<bool>& stopped) {
-  try {
-    for (auto waited = kLookForStop; !stopped && waited < kDigestTimeout; waited += kLookForStop)
-      if (wanted.wait_for(kLookForStop) == std::future_status::ready) return wanted.get();
-    return {.gap = "the recorder did not answer: its disk stalls"};
-  } catch (const std::exception&) {  // a broken promise
-    return {.gap = "the recorder failed"};
-  }
-}
-
-/// Adds the recording to `inputs`. The first input is the one with which the model can be checked:
-/// a recording with a gap is therefore added at the end.
-void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
-  if (recording.bytes == 0) return;
-  // The hash is that of the first `bytes` bytes: the recording goes on.
-  const auto name =
-      fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
-  inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
-}
-
+constexpr auto kStoreAgain = std::chrono::seconds{5};
 template <class T>
 bool ready(const std::future<T>& work) {
   return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;
@@ -72,43 +47,37 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
       authority_(authority),
       recorder_(recorder),
       utc_(utc),
-      session_(Methods::options(config)) {}
+      session_(Methods::options(config)),
+      state_(std::make_shared<IdentificationState>()) {}
 
 CalibrationService::~CalibrationService() {
   const WallTime until = WallTime::clock::now() + kStopTimeout;
-  watch_->stopped = true;
-  stop_identification(until - kLastTry);
-  if (!to_keep_) return;
-  if (const auto kept = try_once_more(until); !kept)
-    fmt::print(stderr,
-               "abbed: model {} is lost: {}; identify it again with `abbe identify {} "
-               "--recording`\n",
-               to_keep_->id, kept.error().text, to_keep_->document.method);
+  state_->stopped = true;
+  const auto stored = store_before_end(until);
+  if (stored || !to_keep_) return;
+  fmt::print(stderr,
+             "abbed: model {} is lost: {}; identify it again with `abbe identify {} "
+             "--recording`\n",
+             to_keep_->id, stored.error().text, to_keep_->document.method);
 }
 
-/// Takes the result of an identification that ends before `until`.
-void CalibrationService::stop_identification(WallTime until) {
-  if (!identification_.valid() || identification_.wait_until(until) != std::future_status::ready)
-    return;
-  (void)sign(outcome_of(identification_), latest_cycle_);
-}
-
-Result<void> CalibrationService::try_once_more(WallTime until) {
-  if (keeping_.valid()) {
-    if (keeping_.wait_until(until - kLastTry) != std::future_status::ready)
-      return fail(ErrorCode::Io, "the store has not answered");
-    if (outcome_of(keeping_)) return {};
+/// Waits for the background task; if that did not store its model, tries once more. An error
+/// without `to_keep_`: no model was identified.
+Result<void> CalibrationService::store_before_end(WallTime until) {
+  if (task_.valid()) {
+    const bool ended = task_.wait_until(until - kLastTry) == std::future_status::ready;
+    follow_task(latest_cycle_);
+    if (!ended) return fail(ErrorCode::Io, "the store has not answered");
+    if (outcome_of(task_)) return {};
   }
 
+  if (!to_keep_) return {};
   ModelKeeper keeper = authority_.keeper();
   keeper.set_lock_timeout(kLastTry);
-  keeping_ = run_abandonable([keeper = std::move(keeper), model = to_keep_]() mutable {
-    return keeper.keep(model->document, model->verdict, model->actor, {});
-  });
-
-  if (keeping_.wait_until(until) != std::future_status::ready)
+  store_in_background(std::move(keeper), latest_cycle_);
+  if (task_.wait_until(until) != std::future_status::ready)
     return fail(ErrorCode::Io, "the store has not answered");
-  const auto kept = outcome_of(keeping_);
+  const auto kept = outcome_of(task_);
 
   return kept ? Result<void>{} : tl::unexpected(kept.error());
 }
@@ -139,7 +108,7 @@ Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) co
 
 Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
                                                 const std::string& who, HostTime now) {
-  if (identification_.valid() && !session_.running())
+  if (task_.valid() && !session_.running())
     return fail(ErrorCode::Refused,
                 fmt::format("calibrate {}: the identification of a cancelled run is still ending",
                             prepared.session.method));
@@ -163,22 +132,27 @@ Result<std::uint64_t> CalibrationService::start(CalibrationTask task, const std:
 }
 
 Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
+  if (task_.valid() && !state_->discard()) follow_task(now);
   const bool stalls = store_stalls(now);
-  if (keeping_.valid() && !stalls)
+  if (storing() && !stalls)
     return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
-  watch_->stopped = true;
+  state_->stopped = true;
   const std::string late =
       stalls ? fmt::format("; the store does not answer and may still take model {}", to_keep_->id)
              : "";
   auto cancelled = session_.cancel(who + late, now);
   if (!cancelled) return cancelled;
-  keeping_ = {};
+  if (stalls) task_ = {};
   discard_unstored();
   return {};
 }
 
+bool CalibrationService::storing() const {
+  return task_.valid() && to_keep_ != nullptr;
+}
+
 bool CalibrationService::store_stalls(HostTime now) const {
-  return keeping_.valid() && now - keeping_from_ > ModelAuthority::kStoreTimeout;
+  return storing() && now - storing_from_ > ModelAuthority::kStoreTimeout;
 }
 
 void CalibrationService::report_stalled_store(HostTime now) {
@@ -191,13 +165,16 @@ void CalibrationService::report_stalled_store(HostTime now) {
 std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Snapshot> snapshots,
                                                     HostTime now) {
   latest_cycle_ = now;
+  state_->now = now;
   for (const auto& snapshot : snapshots) session_.take(snapshot);
   session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
   if (auto discarded = session_.take_discarded()) destroy_in_background(std::move(*discarded));
-  if (ready(identification_)) keep(outcome_of(identification_), now);
-  if (ready(keeping_)) conclude(outcome_of(keeping_), now);
-  if (to_keep_ && !keeping_.valid() && now >= keep_again_at_) begin_keeping(now);
+  const bool ended = ready(task_);
+  follow_task(now);
+  if (ended) conclude(outcome_of(task_), now);
+  if (to_keep_ && !task_.valid() && now >= store_again_at_)
+    store_in_background(authority_.keeper(), now);
   report_stalled_store(now);
   auto events = session_.take_events();
 
@@ -210,73 +187,44 @@ std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Sn
 }
 
 void CalibrationService::begin_identification(Acquisition acquired) {
+  state_ = std::make_shared<IdentificationState>();
+  state_->now = latest_cycle_;
+  revision_before_storing_ = authority_.revision();
   auto active = authority_.to_beat();
-  active_left_out_ = !active && authority_.in_force() != nullptr;
-  std::future<RecordingDigest> digest;
-  if (recorder_ != nullptr) digest = recorder_->digest();
-  watch_ = std::make_shared<Watch>();
+  const bool left_out = !active && authority_.in_force() != nullptr;
 
-  identification_ = run_abandonable([watch = watch_, config = shared_config_,
-                                     acquired = std::move(acquired), active = std::move(active),
-                                     digest = std::move(digest)]() mutable -> Result<Identified> {
-    const CalibrationRun run = run_of(std::move(acquired));
-    std::vector<InputFile> inputs = inputs_of(run);
-    auto candidate = identify(run, *config, active ? &active->model : nullptr,
-                              {.progress = [&watch](double share) { watch->share = share; },
-                               .stopped = [&watch] { return watch->stopped.load(); }});
-    if (!candidate) return tl::unexpected(candidate.error());
-    RecordingDigest recording =
-        digest.valid() ? digest_of(digest, watch->stopped) : RecordingDigest{};
-    cite(recording, inputs);
-    auto document = document_of(*candidate, *config, std::move(inputs), {});
-    document.recording_gap = recording.gap;
-    auto id = model_id(document);
-    auto why = fmt::format("calibrate {}", method_of(*candidate));
-    return Identified{.model = std::shared_ptr<ToKeep>(
-                          new ToKeep{.id = std::move(id),
-                                     .document = std::move(document),
-                                     .verdict = verdict_of(*candidate),
-                                     .actor = {.who = {}, .why = std::move(why), .when = {}}}),
-                      .recording_gap = std::move(recording.gap)};
-  });
+  task_ = run_abandonable(IdentificationTask{
+      .state = state_,
+      .config = shared_config_,
+      .acquired = std::move(acquired),
+      .active = std::move(active),
+      .active_left_out = left_out,
+      .digest = recorder_ != nullptr ? recorder_->digest() : std::future<RecordingDigest>{},
+      .keeper = authority_.keeper(),
+      .utc = utc_,
+      .who = who_});
 }
 
-/// True if there is a model to store: the session was not cancelled and the identification
-/// succeeded.
-bool CalibrationService::sign(Result<Identified> identified, HostTime now) {
-  if (session_.status().state != SessionState::Identifying) {
-    destroy_in_background(std::move(identified));
-    return false;
+/// Whether the task has begun to store its model. Until then no activation in the store can be
+/// newer than that of the model, so `revision_before_storing_` follows the authority.
+void CalibrationService::follow_task(HostTime now) {
+  if (!task_.valid() || to_keep_) return;
+  const auto revision = authority_.revision();
+  to_keep_ = state_->take_model();
+
+  if (!to_keep_) {
+    revision_before_storing_ = revision;
+    return;
   }
-
-  if (!identified) {
-    session_.not_identified(identified.error(), now);
-    return false;
-  }
-
-  to_keep_ = std::move(identified->model);
-  calib::Verdict& verdict = to_keep_->verdict;
-  if (active_left_out_) verdict.notes.emplace_back(kOfAnotherMachine);
-  if (!identified->recording_gap.empty())
-    verdict.notes.push_back(cannot_be_checked(identified->recording_gap));
-  const auto created = utc_.to_utc(now);
-  to_keep_->document.created = to_keep_->actor.when = created;
-  to_keep_->actor.who = who_;
-
-  return true;
+  storing_from_ = now;
+  held_out_ = to_keep_->verdict.held_out;
 }
 
-void CalibrationService::keep(Result<Identified> identified, HostTime now) {
-  if (!sign(std::move(identified), now)) return;
-  verdict_ = to_keep_->verdict;
-  held_out_ = verdict_.held_out;
-  begin_keeping(now);
-}
-
-void CalibrationService::begin_keeping(HostTime now) {
-  keeping_from_ = now;
-  keeping_since_ = authority_.revision();
-  keeping_ = run_abandonable([keeper = authority_.keeper(), model = to_keep_, now]() mutable {
+/// Stores a model again after an error.
+void CalibrationService::store_in_background(ModelKeeper keeper, HostTime now) {
+  storing_from_ = now;
+  revision_before_storing_ = authority_.revision();
+  task_ = run_abandonable([keeper = std::move(keeper), model = to_keep_, now]() mutable {
     return keeper.keep(model->document, model->verdict, model->actor, now, &model->discarded);
   });
 }
@@ -290,22 +238,29 @@ void CalibrationService::discard_unstored() {
 }
 
 void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
+  if (!kept && !to_keep_) {
+    session_.not_identified(kept.error(), now);  // no effect if the session was cancelled
+    return;
+  }
+
   if (!kept) {
-    keep_again_at_ = now + kKeepAgain;
+    store_again_at_ = now + kStoreAgain;
     not_stored_ = fmt::format("model {} is not stored: {}", to_keep_->id, kept.error().text);
     session_.not_stored(fmt::format("{}; tried again every {} s, cancel discards it", not_stored_,
-                                    kKeepAgain.count()),
+                                    kStoreAgain.count()),
                         now);
     return;
   }
+
+  if (kept->active) authority_.take_up(std::move(*kept->active), revision_before_storing_);
+  const calib::Verdict& verdict = to_keep_->verdict;
+  session_.judged(kept->id, verdict.accepted, verdict_text(verdict), now);
   discard_unstored();
-  if (kept->active) authority_.take_up(std::move(*kept->active), keeping_since_);
-  session_.judged(kept->id, verdict_.accepted, verdict_text(verdict_), now);
 }
 
 SessionStatus CalibrationService::status() const {
   SessionStatus s = session_.status();
-  if (s.state == SessionState::Identifying) s.progress = watch_->share;
+  if (s.state == SessionState::Identifying) s.progress = state_->share;
   return s;
 }
 

@@ -8,8 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The hash of what the model was identified from, as its document names it; empty if it names
-/// nothing.
+/// SHA-256 of the first input of the model; empty if the document lists no input.
 std::string provenance(const ModelDocument& document) {
   return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
 }
@@ -47,9 +46,19 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
   if (!verdict.accepted) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
 
-  auto active = read_active(now);
+  auto active = active_after(*id, document, now);
   if (!active) return tl::unexpected(active.error());
   return KeptModel{*id, std::move(*active)};
+}
+
+/// Reads the model of the store only if that is not `document`: another process activated another
+/// model meanwhile, or the same model was stored earlier with other dates or inputs.
+Result<ActiveModel> ModelKeeper::active_after(const std::string& id, const ModelDocument& document,
+                                              protocol::HostTime now) const {
+  const auto activation = store_.activation();
+  if (!activation) return tl::unexpected(activation.error());
+  const bool same = *activation && (*activation)->id == id && store_.holds(id, document);
+  return same ? active_of(**activation, document, now) : read_active(now);
 }
 
 Result<void> ModelKeeper::activate_once(const std::string& id, const StoreActor& actor) {

@@ -108,6 +108,9 @@ class ModelStore {
   /// model. Reads state.json at every call. nullopt: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
+  /// True if the file of model `id` has exactly the bytes of to_json(document): load() would then
+  /// give an equal document.
+  [[nodiscard]] bool holds(const std::string& id, const ModelDocument& document) const;
 
   /// If the stamp is unchanged, nothing was added or activated since.
   [[nodiscard]] StoreStamp stamp() const noexcept;

@@ -1,6 +1,7 @@
 #pragma once
-/// Runs calibrations in the daemon: passes snapshots to the session, identifies the model and
-/// stores it with its verdict on background threads, and activates it if the gate accepted it.
+/// Runs calibrations in the daemon: passes snapshots to the session and takes the result. One
+/// background task identifies the model, stores it with its verdict, activates it if the gate
+/// accepted it, and encodes it for publication.
 ///
 /// A model that cannot be stored (disk full, read-only, locked) stays in memory. Storing is tried
 /// again every five seconds, and the fault is reported, until the model is stored or its session is
@@ -8,7 +9,7 @@
 ///
 /// Used by the hub's thread only, except prepare(). No call waits, and no call of the hub's thread
 /// takes longer for a longer path, more points or a larger model: such work is done in prepare()
-/// and on the background threads.
+/// and in the background task.
 
 #include <atomic>
 #include <chrono>
@@ -27,6 +28,9 @@
 #include "abbe/service/model_authority.hpp"
 
 namespace abbe::daemon {
+
+class IdentificationState;
+struct JudgedModel;
 
 /// A calibration task that is checked and ready to start.
 struct PreparedCalibration {
@@ -88,36 +92,17 @@ class CalibrationService {
   }
 
  private:
-  /// An identified model with its verdict, to be stored.
-  struct ToKeep {
-    std::string id;
-    ModelDocument document;
-    calib::Verdict verdict;
-    StoreActor actor;
-    std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
-  };
-  /// Result of the thread that identifies; the hub's thread adds the user and the time.
-  struct Identified {
-    std::shared_ptr<ToKeep> model;
-    std::string recording_gap;
-  };
-  /// Shared with the thread of an identification, which may outlive this object.
-  struct Watch {
-    std::atomic<double> share{0.0};
-    std::atomic<bool> stopped{false};
-  };
   using WallTime = std::chrono::steady_clock::time_point;
   [[nodiscard]] Result<void> check(const CalibrationTask& task) const;
   void begin_identification(Acquisition acquired);
-  [[nodiscard]] bool sign(Result<Identified> identified, protocol::HostTime now);
-  void keep(Result<Identified> identified, protocol::HostTime now);
-  void discard_unstored();
-  void begin_keeping(protocol::HostTime now);
-  void report_stalled_store(protocol::HostTime now);
-  [[nodiscard]] bool store_stalls(protocol::HostTime now) const;
+  void follow_task(protocol::HostTime now);
   void conclude(Result<KeptModel> kept, protocol::HostTime now);
-  void stop_identification(WallTime until);
-  [[nodiscard]] Result<void> try_once_more(WallTime until);
+  void store_in_background(ModelKeeper keeper, protocol::HostTime now);
+  void discard_unstored();
+  void report_stalled_store(protocol::HostTime now);
+  [[nodiscard]] bool storing() const;
+  [[nodiscard]] bool store_stalls(protocol::HostTime now) const;
+  [[nodiscard]] Result<void> store_before_end(WallTime until);
 
   const Config& config_;
   std::shared_ptr<const Config> shared_config_;  // copy, for the threads of identifications
@@ -126,17 +111,13 @@ class CalibrationService {
   protocol::UtcOffset utc_;
   CalibrationSession session_;
   std::string who_;
-  std::future<Result<Identified>> identification_;
-  std::shared_ptr<ToKeep> to_keep_;  // shared with the thread that stores it
-  std::future<Result<KeptModel>> keeping_;
-  protocol::HostTime keeping_from_{};
-  protocol::HostTime keep_again_at_{};
+  std::future<Result<KeptModel>> task_;         // identifies and stores, or stores again
+  std::shared_ptr<IdentificationState> state_;  // of the last identification
+  std::shared_ptr<JudgedModel> to_keep_;        // shared with the thread that stores it
+  protocol::HostTime storing_from_{};
+  protocol::HostTime store_again_at_{};
   std::string not_stored_;
-  std::uint64_t keeping_since_ = 0;  // revision of the authority when storing began
-  calib::Verdict verdict_;           // of the model being stored
-  // The gate did not compare with the active model: that is for another machine configuration.
-  bool active_left_out_ = false;
-  std::shared_ptr<Watch> watch_ = std::make_shared<Watch>();  // of the last identification
+  std::uint64_t revision_before_storing_ = 0;  // of the authority
   std::deque<SessionStatus> ended_;
   protocol::HostTime latest_cycle_{};
   std::optional<calib::HeldOutFigures> held_out_;

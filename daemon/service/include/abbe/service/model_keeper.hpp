@@ -19,7 +19,7 @@
 
 namespace abbe::daemon {
 
-/// The active model of the store: read, checked and encoded. If `model` is null, `fault` is the
+/// The active model of the store, checked and encoded. If `model` is null, `fault` is the
 /// cause; if that is empty, too, no model is active. An identification whose result is compared
 /// with the model shares it.
 struct ActiveModel {
@@ -52,7 +52,8 @@ class ModelKeeper {
     store_.set_lock_timeout(patience);
   }
   /// Stores a model with its verdict, activates it if the gate accepted it, and returns the active
-  /// model of the store. After an error the call may be repeated with the same `actor`: entries
+  /// model of the store. The store parses and checks the written file before it activates it; the
+  /// returned model is that of `document` if the file has the same bytes. After an error the call may be repeated with the same `actor`: entries
   /// that the store already has are not made twice. Stops with Refused as soon as it sees that
   /// `discarded` is true; `discarded` may be null.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
@@ -72,6 +73,9 @@ class ModelKeeper {
   /// The model of `document` with the data of its `activation`, checked and encoded.
   [[nodiscard]] ActiveModel active_of(const StoreEvent& activation, ModelDocument document,
                                       protocol::HostTime now) const;
+  [[nodiscard]] Result<ActiveModel> active_after(const std::string& id,
+                                                 const ModelDocument& document,
+                                                 protocol::HostTime now) const;
   [[nodiscard]] Result<void> activate_once(const std::string& id, const StoreActor& actor);
 
   ModelStore store_;

@@ -1,0 +1,82 @@
+#pragma once
+/// The background task of a complete run: identifies the model, judges it, stores it, activates it
+/// if the gate accepted it, and encodes what is published of it. Its result reaches the hub once.
+
+#include <atomic>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "abbe/methods/calibration_session.hpp"
+#include "abbe/recording/recorder_thread.hpp"
+#include "abbe/service/model_keeper.hpp"
+
+namespace abbe::daemon {
+
+/// An identified model with its verdict. Not changed while it is stored, except `discarded`.
+struct JudgedModel {
+  std::string id;
+  ModelDocument document;
+  calib::Verdict verdict;
+  StoreActor actor;
+  std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
+};
+
+/// Shared by the hub's thread and one task, which may outlive the service.
+class IdentificationState {
+ public:
+  std::atomic<double> share{0.0};  ///< progress of the identification, 0 to 1
+  std::atomic<bool> stopped{false};
+  std::atomic<protocol::HostTime> now{};  ///< time of the hub's latest cycle
+
+  /// The task: no later cancel() discards the model. False: it is discarded already.
+  [[nodiscard]] bool begin_storing(std::shared_ptr<JudgedModel> model) {
+    model_ = std::move(model);
+    auto stage = Stage::Identifying;
+    // release: pairs with the acquire in take_model()
+    if (stage_.compare_exchange_strong(stage, Stage::Storing, std::memory_order_release))
+      return true;
+    model_ = nullptr;  // here, because the hub's thread must not free a model
+    return false;
+  }
+  /// The hub: the model is not stored when its identification ends. False: it is being stored.
+  [[nodiscard]] bool discard() noexcept {
+    auto stage = Stage::Identifying;
+    return stage_.compare_exchange_strong(stage, Stage::Discarded) || stage == Stage::Discarded;
+  }
+  /// The hub: the model, once, after begin_storing() returned true; before that null.
+  [[nodiscard]] std::shared_ptr<JudgedModel> take_model() noexcept {
+    // acquire: pairs with the release in begin_storing()
+    if (stage_.load(std::memory_order_acquire) != Stage::Storing) return nullptr;
+    return std::exchange(model_, nullptr);
+  }
+
+ private:
+  enum class Stage : std::uint8_t { Identifying, Storing, Discarded };
+  std::atomic<Stage> stage_{Stage::Identifying};
+  std::shared_ptr<JudgedModel> model_;  // the task's before begin_storing(), then the hub's
+};
+
+/// Run it once, on an ordinary thread.
+struct IdentificationTask {
+  std::shared_ptr<IdentificationState> state;
+  std::shared_ptr<const Config> config;
+  Acquisition acquired;
+  std::shared_ptr<const ModelInForce> active;  ///< the gate compares with it; may be null
+  bool active_left_out = false;         ///< the active model is for another machine configuration
+  std::future<RecordingDigest> digest;  ///< invalid: nothing is recorded
+  ModelKeeper keeper;
+  protocol::UtcOffset utc;
+  std::string who;
+
+  /// An error before begin_storing(): no model was identified; after it: the model is not stored.
+  [[nodiscard]] Result<KeptModel> operator()();
+
+ private:
+  [[nodiscard]] Result<std::shared_ptr<JudgedModel>> judged_model();
+  void add_notes(JudgedModel& model) const;
+};
+
+}  // namespace abbe::daemon

@@ -40,15 +40,32 @@ TEST_F(Systemd, FindsNothingWrongWithTheUnits) {
   EXPECT_THAT(verified.err, testing::Not(testing::HasSubstr(".service:"))) << verified.err;
 }
 
-TEST_F(Systemd, TheInstallationHoldsAllOfIt) {
+using Installation = Spine;
+
+TEST_F(Installation, HoldsAllOfIt) {
   const auto installed =
       run({ABBE_CMAKE, "-DCMAKE_INSTALL_PREFIX=" + file("usr"), "-P", ABBE_SYSTEMD_INSTALL});
   ASSERT_EQ(installed.code, 0) << installed.err;
   for (const char* name : {"lib/systemd/system/abbed.service", "lib/sysusers.d/abbe.conf",
                            "lib/tmpfiles.d/abbe.conf", "lib/udev/rules.d/60-abbe.rules"})
     EXPECT_FALSE(text_of(file("usr") + "/" + name).empty()) << name;
-  const auto unit = text_of(file("usr/lib/systemd/system/abbed.service"));
-  EXPECT_THAT(unit, testing::HasSubstr("ExecStart=" ABBE_INSTALLED_BIN "/abbed --config"));
+}
+
+TEST_F(Installation, UnitsStartTheProgramsBelowTheChosenPrefix) {
+  const auto installed =
+      run({ABBE_CMAKE, "-DCMAKE_INSTALL_PREFIX=" + file("opt"), "-P", ABBE_SYSTEMD_INSTALL});
+  ASSERT_EQ(installed.code, 0) << installed.err;
+  const auto unit = text_of(file("opt/lib/systemd/system/abbed.service"));
+  EXPECT_THAT(unit, testing::HasSubstr("ExecStart=" + file("opt/bin/abbed") + " --config"));
+  EXPECT_THAT(unit, testing::HasSubstr("file://" + file("opt/share/doc/abbe/README.md")));
+}
+
+TEST_F(Installation, UnitsDoNotContainTheFolderOfAPackageThatIsBeingMade) {
+  const auto staged = run({"/usr/bin/env", "DESTDIR=" + file("stage"), ABBE_CMAKE,
+                           "-DCMAKE_INSTALL_PREFIX=/usr", "-P", ABBE_SYSTEMD_INSTALL});
+  ASSERT_EQ(staged.code, 0) << staged.err;
+  const auto unit = text_of(file("stage/usr/lib/systemd/system/abbed.service"));
+  EXPECT_THAT(unit, testing::HasSubstr("ExecStart=/usr/bin/abbed --config"));
 }
 
 TEST_F(Systemd, UnitsAreHardened) {

@@ -108,8 +108,15 @@ TEST(UsbipUrb, RepliesSurviveTheWire) {
   EXPECT_EQ(std::get<Unlink>(*decode_urb(encode(Urb{unlink}))), unlink);
 }
 
+/// Linux copies the value into the urb of its host controller, which takes it for a count.
+TEST(UsbipUrb, ASubmitHasNoIsochronousPacketsAsFromLinux) {
+  EXPECT_EQ(word_at(encode(Urb{Submit{}}), 32), 0u);
+}
+
 TEST(UsbipUrb, TakesBothEncodingsOfNotIsochronous) {
   auto bytes = encode(Urb{Submit{}});
+  for (std::size_t i = 32; i < 36; ++i) bytes[i] = std::byte{0xFF};
+  EXPECT_TRUE(decode_urb(bytes));
   for (std::size_t i = 32; i < 36; ++i) bytes[i] = std::byte{0};
   EXPECT_TRUE(decode_urb(bytes));
   bytes[35] = std::byte{1};

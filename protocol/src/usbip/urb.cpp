@@ -8,7 +8,10 @@
 namespace abbe::protocol::usbip {
 namespace {
 
-/// Values of a transfer that is not isochronous: Linux sends either of them.
+/// number_of_packets of a transfer that is not isochronous. usbip_protocol.rst requires FFFFFFFFh;
+/// Linux itself sends 0 (vhci copies the field of the urb). A Linux server passes the value of a
+/// request to its host controller unchanged, and some allocate memory for as many packets (dwc2).
+/// So requests contain 0, replies FFFFFFFFh, and both are accepted in either direction.
 constexpr std::uint32_t kNoPackets = 0;
 constexpr std::uint32_t kNotIsochronous = 0xFFFFFFFF;
 
@@ -25,7 +28,7 @@ void put(ByteWriter& out, const Submit& urb) ABBE_RT {
   out.big(urb.flags);
   out.big(urb.length);
   out.big(urb.start_frame);
-  out.big(kNotIsochronous);
+  out.big(kNoPackets);
   out.big(urb.interval);
   out.put(urb.setup);
 }

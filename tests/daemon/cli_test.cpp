@@ -430,6 +430,16 @@ TEST_F(Cli, HelpIsACommand) {
   EXPECT_EQ(help.exit, 0);
   EXPECT_EQ(help.out, abbe("--help").out);
   EXPECT_EQ(abbe("help model show").out, abbe("model show --help").out);
+  EXPECT_EQ(abbe("help help").exit, 0);
+}
+
+TEST_F(Cli, HelpForAnUnknownCommandNamesTheNearestOne) {
+  const auto ran = abbe("help identfy");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_EQ(ran.out, "");
+  EXPECT_THAT(ran.err, HasSubstr("the nearest one is `abbe identify`"));
+  EXPECT_THAT(abbe("help model lst").err, HasSubstr("the nearest one is `abbe model list`"));
+  EXPECT_EQ(abbe("identfy --help").exit, 2);
 }
 
 TEST_F(Cli, TheHelpOfEveryCommandHasAnExample) {

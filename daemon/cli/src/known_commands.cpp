@@ -67,9 +67,13 @@ std::vector<std::string> command_line(int argc, const char* const* argv) {
   std::vector<std::string> words;
   for (int i = 1; i < argc; ++i) words.emplace_back(argv[i]);
   if (words.empty() || words.front() != "help") return words;
-  words.erase(words.begin());
+  while (!words.empty() && words.front() == "help") words.erase(words.begin());
   words.emplace_back("--help");
   return words;
+}
+
+bool asks_for_help(const std::vector<std::string>& words) {
+  return !words.empty() && (words.back() == "--help" || words.back() == "-h");
 }
 
 std::optional<Error> unknown_command(const CLI::App& app, const std::vector<std::string>& words,

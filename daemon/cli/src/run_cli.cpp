@@ -111,14 +111,18 @@ int parse_and_run(const std::vector<std::string>& words) {
   add_commands(app, exit);
   add_examples(app);
 
+  const std::vector<std::string> programs{kPrograms.begin(), kPrograms.end()};
+  if (asks_for_help(words)) {
+    if (const auto unknown = unknown_command(app, words, programs)) return report(*unknown);
+  }
+
   try {
     // CLI11 takes the words in reverse order.
     app.parse(std::vector<std::string>{words.rbegin(), words.rend()});
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    if (const auto unknown = unknown_command(app, words, {kPrograms.begin(), kPrograms.end()}))
-      return report(*unknown);
+    if (const auto unknown = unknown_command(app, words, programs)) return report(*unknown);
     return report(
         {ErrorCode::Usage, error.what(), {"see `abbe --help`, or --help after any command"}});
   }

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <string>
 
+#include "abbe/base/exit_codes.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
@@ -24,13 +25,21 @@ namespace {
 using namespace abbe::daemon;  // NOLINT(google-build-using-namespace): a program, not a header
 using namespace std::chrono_literals;
 
-constexpr int kDone = 0, kUsage = 2, kBadInput = 3, kIo = 4, kInternal = 70;
+constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
+              kBadInput = number(ExitCode::BadInput), kIo = number(ExitCode::Io),
+              kInternal = number(ExitCode::Internal);
 
-constexpr const char* kExitCodes =
-    "Exit codes: 0 stopped by SIGTERM or SIGINT (--check-config: the configuration is valid);\n"
-    "2 usage; 3 the configuration is invalid or cannot be read; 4 the system refused a socket,\n"
-    "directory, port or priority; 70 the hub hangs, or does not end within 5 s after a signal, or\n"
-    "an internal error: systemd restarts abbed.";
+std::string footer() {
+  return exit_codes_text(
+      {{ExitCode::Done,
+        "stopped by SIGTERM or SIGINT (--check-config: the configuration is valid)"},
+       {ExitCode::Usage},
+       {ExitCode::BadInput, "the configuration is invalid or cannot be read"},
+       {ExitCode::Io, "the system refused a socket, directory, port or priority"},
+       {ExitCode::Internal,
+        "the hub hangs, or does not end within 5 s after a signal, or an internal error: systemd "
+        "restarts abbed"}});
+}
 
 constexpr auto kCycle = 20ms;  // period of the main loop, which supervises abbe-dds
 
@@ -117,7 +126,7 @@ int abbed_main(int argc, char** argv) {
   CLI::App app{
       "Acquires data from a machine tool or measuring machine, identifies its geometric errors and "
       "publishes their compensation."};
-  app.footer(kExitCodes);
+  app.footer(footer());
   app.set_version_flag("--version", ABBE_VERSION);
   std::string file = "/etc/abbe/abbed.toml";
   bool check_only = false;

@@ -11,6 +11,16 @@
 
 namespace abbe::sim {
 
+namespace {
+
+using protocol::exit_codes_text;
+using protocol::ExitCode;
+
+constexpr int kUsage = number(ExitCode::Usage), kBadInput = number(ExitCode::BadInput),
+              kIoFailed = number(ExitCode::Io);
+
+}  // namespace
+
 int report(const Error& error) {
   std::fprintf(stderr, "abbe-sim: %s\n", error.text.c_str());
   switch (error.code) {
@@ -26,12 +36,18 @@ int report(const Error& error) {
 
 namespace {
 
-constexpr const char* kFooter =
-    "Exit codes: 0 done, 2 usage, 3 bad input file, 4 input/output (file, port in use).\n"
-    "A machine file is a TOML file with the tables [machine], [axes.X|Y|Z] and [target], for "
-    "example\n"
-    "the daemon's abbed.toml. Also read from it: [tracker] port, [encoder] peer_port and nodes,\n"
-    "[daemon] speed.";
+std::string footer() {
+  return exit_codes_text({{ExitCode::Done},
+                          {ExitCode::Usage},
+                          {ExitCode::BadInput},
+                          {ExitCode::Io, "input or output failed (file, port in use)"}}) +
+         "\n"
+         "A machine file is a TOML file with the tables [machine], [axes.X|Y|Z] and [target], for "
+         "example\n"
+         "the daemon's abbed.toml. Also read from it: [tracker] port, [encoder] peer_port and "
+         "nodes,\n"
+         "[daemon] speed.";
+}
 
 struct Example {
   const char* command;
@@ -58,7 +74,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Simulated machine tool, laser tracker and encoders with errors that are known",
                "abbe-sim"};
   app.require_subcommand(1);
-  app.footer(kFooter);
+  app.footer(footer());
   app.set_version_flag("--version", "abbe-sim " ABBE_VERSION);
   const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app),
                                          add_replay(app), add_evemu(app)};

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string_view>
 
+#include "abbe/protocol/exit_codes.hpp"
 #include "abbe/sim/error.hpp"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the name of CLI11
@@ -13,10 +14,7 @@ class App;
 
 namespace abbe::sim {
 
-inline constexpr int kDone = 0;
-inline constexpr int kUsage = 2;
-inline constexpr int kBadInput = 3;
-inline constexpr int kIoFailed = 4;
+inline constexpr int kDone = number(protocol::ExitCode::Done);
 
 struct Subcommand {
   CLI::App* app = nullptr;

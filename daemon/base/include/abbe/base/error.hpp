@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/protocol/exit_codes.hpp"
+
 namespace abbe::daemon {
 
 enum class ErrorCode {
@@ -31,22 +33,22 @@ using Result = tl::expected<T, Error>;
   return tl::make_unexpected(Error{code, std::move(text)});
 }
 
-/// Exit code of a program that ends with this error; 0 is success. Listed in every --help.
+/// Exit code of a program that ends with this error; never 0. Listed in every --help.
 [[nodiscard]] constexpr int exit_code(ErrorCode code) noexcept {
   switch (code) {
     case ErrorCode::DataInsufficient:
-      return 1;
+      return number(protocol::ExitCode::DataInsufficient);
     case ErrorCode::Usage:
-      return 2;
+      return number(protocol::ExitCode::Usage);
     case ErrorCode::BadInput:
-      return 3;
+      return number(protocol::ExitCode::BadInput);
     case ErrorCode::Io:
-      return 4;
+      return number(protocol::ExitCode::Io);
     case ErrorCode::Refused:
-      return 5;
+      return number(protocol::ExitCode::Refused);
   }
 
-  return 4;
+  return number(protocol::ExitCode::Io);
 }
 
 }  // namespace abbe::daemon

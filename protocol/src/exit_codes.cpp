@@ -1,8 +1,8 @@
-#include "abbe/base/exit_codes.hpp"
+#include "abbe/protocol/exit_codes.hpp"
 
-#include <fmt/format.h>
+#include <cstddef>
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 namespace {
 
 constexpr std::size_t kWidth = 96;
@@ -47,11 +47,13 @@ std::string_view meaning_of(ExitCode code) noexcept {
 
 std::string exit_codes_text(std::initializer_list<ExitCodeLine> lines) {
   std::string text = "Exit codes:";
-  for (const auto& line : lines)
-    text += fmt::format(" {} {};", number(line.code),
-                        line.meaning.empty() ? meaning_of(line.code) : line.meaning);
+  for (const auto& line : lines) {
+    text += ' ' + std::to_string(number(line.code)) + ' ';
+    text += line.meaning.empty() ? meaning_of(line.code) : line.meaning;
+    text += ';';
+  }
   text.back() = '.';
   return wrapped(std::move(text));
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -1,13 +1,13 @@
 /// The list of exit codes that every --help prints.
 
-#include "abbe/base/exit_codes.hpp"
+#include "abbe/protocol/exit_codes.hpp"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <sstream>
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 namespace {
 
 TEST(ExitCodes, PrintsTheSharedMeaningUnlessAProgramGivesItsOwn) {
@@ -29,4 +29,4 @@ TEST(ExitCodes, LinesHaveAtMost96Characters) {
 }
 
 }  // namespace
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -3,45 +3,101 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace abbe::daemon {
 
+namespace {
+
+/// "ball[].radius_mm" of "ball[3].radius_mm"
+std::string without_indices(std::string_view key) {
+  std::string result;
+  for (const char c : key) {
+    const bool index = c >= '0' && c <= '9' && result.ends_with('[');
+    if (!index) result += c;
+  }
+  return result;
+}
+
+}  // namespace
+
 void Faults::add(std::size_t line, std::size_t column, std::string_view key,
                  std::string_view what) {
-  ++count_;
-  auto text =
-      fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
-  const auto later = [](std::size_t l, const Fault& f) { return l < f.line; };
-  const auto next_line = std::upper_bound(faults_.begin(), faults_.end(), line, later);
+  add_kind(what, line, column, key, what);
+}
 
-  for (auto same = next_line; same != faults_.begin() && (same - 1)->line == line; --same) {
-    if ((same - 1)->text != text) continue;
-    ++(same - 1)->times;
+void Faults::add_kind(std::string_view kind_name, std::size_t line, std::size_t column,
+                      std::string_view key, std::string_view what) {
+  ++count_;
+  Kind& kind = kind_named(fmt::format("{}\n{}", without_indices(key), kind_name));
+  auto& first = kind.first;
+  if (first.size() == kEach && first.back().line < line) {
+    ++kind.count;
     return;
   }
 
-  faults_.insert(next_line, Fault{line, column, std::move(text)});
-  if (faults_.size() > most_shown_) faults_.pop_back();
+  auto text =
+      fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
+  for (auto& fault : first) {
+    if (fault.line != line || fault.text != text) continue;
+    ++fault.times;
+    ++repeated_;
+    return;
+  }
+
+  ++kind.count;
+  const auto later = [](std::size_t l, const Fault& f) { return l < f.line; };
+  first.insert(std::upper_bound(first.begin(), first.end(), line, later),
+               Fault{line, count_, std::move(text)});
+  if (first.size() > kEach) first.pop_back();
+  if (kinds_.size() > most_shown_) drop_last_kind();
 }
 
-std::size_t Faults::dropped() const {
-  std::size_t kept = 0;
-  for (const auto& fault : faults_) kept += fault.times;
-  return count_ - kept;
+Faults::Kind& Faults::kind_named(std::string name) {
+  const auto found = std::find_if(kinds_.begin(), kinds_.end(),
+                                  [&](const Kind& kind) { return kind.name == name; });
+  return found != kinds_.end() ? *found : kinds_.emplace_back(Kind{std::move(name)});
+}
+
+void Faults::drop_last_kind() {
+  kinds_.erase(std::max_element(kinds_.begin(), kinds_.end(), [](const Kind& a, const Kind& b) {
+    return a.first.front().line < b.first.front().line;
+  }));
+}
+
+std::vector<Faults::Shown> Faults::shown() const {
+  std::vector<Shown> shown;
+  for (const auto& kind : kinds_) {
+    if (kind.count > kEach)
+      shown.push_back({&kind.first.front(), kind.count});
+    else
+      for (const auto& fault : kind.first) shown.push_back({&fault, 1});
+  }
+
+  std::sort(shown.begin(), shown.end(), [](const Shown& a, const Shown& b) {
+    return std::pair(a.fault->line, a.fault->order) < std::pair(b.fault->line, b.fault->order);
+  });
+  if (shown.size() > most_shown_) shown.resize(most_shown_);
+  return shown;
 }
 
 std::vector<std::string> Faults::lines() const {
   std::vector<std::string> lines;
-  for (const auto& fault : faults_)
-    lines.push_back(fault.times == 1 ? fault.text
-                                     : fmt::format("{} ({} times)", fault.text, fault.times));
-  if (const auto more = dropped(); more > 0)
-    lines.push_back(fmt::format("{}: and {} more", file_, more));
+  std::size_t more = count_ - repeated_;
+  for (const auto& [fault, stands_for] : shown()) {
+    std::string line = fault->text;
+    if (fault->times > 1) line += fmt::format(" ({} times)", fault->times);
+    if (stands_for > 1) line += fmt::format(", and {} more lines like this", stands_for - 1);
+    lines.push_back(std::move(line));
+    more -= stands_for;
+  }
+
+  if (more > 0) lines.push_back(fmt::format("{}: and {} more", file_, more));
   return lines;
 }
 
 Error Faults::to_error() const {
-  const std::size_t different = faults_.size() + dropped();
+  const std::size_t different = count_ - repeated_;
   return {ErrorCode::BadInput,
           fmt::format("{}: {} fault{}", file_, different, different == 1 ? "" : "s"), lines()};
 }

@@ -11,34 +11,53 @@
 
 namespace abbe::daemon {
 
-/// Collects lines of the form "file:line:column: key: what is wrong". Keeps the `most_shown` that
+/// Collects lines of the form "file:line:column: key: what is wrong". Shows the `most_shown` that
 /// come first in the file and counts the others. A fault that is added several times is one fault
-/// with a count.
+/// with a count. More than `kEach` faults of one kind are one line: the first of them, "and 411
+/// more lines like this".
 class Faults {
  public:
-  static constexpr std::size_t kShown = 20;  ///< a table may have the same fault in every row
+  static constexpr std::size_t kShown = 20;
+  static constexpr std::size_t kEach = 3;
 
   explicit Faults(std::string file, std::size_t most_shown = kShown)
       : file_(std::move(file)), most_shown_(most_shown) {}
+  /// Faults with equal key and `what` are of one kind; an index in the key ("ball[3]") makes no
+  /// difference.
   void add(std::size_t line, std::size_t column, std::string_view key, std::string_view what);
+  /// For a `what` with a value that differs from line to line: equal key and `kind`.
+  void add_kind(std::string_view kind, std::size_t line, std::size_t column, std::string_view key,
+                std::string_view what);
   [[nodiscard]] bool any() const noexcept { return count_ > 0; }
   [[nodiscard]] std::size_t count() const noexcept { return count_; }  ///< of the calls of add()
   [[nodiscard]] Error to_error() const;                                ///< BadInput; needs any()
-  /// The lines that are kept, and one that counts the others.
+  /// The lines that are shown, and one that counts the others.
   [[nodiscard]] std::vector<std::string> lines() const;
 
  private:
   struct Fault {
-    std::size_t line, column;
+    std::size_t line, order;  // order of add(), within a line
     std::string text;
     std::size_t times = 1;
   };
-  [[nodiscard]] std::size_t dropped() const;
+  struct Kind {
+    std::string name;
+    std::vector<Fault> first = {};  // at most kEach, in the order of the file
+    std::size_t count = 0;          // a fault that is added several times counts once
+  };
+  struct Shown {
+    const Fault* fault;
+    std::size_t stands_for;  // number of faults
+  };
+  [[nodiscard]] Kind& kind_named(std::string name);
+  [[nodiscard]] std::vector<Shown> shown() const;
+  void drop_last_kind();
 
   std::string file_;
   std::size_t most_shown_;
-  std::vector<Fault> faults_;
+  std::vector<Kind> kinds_;
   std::size_t count_ = 0;
+  std::size_t repeated_ = 0;  // calls of add() with a fault that was already there
 };
 
 /// The entry of `known` that is most similar to the misspelt `word`: it differs by a few letters or

@@ -28,8 +28,8 @@ int number_at(const NumberTable& table, std::size_t row, std::size_t column, std
   const double value = table.at(row, column);
   const bool valid = value >= 1.0 && value <= kMostNumber && value == std::floor(value);
   if (!valid && table.sound(row))
-    faults.add(table.line(row), 1, name,
-               fmt::format("{}: must be a whole number, 1 to {}", value, kMostNumber));
+    faults.add_kind("whole number", table.line(row), 1, name,
+                    fmt::format("{}: must be a whole number, 1 to {}", value, kMostNumber));
   return valid ? static_cast<int>(value) : 1;
 }
 

@@ -29,8 +29,8 @@ void check_time_ascends(ParsedTable& parsed) {
     if (!table.sound(row)) continue;
     const double time_s = table.at(row, 0);
     if (before_s && time_s <= *before_s)
-      parsed.faults.add(table.line(row), 1, "time_s",
-                        fmt::format("{} after {}: time must ascend", time_s, *before_s));
+      parsed.faults.add_kind("ascend", table.line(row), 1, "time_s",
+                             fmt::format("{} after {}: time must ascend", time_s, *before_s));
     before_s = time_s;
   }
 }

@@ -25,10 +25,11 @@ Result<void> check_travel(const std::filesystem::path& file,
 
   for (const auto& [point, axis] : outside) {
     const auto& nodes_m = travel[axis].nodes_m;
-    faults.add(lines[point], 1, kColumns[axis],
-               fmt::format("{:g}: axis {} travels {:g} to {:g} mm{}",
-                           kMmPerM * positions_m[point][static_cast<Eigen::Index>(axis)],
-                           "XYZ"[axis], kMmPerM * nodes_m.front(), kMmPerM * nodes_m.back(), fits));
+    faults.add_kind(
+        "travel", lines[point], 1, kColumns[axis],
+        fmt::format("{:g}: axis {} travels {:g} to {:g} mm{}",
+                    kMmPerM * positions_m[point][static_cast<Eigen::Index>(axis)], "XYZ"[axis],
+                    kMmPerM * nodes_m.front(), kMmPerM * nodes_m.back(), fits));
   }
 
   return tl::unexpected(faults.to_error());

@@ -54,6 +54,7 @@ constexpr std::array kExamples{
     Example{"model rollback", "--why \"parts out of tolerance\""},
     Example{"dds", "keys -o dds-keys"},
     Example{"dds keys", "-o dds-keys --subscribers 2"},
+    Example{"example", "calibrator.toml > calibrator.toml"},
 };
 
 const Example* example_of(std::string_view command) {
@@ -63,20 +64,20 @@ const Example* example_of(std::string_view command) {
   return nullptr;
 }
 
-void add_example(CLI::App& app, const std::string& command) {
+void add_example_to(CLI::App& app, const std::string& command) {
   if (const auto* example = example_of(command); example != nullptr)
     app.footer(fmt::format("Example: abbe {}{}{}\n{}", command,
                            example->arguments.empty() ? "" : " ", example->arguments,
                            app.get_footer()));
 
   for (auto* sub : app.get_subcommands([](const CLI::App*) { return true; }))
-    add_example(*sub, command.empty() ? sub->get_name() : command + " " + sub->get_name());
+    add_example_to(*sub, command.empty() ? sub->get_name() : command + " " + sub->get_name());
 }
 
 }  // namespace
 
 void add_examples(CLI::App& app) {
-  add_example(app, "");
+  add_example_to(app, "");
 }
 
 }  // namespace abbe::daemon

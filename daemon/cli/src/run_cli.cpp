@@ -97,6 +97,7 @@ void add_commands(CLI::App& app, int& exit) {
   auto* dds = app.add_subcommand("dds", "Set up DDS Security");
   dds->require_subcommand(1);
   add_dds_keys(*dds, exit);
+  add_example(app, exit);
 }
 
 int parse_and_run(const std::vector<std::string>& words) {

@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "abbe/base/faults.hpp"
+#include "commands.hpp"
+#include "example_files.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct Purpose {
+  std::string_view name, text;
+};
+constexpr std::array kPurposes{
+    Purpose{"abbed.toml", "the daemon: machine, devices, checks; every key with its default"},
+    Purpose{"machine.toml", "the machine alone, for abbe identify and abbe sim"},
+    Purpose{"sim.toml", "abbe sim: simulated machine and devices; every key with its default"},
+    Purpose{"calibrator.toml", "a calibrated ball array"},
+    Purpose{"path.csv", "the path of a calibration on the fly"},
+    Purpose{"tracker.csv", "points of a laser tracker along the path"},
+    Purpose{"encoder.csv", "scale readings along the path"},
+    Purpose{"touches.csv", "touches of a ball array"},
+    Purpose{"errors.csv", "errors at the balls of an array, from another program or instrument"},
+    Purpose{"points.csv", "positions for abbe model eval"},
+    Purpose{"verification.csv", "readings and independent measurements for abbe verify"},
+    Purpose{"truth.csv", "the errors of a simulated machine"},
+};
+
+/// "path" of "path.csv"
+std::string_view stem_of(const EmbeddedText& file) {
+  return file.name.substr(0, file.name.find('.'));
+}
+
+const EmbeddedText* example_named(std::string_view name) {
+  const auto files = example_files();
+  const auto found = std::find_if(files.begin(), files.end(), [&](const EmbeddedText& file) {
+    return file.name == name || stem_of(file) == name;
+  });
+  return found != files.end() ? &*found : nullptr;
+}
+
+std::string_view purpose_of(std::string_view name) {
+  const auto found = std::ranges::find(kPurposes, name, &Purpose::name);
+  return found != kPurposes.end() ? found->text : std::string_view{};
+}
+
+std::string list_of_examples() {
+  std::string text;
+  for (const EmbeddedText& file : example_files())
+    text += fmt::format("{:<17} {}\n", file.name, purpose_of(file.name));
+  return text + "\nabbe example NAME > NAME writes one of them.\n";
+}
+
+Error unknown_example(const std::string& name) {
+  std::vector<std::string_view> known;
+  for (const EmbeddedText& file : example_files()) known.push_back(file.name);
+  for (const EmbeddedText& file : example_files()) known.push_back(stem_of(file));
+  const auto* similar = example_named(nearest(name, known));
+  Error error{ErrorCode::Usage, fmt::format("\"{}\" is not an example", name)};
+  if (similar != nullptr) error.text += fmt::format(" (did you mean \"{}\"?)", similar->name);
+  known.resize(example_files().size());
+  error.details = {fmt::format("known: {}", fmt::join(known, ", "))};
+  return error;
+}
+
+int print(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    return report({ErrorCode::Io, "write the example to stdout: it is closed or full"});
+  return 0;
+}
+
+int run_example(const std::string& name) {
+  if (name.empty()) return print(list_of_examples());
+  const auto* file = example_named(name);
+  return file != nullptr ? print(file->text) : report(unknown_example(name));
+}
+
+}  // namespace
+
+void add_example(CLI::App& parent, int& exit) {
+  auto name = std::make_shared<std::string>();
+  auto* command = parent.add_subcommand(
+      "example",
+      "Print a commented example of a file that abbe reads; without a name, list the examples.\n"
+      "Columns, units and signs of every file: docs/files.md");
+  command->add_option("NAME", *name, "name of the file: calibrator.toml");
+  command->callback([name, &exit] { exit = run_example(*name); });
+}
+
+}  // namespace abbe::daemon

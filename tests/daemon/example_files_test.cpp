@@ -1,0 +1,101 @@
+/// `abbe example`: the readers accept each file that it prints.
+
+#include <gmock/gmock.h>
+
+#include "abbe/config/config.hpp"
+#include "abbe/sim/path_motion.hpp"
+#include "abbe/tables/evemu_files.hpp"
+#include "abbe/tables/input_files.hpp"
+#include "abbe_command.hpp"
+#include "recording_fixture.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+class ExampleFiles : public ::testing::Test {
+ protected:
+  test::Ran abbe(const std::string& arguments) const {
+    return test::run_abbe(folder_.path(), arguments);
+  }
+  /// Prints the example to a file of that name.
+  fs::path printed(const std::string& name) const {
+    const auto ran = abbe("example " + name);
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    EXPECT_THAT(ran.out, StartsWith("# ")) << "an example begins with a comment";
+    test::write_text(folder_.path() / name, ran.out);
+    return folder_.path() / name;
+  }
+
+  TemporaryFolder folder_;
+};
+
+template <class T>
+std::string faults_in(const Result<T>& result) {
+  if (result) return {};
+  return result.error().text + (result.error().details.empty() ? "" : result.error().details[0]);
+}
+
+TEST_F(ExampleFiles, OfTheMachineAreAccepted) {
+  for (const std::string name : {"abbed.toml", "machine.toml"}) {
+    const auto file = printed(name);
+    EXPECT_EQ(faults_in(parse_config(test::text_of(file), file)), "") << name;
+  }
+}
+
+TEST_F(ExampleFiles, OfACalibrationOnTheFlyAreAccepted) {
+  const auto path = printed("path.csv");
+  EXPECT_EQ(faults_in(read_path_csv(path)), "");
+  EXPECT_TRUE(sim::parse_path_csv(test::text_of(path), "path.csv"));
+  EXPECT_EQ(faults_in(read_tracker_csv(printed("tracker.csv"))), "");
+  EXPECT_EQ(faults_in(read_encoder_csv(printed("encoder.csv"))), "");
+}
+
+TEST_F(ExampleFiles, OfABallArrayAreAccepted) {
+  EXPECT_EQ(faults_in(read_calibrator_toml(printed("calibrator.toml"))), "");
+  EXPECT_EQ(faults_in(read_touches_csv(printed("touches.csv"))), "");
+  EXPECT_EQ(faults_in(read_errors_csv(printed("errors.csv"))), "");
+}
+
+TEST_F(ExampleFiles, OfModelCommandsAreAccepted) {
+  EXPECT_EQ(faults_in(read_points_csv(printed("points.csv"))), "");
+  EXPECT_EQ(faults_in(read_verification_csv(printed("verification.csv"))), "");
+}
+
+TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {
+  for (const std::string name : {"sim.toml", "machine.toml", "path.csv", "truth.csv", "points.csv"})
+    printed(name);
+  const auto ran = abbe("sim truth --config sim.toml --truth truth.csv --points points.csv");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+}
+
+TEST_F(ExampleFiles, AreListed) {
+  const auto ran = abbe("example");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  for (const char* name :
+       {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
+        "encoder.csv", "touches.csv", "errors.csv", "points.csv", "verification.csv", "truth.csv"})
+    EXPECT_THAT(ran.out, ::testing::ContainsRegex("(^|\n)" + std::string(name) + " +[a-z]"));
+  EXPECT_THAT(abbe("--help").out, HasSubstr("example"));
+}
+
+TEST_F(ExampleFiles, MayBeNamedWithoutExtension) {
+  EXPECT_EQ(abbe("example path").out, abbe("example path.csv").out);
+}
+
+TEST_F(ExampleFiles, OfAnotherNameAreAUsageError) {
+  const auto ran = abbe("example calibratr.toml");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.out, IsEmpty());
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"calibratr.toml\" is not an example"),
+                             HasSubstr("did you mean \"calibrator.toml\"?"),
+                             HasSubstr("known: abbed.toml, machine.toml")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -71,6 +71,13 @@ TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
   EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
 }
 
+TEST(ConfigEncoder, RefusesAnIPv6PeerOfCanOverUdp) {
+  const std::string udp =
+      "[encoder]\ntransport = \"udp\"\npeer_host = \"::1\"\npeer_port = 20000\n";
+  EXPECT_THAT(faults_of(kMachine + udp + kNodes),
+              ElementsAre(HasSubstr("encoder.peer_host: is an IPv6 address")));
+}
+
 TEST(ConfigEncoder, TakesTheMachinesOwnSyncOnEitherTransport) {
   const std::string external = "sync = \"external\"\n";
   const auto config = parse_config(

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <string>
 
 #include "abbe/config/config.hpp"
@@ -60,6 +61,27 @@ TEST(EnvironmentConfiguration, FindsDevicesByTheNameOfTheirMap) {
   EXPECT_EQ(drivers::text_of(line), "/dev/serial/by-id/rs485 9600 8N2");
   EXPECT_THAT(config.temperatures, ElementsAre("scale_x", "part"));
   EXPECT_EQ(config.environment[1].map.measured[1].place.address, 2);
+}
+
+TEST(EnvironmentConfiguration, NamesTheTemperatureThatIsOneTooMany) {
+  std::string many = kScales;
+  many.replace(many.find("[\"scale_x"), std::string::npos, R"(["a", "b", "c", "d", "e"]
+[[environment]]
+name = "parts"
+map = "icpdas-zt2005-c8"
+host = "10.0.0.7"
+inputs = ["f", "g", "h", "i"]
+[[thermal]]
+axis = "X"
+temperature = "i"
+alpha_um_per_m_K = 8
+u_alpha_um_per_m_K = 1
+u_temperature_K = 0.1
+fixed_mm = 0
+)");
+  const auto faults = faults_of(many);
+  EXPECT_THAT(faults, HasSubstr("temperature \"i\" is number 9, but"));
+  EXPECT_EQ(std::ranges::count(faults, '\n'), 1) << faults;
 }
 
 TEST(EnvironmentConfiguration, TakesARegisterMapOfItsOwn) {

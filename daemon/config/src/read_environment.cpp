@@ -21,7 +21,8 @@ using drivers::modbus::WordOrder;
 
 constexpr std::string_view kCustom = "custom";
 
-/// Adds a temperature name and returns its channel. A fault if the name exists already.
+/// Adds a temperature name and returns its channel. A fault if the name exists already, or if
+/// there is no channel left for it.
 std::uint8_t channel_of(const std::string& name, Section& section, std::string_view key,
                         std::vector<std::string>& names) {
   const auto found = std::find(names.begin(), names.end(), name);
@@ -29,12 +30,14 @@ std::uint8_t channel_of(const std::string& name, Section& section, std::string_v
     section.fault(key, fmt::format("temperature \"{}\" is measured twice", name));
     return static_cast<std::uint8_t>(found - names.begin());
   }
-  if (names.size() == protocol::kMaxTemperatures) {
-    section.fault(key, fmt::format("more than {} temperatures", protocol::kMaxTemperatures));
-    return 0;
-  }
+
   names.push_back(name);
-  return static_cast<std::uint8_t>(names.size() - 1);
+  if (names.size() > protocol::kMaxTemperatures)
+    section.fault(key,
+                  fmt::format("temperature \"{}\" is number {}, but all [[environment]] tables "
+                              "together may measure at most {}: remove one",
+                              name, names.size(), protocol::kMaxTemperatures));
+  return static_cast<std::uint8_t>((names.size() - 1) % protocol::kMaxTemperatures);
 }
 
 void read_address(Section& device, drivers::ModbusAddress& out) {
@@ -214,7 +217,7 @@ void read_map(Section& device, std::vector<std::string>& names, drivers::Registe
   }
 
   device.get_integer("base_offset", map.base_offset, -1, 1);
-  if (!valid_map) return;
+  if (!valid_map || names.size() > protocol::kMaxTemperatures) return;  // has a fault already
   if (const auto valid = drivers::check(map); !valid) device.fault("map", valid.error().text);
 }
 

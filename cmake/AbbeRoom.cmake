@@ -59,10 +59,11 @@ function(abbe_allow_local_types target)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endfunction()
 
-# What a checked build spends on a source file is mostly its headers' templates, parsed and instrumented again for
-# each: there, several files are compiled as one. What is local to a file therefore bears a name its room uses once.
+# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_TOGETHER several files
+# of a module are compiled as one. Names that are local to a file are therefore unique in their module.
+option(ABBE_TOGETHER "Compile several source files of a module as one: faster when everything is built" OFF)
 function(abbe_compile_together target)
-  if(ABBE_SANITIZE)
+  if(ABBE_TOGETHER)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     abbe_allow_local_types(${target})
   endif()
@@ -70,7 +71,7 @@ endfunction()
 
 # The same for tests, by the first word of a file's name: tests of one subject share headers and names.
 function(abbe_compile_subjects_together target)
-  if(ABBE_SANITIZE AND NOT ABBE_FUZZ)
+  if(ABBE_TOGETHER AND NOT ABBE_FUZZ)
     get_target_property(sources ${target} SOURCES)
     foreach(source IN LISTS sources)
       get_filename_component(name ${source} NAME_WE)

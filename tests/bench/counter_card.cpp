@@ -1,9 +1,9 @@
-// The encoder path on the host: a simulated counter card in a process of its own, USB/IP over TCP,
-// the driver, its ring and a reader. Asked: 33,333 scans/s x 8 counters with nothing lost, at most
-// 10 % of one processor for driver and ring, and at least ten times the rate without loss.
+// The encoder path on the host: a simulated counter card in its own process, USB/IP over TCP, the
+// driver, its ring and a reader. Requirement: 33,333 scans/s of 8 counters without loss, at most 10
+// % of one processor for driver and ring, and ten times this rate without loss.
 //   bench_counter_card [--seconds N] [--short]
-//   bench_counter_card --serve PORT        only the simulated card, until killed (`usbip attach`)
-//   bench_counter_card --libusb [...]      the card that is plugged in (or attached), by libusb
+// bench_counter_card --serve PORT        only the simulated card, until killed (`usbip attach`)
+// bench_counter_card --libusb [...]      a card on a real port, or attached by usbip, by libusb
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -53,7 +53,8 @@ sim::CounterCardOptions simulated_card() {
   card.channels[5].phases = sim::ClockSignal{.hz = kClock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = sim::ProbeSignal{};
-  card.fifo_bytes = 4 << 20;  // this process may be stopped for a while: not what is asked here
+  // this process may be stopped for a while: an overflow of the card is not measured here
+  card.fifo_bytes = 4 << 20;
 
   return card;
 }
@@ -95,12 +96,12 @@ double thread_cpu_s() {
 }
 
 struct Result {
-  double rate_hz = 0.0;  ///< scans that came out of the ring
+  double rate_hz = 0.0;  ///< scans read from the ring
   double share = 0.0;    ///< of one processor
   std::uint64_t scans = 0;
   std::uint64_t lost = 0;
   std::uint64_t gaps = 0;
-  std::uint64_t unflagged = 0;  ///< holes in the numbers without a mark
+  std::uint64_t unflagged = 0;  ///< gaps in the scan numbers without a gap flag
   std::uint64_t dropped = 0;
   std::uint64_t faults = 0;
   std::string last_fault;
@@ -130,7 +131,7 @@ class Reader {
   std::uint32_t last_ = 0;
 };
 
-/// Port 0: by libusb.
+/// Port 0: a card found by libusb instead of USB/IP.
 std::unique_ptr<drivers::UsbLink> make_link(std::uint16_t port,
                                             const drivers::CounterCardOptions& wanted,
                                             const drivers::TimeSource& time) {

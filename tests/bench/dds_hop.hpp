@@ -1,8 +1,8 @@
 #pragma once
-/// The bare Fast DDS hop others are compared with: a fixed number of bytes from one process to
-/// another, no key, no CDR, best effort, keep last 1, UDP on loopback by the profile abbe itself
-/// uses. One way, by CLOCK_MONOTONIC, which both processes share. Forks: call it before the process
-/// has threads or a participant of its own.
+/// The plain Fast DDS hop used for comparison: a fixed number of bytes from one process to another,
+/// without key or CDR, best effort, keep last 1, UDP on loopback with the transport profile of
+/// abbe. One-way delay by CLOCK_MONOTONIC, which is common to both processes. Forks: call it before
+/// the process has threads or a DDS participant.
 
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -38,7 +38,7 @@ struct HopOptions {
   std::size_t warm_up = 200;  ///< sent first, not counted
   std::chrono::microseconds period{1000};
   std::chrono::nanoseconds
-      phase{};  ///< sent when CLOCK_MONOTONIC is a whole number of periods and this
+      phase{};  ///< sends when CLOCK_MONOTONIC is a multiple of the period plus this
   std::uint32_t domain = 96;
   std::filesystem::path profile;  ///< abbe-dds-loopback.xml
 };
@@ -63,7 +63,7 @@ struct Message {
 };
 static_assert(sizeof(Message) == kMessageBytes);
 
-/// What both processes see.
+/// Memory shared by the two processes.
 struct Shared {
   std::atomic<bool> failed{false};
   std::atomic<bool> stop{false};
@@ -180,7 +180,7 @@ inline bool send(const Shared& shared, const HopOptions& options) {
     writer->write(&message);
   }
 
-  std::this_thread::sleep_for(std::chrono::milliseconds{100});  // what is under way arrives
+  std::this_thread::sleep_for(std::chrono::milliseconds{100});  // packets in transit arrive
   return true;
 }
 
@@ -196,7 +196,8 @@ inline HopResult result_of(const Shared& shared) {
 
 }  // namespace hop
 
-/// received == 0: no participant, or the two processes did not find each other.
+/// received == 0: a participant could not be created, or the two processes did not discover each
+/// other.
 [[nodiscard]] inline HopResult measure_dds_hop(const HopOptions& options) {
   void* memory = ::mmap(nullptr, sizeof(hop::Shared), PROT_READ | PROT_WRITE,
                         MAP_SHARED | MAP_ANONYMOUS, -1, 0);

@@ -1,12 +1,12 @@
-// Question: how much of a machine's errors do the estimators of the ball-array method leave, and
-// are their stated uncertainties true? Machine: the weak-stiffness machine of [Li OMM] Table 3
-// (3.3 mm), layout of the reference data, 2964 points, also where a flatter layout has no balls.
-// Asked, as ratio of the mean R_resmag of bayes-pose to that of ols, same seeds: 8 um
-// white <= 0.80; with 0.15 mrad pose rotations <= 0.52; near-planar layout with 0.32 mrad, where
-// ols leaves points above 1: none above 1; full touch chain: rms left after the best-fit rotation
-// about Ball1 <= 0.07 mm (ols 0.23); coverage of 95 % intervals over 300 seeds 93 to 97 % per
-// component, also with an array that is uncertain (2 um, 5 urad, 0.5 K); hyper-parameters and
-// solution <= 0.1 s on one core.
+// Question: how much of a machine's errors remains after correction with each estimator of the
+// ball-array method, and are the stated uncertainties right? Machine: the weak-stiffness machine of
+// [Li OMM] Table 3 (3.3 mm) in the layout of the reference data, at 2964 points, which include
+// regions without balls in the flatter layout. Requirements for the mean R_resmag of bayes-pose
+// relative to that of ols with the same seeds: 8 um white noise: <= 0.80; with 0.15 mrad pose
+// rotations: <= 0.52; near-planar layout with 0.32 mrad, where ols has points above 1: no point
+// above 1. Simulated touches: rms after the best-fit rotation about Ball1 <= 0.07 mm (ols 0.23).
+// Coverage of the 95 % intervals over 300 seeds: 93 to 97 % per component, also with an uncertain
+// array (2 um, 5 urad, 0.5 K). Hyper-parameters and solution: <= 0.1 s on one core.
 //
 //   bench_evemu_accuracy [seeds = 100] [coverage seeds = 300]
 
@@ -70,8 +70,8 @@ void compare(const char* what, const Layout& layout, const Noise& noise, unsigne
   ask(worst[2] <= 1.0, "no point above 1");
 }
 
-/// SCAD with the grid of [Li OMM], folds by position; its fit before V(Ball1) = 0 is set, as for
-/// ols.
+/// SCAD with the grid of [Li OMM] and folds by position. Its fit is compared before V(Ball1) = 0 is
+/// set, as for ols.
 void against_scad(unsigned seeds) {
   const Field V = table3_machine();
   for (const Noise noise : {Noise{8e-6, 0.0}, Noise{8e-6, 0.15e-3}}) {
@@ -149,13 +149,13 @@ struct Coverage {
   std::size_t all = 0;
 };
 
-/// Leaves the array as it is.
+/// Does not change the array.
 struct ExactArray {
   Observations operator()(Observations o, const Layout&, unsigned) const { return o; }
 };
 
-/// 2 um per ball coordinate, 5 urad per block, 0.5 K of steel, drawn again for every seed.
-/// `stated`: the fit gets the covariance.
+/// Random errors of 2 um per ball coordinate, 5 urad per block and 0.5 K of steel for every seed.
+/// `stated`: the fit gets their covariance.
 struct UncertainArray {
   bool stated_too = true;
   Observations operator()(Observations o, const Layout& layout, unsigned seed) const {
@@ -196,7 +196,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
 
   bool covered = true;
   for (std::size_t e = 0; e < estimators.size(); ++e) {
-    covered = true;  // of the last, bayes-pose
+    covered = true;  // of the last estimator, bayes-pose
     std::printf("coverage %-34s %-10s", what, std::string(name(estimators[e])).c_str());
     for (const std::size_t in : found[e].in) {
       const double percent = 100.0 * static_cast<double>(in) / static_cast<double>(found[e].all);
@@ -206,11 +206,11 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
     std::printf("\n");
   }
 
-  constexpr unsigned kEnough = 300;  // with fewer, 2 % are chance
+  constexpr unsigned kEnough = 300;  // with fewer seeds, 2 % is within the statistical scatter
   ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
 }
 
-/// A machine drawn from the prior of bayes-pose.
+/// A random machine from the prior of bayes-pose.
 Field drawn_machine(unsigned seed) {
   const ScaledDesign design =
       *ScaledDesign::of(reference_machine().chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});
@@ -231,8 +231,8 @@ Field drawn_machine(unsigned seed) {
   return [model](const Vector3& q) { return model.V_at(q); };
 }
 
-/// Table 3 with what polynomials of order 3 do not hold: sag under a travelling weight, and a
-/// screw's pitch.
+/// Table 3 plus errors that polynomials of order 3 cannot represent: sag under a travelling weight,
+/// and a periodic pitch error of a screw.
 Field imperfect_machine(unsigned) {
   const Field V = table3_machine();
   return [V](const Vector3& q) -> Vector3 {
@@ -249,7 +249,7 @@ void speed() {
   int evaluations = 0;
 
   for (double& s : seconds) {
-    const std::clock_t start = std::clock();  // of one core, without other processes
+    const std::clock_t start = std::clock();  // processor time: excludes other processes
     const Solution solution = *solve(o);
     s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     evaluations = solution.hyper->evaluations;
@@ -272,8 +272,8 @@ int main(int argc, char** argv) {
   compare("8 um, 0.32 mrad, tilt x 0.5", reference_layout(0.5), {8e-6, 0.32e-3}, seeds, 1.0);
   compare("8 um, 0.32 mrad, tilt x 0.4", reference_layout(0.4), {8e-6, 0.32e-3}, seeds, 1.0);
 
-  // A flatter layout: compared inside the balls only. Outside them the model reports
-  // inside = false, and there is no requirement.
+  // A flatter layout is compared inside the balls only. Outside, the model reports inside = false,
+  // and there is no requirement.
   compare("the same x 0.3, inside", reference_layout(0.3), {8e-6, 0.32e-3}, seeds, 1.0,
           Grid::OwnHull);
   compare("the same x 0.1, inside", reference_layout(0.1), {8e-6, 0.32e-3}, seeds, 1.0,
@@ -289,8 +289,8 @@ int main(int argc, char** argv) {
       "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3},
       coverage_seeds, false);
 
-  // What the array leaves in the residuals is in s and w, too, and counts twice: rather more than
-  // 95 %.
+  // The array's errors also appear in the residuals and so in s and w: they count twice, and the
+  // coverage is somewhat above 95 %.
   coverage("prior machine, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
            UncertainArray{});
   coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false,

@@ -1,6 +1,6 @@
 #pragma once
-/// Work in a process of its own: forked while this process has no thread yet, begun on request.
-/// Fast DDS starts threads, and a process with threads must not fork.
+/// A task in a child process. The child is forked while this process has no thread, and starts the
+/// task on request. Fast DDS starts threads, and a process with threads must not fork.
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -15,7 +15,7 @@
 
 namespace abbe::bench {
 
-/// Memory both sides see; `T` must not own anything.
+/// Memory shared by parent and child; `T` must not own memory.
 template <class T>
 [[nodiscard]] T& shared_memory() {
   void* memory =
@@ -24,7 +24,7 @@ template <class T>
   return *new (memory) T;  // stays until the process ends
 }
 
-/// The child ends with `work`, or with this process.
+/// The child process ends when `work` returns, or when this process ends.
 class ForkedTask {
  public:
   template <class Work>

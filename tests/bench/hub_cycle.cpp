@@ -1,11 +1,11 @@
-// How long the longest cycle of the hub lasts while what grows is as large as it may be: models of
-// as many parameters as can be published, with covariance, come into force (which is checked); a
-// request of almost 4 MB, a path of 1e5 vertices, comes over the control socket; the machine drives
-// the whole path, seen by a tracker in bursts of 332 points, and the run is identified; requests
-// for the status come as fast as they are answered. A thread of the highest priority on the hub's
-// processor does nothing but wake every 100 us: where it wakes late, no thread ran there, because
-// the hypervisor gave the processor to another guest. This time is printed and subtracted from the
-// hub's cycle. The processor time of the longest cycle is printed, too.
+// The longest cycle of the hub with the largest permitted inputs: models with the maximum number of
+// parameters that can be published, with covariance, become active (this is checked); a request of
+// almost 4 MB, a path of 1e5 vertices, arrives on the control socket; the machine drives the whole
+// path, measured by a tracker in bursts of 332 points, and the run is identified; status requests
+// arrive as fast as they are answered. A thread of the highest priority on the hub's processor
+// wakes every 100 us. If it wakes late, no thread ran there, because the hypervisor gave the
+// processor to another guest. This time is printed and subtracted from the hub's cycle. The
+// processor time of the longest cycle is printed as well.
 //   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
 // Exit code 1: a cycle longer than 2 ms, or a model that did not become active.
 #include <fmt/format.h>
@@ -50,11 +50,11 @@ constexpr auto kPeriod = 250us;
 constexpr auto kAsked = 2ms;
 constexpr auto kLook = 100us;
 constexpr int kPriority = 30, kHighestPriority = 99;
-constexpr int kCpu = 1;  // the hub's
+constexpr int kCpu = 1;  // the hub's processor
 constexpr std::size_t kVertices = 100'000;
 constexpr std::size_t kBurst = 332;            // points of one packet: 1 kHz, every 332 ms
-constexpr std::size_t kMostParameters = 1024;  // of ErrorModel in the IDL
-constexpr std::size_t kMostGridNodes = 4096;   // that are published
+constexpr std::size_t kMostParameters = 1024;  // limit of ErrorModel in the IDL
+constexpr std::size_t kMostGridNodes = 4096;   // limit of a published grid
 
 std::int64_t cpu_ns() {
   timespec t{};
@@ -62,12 +62,12 @@ std::int64_t cpu_ns() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// Written by one thread, read and reset by another.
+/// Written by one thread; read and reset by another.
 struct Longest {
   std::atomic<std::int64_t> wall_ns{0}, cycle_ns{0}, cpu_ns{0};
   std::atomic<std::uint64_t> cycles{0};
 
-  /// `cycle`: the wall time without the time in which the processor was taken away.
+  /// `cycle`: wall time without the time in which the hypervisor took the processor away.
   void take(std::int64_t wall, std::int64_t cycle, std::int64_t cpu) {
     if (wall > wall_ns) wall_ns = wall;
     if (cycle > cycle_ns) cycle_ns = cycle;
@@ -81,7 +81,7 @@ double ms(std::int64_t ns) {
   return 1e-6 * static_cast<double>(ns);
 }
 
-/// SCHED_FIFO on the processor of the hub for the calling thread, if it may.
+/// Sets SCHED_FIFO on the hub's processor for the calling thread, if it is permitted.
 bool real_time(int priority) {
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   cpu_set_t cpus;
@@ -92,9 +92,9 @@ bool real_time(int priority) {
          ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
 }
 
-/// The times at which no thread could run on the hub's processor. look() and taken_away() run
-/// there, too, look() with a higher priority than the hub: after an interruption look() has
-/// recorded it before taken_away() reads it.
+/// The times at which no thread could run on the hub's processor. look() and taken_away() run on it
+/// too, look() with a higher priority than the hub: after an interruption look() records it before
+/// taken_away() reads it.
 class Interruptions {
  public:
   void look(const std::atomic<bool>& stop) {
@@ -147,8 +147,8 @@ void run_periodically(const std::atomic<bool>& stop, Longest& longest,
   }
 }
 
-/// Rows along X, 25 mm beside each other, in layers; 0.6 mm from vertex to vertex. The digits
-/// behind make the request as long as it may be.
+/// Rows along X with a distance of 25 mm, in layers; 0.6 mm from vertex to vertex. Additional
+/// digits bring the request to the maximum length.
 std::vector<std::array<double, 3>> long_path() {
   constexpr std::size_t kInRow = 668, kRows = 17;
   constexpr double kStep_m = 0.6e-3, kRow_m = 25e-3, kLayer_m = 30e-3, kDigit_m = 1e-8;
@@ -186,8 +186,8 @@ calib::VolumetricModel largest_model(unsigned seed) {
   return daemon::test::synthetic_model(seed, static_cast<double>(finer));
 }
 
-/// The machine stands at the first vertex for a second, drives three vertices a millisecond, and
-/// stands at the last. Encoders 1 kHz.
+/// The machine stands at the first vertex for a second, passes three vertices per millisecond, and
+/// stands at the last. Encoders at 1 kHz.
 class DrivenMachine final : public daemon::SampleSource {
  public:
   DrivenMachine(const drivers::TimeSource& time, std::vector<std::array<double, 3>> path)
@@ -238,7 +238,7 @@ class DrivenMachine final : public daemon::SampleSource {
   std::size_t driven_ = 0;
 };
 
-/// Stands in for abbe-dds: reads everything from the socket.
+/// Replaces abbe-dds: reads everything from the socket.
 void swallow(const std::filesystem::path& socket) {
   const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
@@ -280,7 +280,7 @@ class Bench {
         daemon::DdsLink::listen(folder_ / "dds.sock").value(),
         daemon::PublisherOptions{.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0},
         protocol::UtcOffset{});
-    (void)largest_model(1);  // before anything is measured
+    (void)largest_model(1);  // before the measurement starts
     hub_.emplace(daemon::HubParts{.config = config_,
                                   .time = time_,
                                   .devices = machine_,
@@ -335,7 +335,7 @@ class Bench {
   }
 
   void stream() const { std::this_thread::sleep_for(seconds_ * 1s); }
-  /// As `abbe model activate` of another process; the daemon follows the store.
+  /// The same as `abbe model activate` in another process; the daemon follows the store.
   void put_models_in_force() {
     for (unsigned seed = 1; seed <= 3; ++seed) {
       auto document = daemon::test::synthetic_document(seed);
@@ -365,7 +365,7 @@ class Bench {
     request_bytes_ = request.dump().size();
     (void)ask(request);
   }
-  /// The whole path, until the run is being identified.
+  /// Drives the whole path; returns when the identification of the run has started,
   void drive() {
     machine_.drive();
     json session;
@@ -375,7 +375,7 @@ class Bench {
       if (session["state"] == "acquiring") points_ = session["points"];
       if (session["state"] != "acquiring" && session["state"] != "warming") break;
     }
-    // Or the identification has ended already.
+    // or has ended already.
     if (session["state"] == "acquiring" || session["state"] == "warming")
       throw std::runtime_error(session.dump());
   }
@@ -383,7 +383,7 @@ class Bench {
     for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;)
       (void)ask({{"do", "status"}});
   }
-  /// Also where the identification has ended by itself.
+  /// Accepts that the identification has already ended.
   void cancel() {
     (void)daemon::ask_daemon(folder_ / "control.sock", {{"do", "cancel"}}, 60s);
     stream();

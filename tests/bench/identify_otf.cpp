@@ -1,8 +1,8 @@
-/// Asked: `abbe identify otf` on the 488,664 samples of reference case A from CSV in at most 3 s of
-/// wall time, parsing and process start included. Converts the reference stream (int32 triples
-/// range, azimuth, elevation) to tracker.csv once, runs the built program as a process, and holds
-/// the model against the true tables. Build type Release. ABBE_REF_DIR names the folder of the
-/// reference data, default beside the clone.
+/// Requirement: `abbe identify otf` takes at most 3 s of wall time for the 488,664 samples of
+/// reference case A from CSV, including process start and parsing. The program converts the
+/// reference stream (int32 triples range, azimuth, elevation) to tracker.csv once, runs the built
+/// `abbe` as a process, and compares the model with the true tables. Build type Release.
+/// ABBE_REF_DIR names the folder of the reference data, by default beside the clone.
 
 #include <fmt/format.h>
 
@@ -43,7 +43,7 @@ fs::path reference_folder() {
   return fs::path(given != nullptr ? given : ABBE_SOURCE_DIR "/../shared/ref") / "otf";
 }
 
-/// The stream's scales: 1e-8 m, 2e-9 rad; 500 Hz.
+/// Units of the stream: 1e-8 m, 2e-9 rad; 500 Hz.
 void convert_stream(const fs::path& stream, const fs::path& csv) {
   std::ifstream in(stream, std::ios::binary);
   std::ofstream out(csv, std::ios::binary);
@@ -106,7 +106,7 @@ Eigen::VectorXd true_parameters(const calib::ParameterLayout& layout,
   return calib::to_gauge(calib::Gauge::G1, layout, std::array{tool_m}, U).value();
 }
 
-/// How wrong the model is against the true tables, mean absolute error in G1; infinite without one.
+/// Mean absolute difference between the model and the true tables in G1; infinite without a model.
 double print_errors(const fs::path& model_json) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const auto document = daemon::read_model(model_json);

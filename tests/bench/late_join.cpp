@@ -1,6 +1,6 @@
-// How long a Cyclone DDS subscriber that joins late waits for ModelState: from the start of its
-// process to the first state its example prints. Discovery by unicast on loopback, which is the
-// slower way.
+// The time until a Cyclone DDS subscriber that joins late receives ModelState: from the start of
+// its process to the first state that its example prints. Discovery by unicast on loopback, which
+// is slower than by multicast.
 //   bench_late_join [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -32,10 +32,10 @@ using namespace std::chrono_literals;
 using namespace abbe;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kMedian_s = 0.3, kWorst_s = 1.0;  // asked
+constexpr double kMedian_s = 0.3, kWorst_s = 1.0;  // required
 constexpr auto kPatience = 5s;
 
-/// Stands for abbed: a state every second, a vector every 10 ms.
+/// Replaces abbed: a state every second, a vector every 10 ms.
 class Publisher {
  public:
   explicit Publisher(daemon::DdsLink link) : link_(std::move(link)) {}
@@ -74,7 +74,7 @@ class Publisher {
   Clock::time_point next_state_{}, next_vector_{};
 };
 
-/// Its standard output ends in a pipe.
+/// A process whose standard output is read through a pipe.
 class Subscriber {
  public:
   explicit Subscriber(std::string domain) {
@@ -99,7 +99,7 @@ class Subscriber {
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
-  /// Waits 1 ms at most for more of its output.
+  /// Waits at most 1 ms for further output.
   bool printed(std::string_view what) {
     pollfd ready{output_, POLLIN, 0};
     std::array<char, 4096> chunk{};
@@ -116,7 +116,7 @@ class Subscriber {
   std::string text_;
 };
 
-/// Seconds; nothing if no state came in time.
+/// Seconds; nullopt if no state arrived in time.
 std::optional<double> join(Publisher& publisher, const std::string& domain) {
   const auto start = Clock::now();
   Subscriber subscriber(domain);
@@ -128,7 +128,8 @@ std::optional<double> join(Publisher& publisher, const std::string& domain) {
 }
 
 int measure(Publisher& publisher, const std::string& domain, std::size_t joins) {
-  static_cast<void>(join(publisher, domain));  // abbe-dds itself starts at the same time
+  // abbe-dds itself starts during this first measurement
+  static_cast<void>(join(publisher, domain));
   std::vector<double> joined_s;
   std::size_t missed = 0;
 

@@ -1,6 +1,6 @@
-// What recording costs per sample, against plain write() of the same bytes, and how many times
-// faster than real time a recording is read back. Ten minutes of a calibration: 2000 axis samples
-// and 500 tracker points a second, raw bytes beside them.
+// The cost of recording per sample, compared with plain write() of the same bytes, and how many
+// times faster than real time a recording is read. Ten minutes of a calibration: 2000 axis samples
+// and 500 tracker points per second, and their raw bytes.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -32,7 +32,7 @@ double seconds(auto duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
-/// Of this process, user and system.
+/// Processor time of this process, user and system.
 double cpu_seconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
@@ -87,7 +87,8 @@ void record_second(daemon::Recorder& recorder, std::uint32_t second, bool raw) {
   block.length = 2048;
   block.bytes = {};
 
-  for (std::uint32_t i = 0; i < 12; ++i) {  // a second of 500 points of 36 bytes, and of TPDOs
+  // raw bytes of one second: 500 points of 36 bytes, and TPDOs
+  for (std::uint32_t i = 0; i < 12; ++i) {
     block.time = time_at(second * 12 + i, 12);
     recorder.record(protocol::to_raw_bytes(block, "tracker"));
   }
@@ -111,7 +112,7 @@ std::filesystem::path record_all(const std::filesystem::path& folder, bool raw) 
   return closed->file;
 }
 
-/// The same number of bytes by the same number of writes and syncs: what any recorder would pay.
+/// The same number of bytes with the same number of writes and syncs: the minimum for any recorder.
 void write_all(const std::filesystem::path& folder, std::uint64_t bytes) {
   const auto file = folder / "plain";
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);

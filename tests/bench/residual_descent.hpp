@@ -1,8 +1,8 @@
 #pragma once
-/// The peer of bench_sparse_grid: SCAD paths by coordinate descent that keeps the residual up to
-/// date, one path after the other, in plain loops. Same standardisation, warm starts, strong and
-/// active sets, stopping rule and budget as abbe::calib::sparse, so that every sweep count can be
-/// compared.
+/// The reference implementation of bench_sparse_grid: SCAD paths by coordinate descent that updates
+/// the residual, one path after the other, in plain loops. Standardisation, warm starts, strong and
+/// active sets, stopping rule and budget are those of abbe::calib::sparse, so that every sweep
+/// count can be compared.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace abbe::bench {
 
 struct ResidualPath {
-  std::vector<std::vector<double>> b;  ///< of each lambda reached
+  std::vector<std::vector<double>> b;  ///< of each lambda that was reached
   std::vector<long> sweeps;
 };
 

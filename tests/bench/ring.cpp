@@ -1,13 +1,14 @@
-// Question: does the sample ring carry as many samples a second from thread to thread as the better
-// of boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Asked: median ratio >= 0.95
-// over >= 21 rounds. Each round runs all three, in an order that rotates with every round, and
-// gives one ratio ours / better peer; of five short runs of each the fastest counts, because a run
-// in which a thread lost its processor does not measure the ring. Writer: one push per sample, as
-// receive() does, trying again when full (no queue drops, so all carry the same samples). Reader:
-// in batches of 64 where the queue has them (ours, boost), one by one where not (moodycamel). The
-// other lines give each its best: ours and boost also push in batches of 16.
+// Question: does the sample ring transfer as many samples per second between two threads as the
+// faster of boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Requirement: median
+// ratio >= 0.95 over >= 21 rounds. Each round runs all three, in an order that rotates with every
+// round, and gives one ratio ours / faster other queue. The fastest of five short runs of each
+// counts: a run in which a thread lost its processor does not measure the ring. Writer: one push
+// per sample, as receive() does, repeated while the queue is full (no queue drops, so all transfer
+// the same samples). Reader: in batches of 64 where the queue supports batches (ours, boost), one
+// by one otherwise (moodycamel). The other lines show the best rate of each: ours and boost also
+// push in batches of 16.
 //
-// The sample ring is boost's queue plus the project's rule (drop, count, mark), so the
+// The sample ring is boost's queue with the rule of this project (drop, count, mark), so the
 // comparison with boost measures the cost of the rule: a check of the loss counter, and a marked
 // copy after each full queue, which is frequent with this writer.
 //
@@ -57,16 +58,16 @@ std::uint32_t number_of(const AxisSample& s) {
   return s.cycle;
 }
 
-/// Which prepared sample is the i-th sent: blocks of kWriteBatch in a scattered order. In steps
-/// with the slots of a queue a source would lie at the same place modulo 4096 as its slot for a
-/// whole run, or never, as the heap happened to be; a load that seems to hit an earlier store waits
-/// for it, and the placement, not the queue, would decide the rate by two.
+/// Index of the i-th prepared sample: blocks of kWriteBatch in a scattered order. In a regular
+/// order a source would have the same address modulo 4096 as its slot in the queue during a whole
+/// run, or never, depending on the heap. A load whose address matches an earlier store modulo 4096
+/// waits for the store: the placement would change the rate by a factor of two.
 std::uint32_t source_of(std::uint32_t i) {
-  constexpr std::uint32_t kScatter = 13;  // has no factor in common with the number of blocks
+  constexpr std::uint32_t kScatter = 13;  // coprime to the number of blocks
   return (i / kWriteBatch * kScatter * kWriteBatch + i % kWriteBatch) % kPrepared;
 }
 
-/// Each queue behind the same four verbs. push()es answer how many were taken.
+/// All queues with the same four functions. push() functions return the number of accepted samples.
 template <class T>
 struct Ours {
   abbe::drivers::SampleRing<T> ring{kCapacity};
@@ -97,7 +98,7 @@ struct Moodycamel {
   }
 };
 
-/// Waits for the other side: spins first, for it is usually there at once; then lets others run.
+/// Waits for the other thread: spins first, because it usually needs little time, then yields.
 class Patience {
  public:
   void wait() {
@@ -114,8 +115,8 @@ class Patience {
   unsigned turns_ = 0;
 };
 
-/// Numbered samples in memory, as a decoder leaves them: nothing the compiler knows the contents
-/// of.
+/// Numbered samples in memory, as a decoder writes them: the compiler cannot evaluate them in
+/// advance.
 template <class T>
 const std::vector<T>& prepared() {
   static const std::vector<T> samples = [] {
@@ -148,7 +149,7 @@ void write_batches(Queue& queue, std::uint32_t samples) {
   }
 }
 
-/// Million samples a second, from the first push to the last pop. Ends the program if one is
+/// Million samples per second, from the first push to the last pop. Ends the program if a sample is
 /// missing or out of order.
 template <class T, class Queue>
 double run(bool batches, std::uint32_t samples) {
@@ -218,7 +219,8 @@ double compare(const char* what, bool batches, int rounds, std::uint32_t samples
   return median(ratios);
 }
 
-/// On a busy machine a run measures the scheduler rather than the ring. Both threads inherit it.
+/// On a busy machine a run measures the scheduler rather than the ring. Both threads inherit the
+/// priority.
 bool take_priority() {
   const sched_param param{.sched_priority = 1};
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;

@@ -1,8 +1,8 @@
 #pragma once
-/// A subscriber that notes when each Snapshot reached it, with the same kind of reader as the bare
-/// hop: the stamp is taken in the listener, once the sample is out of the reader. The
-/// Compensation contains when the hub had the axes (age_ns counts from host_time_ns to that
-/// instant), so no further clock enters the measurement.
+/// A subscriber that records when each Snapshot arrived, with the same kind of reader as the plain
+/// hop: the time is taken in the listener after the sample was taken from the reader. Compensation
+/// contains when the hub had the axes (age_ns counts from host_time_ns to that instant), so that
+/// the measurement needs no further clock.
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -30,7 +30,8 @@ namespace abbe::bench {
   return std::chrono::steady_clock::now().time_since_epoch().count();
 }
 
-/// One writer, one reader, in memory shared by two processes. Full: the rest is not noted.
+/// One writer, one reader, in memory shared by two processes. When it is full, further arrivals are
+/// not recorded.
 template <class T, std::size_t Capacity>
 class SharedLog {
  public:
@@ -50,8 +51,8 @@ class SharedLog {
 
 /// Times are CLOCK_MONOTONIC, which at speed 1 is host time.
 struct Arrival {
-  std::int64_t host_time_ns = 0;            ///< of the SYNC
-  std::int64_t tracker_device_time_ns = 0;  ///< of the newest point; 0: none yet
+  std::int64_t host_time_ns = 0;            ///< time of the SYNC
+  std::int64_t tracker_device_time_ns = 0;  ///< time of the newest point; 0: no point yet
   std::int64_t arrived_ns = 0;
 };
 
@@ -61,7 +62,7 @@ struct HubCycle {
   std::int64_t hub_ns = 0;
 };
 
-/// Of a device's real-time part: from its bytes being there to its samples in the ring.
+/// Latency of a device's real-time part: from the arrival of its bytes to its samples in the ring.
 struct DeviceLatency {
   double p50_s = 0.0;
   double p99_s = 0.0;
@@ -70,7 +71,7 @@ struct DeviceLatency {
 struct SnapshotLog {
   SharedLog<Arrival, 400'000> arrivals;
   SharedLog<HubCycle, 400'000> turns;
-  DeviceLatency encoder, tracker;  ///< the latest; read it when the subscriber has ended
+  DeviceLatency encoder, tracker;  ///< the latest; read it after the subscriber has ended
   std::atomic<bool> failed{false};
   std::atomic<bool> stop{false};
 };
@@ -118,7 +119,7 @@ inline void note_health(SnapshotLog& log, std::span<const std::byte> payload) {
   if (stream == "tracker") log.tracker = {health->latency_p50_s(), health->latency_p99_s()};
 }
 
-/// Until log.stop.
+/// Runs until log.stop is set.
 inline void subscribe(SnapshotLog& log, const dds::ParticipantOptions& options) {
   using daemon::Topic;
   PayloadListener on_snapshot(

@@ -1,9 +1,9 @@
 #pragma once
-/// The simulated devices at real speed, which note when the last TPDO of a cycle and the last byte
-/// of a burst left. Both leave as their wires carry them: three TPDOs one after the other at 1
-/// Mbit/s, a burst by Ethernet segments at 100 Mbit/s. What leaves is made before; the stamps are
-/// taken just before and after the last of it is sent, so that this system call itself counts
-/// against abbe.
+/// The simulated devices at real speed. They record when the last TPDO of a cycle and the last byte
+/// of a burst were sent. Both are sent at the rate of their transport: three TPDOs one after the
+/// other at 1 Mbit/s, a burst in Ethernet segments at 100 Mbit/s. The bytes are prepared before;
+/// the times are taken just before and after the last of them is sent, so that the duration of this
+/// system call is part of the measured delay.
 
 #include <poll.h>
 
@@ -29,7 +29,7 @@ struct Departure {
 class StampedStage {
  public:
   [[nodiscard]] static sim::Result<std::unique_ptr<StampedStage>> open() {
-    // the machine stands: nothing here depends on it
+    // the machine stands still: no message depends on its position
     auto path = sim::PathMotion::plan({.vertices = {{}}});
     if (!path) return tl::unexpected(path.error());
     std::unique_ptr<StampedStage> stage(new StampedStage(std::move(*path)));
@@ -44,7 +44,7 @@ class StampedStage {
                                                              {.node = 2, .axis = sim::Axis::Y},
                                                              {.node = 3, .axis = sim::Axis::Z}}};
 
-    // Without .speed a SYNC gets the time at which it is read, and its answers are sent at the
+    // Without .speed a SYNC gets the time at which it is read, and its replies are sent at the
     // times given here.
     auto bus = sim::EncoderBus::open({}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
@@ -66,7 +66,7 @@ class StampedStage {
     bursts_.clear();
   }
 
-  /// Waits until something is to do, and does it.
+  /// Waits for the next event and handles it.
   void cycle() {
     std::vector<pollfd> fds{{bus_->fd(), POLLIN, 0}, {tracker_->listener_fd(), POLLIN, 0}};
     if (tracker_->client_fd() >= 0) fds.push_back({tracker_->client_fd(), POLLIN, 0});
@@ -84,17 +84,17 @@ class StampedStage {
   explicit StampedStage(sim::PathMotion path) : machine_({}, std::move(path)) {}
 
   static constexpr std::size_t kNodes = 3;
-  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76; 3 more
-  // until the next, and at most 8 and 16 of stuffing.
+  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76, plus 3 bits
+  // between frames and at most 8 and 16 stuff bits.
   static constexpr std::chrono::microseconds kSyncOnTheBus{55};
   static constexpr std::chrono::microseconds kTpdoOnTheBus{95};
-  // At 100 Mbit/s a segment of an ordinary Ethernet takes, with its heads, 1538 bytes' time.
+  // At 100 Mbit/s a full Ethernet segment takes, with its headers, the time of 1538 bytes.
   static constexpr std::size_t kSegmentBytes = 1448;
   static constexpr std::chrono::microseconds kSegmentOnTheWire{123};
 
-  /// The poll that sends the last answer to a SYNC is stamped. It was a SYNC that came if then an
-  /// answer is due when the first TPDO is. So is node 1's answer to its configuration: forget()
-  /// before measuring.
+  /// Records the time of the poll that sends the last reply to a SYNC. A SYNC was received if a
+  /// reply is due when the first TPDO is due. This also applies to node 1's reply to its
+  /// configuration: call forget() before measuring.
   void cycle_bus(bool asked) {
     const auto now = clock_.now();
     const std::int64_t before_ns = monotonic_ns();
@@ -107,8 +107,8 @@ class StampedStage {
       last_answer_due_ = now + kSyncOnTheBus + kNodes * kTpdoOnTheBus;
   }
 
-  /// The points are made first: what leaves afterwards is only the sending. The poll after which
-  /// nothing is left of a burst is stamped.
+  /// The points are made first, so that only the sending is measured. Records the time of the poll
+  /// after which no byte of a burst is left to send.
   void cycle_tracker() {
     const auto now = clock_.now();
     if (tracker_->wants_write() && now < segment_due_) return;
@@ -127,7 +127,7 @@ class StampedStage {
   sim::VirtualMachine machine_;
   std::unique_ptr<sim::TrackerServer> tracker_;
   std::unique_ptr<sim::EncoderBus> bus_;
-  std::optional<sim::HostTime> last_answer_due_;  ///< to the SYNC that came last
+  std::optional<sim::HostTime> last_answer_due_;  ///< to the latest SYNC
   sim::HostTime segment_due_{};
   bool in_burst_ = false;
   std::vector<Departure> cycles_, bursts_;

@@ -1,11 +1,12 @@
-// From the wire to DDS: how long after the last TPDO of a cycle, or the last byte of a burst, left
-// the simulated device a subscriber in another process has the sample, through abbed and abbe-dds
-// as they are installed, against a bare Fast DDS hop of the same rhythm that goes on beside it all
-// the while, half a cycle away, when abbe has nothing to do but to look every P: a shared machine
-// wakes a sleeping process within 30 us in one minute and within 200 us in the next. The hop alone,
-// measured before, is printed, too. The hub looks every P, so a sample waits P/2 in the mean and P
-// at most before anything can happen to it. What else runs on the machine shows in the tails of
-// both: `nice -n -20 bench_wire_to_dds` lets the whole chain and the bare hop alike go before it.
+// From the wire to DDS: the delay from the last TPDO of a cycle, or the last byte of a burst,
+// leaving the simulated device until a subscriber in another process has the sample, through abbed
+// and abbe-dds as installed. It is compared with a plain Fast DDS hop of the same period that runs
+// at the same time, shifted by half a cycle, when abbe only polls its rings every P: a shared
+// machine wakes a sleeping process within 30 us in one minute and within 200 us in the next. The
+// hop without abbe is measured first and printed as well. The hub polls every P, so a sample waits
+// P/2 on average and P at most before it is processed. Other load on the machine appears in the
+// tails of both: with `nice -n -20 bench_wire_to_dds` the whole chain and the plain hop run before
+// it.
 //   bench_wire_to_dds [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -44,18 +45,18 @@ namespace config_tables = abbe::config_tables;
 namespace fs = std::filesystem;
 
 constexpr auto kHubPeriod = 250us;
-// 100 Hz: the processors stay idle between two cycles. No multiple of P: both run on one clock, and
-// a sample would wait for the hub equally long in every cycle.
+// 100 Hz: the processors stay idle between two cycles. Not a multiple of P: both run on one clock,
+// and a sample would wait for the hub equally long in every cycle.
 constexpr auto kSyncPeriod = 10'007us;
 constexpr std::int64_t kHalfPeriod_ns = std::chrono::nanoseconds{kSyncPeriod}.count() / 2;
-constexpr double kHops = 3.0;  // the limits: P/2 + 3 hops in the middle, P + 3 hops in 99 of 100
+constexpr double kHops = 3.0;  // the limits: median P/2 + 3 hops, p99 P + 3 hops
 constexpr std::int64_t kLongest_ns = 200'000'000;
 
 struct Plan {
   std::size_t cycles = 6500;
   std::size_t bursts = 200;
   std::size_t hops_alone = 700;
-  std::size_t hops_beside = 6200;  ///< last no longer than the cycles
+  std::size_t hops_beside = 6200;  ///< must not last longer than the cycles
 };
 
 double us(std::int64_t ns) {
@@ -74,7 +75,7 @@ Quantiles quantiles(std::vector<double> values) {
   return {n, values[n / 2], values[std::min(n - 1, n * 99 / 100)]};
 }
 
-/// What befell the samples of one device, us.
+/// Results for the samples of one device, us.
 struct Path {
   std::vector<double> sending, to_hub, hub_to_subscriber, whole;
   std::size_t lost = 0;        ///< departures without an arrival
@@ -106,7 +107,7 @@ void note(Path& path, const SnapshotLog& log, const Departure& departure, std::i
   }
 }
 
-/// A cycle's sample carries the time of the SYNC that asked for it, just before its TPDOs left.
+/// A cycle's sample carries the time of its SYNC, shortly before its TPDOs were sent.
 Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) {
   Path path;
   std::size_t i = 0;
@@ -124,8 +125,8 @@ Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) 
   return path;
 }
 
-/// A burst has arrived with the first snapshot that shows its last point: the newest seen before
-/// the next burst left.
+/// A burst has arrived with the first snapshot that contains its last point: the newest one
+/// received before the next burst was sent.
 Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) {
   Path path;
   std::size_t i = 0;
@@ -198,7 +199,7 @@ std::string configuration(const StampedStage& stage, std::uint32_t domain) {
                                     .more = "snapshot_hz = 0\ncompensation_hz = 0\n"});
 }
 
-/// Stopped with SIGTERM, as systemd would.
+/// Stopped with SIGTERM, as systemd does.
 class Daemon {
  public:
   explicit Daemon(const fs::path& folder) {
@@ -252,7 +253,8 @@ bool both_flow(const SnapshotLog& log) {
   return n > 0 && log.turns.size() > 0 && log.arrivals[n - 1].tracker_device_time_ns != 0;
 }
 
-/// The whole chain, from the first SYNC to the last arrival. False: reported on stderr.
+/// The whole chain, from the first SYNC to the last arrival. Returns false after an error, reported
+/// on stderr.
 bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
                const std::function<void(std::int64_t away_ns)>& begin_hop, std::uint32_t domain,
                const Plan& plan) {
@@ -269,7 +271,8 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
   stage.forget();
   cycle_until(stage, 5s, [&] { return !stage.cycles().empty(); });
   if (!stage.cycles().empty()) begin_hop(stage.cycles().back().before_ns + kHalfPeriod_ns);
-  const auto settled = std::chrono::steady_clock::now() + 3s;  // the clock model, caches, discovery
+  // for the clock model, caches and DDS discovery
+  const auto settled = std::chrono::steady_clock::now() + 3s;
   cycle_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
   stage.forget();
   const auto enough = [&] {
@@ -287,8 +290,8 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
   return complete;
 }
 
-/// A device does not wait for a processor: its simulator goes before everything measured. False:
-/// refused.
+/// A real device does not wait for a processor: its simulator gets a higher priority than
+/// everything measured. Returns false if it is not permitted.
 bool stand_for_hardware() {
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const sched_param first{.sched_priority = 80};
@@ -300,8 +303,8 @@ std::string load_average() {
   return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
 }
 
-/// The idle share of the processors, from one call to the next. Near zero, the p99 is the time
-/// slice that the scheduler gave another program (about 3 ms), not the delay of abbe.
+/// The idle share of the processors between two calls. If it is near zero, p99 is the time slice
+/// that the scheduler gave another program (about 3 ms), not the delay of abbe.
 class IdleShare {
  public:
   IdleShare() { read(); }
@@ -327,7 +330,7 @@ class IdleShare {
   double idle_ = 0.0, all_ = 0.0;
 };
 
-/// True: both limits were held, those by the hop beside.
+/// True if both limits, computed with the simultaneous hop, are met.
 bool print_verdict(std::string_view what, const Path& path, const HopResult& hop,
                    const HopResult& alone) {
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());
@@ -392,7 +395,7 @@ int main(int argc, char** argv) {
                       .profile = ABBE_LOOPBACK_PROFILE};
   };
 
-  // Every process is forked here, before anything starts a thread.
+  // All processes are forked here, before any thread is started.
   auto& alone = shared_memory<HopResult>();
   auto& beside = shared_memory<HopResult>();
   auto& log = shared_memory<SnapshotLog>();

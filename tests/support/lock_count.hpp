@@ -29,7 +29,7 @@ inline constexpr bool kLocksAreCounted = false;
 inline constexpr bool kLocksAreCounted = true;
 #endif
 
-/// Locks that this thread took since construction.
+/// Number of locks that this thread has taken since construction.
 class LockCount {
  public:
   [[nodiscard]] std::uint64_t value() const noexcept { return locks_of_this_thread - begin_; }

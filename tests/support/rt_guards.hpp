@@ -28,7 +28,7 @@ void expect_no_allocation(std::size_t times, Path&& path) {
   EXPECT_EQ(allocations.value(), 0u) << "allocations in " << times << " calls of a real-time path";
 }
 
-/// From now on the kernel kills this process at any system call except exit_group.
+/// Installs a filter: the kernel kills this process at any further system call except exit_group.
 inline void allow_only_exit() {
   std::array<sock_filter, 4> filter{{
       BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),

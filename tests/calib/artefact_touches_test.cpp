@@ -1,4 +1,5 @@
-/// Where a ball array is touched for its own calibration, and that nothing is in the way there.
+/// Touch plans for the calibration of a ball array: the touched points, and that the probe does not
+/// collide on the way.
 
 #include <gtest/gtest.h>
 
@@ -73,7 +74,7 @@ TEST(ArtefactTouches, NoWayLeadsThroughABall) {
           EXPECT_GT(distance_to_way(ball.centre_m, here, place), 1.3 * 14.5e-3);
         here = place;
       }
-      // The last of the way lies outward of the touch.
+      // The last section of the way lies outward of the touch.
       EXPECT_NEAR((t.way_m.back() - t.at_m).normalized().dot(t.normal), 1.0, 1e-9);
     }
   }
@@ -86,7 +87,7 @@ double top_of_everything() {
 }
 
 TEST(ArtefactTouches, GoesUpFromWhereItStandsBeforeAnythingElse) {
-  // Between two balls: a straight way to above the first one leads through a ball.
+  // Between two balls: the straight way to the point above the first ball passes through a ball.
   const Vector3 from{0.04, 0.0, -0.01};
   const auto way = whole_plan(from).touches.front().way_m;
   ASSERT_EQ(way.size(), 3u);
@@ -117,7 +118,7 @@ TEST(ArtefactTouches, RefusesATipWithABallAboveIt) {
   ASSERT_FALSE(under);
   EXPECT_NE(under.error().text.find("ball 2 is above the tip"), std::string::npos)
       << under.error().text;
-  // As after a touch on its upper half that was the last one.
+  // The position after a last touch on the ball's upper half.
   EXPECT_TRUE(plan_artefact_touches(array(), kFaces, {0.08 + 14.3e-3, 0.0, 2e-3}, {}));
 }
 

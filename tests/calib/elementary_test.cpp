@@ -1,4 +1,4 @@
-/// Against the C library in extended precision, 64 bits on x86-64.
+/// Compared with the C library in extended precision, 64 bits on x86-64.
 #include "elementary.hpp"
 
 #include <gtest/gtest.h>
@@ -13,13 +13,13 @@
 namespace {
 using namespace abbe::calib;
 
-/// Units in the last place of `value` between it and what is right.
+/// Difference of `value` from the exact value in units of the last place.
 double units_off(double value, long double right) {
   const double last_place = std::nextafter(std::abs(value), INFINITY) - std::abs(value);
   return static_cast<double>(std::abs(static_cast<long double>(value) - right)) / last_place;
 }
 
-/// The most over a million arguments.
+/// The maximum over a million arguments.
 double most(double low, double high, const std::function<double(double)>& off) {
   std::mt19937_64 random(1);
   double worst = 0.0;
@@ -39,7 +39,8 @@ TEST(Elementary, SineAndCosineAreWithinAUnitOfTheLastPlace) {
       0.9);
 }
 
-/// Beyond one quarter the argument is reduced; near the zeros the error counts in units of 1.
+/// Beyond one quarter turn the argument is reduced; near the zeros the unit of the error is that of
+/// 1.
 TEST(Elementary, SineAndCosineHoldForManyTurns) {
   const auto off = [](double x) {
     const SinCos s = sin_cos(x);
@@ -53,7 +54,7 @@ TEST(Elementary, SineAndCosineHoldForManyTurns) {
 TEST(Elementary, TheQuartersAreExactToTheirRounding) {
   const SinCos half = sin_cos(0x1.921fb54442d18p+1), quarter = sin_cos(0x1.921fb54442d18p+0);
   EXPECT_EQ(half.cos, -1.0);
-  EXPECT_NEAR(half.sin, 1.2246467991473532e-16, 1e-31);  // pi less its nearest double
+  EXPECT_NEAR(half.sin, 1.2246467991473532e-16, 1e-31);  // pi minus its nearest double
   EXPECT_EQ(quarter.sin, 1.0);
   EXPECT_NEAR(quarter.cos, 6.123233995736766e-17, 1e-32);
 }
@@ -101,7 +102,7 @@ TEST(Elementary, PowersAreProducts) {
   EXPECT_EQ(power(2.0, -2), 0.25);
 }
 
-/// Moments of a million, each within five of its standard deviations.
+/// Moments of a million values, each within five of its standard deviations.
 TEST(NormalDeviates, HaveTheMomentsOfTheNormalDistribution) {
   constexpr double n = 1e6;
   NormalDeviates normal(3);
@@ -118,7 +119,7 @@ TEST(NormalDeviates, HaveTheMomentsOfTheNormalDistribution) {
   EXPECT_NEAR(sum[2] / n, 1.0, 5 * std::sqrt(2 / n));
   EXPECT_NEAR(sum[3] / n, 0.0, 5 * std::sqrt(15 / n));
   EXPECT_NEAR(sum[4] / n, 3.0, 5 * std::sqrt(96 / n));
-  EXPECT_NEAR(product / n, 0.0, 5 * std::sqrt(1 / n));  // neighbours are independent
+  EXPECT_NEAR(product / n, 0.0, 5 * std::sqrt(1 / n));  // neighbouring values are independent
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-/// The ball array's own uncertainty and temperature, from the calibrator into V and its covariance.
+/// Uncertainty and temperature of the ball array itself, propagated from the calibrator into V and
+/// its covariance.
 #include "abbe/calib/evemu/artefact_rows.hpp"
 
 #include <gmock/gmock.h>
@@ -26,7 +27,7 @@ Observations seen_with(const Calibrator& c, const ObserveOptions& options = {}) 
   return *observe(reference_touches("touched_sig3um.csv"), c, reference_machine(), options);
 }
 
-/// V with another calibrator minus V with this one, through everything observe() does.
+/// V with another calibrator minus V with this one, through all of observe().
 Eigen::VectorXd change_m(const Calibrator& c, const Calibrator& other,
                          const ObserveOptions& options) {
   return observed_m(seen_with(other, options)) - observed_m(seen_with(c, options));
@@ -34,7 +35,7 @@ Eigen::VectorXd change_m(const Calibrator& c, const Calibrator& other,
 
 struct ArtefactRows : testing::Test {
   ArtefactRows() {
-    // Neither square to each other nor along the axes: every term has something to do.
+    // Axes not perpendicular and not along the machine's axes, so that no term is zero.
     calibrator.blocks[1].normal = Vector3(0.02, 1.0, 0.3).normalized();
     const Matrix3 turn = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
     for (auto& ball : calibrator.balls) {
@@ -51,7 +52,7 @@ struct ArtefactRows : testing::Test {
         uniform_frame(Vector3::Zero(), calibrator.blocks[0].normal, calibrator.blocks[1].normal)->R;
   }
   void expect_column(Eigen::Index column, const Calibrator& disturbed) const {
-    // First order: what it leaves out is below (5 urad)^2 over 0.7 m, 2e-11 m.
+    // First order: the neglected terms are below (5 urad)^2 over 0.7 m, 2e-11 m.
     EXPECT_LT((artefact_rows(o).col(column) - change_m(calibrator, disturbed, options))
                   .cwiseAbs()
                   .maxCoeff(),
@@ -91,7 +92,7 @@ TEST_F(ArtefactRows, AreWhatAWarmerArrayDoes) {
   options.artefact_temperature = {297.15, 0.5};
   o = seen_with(calibrator, options);
   const double u_scale = o.artefact->u_scale();
-  EXPECT_NEAR(u_scale, std::hypot(4 * 1e-6, 0.5 * kSteel_per_K), 1e-9);  // over 1.00005
+  EXPECT_NEAR(u_scale, std::hypot(4 * 1e-6, 0.5 * kSteel_per_K), 1e-9);  // divided by 1.00005
   Calibrator longer = calibrator;
   for (auto& ball : longer.balls) {
     ball.centre_m += u_scale * (ball.centre_m - calibrator.balls[0].centre_m);
@@ -106,7 +107,7 @@ TEST_F(ArtefactRows, HaveNoColumnForWhatIsExact) {
   EXPECT_EQ(artefact_rows(errors).cols(), 0);
 }
 
-/// Variances of V that the array adds at a few places, three components each.
+/// Variances of V that the array adds at some points, three components each.
 Eigen::VectorXd variances_m2(const ScaledDesign& design, const Eigen::MatrixXd& covariance_m2) {
   Eigen::VectorXd v(9);
   Eigen::Index i = 0;
@@ -119,11 +120,12 @@ Eigen::VectorXd variances_m2(const ScaledDesign& design, const Eigen::MatrixXd& 
   return v;
 }
 
-/// A sampled variance scatters by sqrt(2 / draws) = 3.2 %; four times that, for nine of them.
+/// The relative standard deviation of a sampled variance is sqrt(2 / draws) = 3.2 %; four times
+/// that, for nine of them.
 constexpr int kDraws = 2000;
 constexpr double kBound = 0.13;
 
-/// Covariance of G y over calibrators drawn, G: estimator and gauge in one.
+/// Covariance of G y over random calibrators. G: estimator and gauge in one.
 Eigen::MatrixXd over_calibrators_m2(const Observations& o, const Calibrator& c,
                                     const Eigen::MatrixXd& G) {
   std::mt19937_64 random(5);
@@ -138,7 +140,7 @@ Eigen::MatrixXd over_calibrators_m2(const Observations& o, const Calibrator& c,
 void expect_the_same_variances(const Solution& with, const Solution& without,
                                const Eigen::MatrixXd& drawn_m2) {
   const auto &a = *with.model.polynomials(), &b = *without.model.polynomials();
-  EXPECT_EQ(a.c_m(), b.c_m());  // the array is not estimated
+  EXPECT_EQ(a.c_m(), b.c_m());  // the errors of the array are not estimated
   const Eigen::VectorXd stated_m2 = variances_m2(a.design(), a.covariance_m2() - b.covariance_m2());
   const Eigen::VectorXd found_m2 = variances_m2(a.design(), drawn_m2);
   for (Eigen::Index i = 0; i < stated_m2.size(); ++i) {
@@ -183,7 +185,7 @@ TEST(EvemuArtefact, AddsToBayesWhatDrawnCalibratorsScatter) {
   const Solution with = *solve(o), without = *solve(without_artefact(o));
   const ScaledDesign design = *design_of(o);
 
-  // b = V Z^T (Z V Z^T + s^2)^-1 y, in one piece.
+  // b = V Z^T (Z V Z^T + s^2)^-1 y, in one expression.
   const auto white = [&](const Eigen::MatrixXd& rows) {
     return observed_rows(o, whitened(o, rows));
   };
@@ -232,14 +234,14 @@ TEST(EvemuArtefact, ChangesNoBitOfTheCovarianceWhenItIsExact) {
 }
 
 TEST(EvemuArtefact, IsInTheBootstrapOfSparseEstimators) {
-  // A penalty too small to hold anything back is least squares, whose answer is known.
+  // A penalty too small to shrink any coefficient gives least squares, whose result is known.
   SolveOptions lasso{.estimator = Estimator::Lasso};
   lasso.sparse.chosen = SparseChoice{.lambda = sparse::log_spaced(1e-1, 1e-9, 9)};
   lasso.sparse.bootstrap_runs = 100;
   const SolveOptions ols{.estimator = Estimator::Ols};
   const Layout layout = reference_layout();
 
-  // Far above the noise, which is drawn anew with it.
+  // Far above the noise, which is random in every run too.
   const Calibrator c = stated(reference_calibrator(), 20 * kBall_m, kBlock_rad);
   const Observations o = with_array(simulated(layout, table3_machine(), {3e-6, 0.0}, 1), layout, c,
                                     uncertainty_of(c, std::nullopt));
@@ -251,15 +253,15 @@ TEST(EvemuArtefact, IsInTheBootstrapOfSparseEstimators) {
     return variances_m2(x.design(), x.covariance_m2() - y.covariance_m2()).sum();
   };
 
-  // A variance of a hundred runs scatters by sqrt(2 / 99) = 14 %, a sum of nine by no more; three
-  // times that.
+  // The relative standard deviation of a variance of a hundred runs is sqrt(2 / 99) = 14 %, that of
+  // a sum of nine not larger; three times that.
   const double ratio =
       added_m2(with, without) / added_m2(*solve(o, ols), *solve(without_artefact(o), ols));
   EXPECT_NEAR(ratio, 1.0, 0.43);
 }
 
-/// 95 % intervals of V over seeds, with noise and an array drawn anew for each, after a rotation
-/// reference.
+/// Coverage of the 95 % intervals of V over seeds, each with random noise and a random array, after
+/// a rotation reference.
 double share_covered(bool stated_too) {
   const Field V = table3_machine();
   const Layout layout = reference_layout();
@@ -308,9 +310,10 @@ double share_covered(bool stated_too) {
 }
 
 TEST(EvemuArtefact, IsCoveredByTheStatedUncertaintyThroughARotationReference) {
-  // 95 % of 540 answers scatter by 0.9 % if they are independent, by 2.8 % if the nine of a seed
-  // are one, and what the array leaves in the residuals counts twice. Below 85 %: the errors
-  // scatter by 1.36 times of what is stated, or more.
+  // The observed coverage of 540 values has a standard deviation of 0.9 % if they are independent,
+  // of 2.8 % if the nine of a seed are fully correlated; the array's errors also appear in the
+  // residuals and count twice. Below 85 % the standard deviation of the errors would be 1.36 times
+  // the stated one, or more.
   const double with = share_covered(true), without = share_covered(false);
   EXPECT_GT(with, 0.91);
   EXPECT_LT(without, 0.85);
@@ -337,7 +340,7 @@ TEST(ArtefactTemperature, MakesAWarmArrayWhatItIsAtTheMachine) {
   Calibrator unknown = at_20_C;
   unknown.expansivity.reset();
 
-  // 12 um per metre and K over the 0.68 m to the last ball.
+  // 12 um/(m K) over the 0.68 m to the last ball.
   EXPECT_NEAR((observed_m(seen_with(unknown)) - observed_m(o)).tail<3>().norm(),
               4 * kSteel_per_K * 0.6786, 1e-8);
 }

@@ -1,5 +1,5 @@
-/// The reference touches of the whole artefact, shown to the guide one by one in its order, and
-/// what it says when something goes wrong.
+/// The reference touches of the whole artefact, passed to the guide one by one in the order of its
+/// plan, and the guide's messages after wrong touches.
 #include "abbe/calib/evemu/touch_guide.hpp"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-/// Touches every feature of the plan in turn; `leave_out` says which touch is not made.
+/// Touches every feature of the plan in order; `leave_out` selects touches that are not made.
 class Toucher {
  public:
   explicit Toucher(TouchGuide guide) : guide_(std::move(guide)) {
@@ -38,7 +38,7 @@ class Toucher {
     notes_.insert(notes_.end(), done.notes.begin(), done.notes.end());
     return done;
   }
-  /// Touches the first `count` points of a feature; all: no number.
+  /// Touches the first `count` points of a feature; nullopt: all.
   void touch_all(int position, Feature feature, int number, std::size_t count = 1000) {
     const auto& all = points(position, feature, number);
     for (std::size_t i = 0; i < std::min(count, all.size()); ++i) touch(all[i]);
@@ -176,8 +176,8 @@ TEST(TouchGuide, ATouchFarFromAnyBallIsSaidWithTheNearestAndTheExpected) {
   EXPECT_EQ(t.guide_.next().position, 8);
 }
 
-/// Where a ball would be if block 2 looked to its other side: touches cannot tell before a ball was
-/// touched.
+/// Position of a ball if block 2 faced the opposite side: before a ball was touched, the touches do
+/// not determine the side.
 Vector3 mirrored_centre(const Toucher& t, int position, int ball) {
   const Vector3 ball1 = fit::fit_sphere(t.points(position, Feature::Ball, 1))->centre;
   const Vector3 centre = fit::fit_sphere(t.points(position, Feature::Ball, ball))->centre;
@@ -233,7 +233,7 @@ TEST(TouchGuide, FacesSetAsideWhenSomebodyWentOnAreTouchedAgain) {
   t.touch_all(4, Feature::Ball, 1);
   t.touch_all(4, Feature::Block, 1);
 
-  // Leans towards block 1: Ball2 is where it was, the angle between the faces is not.
+  // Tilted towards block 1: Ball2 is where it was, the angle between the faces differs.
   const auto& face = t.points(4, Feature::Block, 2);
   const Vector3 n1 = fit::fit_plane(t.points(4, Feature::Block, 1), Vector3::UnitZ())->normal;
   const auto plane = *fit::fit_plane(face, Vector3::UnitX());

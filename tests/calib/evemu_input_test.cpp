@@ -1,4 +1,4 @@
-// What observe() refuses, and how it names it.
+// Inputs that observe() refuses, and how its message names the cause.
 #include "abbe/calib/evemu/observe.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ using namespace abbe::tests::evemu;
 using testing::AllOf;
 using testing::HasSubstr;
 
-/// What observe() says to touches that were changed by `change`.
+/// The error of observe() for touches modified by `change`.
 template <class Change>
 Error refusal(const Change& change) {
   auto touches = reference_touches("touched_sig3um.csv");
@@ -98,7 +98,7 @@ TEST(EvemuInput, NamesABallLeftOut) {
   EXPECT_THAT(e.text, HasSubstr("position 5: ball 9 was left out"));
 }
 
-// Too few touches to test one of them against the sphere of the others alone.
+// Too few touches to test one of them against the sphere through the others.
 TEST(EvemuInput, NamesAFalseTouchAmongFewByTheRadiusOfTheBall) {
   const Error e = refusal([](Touches& touches, Calibrator&) {
     int touch = 0;
@@ -208,13 +208,13 @@ TEST(EvemuInput, NamesAPositionTouchedTwice) {
 
 TEST(EvemuInput, NamesCoplanarPositions) {
   const Error e = refusal([](Touches& touches, Calibrator&) {
-    for (Touch& t : touches) {  // eight times the first position, turned about z only
+    for (Touch& t : touches) {  // eight times the first position, rotated about z only
       t = touches[static_cast<std::size_t>(&t - touches.data()) % 275];
     }
     for (std::size_t i = 0; i < touches.size(); ++i) {
       const int position = static_cast<int>(i / 275) + 1;
       const Vector3 ball1(-90.0427e-3, 139.9988e-3, 30.0979e-3);
-      // About the artefact's own normal: all balls stay in its plane.
+      // About the normal of the artefact: all balls stay in its plane.
       const Vector3 normal = Vector3(-0.05012844983, 0.05514618827, 0.99721915166).normalized();
       touches[i].position = position;
       touches[i].p_m =
@@ -249,7 +249,7 @@ TEST(EvemuInput, NamesATouchBesideItsSurface) {
   EXPECT_THAT(e.text, HasSubstr("mm off the surface of the others"));
 }
 
-/// Two of a face: no single touch explains it.
+/// Two wrong touches on a face: no single touch explains the residuals.
 TEST(EvemuInput, NamesAFaceWithSeveralFalseTouches) {
   const Error e = refusal([](Touches& touches, Calibrator&) {
     int moved = 0;
@@ -292,8 +292,8 @@ TEST(EvemuInput, TakesErrorsThatWereComputedElsewhere) {
               HasSubstr("position 2: Ball1 was left out"));
 }
 
-/// Five touches of every ball, four of every block, in the calibrator's own axes; ball 5 is out of
-/// the plane of the others: without it a mirror image is the array turned over.
+/// Five touches of every ball, four of every block, in the calibrator's own axes. Ball 5 is out of
+/// the plane of the others: with coplanar balls a mirror image equals the array turned over.
 std::string seen_through(const Matrix3& M) {
   Calibrator c = reference_calibrator();
   c.balls[4].centre_m.z() += 0.020;
@@ -324,7 +324,7 @@ TEST(EvemuInput, NamesMirroredTouches) {
               HasSubstr("they fit with one axis reversed"));
 }
 
-/// What observe_errors() says to errors whose V was mapped by `L`.
+/// The error of observe_errors() for errors whose V was mapped by `L`.
 std::string refusal_of_errors(const Matrix3& L) {
   auto errors = reference_errors();
   for (BallError& e : errors) e.V_m = L * e.V_m;

@@ -80,7 +80,7 @@ Verdict verdict_of(const ArrayRun& run) {
   return *judge(o, *solve(o), nullptr, wide_limits());
 }
 
-// What the uncertainty covers, on a machine of 3 mm, is a note.
+// A shift that is covered by the uncertainty, on a machine with errors of 3 mm, is a note.
 TEST_P(EvemuLackOfFit, StandsInTheVerdict) {
   ArrayRun run;
   GetParam().put_in(run);
@@ -140,7 +140,8 @@ TEST(EvemuJudge, RefusesWhatAFaultMovesByMoreThanItsUncertainty) {
   EXPECT_EQ(verdict.causes.size(), verdict.reasons.size());
 }
 
-// A ball whose touches have no place in the order: alternatives in time have no columns.
+// A ball whose touches have no position in the order: alternatives that depend on time have no
+// columns.
 TEST(EvemuJudge, RefusesARunThatCannotBeComparedWithAnAlternative) {
   const Observations o = observed({});
   const Solution solution = *solve(o);
@@ -215,7 +216,7 @@ TEST(EvemuLackOfFit, FindsNothingWhereBall1IsTouchedLast) {
   }
 }
 
-// Two balls at every position, of which none scatters enough to be found alone.
+// Two balls at every position, none of which scatters enough to be found by itself.
 TEST(EvemuLackOfFit, FindsBallsThatMovedALittleWhileTheyWereTouched) {
   ArrayRun run;
   std::map<std::pair<int, int>, int> count;
@@ -229,7 +230,7 @@ TEST(EvemuLackOfFit, FindsBallsThatMovedALittleWhileTheyWereTouched) {
               Contains(testing::Field(&Alternative::text, HasSubstr(" balls scatter by"))));
 }
 
-/// When axis a turns round, the tip shifts by column a of `b_m`.
+/// When axis a reverses, the tip shifts by column a of `b_m`.
 ArrayRun with_backlash(const Matrix3& b_m) {
   ArrayRun run;
   const Observations o = observed(run);
@@ -262,7 +263,7 @@ Vector3 backlash_along_um(const ArrayRun& run) {
   return b;
 }
 
-// Errors of 3 mm bend a ball: the sound run has some backlash, too.
+// Errors of 3 mm deform the measured ball: the run without a fault shows some backlash too.
 TEST(EvemuLackOfFit, FindsBacklashAlongOneAxis) {
   Matrix3 b_m = Matrix3::Zero();
   b_m(0, 0) = 40e-6;
@@ -278,14 +279,15 @@ TEST(EvemuLackOfFit, FindsBacklashAcrossTheAxisThatTurnsRound) {
   EXPECT_GT(found.log_likelihood, 500.0);
 }
 
-// The model is the mean of both sides: it is no scatter that has no cause.
+// The model is the mean of both directions: this is not a scatter without a known cause.
 TEST(EvemuJudge, NotesBacklashThatItFound) {
   const Verdict verdict = verdict_of(with_backlash(Vector3::Constant(30e-6).asDiagonal()));
   EXPECT_TRUE(verdict.accepted) << (verdict.reasons.empty() ? "" : verdict.reasons.front());
   EXPECT_THAT(verdict.notes, Contains(HasSubstr("depend on the direction of approach")));
 }
 
-/// All touches of a position shift together, uncorrelated over a quarter of them.
+/// Adds slow noise: a random shift whose correlation decays by 1/e over a quarter of the touches of
+/// a position.
 ArrayRun with_slow_noise(double sd_m) {
   ArrayRun run;
   NormalDeviates random(11);
@@ -304,7 +306,7 @@ TEST(EvemuLackOfFit, FindsTheSizeOfSlowNoise) {
   const Solution plain = *solve(observed({}));
   EXPECT_EQ(plain.slow_noise, 0.0);
   const Solution slow = *solve(observed(with_slow_noise(20e-6)));
-  // 64 balls and what is lost within them: to a third.
+  // 64 balls and the share that the estimation absorbs: accuracy one third.
   EXPECT_NEAR(slow.statistics.slow_noise_m, 20e-6, 7e-6);
   EXPECT_GT(correction_size(observed({}), slow).u_m,
             1.5 * correction_size(observed({}), plain).u_m);

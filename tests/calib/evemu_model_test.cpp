@@ -25,7 +25,7 @@ EquivalentModel model_of(const std::string& order, int np = 3) {
   return *EquivalentModel::of(chain_of(order), np);
 }
 
-/// Points over a volume like the reference machine's, mm.
+/// Points in a volume of the size of the reference machine, mm.
 std::vector<Vector3> random_points_mm(int count) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> x(-90, 600), y(-60, 370), z(0, 80);
@@ -51,7 +51,7 @@ Eigen::Index rank_of(const Eigen::MatrixXd& M, double threshold = 1e-12) {
   return qr.setThreshold(threshold).rank();
 }
 
-/// With columns of unit length, as a rank asks for.
+/// Columns scaled to unit length before the rank is determined.
 Eigen::Index scaled_rank(Eigen::MatrixXd M) {
   for (Eigen::Index j = 0; j < M.cols(); ++j) {
     const double norm = M.col(j).norm();
@@ -86,7 +86,7 @@ TEST(EquivalentModel, CombinesLikeTermsOfEveryChainLikeTheReference) {
                  [](const std::string& n) { return n.rfind("k_eq", 0) != 0; });
     EXPECT_EQ(single, reference[order]["single_names"].get<std::vector<std::string>>()) << order;
     ASSERT_EQ(model.size(), reference[order]["rank"].get<std::size_t>());
-    // Every row of the reference is a row of W, up to its sign.
+    // Every row of the reference is a row of W, except for the sign.
     for (const auto& row : reference[order]["rows"]) {
       Eigen::RowVectorXd w = Eigen::RowVectorXd::Zero(model.W().cols());
       for (const auto& [name, value] : row["coefs"].items()) {
@@ -128,8 +128,8 @@ TEST(EquivalentModel, IsThePseudoInverseProduct) {
   const EquivalentModel model = model_of("ZXY");
   const Eigen::MatrixXd pinv = model.W().completeOrthogonalDecomposition().pseudoInverse();
   for (const Vector3& p : random_points_mm(10)) {
-    // Scaled to the sizes of the columns: rounding of the largest monomial must not hide in the
-    // smallest.
+    // Scaled to the size of the columns, so that rounding of the largest monomial does not hide
+    // errors in the smallest.
     const Eigen::Matrix3Xd X = model.X(p);
     EXPECT_LE((A.A(p) * pinv - X).norm(), 1e-12 * X.norm());
   }
@@ -163,7 +163,8 @@ TEST(EquivalentModel, GivesTheRegressorsOfTheReference) {
       for (Eigen::Index j = 0; j < 45; ++j) {
         const double theirs =
             std::stod(X[3 * i + static_cast<std::size_t>(c)][static_cast<std::size_t>(j)]);
-        // The reference went through a numeric pseudo-inverse and has rounding where we have zeros.
+        // The reference was computed with a numeric pseudo-inverse and has rounding errors instead
+        // of zeros.
         EXPECT_NEAR(ours(c, j), theirs, 1e-12 * ours.row(c).norm()) << i << " " << model.names()[j];
       }
     }
@@ -213,7 +214,7 @@ TEST(ScaledDesign, SpansTheEquivalentModel) {
       EXPECT_EQ(rank_of(M.rowwise().normalized()), M.cols()) << order << " " << np;
       for (const Vector3& p_mm : random_points_mm(10)) {
         const Eigen::Matrix3Xd B = design.B(p_mm / 1000), X = design.equivalent().X(p_mm);
-        // Monomials of order 5 cancel to 1e-12 of their size.
+        // Monomials of order 5 cancel to 1e-12 of their magnitude.
         EXPECT_LE((X * M - B).norm(), 1e-10 * B.norm()) << order << " " << np;
       }
     }

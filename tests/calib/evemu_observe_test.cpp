@@ -12,7 +12,7 @@ using namespace abbe::calib::evemu;
 using namespace abbe::tests::evemu;
 using testing::HasSubstr;
 
-constexpr double kNanometre_mm = 1e-9;  // what the reference asks for, in mm
+constexpr double kNanometre_mm = 1e-9;  // required agreement with the reference, mm
 
 struct Case {
   const char *touches, *chain;
@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(Reference, EvemuChain,
                          testing::Values(Case{"touched_noiseless.csv", "chain_noiseless.json"},
                                          Case{"touched_sig3um.csv", "chain_sig3um.json"}));
 
-/// Four touches of every ball, three of every block: as many as unknowns.
+/// Four touches of every ball, three of every block: as many as there are unknowns.
 std::vector<Touch> fewest_touches() {
   const Calibrator truth = reference_calibrator();
   std::vector<Touch> touches;
@@ -86,7 +86,7 @@ TEST(Calibrator, OfTouchesWithoutRedundancyHasTheUncertaintyOfATouch) {
   ASSERT_TRUE(c) << c.error().text;
   for (const auto& ball : c->balls) {
     EXPECT_GT(ball.u_m, 0.5e-6);
-    EXPECT_LT(ball.u_m, 3e-6);  // four touches on one half do not average
+    EXPECT_LT(ball.u_m, 3e-6);  // four touches on one half do not average their errors
   }
   EXPECT_NEAR(c->blocks[0].u_rad, 1e-6 / 0.03, 0.5e-6 / 0.03);  // touches 20 to 40 mm apart
 }
@@ -102,7 +102,7 @@ TEST(Calibrator, OfTouchesWithoutRedundancyIsNotExact) {
 }
 
 TEST(Calibrator, TakesTheTipOutOfItsPrecalibration) {
-  // Touches of an array at its calibrated place, by a tip of 2 mm radius.
+  // Touches of an array at its calibrated position, by a tip of 2 mm radius.
   const Calibrator truth = reference_calibrator();
   std::vector<Touch> touches;
   for (const auto& ball : truth.balls) {
@@ -173,8 +173,8 @@ TEST(BlockRotation, IsWhatRefittingTheMovedBlocksGives) {
     const Vector3 exact(turned(2, 1) - turned(1, 2), turned(0, 2) - turned(2, 0),
                         turned(1, 0) - turned(0, 1));
 
-    // Second order: 1e-8 m over 0.02 m of block is 5e-7 rad; rounding 1e-16 m / 1e-8 m / 0.02 m as
-    // much.
+    // Second-order terms: 1e-8 m over 0.02 m of block give 5e-7 rad; rounding,
+    // 1e-16 m / 1e-8 m / 0.02 m, is of the same size.
     EXPECT_LT((0.5 * exact / kSmall_m - theta.col(static_cast<Eigen::Index>(j))).norm(),
               1e-4 * (1 + theta.col(static_cast<Eigen::Index>(j)).norm()))
         << design.equivalent().names()[j];
@@ -197,7 +197,7 @@ TEST(BallDisplacement, IsWhatRefittingTheMovedPointsGives) {
       p += kSmall_m * design.B(p).col(static_cast<Eigen::Index>(j));
     }
     const Vector3 moved = fit::fit_sphere(points)->centre - seen.balls[5].centre;
-    // The ball is not round as read (0.05 mm of 12.7): that is what first order leaves out.
+    // The measured ball is not round (0.05 mm of 12.7): first order neglects this.
     EXPECT_LT((moved / kSmall_m - D.col(static_cast<Eigen::Index>(j))).norm(), 0.01);
   }
 }
@@ -216,8 +216,9 @@ TEST(BlockRotation, CancelsARotationOfTheWholeVolume) {
   const Eigen::MatrixX3d rotation = design.rotation_about(o->ball1_m);
   const Eigen::MatrixXd rows = design_rows(*o, design, RowsFrom::Touches);
 
-  // Per position a rotation leaves omega x (Ball1 of the position - mean Ball1), as read: below a
-  // micrometre of lever here, against 0.7 m in the plain design.
+  // With RowsFrom::Touches a rotation of a position leaves omega x (Ball1 reading of the position -
+  // mean of the Ball1 readings): a lever arm below a micrometre here, compared with 0.7 m with
+  // RowsFrom::Centres.
   EXPECT_LT((rows * rotation).cwiseAbs().maxCoeff(), 1e-4);
   EXPECT_GT((design_rows(*o, design, RowsFrom::Centres) * rotation).cwiseAbs().maxCoeff(), 0.5);
 }

@@ -1,5 +1,4 @@
-/// Gains of added columns against the densities of the normal distribution they
-/// are ratios of.
+/// Gains of added columns, compared with ratios of the densities of the normal distribution.
 #include "evemu/screen.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +16,7 @@ Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns, std::mt19
   return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); });
 }
 
-/// log N(y; 0, K) but for its constant.
+/// log N(y; 0, K) without its constant.
 double log_density(const Eigen::VectorXd& y, const Eigen::MatrixXd& K) {
   const Eigen::LLT<Eigen::MatrixXd> llt(K);
   double log_det = 0.0;

@@ -52,7 +52,7 @@ TEST(EvemuLeastSquares, AgreesWithTheReferenceInStandardisedUnits) {
 }
 
 TEST(EvemuLeastSquares, FindsTheNoiseBallsShare) {
-  // points72 has 5 um per ball; 216 residuals know it to 7 %.
+  // points72 has noise of 5 um per ball; 216 residuals determine it to 7 %.
   EXPECT_NEAR(solve(reference_observations(), {.estimator = Estimator::Ols})->statistics.s_m, 5e-6,
               0.7e-6);
 }
@@ -65,7 +65,7 @@ TEST(EvemuLeastSquares, SaysWhenPositionsDoNotSuffice) {
   const Observations o =
       *observe_errors(errors, reference_machine(), RotationOrigin::Independent, options);
   EXPECT_EQ(solve(o, {.estimator = Estimator::Ols}).error().code, ErrorCode::RankDeficient);
-  // the prior fills in, and says how uncertain it is
+  // the prior determines the missing combination; its uncertainty is large
   EXPECT_TRUE(solve(o, {.estimator = Estimator::BayesPose}));
 }
 
@@ -118,7 +118,7 @@ TEST(LinearGaussian, HasTheGradientOfItsEvidence) {
   EXPECT_NEAR(e.by_log_noise, numeric, 1e-7);
 }
 
-/// One prior far above the others and a noise below rounding: the covariance of y is singular.
+/// One prior far above the others and noise below rounding: the covariance of y is singular.
 TEST(LinearGaussian, HasNoLikelihoodWhereRoundingLeavesNoCovariance) {
   SmallProblem p = small_problem();
   p.prior.setConstant(1.0);
@@ -144,7 +144,7 @@ TEST(LinearGaussian, HasThePosteriorOfTheFullCovariance) {
   EXPECT_NEAR(posterior.effective_parameters, hat, 1e-10);
 }
 
-/// Mean R_resmag of bayes-pose over that of ols, same seeds.
+/// Mean R_resmag of bayes-pose divided by that of ols, same seeds.
 struct Ratio {
   double of_means = 0.0;
   double worst_R = 0.0, worst_R_ols = 0.0;
@@ -183,7 +183,7 @@ TEST(EvemuBayes, LeavesNoPointWorseThanBeforeInANearlyPlaneLayout) {
 TEST(EvemuBayes, FindsNoiseAndPoseRotations) {
   const Solution s = *solve(simulated(reference_layout(), table3_machine(), {8e-6, 0.3e-3}, 3));
   EXPECT_NEAR(s.statistics.s_m, 8e-6, 1.5e-6);
-  EXPECT_NEAR(s.statistics.w_rad, 0.3e-3, 0.15e-3);  // 24 numbers know it to 15 %
+  EXPECT_NEAR(s.statistics.w_rad, 0.3e-3, 0.15e-3);  // 24 values determine it to 15 %
   EXPECT_NEAR(s.statistics.chi2_per_dof, 1.0, 0.2);
 }
 
@@ -195,10 +195,10 @@ TEST(EvemuBayes, SeesTheShapeOfAMachineThatMeasuredItsOwnBlocks) {
   const auto grid = evaluation_grid(s.model.validity());
   const Remaining true_array = remaining(V, field_of(s), grid);
   EXPECT_GT(true_array.mean_R,
-            0.5);  // the blocks' rotation is not V's: nothing in the touches tells
+            0.5);  // V does not contain the rotation of the blocks: the touches do not determine it
   EXPECT_LE(remaining(V, turned_to(V, field_of(s), grid), grid).rms_m, 0.07e-3);
 
-  // ... and the stated uncertainty knows.
+  // ... and the stated uncertainty covers it.
   std::size_t in = 0;
   for (const Vector3& p : grid) {
     const VolumetricError e = s.model.error_at(p, Vector3::Zero());
@@ -261,7 +261,7 @@ TEST(EvemuSolution, CorrectsACommand) {
 
 JudgeOptions generous() {
   JudgeOptions options;
-  options.limits.max_error_m = 10e-3;  // the machine has 3.3 mm
+  options.limits.max_error_m = 10e-3;  // the machine has errors of 3.3 mm
   options.limits.max_gradient = 0.1;
   return options;
 }
@@ -296,7 +296,7 @@ TEST(RotationReference, NeedsPointsOffALine) {
   EXPECT_EQ(with_rotation_reference(s, {line, 1e-6}).error().code, ErrorCode::DegenerateGeometry);
 }
 
-/// Six places well inside the balls' hull, far apart.
+/// Six points well inside the hull of the balls, far apart.
 std::vector<Vector3> places_inside(const ValidityVolume& hull) {
   std::vector<Vector3> places;
   const std::span<const Vector3> vertices = hull.vertices_m();
@@ -311,7 +311,8 @@ std::vector<Vector3> places_inside(const ValidityVolume& hull) {
   return places;
 }
 
-/// V there, in the frame of something that stands turned and moved and has noise of its own.
+/// V at these points, in the frame of a reference body that is rotated and shifted and has its own
+/// noise.
 std::vector<BallError> reference_points(const ValidityVolume& hull, const Field& V,
                                         const Vector3& turned_rad, double sigma_m, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -411,7 +412,8 @@ TEST(RotationReference, LeavesPointsOutsideTheBallsOutAndNamesThem) {
   EXPECT_THAT(refused.error().text, HasSubstr("outside: point 1, 2"));
 }
 
-/// Least squares and noise balls share: the one case in which the shape's covariance is exact.
+/// Least squares, and noise with the same standard deviation for all balls: the only case in which
+/// the covariance of the shape is exact.
 TEST(RotationReference, StatesAnUncertaintyThatCovers) {
   const Field V = table3_machine();
   constexpr unsigned kSeeds = 60;
@@ -435,7 +437,8 @@ TEST(RotationReference, StatesAnUncertaintyThatCovers) {
     }
   }
 
-  // 1080 answers, 18 of a seed not independent: 95 % to 2 %. Of the reference's noise alone: 0.7.
+  // 1080 values, the 18 of a seed not independent: 95 % within 2 %. With the reference's noise
+  // alone: 0.7.
   const double share = static_cast<double>(covered) / static_cast<double>(asked);
   EXPECT_GT(share, 0.91);
   EXPECT_LT(share, 0.99);
@@ -462,7 +465,8 @@ TEST(EvemuJudge, RefusesWhatDoesNotBeatNoCompensation) {
       EXPECT_FALSE(verdict->accepted);
       EXPECT_THAT(verdict->reasons, Contains(HasSubstr("without compensation")));
     } else {
-      // Priors find next to nothing, and what they find is next to nothing better or worse.
+      // The estimated prior variances and the model are almost zero: the error is that without
+      // compensation, within 10 %.
       EXPECT_NEAR(verdict->held_out.candidate / verdict->held_out.no_compensation, 1.0, 0.1);
     }
   }
@@ -496,7 +500,8 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
     near.push_back(o.ball1_m + 0.6 * (v - o.ball1_m));
   }
 
-  near.push_back(o.ball1_m - 0.01 * (near.back() - o.ball1_m));  // Ball1 is within, not at the tip
+  // Ball1 inside the hull, not at its corner
+  near.push_back(o.ball1_m - 0.01 * (near.back() - o.ball1_m));
   near.push_back(o.ball1_m + Vector3(-0.01, 0.01, 0.01));
   near.push_back(o.ball1_m + Vector3(-0.01, -0.01, -0.01));
   const VolumetricModel smaller = *VolumetricModel::from_polynomials(
@@ -506,7 +511,7 @@ TEST(EvemuJudge, ComparesAtBallsInsideTheActiveModelsVolumeOnly) {
   EXPECT_GT(held->observations_beside_active, 0u);
   EXPECT_LT(held->observations_beside_active, held->observations);
 
-  // A model of few balls in the place of one of the whole machine: only by name.
+  // A model of few balls must not replace one of the whole machine, except by name.
   Solution candidate = s;
   candidate.model = smaller;
   EXPECT_THAT(judge(o, candidate, &s.model, generous())->reasons,

@@ -1,4 +1,4 @@
-/// Lasso, MCP and SCAD as estimators of a ball array: what stands between the sparse solver and a
+/// Lasso, MCP and SCAD as estimators of a ball array: the code between the sparse solver and a
 /// model.
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ const Observations& observations() {
   return o;
 }
 
-/// A small grid, the smallest bootstrap: tests are about the glue.
+/// A small grid and the smallest bootstrap: these tests check the code around the solver.
 SolveOptions quick(Estimator estimator, FoldsBy folds = FoldsBy::Position) {
   SolveOptions options{.estimator = estimator};
   options.sparse.folds = folds;
@@ -54,7 +54,7 @@ TEST(EvemuSparse, PredictsWhatTheSolverPredicts) {
 
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const Vector3 V_mm = 1000 * design.B(o.rows[i].reading_m) * s.raw_c_m;
-    // Monomials of mm span 1e9: nine digits go into telling them apart.
+    // Monomials of mm span 1e9: distinguishing them costs nine digits.
     EXPECT_LT((V_mm - expected_mm.segment<3>(static_cast<Eigen::Index>(3 * i))).norm(), 1e-6);
   }
 }
@@ -76,7 +76,7 @@ TEST(EvemuSparse, ChoosesTheSmallestHeldOutError) {
 }
 
 TEST(EvemuSparse, LooksBetterByRowsThanItIs) {
-  // Rows of one ball share their touches, rows of one position share Ball1.
+  // Rows of one ball have touches in common, rows of one position Ball1.
   const auto least = [](FoldsBy folds) {
     double least_mm2 = std::numeric_limits<double>::infinity();
     const Solution s = *solve(observations(), quick(Estimator::Scad, folds));
@@ -113,7 +113,7 @@ TEST(EvemuSparse, HasABootstrapOfTheSizeOfTheNoise) {
   const Vector3 q(0.4, 0.15, 0.045);
   const double u_m = std::sqrt(s.model.error_at(q, Vector3::Zero()).cov_V_m2.trace()),
                u_ols_m = std::sqrt(ols.model.error_at(q, Vector3::Zero()).cov_V_m2.trace());
-  EXPECT_GT(u_m, 0.2 * u_ols_m);  // shrinking takes scatter away, not all of it
+  EXPECT_GT(u_m, 0.2 * u_ols_m);  // shrinking reduces the scatter, but not to zero
   EXPECT_LT(u_m, 2.0 * u_ols_m);
 }
 
@@ -128,7 +128,7 @@ TEST(EvemuSparse, NeedsABootstrapForItsUncertainty) {
   }
 }
 
-/// The budget of sweeps ends before the lambda that was chosen.
+/// The budget of sweeps is used up before the chosen lambda.
 TEST(EvemuSparse, IsNotConvergedAboveTheLambdaItWasAskedFor) {
   SolveOptions options = quick(Estimator::Lasso);
   options.sparse.chosen = solve(observations(), options)->sparse;

@@ -43,7 +43,7 @@ TEST(SphereFit, FindsAnExactSphereFarAway) {
   const Vector3 centre(1000, -700, 400);
   const auto sphere = fit_sphere(on_sphere(centre, 10, 0.0, 1));
   ASSERT_TRUE(sphere) << sphere.error().text;
-  EXPECT_LT((sphere->centre - centre).norm(), 1e-11);  // coordinates themselves are good to 1e-13
+  EXPECT_LT((sphere->centre - centre).norm(), 1e-11);  // the coordinates are accurate to 1e-13
   EXPECT_NEAR(sphere->radius, 10, 1e-11);
   EXPECT_EQ(sphere->residuals.degrees_of_freedom, 21u);
 }
@@ -72,7 +72,7 @@ TEST(SphereFit, StatesItsUncertainty) {
   constexpr int kRuns = 2000;
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
 
-  // The same places every time, another noise.
+  // The same points in every run, with different noise.
   const auto places = on_sphere(centre, 0.0127, 0.0, 5);
   std::mt19937 random(6);
   std::normal_distribution<double> noise(0, 3e-6);
@@ -92,7 +92,7 @@ TEST(SphereFit, StatesItsUncertainty) {
   }
 
   for (Eigen::Index i = 0; i < 4; ++i) {
-    // 2000 runs know a variance to 3 %.
+    // 2000 runs determine a variance to 3 %.
     EXPECT_NEAR(squares(i) / stated(i, i), 1.0, 0.12) << i;
   }
 }

@@ -68,7 +68,7 @@ TEST(Gate, RefusesImplausibleMagnitudeAndGradient) {
               ElementsAre(HasSubstr("largest error 6000 um"), HasSubstr("steepest change 10000")));
 }
 
-/// Every axis longer by `growth`, with this standard uncertainty of every parameter.
+/// Every axis longer by the factor 1 + `growth`, with this standard uncertainty of every parameter.
 VolumetricModel grown_model(double growth, double u_m) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = layout_of(machine);
@@ -117,7 +117,7 @@ TEST(Gate, ComparesWithTheActiveModelOnTheSameObservations) {
   EXPECT_THAT(verdict.notes, ElementsAre(HasSubstr("300 of 1000")));
 }
 
-/// EXX as above, but only of the lower part of the machine.
+/// EXX as above, but only in the lower part of the machine.
 VolumetricModel lower_part(const VolumetricModel& whole, double share) {
   std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
                                whole.validity().vertices_m().end());
@@ -141,8 +141,8 @@ TEST(Gate, LetsASmallerVolumeReplaceALargerOneOnlyByName) {
   EXPECT_THAT(told.notes, ElementsAre(HasSubstr("explicitly accepted")));
 }
 
-/// The reference array in eight positions round a vertical axis and up and down, set up by hand: 3
-/// degrees of scatter round the axis, 1 degree of tilt.
+/// The reference array in eight positions about a vertical axis and at several heights, set up by
+/// hand: 3 degrees of scatter about the axis, 1 degree of tilt.
 ValidityVolume set_up_by_hand(unsigned seed) {
   constexpr double kDeg = std::numbers::pi / 180.0;
   std::mt19937_64 random(seed);
@@ -173,7 +173,7 @@ TEST(Gate, TakesTwoSetupsByHandForOneVolume) {
     least = std::min(least, kept_share(before, after));
     least_with_rim = std::min(least_with_rim, kept_share(before, after, 0.02));
   }
-  EXPECT_LT(least, 0.96);  // what this test is about
+  EXPECT_LT(least, 0.96);  // the precondition of this test
   EXPECT_GT(least_with_rim, 0.98);
 }
 
@@ -192,7 +192,7 @@ TEST(Gate, NotesARimThatIsLostAndRefusesMore) {
   EXPECT_FALSE(decide(lower_part(whole, 0.93), f, {}, &whole).accepted);
   std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
                                whole.validity().vertices_m().end());
-  corners.pop_back();  // one corner less: a sixth of the volume
+  corners.pop_back();  // one corner fewer: five sixths of the volume
   EXPECT_FALSE(
       decide(with_volume(whole, *ValidityVolume::hull_of(corners)), f, {}, &whole).accepted);
 }

@@ -117,7 +117,7 @@ TEST_P(Nullity, IsRemovedExactlyByGaugeG1) {
   EXPECT_EQ(factor.setThreshold(1e-9).rank(), 20);
 }
 
-/// Nodes are rounded on their way from range and spacing: 1e-17 m beside the reference is at the
+/// Nodes computed from range and spacing are rounded: a node 1e-17 m from the reference is at the
 /// reference.
 TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
   std::size_t beside = 0;
@@ -140,7 +140,7 @@ TEST(GaugeG1, FixesTheNodeAtTheReferenceAloneForEveryRangeAndSpacing) {
     }
   }
 
-  EXPECT_GT(beside, 50u);  // the ranges this test is about
+  EXPECT_GT(beside, 50u);  // the ranges that this test checks
 }
 
 TEST(GaugeG1, Has24ConditionsFor18Tables) {
@@ -168,7 +168,7 @@ TEST(GaugeG1, ConversionMeetsTheConditionsAndChangesNoMeasurement) {
   EXPECT_LT(change.norm(), 1e-15);
 }
 
-/// 18 tables, three tools: what one of them alone leaves open is not moved.
+/// 18 tables, three tools: combinations that a single tool leaves undetermined do not change.
 TEST(GaugeG1, ConversionOf18TablesKeepsWhatEveryToolMeasures) {
   const otf::Machine machine = coarse_machine("[w X' b Y Z t]");
   const ParameterLayout layout = *ParameterLayout::all_tables(machine.chain, machine.nodes);

@@ -23,8 +23,8 @@ std::size_t nodes_of(const InterpolationGrid& grid) {
   return grid.axes_m[0].size() * grid.axes_m[1].size() * grid.axes_m[2].size();
 }
 
-/// Misses of linear interpolation over the moment stated for them, squared, in the middle of every
-/// cell and beside it.
+/// Errors of linear interpolation at three Gauss points per axis in every cell; their mean square
+/// and the stated one.
 struct Missed {
   double mean_m = 0.0, max_m = 0.0;
   double squares_m2 = 0.0, stated_m2 = 0.0;
@@ -36,7 +36,7 @@ Missed missed(const VolumetricModel& model, const InterpolationGrid& grid) {
   const auto& [x, y, z] = grid.axes_m;
   const Vector3 t = model.tool_offsets_m().front();
   constexpr std::array kAt{0.113, 0.5,
-                           0.887};  // Gauss points of three: exact for the squares of a parabola
+                           0.887};  // three Gauss points: exact for the square of a parabola
   constexpr std::array kWeight{5.0 / 18, 8.0 / 18, 5.0 / 18};
   double weights = 0.0;
 
@@ -95,14 +95,14 @@ TEST(InterpolationGrid, MissesLittleOfAMachineOfMillimetres) {
   const Missed m = missed(table3_model(), interpolation_grid(table3_model(), kMost));
   RecordProperty("mean_um", std::to_string(1e6 * m.mean_m));
   RecordProperty("max_um", std::to_string(1e6 * m.max_m));
-  EXPECT_LT(m.mean_m, 12e-6);  // 3.3 mm; 35 um on 9 x 9 x 9 places
+  EXPECT_LT(m.mean_m, 12e-6);  // machine errors 3.3 mm; 35 um on 9 x 9 x 9 nodes
   EXPECT_LT(m.max_m, 30e-6);
 }
 
 TEST(InterpolationGrid, StatesWhatItMisses) {
   for (const std::size_t most : {std::size_t{125}, std::size_t{729}, kMost}) {
     const Missed m = missed(table3_model(), interpolation_grid(table3_model(), most));
-    // The larger of two neighbours' misses is stated: a little more than there is.
+    // The larger error of two neighbouring cells is stated: slightly more than the actual one.
     EXPECT_GT(m.stated_m2, 0.9 * m.squares_m2) << most;
     EXPECT_LT(m.stated_m2, 2.0 * m.squares_m2) << most;
   }

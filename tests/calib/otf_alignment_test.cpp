@@ -18,7 +18,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 TEST(LegAssignment, FindsTheTurningPointOfLegsOnOneLine) {
-  // Out 30 mm, back 20 mm, on the same line: distances alone cannot tell.
+  // Out 30 mm, back 20 mm, on the same line: distances alone do not distinguish the legs.
   const Path path{{{0, 0, 0}, {0.03, 0, 0}, {0.01, 0, 0}}};
   std::vector<Vector3> points;
   for (const double x : {0.002, 0.010, 0.018, 0.026, 0.028, 0.020, 0.012}) {
@@ -65,7 +65,7 @@ double cost_on_leg(const std::vector<Vector3>& points, std::size_t i, const Path
   return (points[i] - from - share * way).squaredNorm() + 0.02 * 0.02 * (1.0 - cosine);
 }
 
-/// The cheapest of all assignments that visit every leg in order.
+/// The assignment with the lowest cost among those that visit all legs in order.
 std::vector<std::size_t> cheapest(const std::vector<Vector3>& points, const Path& path) {
   const std::size_t n = points.size(), m = path.vertices_m.size() - 1;
   std::vector<bool> advances(n - 1, false);
@@ -102,7 +102,7 @@ TEST(LegAssignment, NeedsABlockForEveryLeg) {
   EXPECT_FALSE(assign_legs(std::vector<Vector3>{{0, 0, 0}}, path, 0.02));
 }
 
-/// Case A from its published block means; where the machine stood at the ends follows from the
+/// Case A from its published block means; the machine's positions at the ends are computed with the
 /// rough transform.
 BlockSeries case_a_series(const ReferenceBlocks& blocks) {
   const RigidTransform rough = case_a_rough_alignment_noisy(), fine = case_a_alignment(true);
@@ -118,8 +118,8 @@ TEST(Alignment, OfTheReferenceBlocksIsThePrototypes) {
   const Result<Alignment> a = align(case_a_series(blocks), case_a_machine(), case_a_path(), {});
   ASSERT_TRUE(a) << a.error().text;
   const RigidTransform reference = case_a_alignment(true);
-  // The means are printed to 1e-9 m and the end is not the measured one; from samples it is 1e-8,
-  // see CaseAStream.
+  // The means are printed to 1e-9 m and the end is not a measured one; with samples the agreement
+  // is 1e-8, see CaseAStream.
   EXPECT_LT((a->T_machine_tracker.R - reference.R).cwiseAbs().maxCoeff(), 3e-8);
   EXPECT_LT((a->T_machine_tracker.t_m - reference.t_m).cwiseAbs().maxCoeff(), 3e-8);
   EXPECT_EQ(a->leg, blocks.leg);
@@ -157,7 +157,7 @@ TEST(Alignment, RefusesAPathOfTheRightLengthButAnotherShape) {
   const MadeRun run = make_run({});
   Path other = run.path;
   for (Vector3& v : other.vertices_m) {
-    v.y() = -v.y();  // the mirror image: no rotation brings it there
+    v.y() = -v.y();  // the mirror image: no rotation maps it to the path
   }
   const Refusal r = refusal(run, other);
   EXPECT_EQ(r.code, ErrorCode::AlignmentFailed);
@@ -182,7 +182,7 @@ TEST(Alignment, NamesAPathInMetres) {
 
 TEST(Alignment, RefusesARunThatEndsEarly) {
   MadeRun run = make_run({});
-  run.samples.resize(run.samples.size() - 400);  // 0.8 s: less than the length check sees
+  run.samples.resize(run.samples.size() - 400);  // 0.8 s: less than the length check detects
   EXPECT_EQ(refusal(run, run.path).code, ErrorCode::AlignmentFailed);
 }
 

@@ -10,7 +10,7 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using testing::HasSubstr;
 
-/// Moves 1 mm in x a sample.
+/// Moves 1 mm in x per sample.
 std::vector<TrackerObservation> straight(std::size_t n) {
   std::vector<TrackerObservation> samples;
   for (std::size_t i = 0; i < n; ++i) {

@@ -85,7 +85,7 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
     v.z() = v.z() > middle ? middle : bottom;
   }
 
-  // Right where it holds; nonsense above, where nobody may ask it.
+  // Right inside its volume, wrong above it, where it must not be used.
   Eigen::VectorXd U = m.U();
   const ParameterLayout& layout = m.layout();
   const auto& z_nodes = layout.nodes()[2].nodes_m;
@@ -109,7 +109,7 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
   EXPECT_LT(held->observations_beside_active, held->observations);
   EXPECT_LT(held->active.value(), 2.0);
 
-  // As good where the smaller one holds, and it holds in more.
+  // Equally good inside the volume of the smaller one, and valid in a larger volume.
   EXPECT_THAT(judge(id.observations, id.solution, &active, {}, run.options)->notes,
               Contains(HasSubstr("outside its validity volume")));
 }
@@ -119,7 +119,7 @@ TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {
   const Identification id = identified(run);
   const VolumetricModel& model = id.solution.model;
 
-  // The same machine, written down in another gauge: any combination nothing can see is added.
+  // The same machine in another gauge: any unobservable combination is added.
   const Eigen::MatrixXd N =
       unobservable_combinations(model.layout(), std::array{run.machine.target_offset_m});
   const auto n = static_cast<Eigen::Index>(model.layout().model_size());
@@ -141,7 +141,7 @@ TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
   EXPECT_FALSE(held_out(id.observations, &other, run.options)->active);
 }
 
-/// Deals every row of the parameter with the fewest rows into one fold; returns how many it has.
+/// Assigns every row of the parameter with the fewest rows to one fold; returns their number.
 std::size_t give_a_node_to_one_fold(Observations& o, std::size_t folds) {
   std::vector<std::size_t> rows_of(o.layout.fit_size() - 6, 0);
   const auto each = [&](auto&& take) {
@@ -180,8 +180,8 @@ TEST(Judge, HoldsOutNothingThatAloneTouchesANode) {
               Contains(HasSubstr("were not held out")));
 }
 
-/// A volume that holds a few observations of every fold only: a rigid motion fits six of them
-/// exactly, under any model.
+/// A volume that contains only a few observations of every fold: a rigid motion fits six of them
+/// exactly with any model.
 TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
   const MadeRun run = make_run({.seed = 1});
   const Identification id = identified(run);

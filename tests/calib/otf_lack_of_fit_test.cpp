@@ -60,14 +60,14 @@ TEST(LackOfFit, CorrelatedNoiseWidensTheCovariance) {
 
 struct Case {
   Cause cause;
-  std::string text;  ///< in the words of the verdict
+  std::string text;  ///< as in the verdict
   std::function<void(MadeRun&)> put_in;
 };
 void PrintTo(const Case& c, std::ostream* out) {
   *out << name(c.cause);
 }
 
-/// The share of the run at each sample.
+/// The fraction of the run at each sample.
 void move_samples(MadeRun& run, const std::function<Vector3(double share, const Vector3&)>& by_m) {
   for (std::size_t i = 0; i < run.samples.size(); ++i) {
     Vector3& p = run.samples[i].p_tracker_m;
@@ -129,7 +129,7 @@ TEST(LackOfFit, RefusesACorrectionOfTheSizeOfItsUncertainty) {
   EXPECT_THAT(verdict->reasons, testing::Contains(HasSubstr("more than half of it")));
 }
 
-// The share of a scale in V is its relative error times the distance from the reference.
+// The effect of a scale error on V is its relative error times the distance from the reference.
 TEST(LackOfFit, ScalesOfTheAxesEnterTheUncertainty) {
   MadeRun run = make_run({});
   const Vector3 q(0.3, 0.0, 0.0), t = run.machine.target_offset_m;

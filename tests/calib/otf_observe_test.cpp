@@ -84,7 +84,7 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
 
   const Vector3 at_mean = volumetric_error(o.layout, {U.data(), o.layout.model_size()},
                                            point.axis_position_m, machine.target_offset_m);
-  EXPECT_GT((at_mean - mean).norm(), 0.1e-6);  // what would be lost
+  EXPECT_GT((at_mean - mean).norm(), 0.1e-6);  // the error of a row at the mean
 }
 
 TEST(Observe, DividesTheNoiseByTheSamplesOfABlock) {

@@ -1,4 +1,4 @@
-/// What decides how a path file lies in the machine.
+/// Evidence for the orientation of a path file in the machine.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ Verdict verdict_with(const OrientationEvidence& evidence, const RigidTransform& 
   return verdict;
 }
 
-/// What the alignment gives with X and Y reversed in the path file: the target moves by turn
+/// The result of the alignment with X and Y reversed in the path file: the target moves by turn
 /// q + offset.
 RigidTransform about_z(RigidTransform T) {
   const Matrix3 turn = Vector3(-1, -1, 1).asDiagonal();
@@ -106,7 +106,7 @@ TEST(PathOrientation, ScalesThatAgreeAreEnough) {
   EXPECT_THAT(verdict.notes, IsEmpty());
 }
 
-/// Gravity does not tell apart what differs by a turn about the vertical.
+/// Gravity does not distinguish orientations that differ by a turn about the vertical.
 TEST(PathOrientation, ALevelledTrackerLeavesTheTurnAboutTheVerticalOpen) {
   EXPECT_THAT(verdict_with({.up = Vector3::UnitZ()}).reasons,
               ElementsAre(HasSubstr("turned by 180 degrees about Z (")));
@@ -118,7 +118,7 @@ TEST(PathOrientation, ThePlaceOfTheTrackerIsEnough) {
 }
 
 /// 0.4 m from the line along X through the target offset, a half turn moves the tracker by 0.8 m:
-/// not more than twice what its place is known to.
+/// not more than twice the uncertainty of its position.
 TEST(PathOrientation, APlaceNearAnAxisLeavesTheTurnAboutItOpen) {
   const RigidTransform near_x{Matrix3::Identity(), {2.0, 0.7, -0.4}};
   EXPECT_THAT(verdict_with({.tracker_m = near_x.t_m}, near_x).reasons,
@@ -144,7 +144,7 @@ TEST(PathOrientation, EvidenceThatNoHalfTurnExplainsNamesWhatToCheck) {
               ElementsAre(HasSubstr("check the evidence and the axes of the path file")));
 }
 
-/// The whole way: X and Y reversed in the file, and nothing in the residuals.
+/// The complete identification: X and Y are reversed in the file, and the residuals do not show it.
 TEST(PathOrientation, ATurnedPathIsRefusedByThePlaceOfTheTracker) {
   auto run = abbe::tests::otf::make_run({});
   for (Vector3& q : run.path.vertices_m) q = Vector3(-q.x(), -q.y(), q.z());

@@ -70,7 +70,7 @@ TEST(PathCheck, NamesTheVertexTheAxisAndItsTravel) {
               HasSubstr("vertex 2 at Y 501 mm, the axis travels -100 to 500 mm"));
 }
 
-// X travels -100 to 500 mm, as do Y and Z: -500 lies inside once it is reversed.
+// X travels -100 to 500 mm, like Y and Z: -500 is inside after a reversal of X.
 TEST(PathCheck, NamesTheMistakeThatPutsAllVerticesInside) {
   const auto refused = check(Path{{{0, 0, 0}, {-0.5, 0, 0}, {-0.5, 0.5, 0.5}}}, travel());
   ASSERT_FALSE(refused);
@@ -88,7 +88,7 @@ TEST(BlockLength, IsTheTravelOfEightMillimetres) {
     std::vector<TrackerObservation> samples;
     for (int i = 0; i < 5000; ++i) {
       const double time_s = 0.002 * i;
-      // a standstill of two seconds first: it is not what the length is made for
+      // a standstill of two seconds first: it must not affect the length
       samples.push_back(
           {.time_s = time_s, .p_tracker_m = {1.0 + speed_m_s * std::max(0.0, time_s - 2.0), 0, 0}});
     }

@@ -1,4 +1,4 @@
-/// The offset that all ranges have in common, estimated with its prior beside the errors of the
+/// The offset common to all ranges, estimated with its prior together with the errors of the
 /// machine.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,8 +40,8 @@ struct Dense {
   Eigen::VectorXd fitted;  ///< of every row, divided by its standard uncertainty
 };
 
-/// Rows and prior in one dense least-squares problem; the rigid motion and the gauge by the
-/// shortest solution.
+/// Rows and prior in one dense least-squares problem; the shortest solution determines the rigid
+/// motion and the gauge.
 Dense dense_solution(const Observations& o) {
   const auto rows = static_cast<Eigen::Index>(o.rows.size()),
              n = static_cast<Eigen::Index>(o.layout.fit_size());
@@ -124,7 +124,7 @@ TEST(RangeOffset, WithinItsStatedUncertaintyNothingIsSaid) {
   EXPECT_THAT(verdict->notes, Not(Contains(HasSubstr("offset of"))));
 }
 
-/// The limit in the verdict's note, um; none: there is no such note.
+/// The limit in the verdict's note, um; nullopt: no such note.
 std::optional<double> noted_limit_um(double u_m) {
   const MadeRun run = run_with_offset(0.0, u_m);
   const Identification id = identification(run);
@@ -137,7 +137,7 @@ std::optional<double> noted_limit_um(double u_m) {
   return std::nullopt;
 }
 
-/// What the run shows of the offset by itself is its uncertainty with a prior of 1 m.
+/// The uncertainty with a prior of 1 m: what the run alone determines of the offset.
 TEST(RangeOffset, ALimitIsNotedWhereTheDataDetermineItLessThanThePrior) {
   const double u_m = identification(run_with_offset(0.0, 1.0)).solution.range_offset.u_m;
   ASSERT_TRUE(noted_limit_um(0.5 * u_m));

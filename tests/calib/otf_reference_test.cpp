@@ -12,7 +12,7 @@ using namespace abbe::calib;
 using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 
-/// V of a model minus V of the true tables on the 13 x 11 x 9 grid, gauge G1, rigid unknowns at 0.
+/// V of a model minus V of the true tables on the 13 x 11 x 9 grid, gauge G1, rigid unknowns 0.
 VectorStatistics grid_error(const VolumetricModel& model) {
   const Machine machine = case_a_machine();
   const ParameterLayout layout = layout_of(machine);
@@ -26,7 +26,7 @@ VectorStatistics grid_error(const VolumetricModel& model) {
   return vector_statistics(left);
 }
 
-/// Solution from the block means alone, for a clone without the streams.
+/// Solution from the block means alone, for a clone without the stream files.
 TEST(CaseA, FromItsBlockMeansIsWithinTheAskedError) {
   const RigidTransform T = case_a_alignment(true);
   const Path path = case_a_path();
@@ -46,7 +46,7 @@ TEST(CaseA, FromItsBlockMeansIsWithinTheAskedError) {
   EXPECT_EQ(solution->statistics.rank, 149u);
   EXPECT_LE(grid_error(solution->model).mean_m, 0.105e-6);
 
-  // Sub-points are interpolated and the ends are not measured ones: 2e-9 where samples give 1e-9.
+  // Sub-points are interpolated and the ends are not measured: 2e-9 instead of the 1e-9 of samples.
   const Eigen::VectorXd reference = case_a_tables(TableColumn::NoisyTwoStep);
   EXPECT_LT((solution->model.U() - reference).cwiseAbs().maxCoeff(), 2e-9);
 }
@@ -105,8 +105,8 @@ TEST_P(CaseAStream, IsWithinTheAskedError) {
   EXPECT_LE(grid_error(id_->solution.model).mean_m, GetParam().asked_mean_m);
 }
 
-/// Every sample a row, weights per sample, the prototype's own alignment: the normal equations to
-/// rounding.
+/// Every sample as a row, weights per sample, the prototype's own alignment: the normal equations
+/// agree to rounding.
 TEST(CaseANormalEquations, OfAllSamplesAreThePrototypes) {
   const auto stream = big_file("caseA_stream_noisy.i32"),
              H_file = big_file("caseA_H_all_noisy.f64"), g_file = big_file("caseA_g_all_noisy.f64");

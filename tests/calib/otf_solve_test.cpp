@@ -33,7 +33,7 @@ TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
   const Observations o = observed(run);
   ASSERT_TRUE(solve(o, run.options));
   const int looks = asked;
-  ASSERT_GT(looks, 7);  // once in an update of the alignment, of which there are 7 at least
+  ASSERT_GT(looks, 7);  // one check per update of the alignment, of which there are at least 7
 
   for (const int at : {0, looks / 2, looks - 1}) {
     asked = 0;
@@ -99,8 +99,8 @@ TEST(Adjustment, HasNoNegativeVarianceWhereRoundingPutsANodeBesideTheReference) 
   }
 }
 
-/// Var of any weighted least-squares estimate, from its definition: the sandwich holds for weights
-/// that are wrong.
+/// The variance of any weighted least-squares estimate, from its definition: the sandwich formula
+/// is valid for wrong weights too.
 TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
   Observations o = observed(make_run({}));
   const Adjustment right = *adjust(normal_equations(o), o.layout);
@@ -109,13 +109,13 @@ TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
   }
 
   const Adjustment wrong = *adjust(normal_equations(o), o.layout);
-  // Gauss-Markov: no other weights do better, in any direction.
+  // Gauss-Markov: no other weights give a smaller variance, in any direction.
   const Eigen::MatrixXd excess = wrong.covariance - right.covariance;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(excess, Eigen::EigenvaluesOnly);
   EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9 * eigen.eigenvalues().maxCoeff());
   EXPECT_GT(eigen.eigenvalues().maxCoeff(), 0.0);
 
-  // A common factor of all weights changes nothing.
+  // A common factor of all weights has no effect.
   for (Observation& r : o.rows) {
     r.weight = 7.0 / (r.sigma_m * r.sigma_m);
   }
@@ -157,8 +157,8 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
     }
   }
 
-  // 40 x about 45 values with strong correlations: a few hundred independent ones, so 3 standard
-  // deviations are 0.04 and 0.2.
+  // 40 x about 45 values with strong correlations correspond to a few hundred independent ones: 3
+  // standard deviations are 0.04 and 0.2.
   EXPECT_NEAR(static_cast<double>(inside) / static_cast<double>(all), 0.9545, 0.04);
   EXPECT_NEAR(chi2 / static_cast<double>(all), 1.0, 0.2);
 }
@@ -233,7 +233,8 @@ TEST(WholeRun, WidensTheUncertaintyWhenTheTrackerIsWorseThanStated) {
 }
 
 TEST(WholeRun, KnowsWhatAnErrorAllRangesShareDoesToTheModel) {
-  constexpr double kScale = 1e-5;  // large against second orders of the errors, 30 um in 1 m
+  // large compared with second-order terms of the errors, 30 um in 1 m
+  constexpr double kScale = 1e-5;
   MadeRun run = make_run({.seed = 5, .noise_factor = 0.0, .error_scale_m = 1e-6});
   const auto right = identify(run.samples, run.machine, run.path, run.noise, run.options);
   run.noise.u_scale = kScale;

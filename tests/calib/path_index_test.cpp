@@ -14,12 +14,12 @@ Path random_path(std::size_t vertices, double step_m, std::mt19937& random) {
   for (std::size_t i = 0; i < vertices; ++i) {
     path.vertices_m.push_back(p);
     if (i % 7 != 3)
-      p += Vector3(step(random), step(random), step(random));  // else a leg that is a point
+      p += Vector3(step(random), step(random), step(random));  // otherwise the leg would be a point
   }
   return path;
 }
 
-/// Every leg, one after the other.
+/// Checks every leg, one after the other.
 std::optional<std::size_t> first_of_all(const Path& path, const Vector3& p, double within,
                                         std::size_t from) {
   for (std::size_t i = from; i + 1 < path.vertices_m.size(); ++i)

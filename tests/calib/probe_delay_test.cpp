@@ -22,7 +22,7 @@ std::vector<FeedTouch> touches(const Truth& truth, const std::vector<double>& fe
   std::vector<FeedTouch> out;
   for (const double feed : feeds_m_s) {
     for (int i = 0; i < each; ++i) {
-      const double v = feed * (1.0 + 0.002 * normal(random));  // no control holds a feed exactly
+      const double v = feed * (1.0 + 0.002 * normal(random));  // no control keeps a feed exactly
       const double delay = truth.delay_s + truth.jitter_s * normal(random);
       out.push_back({v, 0.7 + v * delay + truth.scatter_m * normal(random)});
     }
@@ -48,8 +48,8 @@ TEST(ProbeDelay, FindsAFallingPlaceAsANegativeDelay) {
   EXPECT_NEAR(fit->delay_s, -1e-3, 6 * fit->u_delay_s);
 }
 
-/// Of 2000 calibrations of a probe: the share in which the truth lies within 1.96 u, and the jitter
-/// found.
+/// Of 2000 calibrations of a probe: the fraction in which the truth is within 1.96 u, and the
+/// estimated jitter.
 struct Coverage {
   double share = 0.0;
   double jitter_s = 0.0;
@@ -75,7 +75,8 @@ TEST(ProbeDelay, StatesItsUncertainty) {
   EXPECT_NEAR(c.jitter_s, truth.jitter_s, 0.15 * truth.jitter_s);
 }
 
-/// Nine touches know their scatter to a quarter: without Student's factor 88 % would be covered.
+/// Nine touches determine their scatter to a quarter: without Student's factor the coverage would
+/// be 88 %.
 TEST(ProbeDelay, StatesAnUncertaintyThatHoldsForFewTouches) {
   for (const double jitter_s : {1e-6, 50e-6}) {
     const Coverage c = coverage({.jitter_s = jitter_s}, kThreeFeeds, 3);
@@ -85,8 +86,8 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsForFewTouches) {
   EXPECT_GE(coverage({}, {1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3}, 3).share, 0.93);
 }
 
-/// The same, and three feeds: their disagreement is one number, which is known to nobody better
-/// than Student's t with one degree of freedom says.
+/// The same with three feeds: their lack of fit has one degree of freedom, so that Student's factor
+/// is that of t with one degree of freedom.
 TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
@@ -107,8 +108,8 @@ TEST(ProbeDelay, StatesAnUncertaintyThatHoldsWhereThreeFeedsDoNotAgree) {
               0.015);  // three standard deviations of the share
 }
 
-/// Every feed has an error of its own (the surface was warmer, the control overshot): the touches
-/// at a feed know nothing of it, the lack_of_fit does.
+/// Every feed has its own error (the surface was warmer, the control overshot): the touches at one
+/// feed do not show it, the lack_of_fit does.
 TEST(ProbeDelay, WidensItsUncertaintyWhereTheFeedsDoNotAgree) {
   std::mt19937 random(7);
   auto some = touches({.jitter_s = 0.0}, {1e-3, 3e-3, 5e-3, 8e-3}, 20, random);

@@ -12,8 +12,8 @@ TEST(ProbeObserve, TakesTheLargestSetOfOnePlaceFromOneSide) {
   for (const double v : {1e-3, 4e-3, 8e-3})
     for (int i = 0; i < 3; ++i) touches.push_back({{0.1, 0.2, 0.3 - v * 1e-3}, {0.0, 0.0, -v}});
   touches.push_back({{0.1, 0.2, 0.3}, {0.0, 0.0, 4e-3}});    // the other side
-  touches.push_back({{0.15, 0.2, 0.3}, {0.0, 0.0, -4e-3}});  // another place
-  touches.push_back({{0.1, 0.2, 0.3}, {0.0, 0.0, 0.0}});     // reported without an approach
+  touches.push_back({{0.15, 0.2, 0.3}, {0.0, 0.0, -4e-3}});  // another position
+  touches.push_back({{0.1, 0.2, 0.3}, {0.0, 0.0, 0.0}});     // recorded without an approach
   const auto place = same_place(touches);
   ASSERT_EQ(place.size(), 9u);
   EXPECT_NEAR(place[8].speed_m_s, 8e-3, 1e-15);

@@ -13,15 +13,14 @@ namespace {
 constexpr double kSphere_m = 12.5e-3;
 const Vector3 kCentre_m{0.31, -0.12, 0.05};
 
-/// A kinematic seat: three lobes around z that vanish at the pole, and a stylus that bends
-/// sideways.
+/// A kinematic seat: three lobes about z that vanish at the pole, and a stylus that bends sideways.
 double true_radius_m(const Vector3& n) {
   const double lobes = n[0] * n[0] * n[0] - 3.0 * n[0] * n[1] * n[1];
   return 2e-3 - 4e-6 + 1.5e-6 * lobes - 2e-6 * (1.0 - n[2] * n[2]);
 }
 
-/// Pole and rings of 12, evenly from an elevation of `lowest_rad` up; -0.3 is as far as a stylus
-/// reaches below.
+/// The pole and rings of 12, evenly from an elevation of `lowest_rad` upwards; a stylus reaches
+/// down to -0.3 at most.
 std::vector<Vector3> directions(double lowest_rad, int rings) {
   std::vector<Vector3> all = {Vector3::UnitZ()};
   for (int ring = 0; ring < rings; ++ring) {
@@ -55,7 +54,7 @@ TEST(ProbeQualification, FindsRadiusLobesAndCentreWithoutNoise) {
   EXPECT_NEAR(q->lobing_m, 3.5e-6, 0.5e-6);  // 0 at the pole, -3.1 um in the lowest ring
 }
 
-/// The mean radius alone would leave micrometres.
+/// With the mean radius alone, errors of micrometres would remain.
 TEST(ProbeQualification, PredictsDirectionsThatWereNotTouched) {
   std::mt19937 random(2);
   const auto q = qualify(touches(directions(-0.3, 5), 0.1e-6, random));

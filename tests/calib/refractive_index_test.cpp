@@ -58,8 +58,8 @@ struct Co2Row {
   double t_C, p_Pa, rh_percent, co2_ppm, n;
 };
 
-// 633 nm; computed with M. Polyanskiy's program of [Ciddor 1996] (refractiveindex.info), of another
-// vapour pressure.
+// 633 nm; computed with M. Polyanskiy's program of [Ciddor 1996] (refractiveindex.info), which uses
+// another vapour pressure equation.
 constexpr Co2Row kCo2Table[]{
     {20, 101325, 50, 0, 1.0002713082},   {20, 101325, 50, 400, 1.0002713656},
     {20, 101325, 0, 1000, 1.0002718797}, {20, 101325, 50, 1000, 1.0002714516},
@@ -96,8 +96,8 @@ TEST(RefractiveIndex, CountsTheCo2ThatAFormulaLeavesOut) {
   EXPECT_DOUBLE_EQ(u_n(IndexEquation::Edlen), u_of_equation(IndexEquation::Edlen));
 }
 
-// Root mean square of n - n(20 C, 1013.25 hPa, 50 %) over the shop floor's box, by quadrature with
-// the program of Co2Table: 1.0443e-5. n is not linear over 15 K: 1 %.
+// Root mean square of n - n(20 C, 1013.25 hPa, 50 %) over the range of shop-floor air, by
+// quadrature with the program of Co2Table: 1.0443e-5. n is not linear over 15 K: 1 %.
 TEST(AssumedAir, IsUncertainByWhatAShopFloorCanBe) {
   const double u =
       u_of_assumed_air(air(20, 101'325, 50), kHeliumNeon_m, IndexEquation::Ciddor).value();
@@ -151,7 +151,7 @@ TEST(RefractiveIndex, StatesTheScatterThatUncertainAirCauses) {
 
   const double scatter = std::sqrt(sum2 / kDraws);
   const double u_air = std::sqrt(stated.u_n * stated.u_n - 1.5e-8 * 1.5e-8);
-  EXPECT_NEAR(u_air / scatter, 1.0, 0.02);  // the scatter itself is known to 0.5 %
+  EXPECT_NEAR(u_air / scatter, 1.0, 0.02);  // the sampled scatter is accurate to 0.5 %
 }
 
 TEST(RefractiveIndex, RefusesAirThatIsNone) {

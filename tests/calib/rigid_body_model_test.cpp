@@ -12,7 +12,7 @@ Vector3 three(const std::vector<double>& v, std::size_t from) {
   return {v.at(from), v.at(from + 1), v.at(from + 2)};
 }
 
-// The reference is printed with 13 significant digits of values of 1e-4 m: 1e-12 m is far above its
+// The reference is printed with 13 significant digits of values of 1e-4 m: 1e-12 m is far above the
 // rounding.
 TEST(RigidBodyModel, GivesTheReferenceErrorsAt50Points) {
   const otf::Machine machine = case_a_machine();
@@ -58,7 +58,7 @@ TEST_P(AnyOrder, ColumnsTimesParametersAreTheError) {
   EXPECT_LT((sum - volumetric_error(layout, {U.data(), layout.model_size()}, q, t)).norm(), 1e-18);
 }
 
-/// A rotation of one axis, as an exact product of transforms would have it: it turns everything
+/// As in an exact product of transforms, a rotation of one axis also rotates the travel of all axes
 /// nearer to the tool.
 TEST_P(AnyOrder, ARotationTurnsWhatIsNearerToTheTool) {
   const otf::Machine machine = coarse_machine(GetParam());

@@ -34,7 +34,7 @@ TEST(RigidFreeNorm, CountsAStretchWithoutItsRigidPart) {
   const FourPoints p;
   const double rms_m = RigidFreeNorm(p.D, p.points_m).rms_m(Eigen::Vector2d(0.0, 1.0));
   EXPECT_GT(rms_m, 0.1);
-  EXPECT_LT(rms_m, std::sqrt(3.0) / 4.0 + 1e-9);  // after the mean alone
+  EXPECT_LT(rms_m, std::sqrt(3.0) / 4.0 + 1e-9);  // upper limit: removal of the mean alone
 }
 
 TEST(RigidFreeNorm, WhatIsNotANumberStaysSoAndIsRefused) {

@@ -26,7 +26,7 @@ Folds five_folds(const Problem& problem) {
   return random_folds(static_cast<std::size_t>(problem.y.size()), 5, 42).value();
 }
 
-/// Mean squared error of rows held out, from fits made one by one.
+/// Mean squared error of held-out rows, from fits made one by one.
 double error_by_hand(const Problem& problem, const Folds& folds, const Penalty& penalty,
                      const PathOptions& options, Eigen::Index k) {
   double sum = 0.0;
@@ -48,7 +48,7 @@ TEST(SparseCrossValidation, IsTheErrorOfFitsThatDidNotSeeTheRow) {
   const auto cv = cross_validate(problem.X, problem.y, penalty, five_folds(problem), options);
   ASSERT_TRUE(cv) << cv.error().text;
   for (const Eigen::Index k : {0, 10, 19}) {
-    // standardised twice instead of once: rounding of 1e4-sized columns
+    // standardised twice instead of once: rounding of columns of size 1e4
     EXPECT_NEAR(cv->error(k), error_by_hand(problem, five_folds(problem), penalty, options, k),
                 1e-10)
         << k;
@@ -61,7 +61,7 @@ TEST(SparseCrossValidation, ChoosesTheSmallestErrorAndBeatsTheEmptyModel) {
   ASSERT_TRUE(cv) << cv.error().text;
   EXPECT_EQ(cv->error(cv->best), cv->error.minCoeff());
   EXPECT_LT(cv->error(cv->best),
-            0.2 * cv->null_error);  // 0.09 of noise in a variance of 1 and more
+            0.2 * cv->null_error);  // noise 0.09, variance above 1
   EXPECT_GT(cv->standard_error(cv->best), 0.0);
 }
 
@@ -82,7 +82,7 @@ TEST(SparseCrossValidation, OfAnEmptyModelIsTheSpreadOfTheRows) {
 
 TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
   const Problem problem = random_problem(60, 20, 24);
-  const auto gamma = equally_spaced(2.001, 30.0, 11);  // more than one register full
+  const auto gamma = equally_spaced(2.001, 30.0, 11);  // more values than one register holds
   const auto grid =
       grid_search(problem.X, problem.y, PenaltyKind::Scad, gamma, five_folds(problem));
   ASSERT_TRUE(grid) << grid.error().text;
@@ -97,7 +97,7 @@ TEST(SparseGridSearch, EveryColumnIsItsOwnCrossValidationBitForBit) {
   }
 }
 
-/// Both halves of the tasks on a thread of their own.
+/// Each half of the tasks on its own thread.
 void on_two_threads(std::size_t count, const std::function<void(std::size_t)>& task) {
   const auto every_other = [&](std::size_t first) {
     for (std::size_t i = first; i < count; i += 2) {
@@ -152,7 +152,7 @@ TEST(SparseGridSearch, RefusesFoldsThatDoNotFit) {
 TEST(SparseGridSearch, NamesTheFoldThatLeavesTooFewRows) {
   const Problem problem = random_problem(20, 4, 29);
   Folds folds{.of_row = std::vector<int>(20, 1), .count = 2};
-  folds.of_row[0] = 0;  // without fold 1 a single row is left
+  folds.of_row[0] = 0;  // without fold 1 only one row remains
   const auto cv = cross_validate(problem.X, problem.y, {}, folds);
   ASSERT_FALSE(cv);
   EXPECT_EQ(cv.error().code, ErrorCode::TooFewObservations);

@@ -19,7 +19,7 @@ TEST(SparseOptimality, ANudgedSolutionViolatesTheConditions) {
   const auto path = fit_path(X, y, lasso).value();
   Eigen::VectorXd b = path.standardised.col(50);
   EXPECT_LE(*kkt_violation(X, y, lasso, path.lambda[50], b), 1e-13);
-  b(2) += 0.01;  // orthogonal columns: the gradient moves by as much
+  b(2) += 0.01;  // orthogonal columns: the gradient changes by the same amount
   EXPECT_NEAR(*kkt_violation(X, y, lasso, path.lambda[50], b), 0.01, 1e-12);
 }
 

@@ -27,7 +27,7 @@ PathOptions exact() {
   return {.lambda = {}, .tolerance = 1e-12, .max_sweeps = 1000000};
 }
 
-/// The one-coefficient solutions as their papers print them.
+/// The one-coefficient solutions as printed in their papers.
 double closed_form(const Penalty& penalty, double l, double z) {
   const double size = std::abs(z), g = penalty.gamma;
   const double soft = std::max(size - l, 0.0);

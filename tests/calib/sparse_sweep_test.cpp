@@ -10,7 +10,7 @@
 namespace {
 using namespace abbe::calib::sparse;
 
-/// Eight lassos of one random Gram matrix, with different lambdas and different columns left out.
+/// Eight lassos of one random Gram matrix, with different lambdas and different columns excluded.
 struct Eight {
   static constexpr std::size_t kColumns = 12;
   std::vector<double> gram, xty;
@@ -42,7 +42,7 @@ struct Eight {
     return sweep({kColumns, gram.data(), xty.data(), mask.data(), b.data()}, parameters, count);
   }
 
-  /// One sweep of one lane, written plainly.
+  /// One sweep of one lane in plain loops.
   void sweep_plainly(std::size_t lane) {
     for (std::size_t j = 0; j < kColumns; ++j) {
       double z = xty[j];

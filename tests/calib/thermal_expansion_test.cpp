@@ -66,7 +66,8 @@ TEST(ThermalExpansion, StatesTheScatterThatItsUncertaintiesCause) {
     sum2 += d * d;
   }
 
-  EXPECT_NEAR(stated.u_m / std::sqrt(sum2 / kDraws), 1.0, 0.02);  // the scatter is known to 0.5 %
+  // the sampled scatter is accurate to 0.5 %
+  EXPECT_NEAR(stated.u_m / std::sqrt(sum2 / kDraws), 1.0, 0.02);
 }
 
 }  // namespace

@@ -111,7 +111,7 @@ TEST(ValidityVolume, KeepsAnApexJustAboveAFace) {
 enum class Shape { Sphere, Lattice, OnCube, Wavy };
 constexpr double kSide_m = 0.3;
 
-/// 150 points, turned and flattened at random: many coplanar ones, many almost so.
+/// 150 points, randomly rotated and flattened: many of them coplanar or nearly coplanar.
 std::vector<Vector3> points_of(Shape shape, double flat, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   std::uniform_int_distribution<int> step(0, 4), axis(0, 2);
@@ -150,7 +150,7 @@ TEST(ValidityVolume, ContainsTheSameAfterItWasStored) {
       const std::vector<Vector3> points = points_of(shape, flat, random);
       const ValidityVolume live = *ValidityVolume::hull_of(points);
       const ValidityVolume stored = *ValidityVolume::of_vertices(live.vertices_m());
-      for (int i = 0; i < 1000; ++i) {  // close to a point, most of them at the border
+      for (int i = 0; i < 1000; ++i) {  // close to a point, most of them at the boundary
         const double away_m = i % 2 == 0 ? 1e-6 : 1e-3;
         const Vector3 q = points[static_cast<std::size_t>(i) % points.size()] +
                           away_m * Vector3(normal(random), normal(random), normal(random));
@@ -166,7 +166,7 @@ TEST(ValidityVolume, ContainsTheSameAfterItWasStored) {
   EXPECT_LT(inside, tried / 20 * 19);
 }
 
-/// Planes through three points that have all others on one side, by brute force.
+/// Planes through three points with all others on one side, by brute force.
 bool in_brute_force_hull(const std::vector<Vector3>& points, const Vector3& q, double tolerance_m) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -242,7 +242,8 @@ TEST(ValidityVolume, OfFiveThousandVerticesTakesNoTime) {
   const double cpu_s = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
   EXPECT_EQ(volume->vertices_m().size(), points.size());
   EXPECT_LT(cpu_s,
-            5.0);  // 0.07 s were seen, ten times that under a sanitizer; n^3 takes half an hour
+            // measured 0.07 s, ten times that with a sanitizer; an n^3 algorithm takes half an hour
+            5.0);
 }
 
 TEST(ValidityVolume, RefusesAFlatOne) {
@@ -259,7 +260,7 @@ TEST(ValidityVolume, OfNothingContainsNothing) {
 TEST(SpreadSubset, LosesNoSide) {
   std::vector<Vector3> sphere;
   constexpr int kPoints = 2000;
-  for (int i = 0; i < kPoints; ++i) {  // a spiral, as even as points on a sphere get
+  for (int i = 0; i < kPoints; ++i) {  // a spiral: nearly uniform points on a sphere
     const double z = 1.0 - (2.0 * i + 1.0) / kPoints, turn = 2.399963 * i,
                  r = std::sqrt(1.0 - z * z);
     sphere.emplace_back(z, r * std::cos(turn), r * std::sin(turn));
@@ -268,7 +269,7 @@ TEST(SpreadSubset, LosesNoSide) {
   const std::vector<Vector3> some = spread_subset(sphere, 512);
   ASSERT_EQ(some.size(), 512u);
 
-  // No place of the sphere is farther from the subset than a few times the distance of 512 even
+  // Every point of the sphere is nearer to the subset than a few times the spacing of 512 uniform
   // points.
   double farthest = 0.0;
   for (const Vector3& p : sphere) {

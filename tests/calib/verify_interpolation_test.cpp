@@ -68,7 +68,7 @@ TEST(LinearWeights, AreThePointItselfAtAPoint) {
 }
 
 /// The definition: no other point lies in the sphere through the corners (coordinates scaled to the
-/// box).
+/// bounding box).
 TEST(LinearWeights, ComeFromTheDelaunayTriangulation) {
   const auto points = scattered(60, 5), places = scattered(100, 6);
   Vector3 low = points[0], high = points[0];

@@ -1,5 +1,5 @@
-/// Verification against an independent instrument: the reference solutions of the ball array on
-/// their own grid, and tracker points of a machine whose errors are known.
+/// Verification with an independent instrument: the reference solutions of the ball array on their
+/// own grid, and tracker points of a machine with known errors.
 
 #include <gmock/gmock.h>
 
@@ -19,7 +19,7 @@ RigidTransform tracker_station() {
           Vector3(2.5, -1.4, 0.6)};
 }
 
-/// What the tracker sees: the true place, in its own frame.
+/// The tracker's measurement: the true position, in the tracker's frame.
 std::vector<MeasuredPoint> measured(const Field& V, const std::vector<Vector3>& readings,
                                     const RigidTransform& T_tracker_machine = tracker_station()) {
   std::vector<MeasuredPoint> points;
@@ -44,7 +44,7 @@ std::vector<Vector3> measured_box() {
   return box_of({-0.1, -0.1, -0.04}, {0.8, 0.4, 0.12}, {10, 6, 9});
 }
 
-/// The grid of the reference and Ball1: asked for on the same grid, nothing is interpolated.
+/// The grid of the reference and Ball1: no interpolation when it is evaluated on the same grid.
 std::vector<Vector3> measured_grid() {
   auto readings = tests::evemu::reference_grid();
   readings.emplace_back(-0.09, 0.14, 0.03);
@@ -55,7 +55,7 @@ Options paper_grid() {
   return {.step_m = Vector3(0.1 / 3, 0.05 / 3, 0.01 / 3), .least_distance_m = 0.17};
 }
 
-/// Every second place along every axis, for what does not ask for the reference's numbers.
+/// Every second point along every axis, for tests that do not need the numbers of the reference.
 Options thin_grid() {
   Options options = paper_grid();
   options.step_m *= 2.0;
@@ -72,7 +72,7 @@ std::vector<Vector3> measured_thinly() {
   return readings;
 }
 
-/// A model out of coefficients of the reference; holds inside the balls of the reference layout.
+/// A model from coefficients of the reference; valid inside the balls of the reference layout.
 VolumetricModel reference_model(const std::string& solution) {
   std::vector<Vector3> balls;
   for (const auto& position : tests::evemu::reference_layout().true_m)
@@ -105,7 +105,8 @@ TEST(Verification, GivesTheStatisticsOfTheReferenceOnItsGrid) {
                             measured_grid(), Frame::Machine, paper_grid());
     const auto& R = all["solutions"][solution]["R_resmag"];
     EXPECT_EQ(c.R_stated.count, all["n_grid"].get<std::size_t>());
-    constexpr double kShiftOfConstants = 2e-3;  // the reference keeps the estimate's own V at Ball1
+    // the reference does not subtract the estimate's own V at Ball1
+    constexpr double kShiftOfConstants = 2e-3;
     EXPECT_NEAR(c.R_stated.mean, R["mean"].get<double>(), kShiftOfConstants) << solution;
     EXPECT_NEAR(c.R_stated.median, R["p50"].get<double>(), kShiftOfConstants) << solution;
     EXPECT_EQ(c.R_stated.above_1, 0u);
@@ -146,8 +147,8 @@ VolumetricModel scaled_tables(double factor) {
                                        *ValidityVolume::hull_of(hull));
 }
 
-// Nodes every 50 mm, points every 200 mm: between them the tables bend by tens of um, a good model
-// leaves 0.1 um.
+// Nodes every 50 mm, points every 200 mm: between the nodes the tables change by tens of um; the
+// remaining error of a good model is 0.1 um.
 TEST(Verification, GivesNoRatioWhereInterpolationCostsMoreThanIsLeft) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.05e-6);
@@ -157,7 +158,7 @@ TEST(Verification, GivesNoRatioWhereInterpolationCostsMoreThanIsLeft) {
   };
   const auto c =
       verified(truth, model, box_of({0, 0, 0}, {0.4, 0.4, 0.4}, {3, 3, 3}), Frame::BestFit);
-  EXPECT_GT(c.R_turned.above_1, 0u);  // what frightened
+  EXPECT_GT(c.R_turned.above_1, 0u);  // ratios above 1 although the model is good
   EXPECT_FALSE(ratios_hold(c));
   EXPECT_EQ(effect_at_points(c), Effect::Better);
 }
@@ -249,7 +250,7 @@ TEST(Verification, SaysWhatTheDataDoNotAllow) {
 
   EXPECT_EQ(code(box_of({0, 0, 0}, {0.8, 0.4, 0.0}, {5, 5, 2})), ErrorCode::DegenerateGeometry);
   EXPECT_EQ(code(box_of({0.1, 0, 0}, {0.5, 0.3, 0.1}, {9, 7, 5})),
-            ErrorCode::DegenerateGeometry);  // no Ball1
+            ErrorCode::DegenerateGeometry);  // Ball1 is missing
   EXPECT_EQ(code(box_of({-0.1, -0.1, -0.05}, {0.8, 0.4, 0.15}, {2, 2, 2})),
             ErrorCode::TooFewObservations);
   EXPECT_EQ(code(measured_box(), {.step_m = Vector3::Constant(1e-6)}), ErrorCode::BadInput);

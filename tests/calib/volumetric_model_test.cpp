@@ -105,7 +105,7 @@ TEST(VolumetricModel, OfToolsOnALineHoldsForToolsOnThatLineOnly) {
     EXPECT_TRUE(model.holds_for_tool({0.2, 0, 0}));
     EXPECT_FALSE(model.holds_for_tool({0.1, 0.05, 0}));
     EXPECT_TRUE(model.error_at(Vector3::Zero(), {0.2, 0, 0.05}).V_m.array().isNaN().all());
-    // Close to the line: the rotation about it, which no tool has shown, must not count.
+    // Near the line: the rotation about it, which the tools do not determine, must not count.
     EXPECT_EQ(model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 4e-4}),
               model.V_at({0.1, 0.1, -0.1}, {0.2, 0, 0}));
   }
@@ -187,7 +187,7 @@ TEST(VolumetricModel, RefusesADescriptionThatDoesNotAddUp) {
   EXPECT_EQ(code_of(d), ErrorCode::BadInput);
 }
 
-/// No single variance is negative, that of the difference of two parameters is.
+/// No single variance is negative; that of the difference of two parameters is.
 TEST(VolumetricModel, RefusesACovarianceThatIsNotPositive) {
   ModelDescription d = model_of(random_model(1e-4)).description();
   EXPECT_TRUE(check_covariance(d.covariance));

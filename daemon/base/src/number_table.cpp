@@ -4,8 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 #include "table_recognition.hpp"
 #include "table_text.hpp"
@@ -73,24 +71,36 @@ class RowReader {
 
   void read(std::string_view line, std::size_t number, NumberTable& table) {
     double* const row = table.append(number);
-    const auto faults_before = faults_.count();
-    if (!is_unusual(line) || !recognised_row(line, number, faults_)) read_cells(line, number, row);
-    if (faults_.count() != faults_before) table.mark_invalid();
+    if (fill(line, row)) return;
+    table.mark_invalid();
+    if (!recognised_row(line, number, faults_)) add_faults(line, number, row);
   }
 
  private:
-  /// Quotation marks, semicolons, or no comma in a row of several values.
-  [[nodiscard]] bool is_unusual(std::string_view line) const {
-    const auto has = [&](char c) { return line.find(c) != std::string_view::npos; };
-    return has('"') || has(';') || (target_.size() > 1 && !has(','));
-  }
-
-  void read_cells(std::string_view line, std::size_t number, double* row) {
+  /// False if the row has a fault.
+  [[nodiscard]] bool fill(std::string_view line, double* row) const {
     Cells cutter(line);
     Cell cell;
     std::size_t count = 0;
     for (; cutter.next(cell); ++count)
-      if (count < target_.size()) read_cell(cell, number, target_[count], row);
+      if (count >= target_.size() || !fill_cell(cell.text, target_[count], row)) return false;
+    return count == target_.size();
+  }
+
+  [[nodiscard]] bool fill_cell(std::string_view text, std::size_t column, double* row) const {
+    const auto& words = form_[column].words;
+    if (words.empty()) return parse_cell(text, row[column]).empty();
+    const auto found = std::find(words.begin(), words.end(), text);
+    row[column] = static_cast<double>(found - words.begin());
+    return found != words.end();
+  }
+
+  void add_faults(std::string_view line, std::size_t number, double* row) {
+    Cells cutter(line);
+    Cell cell;
+    std::size_t count = 0;
+    for (; cutter.next(cell); ++count)
+      if (count < target_.size()) check_cell(cell, number, target_[count], row);
     if (count != target_.size()) add_count(line, number, count);
   }
 
@@ -103,21 +113,16 @@ class RowReader {
     faults_.add_kind(commas ? "decimal comma" : "values", number, line.size() + 1, "", what);
   }
 
-  void read_word(const Cell& cell, std::size_t number, std::size_t column, double* row) {
+  void check_cell(const Cell& cell, std::size_t number, std::size_t column, double* row) {
+    if (fill_cell(cell.text, column, row)) return;
     const auto& words = form_[column].words;
-    const auto found = std::find(words.begin(), words.end(), cell.text);
-    row[column] = static_cast<double>(found - words.begin());
-    if (found == words.end())
-      faults_.add_kind("word", number, cell.column, form_[column].name,
-                       fmt::format("\"{}\": must be {}", cell.text, fmt::join(words, " or ")));
-  }
-
-  void read_cell(const Cell& cell, std::size_t number, std::size_t column, double* row) {
-    if (!form_[column].words.empty()) return read_word(cell, number, column, row);
+    if (!words.empty())
+      return faults_.add_kind(
+          "word", number, cell.column, form_[column].name,
+          fmt::format("\"{}\": must be {}", cell.text, fmt::join(words, " or ")));
     const auto fault = parse_cell(cell.text, row[column]);
-    if (!fault.empty())
-      faults_.add_kind(fault, number, cell.column, form_[column].name,
-                       fmt::format("\"{}\": {}", cell.text, fault));
+    faults_.add_kind(fault, number, cell.column, form_[column].name,
+                     fmt::format("\"{}\": {}", cell.text, fault));
   }
 
   const TableForm& form_;
@@ -133,17 +138,6 @@ void check_end(const Lines& lines, std::string_view last, Faults& faults) {
 }
 
 }  // namespace
-
-std::string_view parse_cell(std::string_view text, double& value) {
-  if (text.empty()) return "empty";
-  // Spreadsheets write "+"; std::from_chars does not accept it.
-  if (text.front() == '+') text.remove_prefix(1);
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (fault == std::errc::result_out_of_range) return "out of range";
-  if (fault != std::errc{} || end != text.data() + text.size()) return "not a number";
-  if (!std::isfinite(value)) return "must be finite";
-  return {};
-}
 
 double* NumberTable::append(std::size_t line) {
   lines_.push_back(static_cast<std::uint32_t>(line));

@@ -2,8 +2,11 @@
 /// The text of a CSV file: its lines and their cells.
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace abbe::daemon {
@@ -82,6 +85,15 @@ class Cells {
 }
 
 /// Sets `value`. Returns what is wrong with the cell; empty if it is valid.
-[[nodiscard]] std::string_view parse_cell(std::string_view text, double& value);
+[[nodiscard]] inline std::string_view parse_cell(std::string_view text, double& value) {
+  if (text.empty()) return "empty";
+  // Spreadsheets write "+"; std::from_chars does not accept it.
+  if (text.front() == '+') text.remove_prefix(1);
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (fault == std::errc::result_out_of_range) return "out of range";
+  if (fault != std::errc{} || end != text.data() + text.size()) return "not a number";
+  if (!std::isfinite(value)) return "must be finite";
+  return {};
+}
 
 }  // namespace abbe::daemon

@@ -7,7 +7,7 @@ endif()
 set(tests "")
 foreach(suite IN LISTS suites)
   string(REGEX REPLACE "[\n.]" "" suite "${suite}")
-  string(APPEND tests "add_test([=[${ROOM}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${suite}.*]=] --gtest_brief=1)\n"
-                      "set_tests_properties([=[${ROOM}.${suite}]=] PROPERTIES TIMEOUT 300 LABELS ${ROOM})\n")
+  string(APPEND tests "add_test([=[${MODULE}.${suite}]=] [=[${PROGRAM}]=] [=[--gtest_filter=${suite}.*]=] --gtest_brief=1)\n"
+                      "set_tests_properties([=[${MODULE}.${suite}]=] PROPERTIES TIMEOUT 300 LABELS ${MODULE})\n")
 endforeach()
 file(WRITE ${FILE} "${tests}")

@@ -1,5 +1,5 @@
-# A room is a folder: its public headers in include/abbe/NAME, its sources in src, one static library abbe_NAME.
-# The library exposes nothing but its own include folder, so an arrow the architecture forbids does not compile.
+# A module is a folder: its public headers in include/abbe/NAME, its sources in src, one static library abbe_NAME.
+# The library exposes nothing but its own include folder, so a dependency that the architecture forbids does not compile.
 
 add_library(abbe_warnings INTERFACE)
 add_library(abbe::warnings ALIAS abbe_warnings)
@@ -59,19 +59,19 @@ function(abbe_allow_local_types target)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endfunction()
 
-# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_TOGETHER several files
+# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_UNITY_BUILD several files
 # of a module are compiled as one. Names that are local to a file are therefore unique in their module.
-option(ABBE_TOGETHER "Compile several source files of a module as one: faster when everything is built" OFF)
-function(abbe_compile_together target)
-  if(ABBE_TOGETHER)
+option(ABBE_UNITY_BUILD "Compile several source files of a module as one: faster when everything is built" OFF)
+function(abbe_unity_build target)
+  if(ABBE_UNITY_BUILD)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     abbe_allow_local_types(${target})
   endif()
 endfunction()
 
 # The same for tests, by the first word of a file's name: tests of one subject share headers and names.
-function(abbe_compile_subjects_together target)
-  if(ABBE_TOGETHER AND NOT ABBE_FUZZ)
+function(abbe_unity_build_tests target)
+  if(ABBE_UNITY_BUILD AND NOT ABBE_FUZZ)
     get_target_property(sources ${target} SOURCES)
     foreach(source IN LISTS sources)
       get_filename_component(name ${source} NAME_WE)
@@ -83,7 +83,7 @@ function(abbe_compile_subjects_together target)
   endif()
 endfunction()
 
-function(abbe_room name)
+function(abbe_module name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)
   add_library(abbe_${name} STATIC ${sources})

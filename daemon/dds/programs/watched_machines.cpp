@@ -1,0 +1,245 @@
+#include "watched_machines.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <vector>
+
+#include "abbe/dds/json_lines.hpp"
+#include "abbe/messages/cdr.hpp"
+
+namespace abbe::dds {
+namespace {
+
+using daemon::Topic;
+
+/// A publisher is not alive if its last ModelState is older. ModelState is repeated every second,
+/// even if nothing changes.
+constexpr std::chrono::milliseconds kLongestSilence{1500};
+
+std::string micrometres(const std::array<double, 3>& v_m) {
+  return fmt::format("{:+.2f} {:+.2f} {:+.2f} um", v_m[0] * 1e6, v_m[1] * 1e6, v_m[2] * 1e6);
+}
+
+/// A missing axis is shown as "-": its last position is out of date.
+std::string millimetres(const std::vector<double>& position_m, unsigned missing_mask) {
+  std::string text;
+  for (std::size_t axis = 0; axis < position_m.size(); ++axis) {
+    const bool missing = (missing_mask >> axis & 1u) != 0;
+    text += missing ? fmt::format("{:>10}", '-') : fmt::format("{:10.4f}", position_m[axis] * 1e3);
+  }
+  return text + " mm";
+}
+
+template <class T, class F>
+void with(std::span<const std::byte> payload, F&& use) {
+  if (auto value = daemon::decode<T>(payload)) {
+    use(*value);
+  } else {
+    std::fprintf(stderr, "abbe-watch: %s\n", value.error().text.c_str());
+  }
+}
+
+}  // namespace
+
+WatchedMachines::WatchedMachines(WatchOptions options, const Readers& readers,
+                                 const ParticipantAddresses& addresses)
+    : options_(std::move(options)),
+      readers_(readers),
+      addresses_(addresses),
+      on_terminal_(::isatty(STDOUT_FILENO) != 0) {}
+
+void WatchedMachines::take(const Arrival& arrival) {
+  using Verdict = PublisherPin::Verdict;
+  const auto key = daemon::payload_key(arrival.topic, arrival.payload);
+
+  if (!key || (!options_.machine.empty() && key->machine != options_.machine)) return;
+  received_ = true;
+  const std::string name(key->machine);
+  auto& machine = machines_[name];
+  const auto from = participant_of(arrival.writer);
+  const auto former = machine.pin.pinned();
+  const auto verdict = machine.pin.heard(from, WallClock::now());
+  auto& publisher = machine.publisher(from);
+  keep(arrival, publisher);
+  if (verdict == Verdict::Waiting) return;
+  if (verdict == Verdict::Foreign) return report_foreign_publisher(name, machine, from);
+  if (former && former != from) show_successor(name, from, *former);
+  show(arrival, name, machine, publisher);
+}
+
+void WatchedMachines::notice_losses() {
+  for (auto& [name, machine] : machines_) {
+    for (auto& [id, publisher] : machine.publishers)
+      if (!alive(publisher)) publisher.state_from.reset();
+    show_liveness(name, machine);
+  }
+}
+
+const ReceivedModel* WatchedMachines::applicable() const {
+  for (const auto& [name, machine] : machines_) {
+    const Publisher& publisher = machine.pinned();
+    const auto& model = publisher.model;
+    if (!model.model() || !model.decide(alive(publisher)).apply) continue;
+    if (model.model()->model_id() == model.state()->model_id()) return &model;
+  }
+  return nullptr;
+}
+
+std::string WatchedMachines::why_not() const {
+  std::string text;
+  for (const auto& [name, machine] : machines_) {
+    const auto decision = machine.pinned().model.decide(alive(machine.pinned()));
+    text += name + ": " +
+            (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
+  }
+  return text.empty() ? "nothing received" : text;
+}
+
+bool WatchedMachines::alive(const Publisher& publisher) const {
+  return publisher.state_from && WallClock::now() - publisher.state_at < kLongestSilence &&
+         readers_.is_alive(*publisher.state_from);
+}
+
+void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
+  switch (arrival.topic) {
+    case Topic::ModelState:
+      return with<v1::ModelState>(arrival.payload, [&](auto& m) {
+        publisher.state_from = arrival.writer;
+        publisher.state_at = WallClock::now();
+        publisher.model.state(m);
+      });
+    case Topic::ErrorModel:
+      return with<v1::ErrorModel>(arrival.payload, [&](auto& m) { publisher.model.model(m); });
+    case Topic::ErrorGrid:
+      return with<v1::ErrorGrid>(arrival.payload, [&](auto& m) { publisher.model.slice(m); });
+    case Topic::Snapshot:
+      return with<v1::Snapshot>(arrival.payload, [&](auto& m) {
+        publisher.position = millimetres(m.position(), m.missing_mask());
+      });
+    case Topic::Compensation:
+      return with<v1::Compensation>(arrival.payload, [&](auto& m) {
+        publisher.last_delay = publisher.delay.of(m, WallClock::now());
+      });
+    case Topic::Health:
+    case Topic::CalibrationEvent:
+      return;  // shown when it arrives, not kept
+  }
+}
+
+void WatchedMachines::show(const Arrival& arrival, const std::string& name, Machine& machine,
+                           const Publisher& publisher) {
+  const auto& payload = arrival.payload;
+  if (options_.json) print_json(arrival.topic, payload);
+  show_liveness(name, machine);
+  show_state(name, machine, publisher);
+  if (arrival.topic == Topic::ErrorModel) show_model(machine, publisher);
+  if (arrival.topic == Topic::Health) with<v1::Health>(payload, [&](auto& m) { show_health(m); });
+  if (arrival.topic == Topic::CalibrationEvent)
+    with<v1::CalibrationEvent>(payload, [&](auto& m) { show_event(m); });
+  if (arrival.topic == Topic::Compensation)
+    with<v1::Compensation>(payload, [&](auto& m) { show_vector(machine, publisher, m); });
+}
+
+void WatchedMachines::print_json(Topic topic, std::span<const std::byte> payload) {
+  if (const auto line = json_line(topic, payload)) std::printf("%s\n", line->c_str());
+  std::fflush(stdout);
+}
+
+void WatchedMachines::print(const std::string& line) {
+  if (options_.json) return;
+  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", line.c_str());
+  std::fflush(stdout);
+}
+
+void WatchedMachines::show_liveness(const std::string& name, Machine& machine) {
+  const bool now = alive(machine.pinned());
+  if (std::exchange(machine.shown_alive, now) == now) return;
+  if (options_.json) {
+    fmt::print("{{\"machine\":\"{}\",\"publisher_alive\":{}}}\n", name, now);
+    std::fflush(stdout);
+  }
+  print(fmt::format("{}  {}", name,
+                    now ? "publisher is alive" : "publisher is not alive: do not apply"));
+}
+
+std::string WatchedMachines::described(const ParticipantId& id) const {
+  const auto address = addresses_.of(id);
+  return text_of(id) + (address.empty() ? "" : ", announced at " + address);
+}
+
+void WatchedMachines::show_successor(const std::string& name, const ParticipantId& id,
+                                     const ParticipantId& former) {
+  if (options_.json) {
+    fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name, text_of(id),
+               text_of(former));
+    std::fflush(stdout);
+  }
+  print(fmt::format("{}  publisher is now {}: {} sends no more", name, described(id),
+                    text_of(former)));
+}
+
+void WatchedMachines::report_foreign_publisher(const std::string& name, Machine& machine,
+                                               const ParticipantId& id) {
+  constexpr std::chrono::seconds kReportPeriod{10};
+  const auto now = WallClock::now();
+  if (machine.foreign_reported && now - *machine.foreign_reported < kReportPeriod) return;
+  machine.foreign_reported = now;
+  if (options_.json) {
+    fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name, text_of(id),
+               addresses_.of(id));
+    std::fflush(stdout);
+  }
+  print(
+      fmt::format("{}  another publisher {}: ignored; stop it, or use DDS Security (abbe dds keys)",
+                  name, described(id)));
+}
+
+void WatchedMachines::show_state(const std::string& name, Machine& machine,
+                                 const Publisher& publisher) {
+  const auto& s = publisher.model.state();
+  if (!s) return;
+  const std::string line =
+      fmt::format("{}  model {} is {}{}{}", name, s->model_id().empty() ? "-" : s->model_id(),
+                  name_of(s->state()), s->reason().empty() ? "" : ": ", s->reason());
+  if (std::exchange(machine.shown_state, line) != line) print(line);
+}
+
+void WatchedMachines::show_model(Machine& machine, const Publisher& publisher) {
+  const auto& m = publisher.model.model();
+  if (!m || std::exchange(machine.shown_model, m->model_id()) == m->model_id()) return;
+  print(fmt::format("{}  received model {}: {} {}, gauge {}, {} parameters, chain {}", m->machine(),
+                    m->model_id(), m->method(), m->estimator(), m->gauge(), m->parameters().size(),
+                    m->chain()));
+}
+
+void WatchedMachines::show_health(const v1::Health& h) {
+  const std::string line = fmt::format("{}  {} {}{}{}", h.machine(), h.stream(), h.state(),
+                                       h.fault().empty() ? "" : ": ", h.fault());
+  if (std::exchange(health_[{h.machine(), h.stream()}], line) != line) print(line);
+}
+
+void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
+  const std::string line = fmt::format("{}  calibration {} {}{}{}", e.machine(), e.method(),
+                                       e.state(), e.reason().empty() ? "" : ": ", e.reason());
+  if (std::exchange(calibration_[e.machine()], line) != line) print(line);
+}
+
+void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
+                                  const v1::Compensation& c) {
+  const auto now = WallClock::now();
+  if (options_.json || now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100}
+                                                               : std::chrono::seconds{1}))
+    return;
+  machine.last_live = now;
+  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
+  const std::string line =
+      fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
+                  decision.apply ? "apply" : "do not apply: " + decision.reason);
+  std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", line.c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace abbe::dds

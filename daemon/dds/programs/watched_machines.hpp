@@ -1,0 +1,109 @@
+#pragma once
+/// The display of abbe-watch: what participants published about each machine, and the lines that are
+/// printed when it changes. Used by one thread.
+
+#include <chrono>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "abbe/dds/participant_addresses.hpp"
+#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/dds/readers.hpp"
+#include "abbe/dds/received_model.hpp"
+
+namespace abbe::dds {
+
+struct WatchOptions {
+  std::string machine;  ///< empty: all machines
+  bool json = false;    ///< one line with a JSON object per sample, instead of text
+};
+
+/// Keeps the received data of every machine, and prints what has changed.
+class WatchedMachines {
+ public:
+  /// Uses `readers` and `addresses` as long as it exists.
+  WatchedMachines(WatchOptions options, const Readers& readers,
+                  const ParticipantAddresses& addresses);
+
+  /// True once a sample of a machine that is watched has arrived.
+  [[nodiscard]] bool received() const { return received_; }
+  void take(const Arrival& arrival);
+  /// Discards the ModelState of publishers that are not alive, and shows the change. If such a
+  /// publisher becomes alive again, it repeats its state within a second.
+  void notice_losses();
+  /// The first model that may be applied and is complete; nullptr if there is none.
+  [[nodiscard]] const ReceivedModel* applicable() const;
+  /// Why applicable() is nullptr, for each machine.
+  [[nodiscard]] std::string why_not() const;
+
+ private:
+  using WallClock = std::chrono::steady_clock;
+
+  /// The data that one participant published about one machine.
+  struct Publisher {
+    ReceivedModel model;
+    std::optional<WriterId> state_from;  ///< writer of the last valid ModelState
+    WallClock::time_point state_at{};    ///< when that ModelState arrived
+    std::string position;
+    Delay delay;
+    std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
+  };
+
+  /// Several participants of a domain may publish data of the same machine. Only the data of the
+  /// pinned publisher is shown and used.
+  struct Machine {
+    PublisherPin pin;
+    std::map<ParticipantId, Publisher> publishers;
+    bool shown_alive = false;
+    std::string shown_state, shown_model;
+    WallClock::time_point last_live{};
+    std::optional<WallClock::time_point> foreign_reported;
+
+    /// Valid once a sample of the machine was received.
+    [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
+
+    Publisher& publisher(const ParticipantId& id) {
+      const auto [found, is_new] = publishers.try_emplace(id);
+      if (is_new && pin.pinned() != id) found->second.delay = pinned().delay.for_next_publisher();
+      if (is_new) std::erase_if(publishers, [&](const auto& p) { return !pin.remembers(p.first); });
+      return found->second;
+    }
+  };
+
+  [[nodiscard]] bool alive(const Publisher& publisher) const;
+  /// Called also for publishers that are not pinned, because one of them may be pinned next.
+  void keep(const Arrival& arrival, Publisher& publisher);
+  /// Shows a sample of the pinned publisher, after keep().
+  void show(const Arrival& arrival, const std::string& name, Machine& machine,
+            const Publisher& publisher);
+  void print_json(daemon::Topic topic, std::span<const std::byte> payload);
+  void print(const std::string& line);
+  void show_liveness(const std::string& name, Machine& machine);
+  /// Participant id and announced addresses; the addresses are not verified.
+  [[nodiscard]] std::string described(const ParticipantId& id) const;
+  void show_successor(const std::string& name, const ParticipantId& id,
+                      const ParticipantId& former);
+  void report_foreign_publisher(const std::string& name, Machine& machine, const ParticipantId& id);
+  void show_state(const std::string& name, Machine& machine, const Publisher& publisher);
+  void show_model(Machine& machine, const Publisher& publisher);
+  void show_health(const v1::Health& h);
+  void show_event(const v1::CalibrationEvent& e);
+  /// The line with position, vector and decision. On a terminal it is updated in place, otherwise a
+  /// new line is printed once a second.
+  void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c);
+
+  const WatchOptions options_;
+  const Readers& readers_;
+  const ParticipantAddresses& addresses_;
+  bool received_ = false;
+  const bool on_terminal_;
+  std::map<std::string, Machine> machines_;
+  std::map<std::pair<std::string, std::string>, std::string> health_;  // by machine and stream
+  std::map<std::string, std::string> calibration_;                     // by machine
+};
+
+}  // namespace abbe::dds

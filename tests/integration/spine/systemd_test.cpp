@@ -60,6 +60,14 @@ TEST_F(Installation, UnitsStartTheProgramsBelowTheChosenPrefix) {
   EXPECT_THAT(unit, testing::HasSubstr("file://" + file("opt/share/doc/abbe/README.md")));
 }
 
+TEST_F(Installation, UnitsOfTheRootPrefixStartTheProgramsInBin) {
+  const auto staged = run({"/usr/bin/env", "DESTDIR=" + file("root"), ABBE_CMAKE,
+                           "-DCMAKE_INSTALL_PREFIX=/", "-P", ABBE_SYSTEMD_INSTALL});
+  ASSERT_EQ(staged.code, 0) << staged.err;
+  const auto unit = text_of(file("root/lib/systemd/system/abbed.service"));
+  EXPECT_THAT(unit, testing::HasSubstr("ExecStart=/bin/abbed --config"));
+}
+
 TEST_F(Installation, UnitsDoNotContainTheFolderOfAPackageThatIsBeingMade) {
   const auto staged = run({"/usr/bin/env", "DESTDIR=" + file("stage"), ABBE_CMAKE,
                            "-DCMAKE_INSTALL_PREFIX=/usr", "-P", ABBE_SYSTEMD_INSTALL});

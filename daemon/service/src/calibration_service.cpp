@@ -33,6 +33,7 @@ std::string verdict_text(const calib::Verdict& verdict) {
 
 // A full disk or a lock lasts until an operator acts; one attempt writes one small file.
 constexpr auto kStoreAgain = std::chrono::seconds{5};
+
 template <class T>
 bool ready(const std::future<T>& work) {
   return work.valid() && work.wait_for(std::chrono::seconds{0}) == std::future_status::ready;

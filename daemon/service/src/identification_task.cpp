@@ -21,7 +21,8 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
   try {
     for (auto waited = kLookForStop; !stopped && waited < kDigestTimeout; waited += kLookForStop)
       if (wanted.wait_for(kLookForStop) == std::future_status::ready) return wanted.get();
-    return {.gap = "the recorder did not answer: its disk stalls"};
+    return {.gap = stopped ? "abbed ended before the recorder answered"
+                           : "the recorder did not answer: its disk stalls"};
   } catch (const std::exception&) {  // a broken promise
     return {.gap = "the recorder failed"};
   }

@@ -53,9 +53,11 @@ class ModelKeeper {
   }
   /// Stores a model with its verdict, activates it if the gate accepted it, and returns the active
   /// model of the store. The store parses and checks the written file before it activates it; the
-  /// returned model is that of `document` if the file has the same bytes. After an error the call may be repeated with the same `actor`: entries
-  /// that the store already has are not made twice. Stops with Refused as soon as it sees that
-  /// `discarded` is true; `discarded` may be null.
+  /// returned model is that of `document` if the file has the same bytes.
+  ///
+  /// After an error the call may be repeated with the same `actor`: entries that the store already
+  /// has are not made twice. Stops with Refused as soon as `discarded` is true; `discarded` may be
+  /// null.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now,
                                        const std::atomic<bool>* discarded = nullptr);

@@ -17,7 +17,7 @@ TEST(Faults, ShowAFaultOfManyLinesOnceWithItsCount) {
   for (std::size_t line = 2; line < 414; ++line)
     faults.add_kind("not a number", line, 7, "z_mm", std::to_string(line) + "x: not a number");
   EXPECT_THAT(faults.lines(),
-              ElementsAre("t.csv:2:7: z_mm: 2x: not a number, and 411 more lines like this"));
+              ElementsAre("t.csv:2:7: z_mm: 2x: not a number, and 411 more like this"));
   EXPECT_EQ(faults.to_error().text, "t.csv: 412 faults");
 }
 
@@ -34,14 +34,14 @@ TEST(Faults, OfTwoColumnsAreTwoKinds) {
     faults.add(line, 3, "y_mm", "empty");
     faults.add(line, 5, "z_mm", "empty");
   }
-  EXPECT_THAT(faults.lines(), ElementsAre("t.csv:2:3: y_mm: empty, and 3 more lines like this",
-                                          "t.csv:2:5: z_mm: empty, and 3 more lines like this"));
+  EXPECT_THAT(faults.lines(), ElementsAre("t.csv:2:3: y_mm: empty, and 3 more like this",
+                                          "t.csv:2:5: z_mm: empty, and 3 more like this"));
 }
 
 TEST(Faults, ShowTheFirstOfAKindAlsoIfItIsAddedLast) {
   Faults faults("t.csv");
   for (const std::size_t line : {9, 8, 7, 6, 2}) faults.add(line, 1, "x_mm", "empty");
-  EXPECT_THAT(faults.lines(), ElementsAre("t.csv:2:1: x_mm: empty, and 4 more lines like this"));
+  EXPECT_THAT(faults.lines(), ElementsAre("t.csv:2:1: x_mm: empty, and 4 more like this"));
 }
 
 TEST(Faults, OfManyTablesOfAnArrayAreOneKind) {
@@ -50,7 +50,15 @@ TEST(Faults, OfManyTablesOfAnArrayAreOneKind) {
     faults.add(4 + 2 * static_cast<std::size_t>(i), 1, "ball[" + std::to_string(i) + "].r_mm",
                "unknown key");
   EXPECT_THAT(faults.lines(),
-              ElementsAre("c.toml:4:1: ball[0].r_mm: unknown key, and 3 more lines like this"));
+              ElementsAre("c.toml:4:1: ball[0].r_mm: unknown key, and 3 more like this"));
+}
+
+TEST(Faults, OfOneLineAreShownFromItsBegin) {
+  Faults faults("t.csv");
+  for (std::size_t i = 1; i <= 30; ++i) faults.add(1, i, "column " + std::to_string(i), "unknown");
+  ASSERT_THAT(faults.lines(), SizeIs(Faults::kShown + 1));
+  EXPECT_EQ(faults.lines().front(), "t.csv:1:1: column 1: unknown");
+  EXPECT_EQ(faults.lines()[19], "t.csv:1:20: column 20: unknown");
 }
 
 TEST(Faults, AreCountedBeyondTheShownOnes) {

@@ -106,7 +106,7 @@ TEST_F(InputFiles, ShowAFaultOfManyLinesOnceWithItsCount) {
   for (int i = 0; i < 50; ++i) text += std::to_string(i) + ",1,2,oops" + std::to_string(i) + "\n";
   EXPECT_THAT(tracker_faults(text),
               ElementsAre(AllOf(HasSubstr("tracker.csv:2:7: z_mm: \"oops0\": not a number"),
-                                HasSubstr(", and 49 more lines like this"))));
+                                HasSubstr(", and 49 more like this"))));
 }
 
 TEST_F(InputFiles, ReportAnglesThatLookLikeDegrees) {

@@ -58,7 +58,7 @@ TEST_F(TableRecognition, NamesDecimalCommasBetweenSemicolonsOnceWithTheirCount) 
   EXPECT_THAT(points_faults(text),
               ElementsAre(HasSubstr("semicolons"),
                           AllOf(HasSubstr("f.csv:3:1: \"1,5\" has a decimal comma: write 0.5"),
-                                HasSubstr(", and 411 more lines like this"))));
+                                HasSubstr(", and 411 more like this"))));
 }
 
 TEST_F(TableRecognition, NamesDecimalCommasBetweenCommas) {
@@ -78,6 +78,11 @@ TEST_F(TableRecognition, NamesAMissingHeaderAndItsColumns) {
   EXPECT_THAT(points_faults("# by hand\n1,2,3\n4,5,6\n"),
               ElementsAre(AllOf(HasSubstr("f.csv:2:1: the header line is missing"),
                                 HasSubstr("before this one: x_mm,y_mm,z_mm"))));
+}
+
+TEST_F(TableRecognition, NamesOnlyTheMissingHeaderIfSpacesFollowTheCommas) {
+  for (const char* row : {"0, 0, 0\n", "12, 0, 0.5\n"})
+    EXPECT_THAT(points_faults(row), ElementsAre(HasSubstr("the header line is missing"))) << row;
 }
 
 TEST_F(TableRecognition, NamesTheHeadersOfAsManyColumns) {

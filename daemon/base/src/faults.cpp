@@ -59,9 +59,13 @@ Faults::Kind& Faults::kind_named(std::string name) {
   return found != kinds_.end() ? *found : kinds_.emplace_back(Kind{std::move(name)});
 }
 
+bool Faults::is_before(const Fault& a, const Fault& b) {
+  return std::pair(a.line, a.order) < std::pair(b.line, b.order);
+}
+
 void Faults::drop_last_kind() {
   kinds_.erase(std::max_element(kinds_.begin(), kinds_.end(), [](const Kind& a, const Kind& b) {
-    return a.first.front().line < b.first.front().line;
+    return is_before(a.first.front(), b.first.front());
   }));
 }
 
@@ -74,9 +78,8 @@ std::vector<Faults::Shown> Faults::shown() const {
       for (const auto& fault : kind.first) shown.push_back({&fault, 1});
   }
 
-  std::sort(shown.begin(), shown.end(), [](const Shown& a, const Shown& b) {
-    return std::pair(a.fault->line, a.fault->order) < std::pair(b.fault->line, b.fault->order);
-  });
+  std::sort(shown.begin(), shown.end(),
+            [](const Shown& a, const Shown& b) { return is_before(*a.fault, *b.fault); });
   if (shown.size() > most_shown_) shown.resize(most_shown_);
   return shown;
 }
@@ -87,7 +90,7 @@ std::vector<std::string> Faults::lines() const {
   for (const auto& [fault, stands_for] : shown()) {
     std::string line = fault->text;
     if (fault->times > 1) line += fmt::format(" ({} times)", fault->times);
-    if (stands_for > 1) line += fmt::format(", and {} more lines like this", stands_for - 1);
+    if (stands_for > 1) line += fmt::format(", and {} more like this", stands_for - 1);
     lines.push_back(std::move(line));
     more -= stands_for;
   }

@@ -48,10 +48,16 @@ bool is_number(std::string_view cell) {
   return parse_cell(cell, value).empty();
 }
 
-/// "0,5"
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// "0,5", not "0,": that is a value before a comma and a space.
 bool has_decimal_comma(std::string_view cell) {
   const auto comma = cell.find(',');
-  if (comma == std::string_view::npos || cell.find('.') != std::string_view::npos) return false;
+  if (comma == 0 || comma >= cell.size() - 1 || cell.find('.') != std::string_view::npos)
+    return false;
+  if (!is_digit(cell[comma - 1]) || !is_digit(cell[comma + 1])) return false;
   std::string pointed(cell);
   pointed[comma] = '.';
   return is_number(pointed);
@@ -192,7 +198,8 @@ bool recognised_row(std::string_view line, std::size_t number, Faults& faults) {
 
 bool has_decimal_commas(std::string_view line, const TableForm& form, std::size_t columns) {
   const auto cells = all_cells(line);
-  if (cells.size() > 2 * columns || line.find('.') != std::string_view::npos) return false;
+  const std::size_t most_cells = 2 * columns;  // a decimal comma in every value
+  if (cells.size() > most_cells || line.find('.') != std::string_view::npos) return false;
   return std::all_of(cells.begin(), cells.end(), [&](const Cell& cell) {
     return is_number(cell.text) || is_word(cell.text, form);
   });

@@ -14,7 +14,7 @@ namespace abbe::daemon {
 /// Collects lines of the form "file:line:column: key: what is wrong". Shows the `most_shown` that
 /// come first in the file and counts the others. A fault that is added several times is one fault
 /// with a count. More than `kEach` faults of one kind are one line: the first of them, "and 411
-/// more lines like this".
+/// more like this".
 class Faults {
  public:
   static constexpr std::size_t kShown = 20;
@@ -49,6 +49,7 @@ class Faults {
     const Fault* fault;
     std::size_t stands_for;  // number of faults
   };
+  [[nodiscard]] static bool is_before(const Fault& a, const Fault& b);
   [[nodiscard]] Kind& kind_named(std::string name);
   [[nodiscard]] std::vector<Shown> shown() const;
   void drop_last_kind();

@@ -17,6 +17,7 @@
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe_command.hpp"
+#include "faults_text.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
 
@@ -66,24 +67,16 @@ std::string header_of_csv(const std::string& text) {
   return line;
 }
 
-/// What a reader says about a file; empty if it accepts the file.
+/// faults_text() of a reader for one file.
 using FileReader = std::function<std::string(const fs::path&)>;
-
-template <class T>
-std::string faults_text(const Result<T>& result) {
-  if (result) return {};
-  std::string text = result.error().text;
-  for (const auto& detail : result.error().details) text += "\n" + detail;
-  return text;
-}
 
 template <class Read>
 FileReader reader(Read read) {
-  return [read](const fs::path& file) { return faults_text(read(file)); };
+  return [read](const fs::path& file) { return test::faults_text(read(file)); };
 }
 
 std::string faults_of_config(const fs::path& file) {
-  return faults_text(parse_config(test::text_of(file), file));
+  return test::faults_text(parse_config(test::text_of(file), file));
 }
 
 const std::map<std::string, FileReader> kTableReaders{

@@ -219,6 +219,19 @@ TEST_F(TrackerSessionTest, ABeamThatIsBackIsMeasuredAfterAListToo) {
   EXPECT_EQ(sent_.back(), Command::StartMeasurement);
 }
 
+TEST_F(TrackerSessionTest, ALossOfTheBeamDuringAListIsNoFault) {
+  reach_streaming();
+  on(TrackerOrder{TrackerOrder::What::ListReflectors, 3, "", 0.0});
+  say(Event::MeasurementNotReady);
+  on(emscon::Answer{emscon::ReflectorAnswer{Status::Ok, 5}});
+  on(emscon::Answer{emscon::ReflectorsAnswer{.total = 1, .internal_id = 5}});
+
+  EXPECT_EQ(session_.state(), TrackerState::BeamLost);
+  let_pass(options_.keep_alive);
+  EXPECT_EQ(sent_.back(), Command::GetTrackerStatus);
+  EXPECT_EQ(session_.fault().count, 0u);
+}
+
 class StationaryOrders : public TrackerSessionTest {
  protected:
   StationaryOrders() : TrackerSessionTest(TrackerSessionOptions{.mode = TrackerMode::Stationary}) {}

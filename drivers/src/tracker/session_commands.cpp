@@ -68,7 +68,7 @@ void TrackerSession::plan_restoring(TrackerState state) {
 TrackerAction TrackerSession::next_step() {
   if (step_ == plan_.size()) return plan_done();
   const Step step = plan_[step_++];
-  state_ = step.state;
+  state_ = step.state.value_or(state_);
   return send(step, true);
 }
 

@@ -166,8 +166,8 @@ TrackerAction TrackerSession::begin_order() {
     const auto restart_at = restart_at_;  // keep a planned StartMeasurement
     new_plan(Goal::Stay);
     restart_at_ = restart_at;
-    plan(state_, emscon::GetReflector{}, true, true);
-    plan(state_, emscon::GetReflectors{}, false, true);
+    plan(std::nullopt, emscon::GetReflector{}, true, true);
+    plan(std::nullopt, emscon::GetReflectors{}, false, true);
     return next_step();
   }
 

@@ -167,7 +167,7 @@ class TrackerSession {
  private:
   using Outcome = TrackerOrderReport::Outcome;
   struct Step {
-    TrackerState state{};
+    std::optional<TrackerState> state;  ///< of the session from this step on; none: it stays
     emscon::Request request;
     bool optional = false;  ///< a refusal counts as done
     bool of_order = false;  ///< a refusal ends the order, not the session
@@ -199,8 +199,8 @@ class TrackerSession {
   void plan_sets(std::initializer_list<emscon::Command> commands, bool optional = false);
   void plan_reflector(TrackerState state, bool of_order);
   void plan_restoring(TrackerState state);
-  void plan(TrackerState state, const emscon::Request& request, bool optional = false,
-            bool of_order = false) {
+  void plan(std::optional<TrackerState> state, const emscon::Request& request,
+            bool optional = false, bool of_order = false) {
     plan_.push_back({state, request, optional, of_order});
   }
   void new_plan(Goal goal);

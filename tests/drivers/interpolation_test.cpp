@@ -65,6 +65,15 @@ TEST(InterpolateAxes, DrawsAStraightLineWhereANeighbourIsFarAway) {
   EXPECT_NEAR(at->position[0], 2.5 * (4e-6 + 9e-6) / 2.0, 1e-15);
 }
 
+TEST(InterpolateAxes, DrawsAStraightLineWhereANeighbourHasTheSameInstant) {
+  for (const auto& at_ms : {std::vector{0, 1, 1, 2, 3}, std::vector{0, 1, 2, 2, 3}}) {
+    const auto at = interpolate_axes(sampled(at_ms, standing), HostTime{1500us}, 0ns);
+    ASSERT_TRUE(at);
+    EXPECT_EQ(at->position[0], 0.25);
+    EXPECT_EQ(at->velocity[0], 0.0);
+  }
+}
+
 TEST(InterpolateAxes, HitsTheSampleAtItsInstant) {
   const auto samples = sampled({0, 1, 2, 3}, [](double t) { return std::sin(300.0 * t); });
   const auto at = interpolate_axes(samples, HostTime{1ms}, 0ns);

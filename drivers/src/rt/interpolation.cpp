@@ -84,8 +84,9 @@ tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample>
   s.theta = seconds(time - before->head.time) / s.span_s;
 
   const auto useful = [span](const AxisSample& left, const AxisSample& right) {
+    const auto step = right.head.time - left.head.time;
     // The bound in u_of_curve() is valid for a ratio up to 1.2.
-    return 5 * (right.head.time - left.head.time) <= 6 * span;
+    return step.count() > 0 && 5 * step <= 6 * span;
   };
 
   if (before != samples.begin() && useful(*(before - 1), *before))

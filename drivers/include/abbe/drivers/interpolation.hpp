@@ -53,8 +53,8 @@ struct AxesAt {
   std::array<double, protocol::kMaxAxes> u_position{};  ///< standard uncertainty, m or rad
 };
 
-/// `samples`: in order of time, no two at the same instant. `u_time`: standard uncertainty of
-/// `time`.
+/// `samples`: in order of time; there is no slope between two of the same instant. `u_time`:
+/// standard uncertainty of `time`.
 [[nodiscard]] tl::expected<AxesAt, InterpolationError> interpolate_axes(
     std::span<const protocol::AxisSample> samples, protocol::HostTime time,
     std::chrono::nanoseconds u_time, const InterpolationOptions& options = {}) noexcept;

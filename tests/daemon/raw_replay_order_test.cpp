@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -157,7 +156,7 @@ TEST(RawReplay, GivesSamplesInTheCyclesOfTheLiveRunNotInThoseOfTheirBytes) {
   EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), live.turns());
 }
 
-TEST(RawReplay, ARetractedSampleComesInACycleOfItsOwn) {
+TEST(RawReplay, AHeldSampleComesInTheCycleOfTheLiveRun) {
   const TemporaryFolder folder;
   LiveEncoders live{folder.path()};
   for (std::int64_t i = 0; i < 20; ++i) {
@@ -166,17 +165,28 @@ TEST(RawReplay, ARetractedSampleComesInACycleOfItsOwn) {
     live.sync(sync);
     live.all_answer(i, sync + 100us);
     live.cycle(sync + 500us, sync + 750us);
-    if (i % 4 == 2) live.answer(1, i, sync + 400us);  // twice in one cycle: neither counts
+    if (i % 4 == 2) live.answer(1, i, sync + 400us);  // twice in one cycle
   }
 
-  const auto& samples = live.samples();
-  const auto same_instant = [](const AxisSample& a, const AxisSample& b) {
-    return a.head.time == b.head.time;
-  };
-
-  ASSERT_NE(std::adjacent_find(samples.begin(), samples.end(), same_instant), samples.end());
+  live.cycle(example_time(20), example_time(20));
+  live.sync(example_time(20));
   const auto turns = live.turns();
+  ASSERT_EQ(live.samples().back().head.time, example_time(19));
+  ASSERT_EQ(turns.back(), example_time(20)) << "it was held";
   EXPECT_EQ(cycles_from_bytes(live.recording(), live.config()), turns);
+}
+
+TEST(RawReplay, ASampleHeldAtTheEndOfTheRecordingIsNotLost) {
+  const TemporaryFolder folder;
+  LiveEncoders live{folder.path()};
+  live.lose_samples();
+  for (const auto sync : {example_time(0), example_time(5)}) {  // with a pause of the SYNC
+    live.cycle(sync + 250us, sync + 250us);
+    live.sync(sync);
+    live.all_answer(7, sync + 100us);
+  }
+  EXPECT_THAT(cycles_from_bytes(live.recording(), live.config()),
+              testing::ElementsAre(example_time(0) + 250us, example_time(5) + 250us));
 }
 
 TEST(RawReplay, SamplesMissingInTheLiveRunComeWithTheirBytes) {

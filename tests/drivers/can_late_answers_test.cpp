@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <map>
 #include <random>
 #include <vector>
 
+#include "abbe/protocol/can/error_frame.hpp"
 #include "encoder_line.hpp"
 
 namespace abbe::drivers {
@@ -54,31 +54,102 @@ TEST(EncoderReceiver, ALateAnswerIsNotAssignedToTheNextCycle) {
   EXPECT_EQ(line.samples[2].missing_mask, 0b001);
   EXPECT_EQ(line.samples[2].count[1], 3001);
   line.cycle(kStart + 3ms, 4000);
+  line.finish();
   EXPECT_EQ(line.samples.back().missing_mask, 0);
   EXPECT_EQ(line.samples.back().count[0], 4000);
 }
 
-TEST(EncoderReceiver, APublishedSampleIsRetractedByASecondAnswer) {
+TEST(EncoderReceiver, ASecondAnswerMarksTheAxisInAHeldSample) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.cycle(kStart + 3ms, 2000);  // after a pause of the SYNC
+  EXPECT_EQ(line.samples.size(), 1u);
+  line.frame(position(2, 3001), kStart + 3900us);
+  line.cycle(kStart + 4ms, 4000);
+
+  ASSERT_EQ(line.samples.size(), 2u);
+  const auto& held = line.samples[1];
+  EXPECT_EQ(held.head.time, kStart + 3ms);
+  EXPECT_EQ(held.missing_mask, 0b010);
+  EXPECT_EQ(held.count[1], 2001);
+  EXPECT_EQ(held.head.flags, SampleFlag::AxisMissing | SampleFlag::GapBefore);
+  EXPECT_EQ(held.head.lost_before, 2u);
+  EXPECT_EQ(line.receiver.counters().samples, 2u);
+}
+
+TEST(EncoderReceiver, AHeldSampleLeavesAtTheEndOfItsPeriodWithoutASync) {
   Line line;
   line.cycle(kStart, 1000);
   line.cycle(kStart + 3ms, 2000);
-  line.frame(position(2, 3001), kStart + 3900us);
+  EXPECT_EQ(line.receiver.deadline(), kStart + 4ms);
+  line.time(kStart + 4ms - 1ns);
+  EXPECT_EQ(line.samples.size(), 1u);
+  line.time(kStart + 4ms);
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0);
+  EXPECT_EQ(line.receiver.deadline(), HostTime::max());
+}
+
+TEST(EncoderReceiver, AHeldSampleLeavesBeforeTheSampleOfABusOff) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.cycle(kStart + 3ms, 2000);
+  line.frame(can::encode_error_frame(
+                 {.conditions = static_cast<can::BusConditions>(can::BusCondition::BusOff)}),
+             kStart + 3500us);
+  ASSERT_EQ(line.samples.size(), 3u);
+  EXPECT_EQ(line.samples[1].missing_mask, 0);
+  EXPECT_EQ(line.samples[2].missing_mask, 0b111);
+}
+
+TEST(EncoderReceiver, ASettledAxisThatAnswersTwiceIsMissingInTheNextSample) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.frame(position(2, 1501), kStart + 900us);
+  line.frame(position(2, 1502), kStart + 950us);
+  line.cycle(kStart + 1ms, 2000);
+  line.cycle(kStart + 2ms, 3000);
+  line.time(kStart + 3ms);
 
   ASSERT_EQ(line.samples.size(), 3u);
-  const auto& as_it_left = line.samples[1];
-  const auto& taken_back = line.samples[2];
-  EXPECT_EQ(as_it_left.missing_mask, 0);
-  EXPECT_TRUE(has(as_it_left.head.flags, SampleFlag::GapBefore));
-  EXPECT_EQ(taken_back.head.time, as_it_left.head.time);
-  EXPECT_EQ(taken_back.cycle, as_it_left.cycle);
-  EXPECT_EQ(taken_back.count, as_it_left.count);
-  EXPECT_EQ(taken_back.missing_mask, 0b010);
-  EXPECT_EQ(taken_back.head.flags, static_cast<protocol::SampleFlags>(SampleFlag::AxisMissing));
-  EXPECT_EQ(taken_back.head.lost_before, 0u);
-  line.frame(position(2, 3001), kStart + 3950us);
-  EXPECT_EQ(line.samples.size(), 3u) << "that is said already";
-  line.cycle(kStart + 4ms, 4000);
-  EXPECT_EQ(line.samples.back().missing_mask, 0);
+  EXPECT_EQ(line.samples[0].missing_mask, 0);
+  EXPECT_EQ(line.samples[1].missing_mask, 0b010);
+  EXPECT_EQ(line.samples[2].missing_mask, 0);
+}
+
+TEST(EncoderReceiver, OfTwoNodesWithOneIdOnlyOneSampleIsUsed) {
+  Line line;
+  for (int i = 0; i < 1000; ++i) {
+    line.cycle(kStart + 1ms * i, 1000);
+    line.frame(position(2, -7), kStart + 1ms * i + 500us);
+  }
+  const auto used = [](const AxisSample& s) { return (s.missing_mask & 0b010) == 0; };
+  EXPECT_EQ(std::ranges::count_if(line.samples, used), 1);
+}
+
+TEST(EncoderReceiver, AnAxisIsSettledAfterAHundredRegularCycles) {
+  Line line;
+  line.cycle(kStart, 1000);
+  line.sync(kStart + 1ms);  // without an answer
+  HostTime sync = kStart + 2ms;
+  for (int i = 0; i < 101; ++i, sync += 1ms) {  // the first answers are doubtful
+    line.cycle(sync, 2000);
+    if (i > 0) EXPECT_NE(line.samples.back().head.time, sync) << i;
+  }
+  line.cycle(sync, 3000);
+  EXPECT_EQ(line.samples.back().head.time, sync);
+}
+
+TEST(EncoderReceiver, AnAxisWithoutAnAnswerDelaysNoSample) {
+  Line line;
+  for (int i = 0; i < 10; ++i) {
+    const HostTime sync = kStart + 1ms * i;
+    line.sync(sync);
+    line.frame(position(1, 1000), sync + 100us);
+    line.frame(position(2, 1000), sync + 200us);
+    line.time(sync + 800us);
+    ASSERT_EQ(line.samples.back().head.time, sync);
+  }
 }
 
 TEST(EncoderReceiver, AnswersBeforeTheFirstSyncAreNoSamples) {
@@ -90,12 +161,13 @@ TEST(EncoderReceiver, AnswersBeforeTheFirstSyncAreNoSamples) {
   EXPECT_EQ(line.samples[0].missing_mask, 0);
 }
 
-TEST(EncoderReceiver, AnswersToASyncThatWasNotReceivedRetractNothing) {
+TEST(EncoderReceiver, AnswersToASyncThatWasNotReceivedMarkNothing) {
   Line line;
   line.cycle(kStart, 1000);
   for (const can::NodeId node : kNodes) line.frame(position(node, 2000), kStart + 1200us);
   EXPECT_EQ(line.samples.size(), 1u);
   line.cycle(kStart + 2ms, 3000);
+  line.finish();
   ASSERT_EQ(line.samples.size(), 2u);
   EXPECT_EQ(line.samples[1].missing_mask, 0);
   EXPECT_EQ(line.samples[1].head.lost_before, 1u);
@@ -109,6 +181,7 @@ TEST(EncoderReceiver, TheFirstAnswerAfterAnUnansweredCycleIsAmbiguous) {
   line.cycle(kStart + 2ms, 3000);
   EXPECT_EQ(line.samples.back().missing_mask, 0b111);
   line.cycle(kStart + 3ms, 4000);
+  line.finish();
   EXPECT_EQ(line.samples.back().missing_mask, 0);
   EXPECT_EQ(line.receiver.counters().missing_answers, 6u);
 }
@@ -125,6 +198,7 @@ TEST(EncoderReceiver, AnAnswerKnownToBeLateLeavesNoAmbiguity) {
     if (!before_the_sync)
       line.frame(position(1, 2000), kStart + 1900us);  // read late, stamped before
     for (const can::NodeId node : kNodes) line.frame(position(node, 3000), kStart + 2100us);
+    line.finish();
     EXPECT_EQ(line.samples.back().missing_mask, 0);
     EXPECT_EQ(line.samples.back().count[0], 3000);
     EXPECT_EQ(line.receiver.counters().late_frames, 1u);
@@ -142,6 +216,7 @@ TEST(EncoderReceiver, AfterAPauseOrABootUpNoReplyIsOutstanding) {
         line.frame(can::encode_heartbeat(node, can::NodeState::BootUp), kStart + 1900us);
     }
     line.cycle(paused ? kStart + 5ms : kStart + 2ms, 3000);
+    line.finish();
     EXPECT_EQ(line.samples.back().missing_mask, 0);
   }
 }
@@ -201,14 +276,13 @@ TEST(EncoderReceiver, DiscardsOldAnswersOfANodeThatIsSometimesLate) {
     }
   }
 
-  std::map<std::uint32_t, AxisSample> last_word;
-  for (const auto& sample : line.samples) last_word[sample.cycle] = sample;
   std::size_t believed = 0;
-
-  for (const auto& [cycle, sample] : last_word) {
+  for (std::size_t i = 0; i < line.samples.size(); ++i) {
+    const auto& sample = line.samples[i];
+    ASSERT_EQ(sample.cycle, i) << "one sample for each cycle";
     if (sample.missing_mask != 0) continue;
     ++believed;
-    ASSERT_EQ(sample.count[0], static_cast<std::int64_t>(cycle));
+    ASSERT_EQ(sample.count[0], static_cast<std::int64_t>(sample.cycle));
   }
 
   EXPECT_GT(believed, std::size_t{kCycles} / 2);

@@ -237,6 +237,7 @@ TEST(EncoderReceiver, AnOverflowOfTheControllerIsALoss) {
   line.frame(bus_report(BusCondition::ReceiveOverflow), kStart + 1200us);
   line.frame(position(2, 2001), kStart + 1300us);
   line.cycle(kStart + 2ms, 3000);
+  line.finish();
   ASSERT_EQ(line.samples.size(), 3u);
   EXPECT_EQ(line.samples[1].missing_mask, 0b110);
   EXPECT_EQ(line.samples[2].missing_mask, 0);
@@ -267,6 +268,7 @@ TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeStates) {
   line.cycle(kStart + 2s, 1);
   EXPECT_FALSE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
   line.cycle(kStart + 4s, 2);
+  line.finish();
   EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
 }
 
@@ -314,6 +316,7 @@ TEST(EncoderReceiver, ComesBackFromBusOffWithARestartedSample) {
     line.frame(bus_report(BusCondition::BusOff), kStart + 900us);
     if (told) line.frame(bus_report(BusCondition::Restarted), kStart + 100ms);
     line.cycle(kStart + 101ms, 3000);
+    line.finish();
     const auto& sample = line.samples.back();
     EXPECT_EQ(sample.missing_mask, 0);
     EXPECT_FALSE(has(sample.head.flags, SampleFlag::BusOff));
@@ -345,6 +348,7 @@ TEST(EncoderReceiver, ALossEndsTheOpenCycleAndMarksTheNextSample) {
   line.frame(position(kNodes[1], 3000), kStart + 2200us);
   EXPECT_EQ(line.samples.size(), 2u) << "an answer to a SYNC nobody knows";
   line.cycle(kStart + 3ms, 4000);
+  line.finish();
   ASSERT_EQ(line.samples.size(), 3u);
   EXPECT_EQ(line.samples.back().missing_mask, 0);
   EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::GapBefore));
@@ -404,6 +408,7 @@ TEST(EncoderReceiver, CountsPeriodsWithoutASync) {
   Line line;
   line.cycle(kStart, 1);
   line.cycle(kStart + 4ms + 30us, 2);
+  line.finish();
   EXPECT_TRUE(has(line.samples.at(1).head.flags, SampleFlag::GapBefore));
   EXPECT_EQ(line.samples.at(1).head.lost_before, 3u);
   EXPECT_EQ(line.receiver.counters().missed_syncs, 3u);

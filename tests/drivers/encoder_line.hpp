@@ -38,6 +38,10 @@ struct Line {
   void sync(HostTime t) { keep(receiver.on_sent(can::encode_sync(), t)); }
   void frame(const can::CanFrame& f, HostTime t) { keep(receiver.on_frame(f, t)); }
   void time(HostTime t) { keep(receiver.on_time(t)); }
+  /// Time passes until no cycle is open and no sample is held.
+  void finish() {
+    while (receiver.deadline() != HostTime::max()) time(receiver.deadline());
+  }
   /// A whole cycle in which the axes answer `count`, + 1, + 2.
   void cycle(HostTime t, std::int64_t count) {
     sync(t);

@@ -81,6 +81,9 @@ class EncoderDecoder final : public RawDecoders {
     if (device != name_) return;
     receiver_.on_raw(block, [&](const protocol::AxisSample& s) { batch.axes.push_back(s); });
   }
+  void finish(Batch& batch) override {
+    for (const protocol::AxisSample& s : receiver_.on_end()) batch.axes.push_back(s);
+  }
 
  private:
   std::string name_;

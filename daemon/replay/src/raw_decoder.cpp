@@ -15,4 +15,8 @@ void RawDecoder::take(const protocol::RawBlock& block, std::string_view device, 
   for (const auto& decoders : decoders_) decoders->take(block, device, batch);
 }
 
+void RawDecoder::finish(Batch& batch) {
+  for (const auto& decoders : decoders_) decoders->finish(batch);
+}
+
 }  // namespace abbe::daemon

@@ -21,6 +21,8 @@ class RawDecoder {
   /// Appends to `batch` the samples that the block completes; nothing for a device that `config`
   /// does not have.
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch);
+  /// The recording has ended: appends the samples that waited for further blocks.
+  void finish(Batch& batch);
 
  private:
   std::vector<std::unique_ptr<RawDecoders>> decoders_;

@@ -250,6 +250,7 @@ class FromBytes {
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) {
     decoder_.take(block, device, batch);
   }
+  void finish(Batch& batch) { decoder_.finish(batch); }
   void end_cycle(Batch& batch) {
     for (; next_ && next_->taken <= batch.taken + kLongestAhead; next_ = ahead_.next())
       (void)deliver(*next_, sink_);
@@ -356,6 +357,7 @@ class Replay : private PipelineObserver {
       if (++messages % kMessagesPerProgress == 0 && options_.progress)
         options_.progress(cursor.progress());
     }
+    if (bytes_) bytes_->finish(batch_);
     end_cycle();
   }
   void end_cycle() {

@@ -17,6 +17,12 @@ namespace {
 
 constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
+/// Cycles with one answer in time after which an axis is settled. A row of n late answers gives
+/// n - 2 wrong positions that are not detected. The second answer at its end reveals one more, if
+/// its sample is still held: in a longer row that is below 1 % of them.
+constexpr std::uint8_t kCyclesToSettle = 100;
+/// After a boot-up or a pause of the SYNC no answer should be outstanding: one cycle confirms it.
+constexpr std::uint8_t kCyclesToConfirm = 1;
 
 /// [GUM] 4.3.7: the instant is uncertain by +- one period, rectangular.
 std::chrono::nanoseconds widened(std::chrono::nanoseconds u,
@@ -63,6 +69,7 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     axis.mapping = static_cast<std::uint16_t>(can::object::kTpdoMapping + from.tpdo - 1);
     axis.position_byte = from.position_byte;
     axis.heartbeat_timeout = options.heartbeat_timeout;
+    axis.cycles_to_hold = options.external_sync ? kCyclesToConfirm : 0;
     axis.scale_configured = from.scale.has_value();
     axis.scale = from.scale.value_or(0.0);
     axis.offset = from.offset;
@@ -82,7 +89,8 @@ std::optional<double> EncoderReceiver::scale(std::size_t axis) const ABBE_RT {
 }
 
 HostTime EncoderReceiver::deadline() const ABBE_RT {
-  return open_ ? *sync_time_ + answer_within_ : HostTime::max();
+  if (open_) return *sync_time_ + answer_within_;
+  return held_for_ != 0 ? *sync_time_ + period_ : HostTime::max();
 }
 
 EncoderReceiver::Samples EncoderReceiver::on_sent(const can::CanFrame& frame, HostTime time,
@@ -94,7 +102,7 @@ EncoderReceiver::Samples EncoderReceiver::on_sent(const can::CanFrame& frame, Ho
 
 EncoderReceiver::Samples EncoderReceiver::on_time(HostTime now) ABBE_RT {
   out_count_ = 0;
-  if (now >= deadline()) close_cycle();
+  follow_time(now);
   return done();
 }
 
@@ -104,9 +112,16 @@ EncoderReceiver::Samples EncoderReceiver::on_loss() ABBE_RT {
   return done();
 }
 
+EncoderReceiver::Samples EncoderReceiver::on_end() ABBE_RT {
+  out_count_ = 0;
+  release();
+  return done();
+}
+
 void EncoderReceiver::lose() ABBE_RT {
   close_cycle();
-  note_outstanding_replies(true);
+  release();
+  judge_answers(true);
   received_mask_ = 0;
   gap_pending_ = true;
 }
@@ -114,7 +129,7 @@ void EncoderReceiver::lose() ABBE_RT {
 EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, HostTime time,
                                                    bool time_widened) ABBE_RT {
   out_count_ = 0;
-  if (time >= deadline()) close_cycle();
+  follow_time(time);
   if (frame.is(can::FrameFlag::Error)) {
     on_bus_report(frame, time);
   } else if (external_sync_ && can::decode_sync(frame)) {
@@ -131,8 +146,15 @@ EncoderReceiver::Samples EncoderReceiver::on_frame(const can::CanFrame& frame, H
   return done();
 }
 
+/// Ends the open cycle and releases the held sample if their deadlines have passed.
+void EncoderReceiver::follow_time(HostTime now) ABBE_RT {
+  if (open_ && now >= deadline()) close_cycle();
+  if (held_for_ != 0 && now >= deadline()) release();
+}
+
 void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
   close_cycle();
+  release();
   bool paused = false;
   if (sync_time_ && period_.count() > 0) {
     const auto periods = (time - *sync_time_ + period_ / 2) / period_;
@@ -143,22 +165,33 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
     }
     ++cycle_;
   }
-  note_outstanding_replies(paused);
+  judge_answers(paused);
   sync_time_ = time;
   time_widened_ = time_widened;
-  received_mask_ = doubtful_mask_ = 0;
+  received_mask_ = 0;
+  doubtful_mask_ = std::exchange(mark_next_mask_, std::uint8_t{0});
   open_ = true;
   check_heartbeats(time);
 }
 
-/// Called at the end of a cycle. `paused`: the SYNC paused, so that answers to earlier SYNCs have
-/// arrived or are lost.
-void EncoderReceiver::note_outstanding_replies(bool paused) ABBE_RT {
+/// Called after a cycle, before the next one begins. `paused`: the SYNC paused, so that answers to
+/// earlier SYNCs have arrived or are lost.
+void EncoderReceiver::judge_answers(bool paused) ABBE_RT {
+  if (!sync_time_) return;
   for (std::size_t i = 0; i < axis_count_; ++i) {
     auto& axis = axes_[i];
-    const bool unanswered = sync_time_ && ((received_mask_ >> i) & 1u) == 0;
-    axis.reply_outstanding = !paused && (axis.reply_outstanding || (axis.answers && unanswered));
+    const bool answered = ((received_mask_ >> i) & 1u) != 0;
+    const bool regular = answered && ((doubtful_mask_ >> i) & 1u) == 0;
+
+    axis.reply_outstanding = !paused && (axis.reply_outstanding || (axis.answers && !answered));
     axis.answers = axis.answers && !paused;
+
+    if (!regular) {
+      axis.cycles_to_hold = kCyclesToSettle;
+    } else if (axis.cycles_to_hold != 0) {
+      --axis.cycles_to_hold;
+    }
+    if (!axis.answers) axis.cycles_to_hold = std::max(axis.cycles_to_hold, kCyclesToConfirm);
   }
 }
 
@@ -184,6 +217,21 @@ void EncoderReceiver::emit(HostTime time) ABBE_RT {
   current_.head.flags = take_flags(missing);
   current_.cycle = cycle_;
   current_.missing_mask = missing;
+  held_for_ = static_cast<std::uint8_t>(usable & unsettled_mask());
+  if (held_for_ == 0) output();
+}
+
+std::uint8_t EncoderReceiver::unsettled_mask() const ABBE_RT {
+  unsigned mask = 0;
+  for (std::size_t i = 0; i < axis_count_; ++i) mask |= axes_[i].cycles_to_hold != 0 ? 1u << i : 0u;
+  return static_cast<std::uint8_t>(mask);
+}
+
+void EncoderReceiver::release() ABBE_RT {
+  if (std::exchange(held_for_, std::uint8_t{0}) != 0) output();
+}
+
+void EncoderReceiver::output() ABBE_RT {
   ++counters_.samples;
   if (out_count_ < out_.size()) out_[out_count_++] = current_;
 }
@@ -228,7 +276,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
 
   const bool again = (received_mask_ & bit) != 0;
   if (again) ++counters_.duplicate_frames;
-  if (!open_) return again ? correct_sample(i, time) : count_late(i);
+  if (!open_) return again ? on_second_answer(i, time) : count_late(i);
   if (again || std::exchange(axes_[i].reply_outstanding, false))
     doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   take_position(i, *count);
@@ -239,24 +287,34 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
 
 /// A reply after the deadline is discarded and no longer awaited.
 void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
+  const auto bit = static_cast<std::uint8_t>(1u << i);
   ++counters_.late_frames;
+  doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
   if (!std::exchange(axes_[i].reply_outstanding, false))
-    received_mask_ = static_cast<std::uint8_t>(received_mask_ | (1u << i));
+    received_mask_ = static_cast<std::uint8_t>(received_mask_ | bit);
 }
 
-/// The sample of this cycle was output with an answer that may belong to an earlier SYNC: outputs
-/// it again with this axis missing. An answer more than a period after the SYNC belongs to a SYNC
-/// that was not recorded; it does not affect that sample.
-void EncoderReceiver::correct_sample(std::size_t i, HostTime time) ABBE_RT {
+/// The cycle has ended with an answer of this axis that may belong to an earlier SYNC. In a held
+/// sample the axis becomes missing. If the sample has left, the axis is missing in the next one. An
+/// answer more than a period after the SYNC belongs to a SYNC that was not recorded; it does not
+/// affect the sample.
+void EncoderReceiver::on_second_answer(std::size_t i, HostTime time) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
-  const bool has_left = sync_time_ && time <= *sync_time_ + period_;
-  if (!has_left || (current_.missing_mask & bit) != 0) return;
+  const bool of_this_cycle = sync_time_ && time <= *sync_time_ + period_;
+  if (!of_this_cycle) return;
+  doubtful_mask_ = static_cast<std::uint8_t>(doubtful_mask_ | bit);
+  if ((current_.missing_mask & bit) != 0) return;
+
+  if (held_for_ == 0) {
+    mark_next_mask_ = static_cast<std::uint8_t>(mark_next_mask_ | bit);
+    return;
+  }
+
   current_.missing_mask = static_cast<std::uint8_t>(current_.missing_mask | bit);
   current_.head.flags |= SampleFlag::AxisMissing;
-  current_.head.flags &= ~static_cast<protocol::SampleFlags>(SampleFlag::GapBefore);
-  current_.head.lost_before = 0;
   ++counters_.missing_answers;
-  if (out_count_ < out_.size()) out_[out_count_++] = current_;
+  held_for_ = static_cast<std::uint8_t>(held_for_ & ~bit);
+  if (held_for_ == 0) output();
 }
 
 /// A frame of a node was received, so the controller is no longer in bus-off.
@@ -332,6 +390,7 @@ void EncoderReceiver::on_bus_report(const can::CanFrame& frame, HostTime time) A
                     has(report->conditions, BusCondition::Active);
   if (has(report->conditions, BusCondition::BusOff) && !bus_off_) {
     bus_off_ = true;
+    release();
     const auto last = open_ ? *sync_time_ + sampling_delay_ : time;
     emit(last);  // immediately: until the deadline subscribers would use the previous sample
   } else if (back && bus_off_) {

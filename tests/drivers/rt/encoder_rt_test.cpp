@@ -19,7 +19,7 @@ EncoderReceiverOptions two_axes() {
 }
 
 /// Every kind of frame on the bus, cycle after cycle, an axis missing in every third, a second
-/// answer in every fifth.
+/// answer in every fifth. A held sample leaves with the next SYNC, or without it.
 void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
   const HostTime t{1h + 1ms * i};
   const auto count = static_cast<std::int64_t>(i * 1000);
@@ -41,6 +41,7 @@ void cycle(EncoderReceiver& receiver, std::size_t i) ABBE_RT {
     (void)receiver.on_frame(can::encode_position(0x181, can::PositionType::Signed32, count),
                             t + 300us);
   (void)receiver.on_time(t + 900us);
+  if (i % 2 != 0) (void)receiver.on_time(t + 1ms);
 }
 
 TEST(EncoderReceiverRt, TakesNoMemory) {

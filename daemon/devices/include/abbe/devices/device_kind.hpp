@@ -93,6 +93,8 @@ class RawDecoders {
 
   /// Appends the samples that the block completes. Ignores a block from a device of another kind.
   virtual void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) = 0;
+  /// The recording has ended: appends the samples that waited for further blocks.
+  virtual void finish(Batch& /*batch*/) {}
 };
 
 /// Names of the configured devices, and which device delivers which data.

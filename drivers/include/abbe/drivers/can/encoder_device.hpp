@@ -1,7 +1,7 @@
 #pragma once
 /// All encoders of one CAN bus as a Device: configures the nodes, produces the SYNC, and converts
 /// the answers to one AxisSample per SYNC. The sample is output as soon as the last axis has
-/// answered.
+/// answered; EncoderReceiver describes the exception.
 ///
 /// The device listens before it sends (ForeignSync): on a bus with another SYNC producer it sends
 /// nothing. With SyncSource::External it never sends: the machine produces the SYNC and configures
@@ -159,7 +159,6 @@ class EncoderDevice final : public Device {
   protocol::HostTime last_heard_{};
   CanBusCounters bus_seen_;
   std::uint64_t missed_seen_ = 0;
-  std::uint64_t samples_seen_ = 0;
   std::uint64_t withheld_syncs_ = 0;
   Reported withheld_reported_, shorts_reported_, duplicates_reported_, strangers_reported_,
       bundled_reported_, late_reported_;

@@ -4,25 +4,29 @@
 /// Real time: no allocation after construction. One thread.
 ///
 /// A cycle begins when our SYNC is sent (on_sent), or with external_sync when the machine's SYNC
-/// arrives. It ends, and its sample is output, when the last axis has answered, at the deadline, at
-/// the next SYNC, or at bus-off. Axes without an answer are marked in missing_mask and keep their
-/// previous value; an axis that never answered has position NaN. All axes have one time: SYNC +
-/// sampling delay. An answer that arrives after the end of its cycle is counted and not used. An
-/// answer with a time before the SYNC is not an answer to this SYNC.
+/// arrives. It ends when the last axis has answered, at the deadline, at the next SYNC, or at
+/// bus-off. Then its sample is output, or held (below). Axes without an answer are marked in
+/// missing_mask and keep their previous value; an axis that never answered has position NaN. All
+/// axes have one time: SYNC + sampling delay. An answer that arrives after the end of its cycle is
+/// counted and not used. An answer with a time before the SYNC is not an answer to this SYNC.
 ///
 /// An answer does not identify its SYNC. An answer that may belong to an earlier SYNC is doubtful,
 /// and its axis is marked missing. Doubtful are
 ///  - the first answer after cycles without an answer, unless the node booted or the SYNC paused
 ///    for a period in between, and
 ///  - all answers of a cycle in which the node answers twice.
-/// If the sample of that cycle was output before the second answer, it is output again with the
-/// same time and cycle number and with that axis missing: of two samples with the same time the
-/// later one replaces the earlier one.
+/// A sample is output once and not changed afterwards. Therefore it is held until the next SYNC, at
+/// most for a period after its SYNC, while an axis in it is unsettled: a second answer then marks
+/// the axis missing. An axis is unsettled after a cycle that it did not answer exactly once and in
+/// time, for 100 cycles that it does, and in the first cycle after its boot-up or a pause of the
+/// SYNC. The samples of settled axes are output at once. If a settled axis answers twice all the
+/// same, and its sample has left, the axis is missing in the next sample.
 ///
 /// What this does not detect: if a node answers late in more than two consecutive cycles, its first
 /// and its last late answers are doubtful, those in between are not. If a node is late from its
 /// first answer on, or still late after a pause, its first late answers are not doubtful either.
-/// Therefore the period must be longer than the slowest answer.
+/// Therefore the period must be longer than the slowest answer. The first of two answers of a
+/// settled axis is used; encoder.md weighs this.
 ///
 /// The scale is configured, or read from SDO answers on the bus (6005h:01, else 6501h; rotary:
 /// 6001h, else 6501h), so that a recording contains it. A scale of 0 is refused: the axis stays
@@ -32,7 +36,7 @@
 /// Raw blocks of a CAN bus: each block is one whole datagram of protocol/can/udp_framing.hpp; all
 /// its frames have one host time.
 ///   FromDevice  frames as received; without frames (no bytes or count 0): no further frame arrived
-///               before that time, which ends a cycle at its deadline
+///               before that time, which ends a cycle at its deadline, or releases a held sample
 ///   ToDevice    frames as sent, including the SYNC
 /// The sequence number counts blocks.
 
@@ -134,7 +138,10 @@ class EncoderReceiver {
   /// Frames were lost at this point. The open cycle ends, because the next answer may belong to a
   /// SYNC that was lost; the next sample is flagged GapBefore.
   [[nodiscard]] std::span<const protocol::AxisSample> on_loss() ABBE_RT;
-  /// When on_time() has something to do: the deadline of the open cycle, else HostTime::max().
+  /// No further event follows: a held sample is output. An open cycle gives no sample.
+  [[nodiscard]] std::span<const protocol::AxisSample> on_end() ABBE_RT;
+  /// When on_time() has something to do: the deadline of the open cycle, the end of the period of a
+  /// held sample, else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
 
   /// Replay: processes all events of one raw block and passes every sample to
@@ -179,27 +186,32 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
-    bool answers = false;            ///< has answered since its boot-up or the last SYNC pause
-    bool reply_outstanding = false;  ///< the answer to an earlier SYNC may still arrive
-    std::uint64_t raw = 0;           ///< the latest count as sent, modulo `modulus`
-    std::uint16_t emergency = 0;     ///< the latest code; 0: none
+    bool answers = false;             ///< has answered since its boot-up or the last SYNC pause
+    bool reply_outstanding = false;   ///< the answer to an earlier SYNC may still arrive
+    std::uint8_t cycles_to_hold = 0;  ///< regular cycles until it is settled; 0: it is
+    std::uint64_t raw = 0;            ///< the latest count as sent, modulo `modulus`
+    std::uint16_t emergency = 0;      ///< the latest code; 0: none
     bool heartbeat_lost = false;
     std::optional<protocol::HostTime> last_heartbeat;
   };
   using Samples = std::span<const protocol::AxisSample>;
 
   void begin_cycle(protocol::HostTime time, bool time_widened) ABBE_RT;
+  void follow_time(protocol::HostTime now) ABBE_RT;
   void close_cycle() ABBE_RT;
   void lose() ABBE_RT;
   void emit(protocol::HostTime time) ABBE_RT;
+  void release() ABBE_RT;
+  void output() ABBE_RT;
+  [[nodiscard]] std::uint8_t unsettled_mask() const ABBE_RT;
   [[nodiscard]] protocol::SampleFlags take_flags(std::uint8_t missing) ABBE_RT;
   [[nodiscard]] Samples done() const ABBE_RT { return {out_.data(), out_count_}; }
   void on_position(std::size_t i, const can::CanFrame& frame, protocol::HostTime time,
                    bool time_widened) ABBE_RT;
   void end_bus_off() ABBE_RT;
   void count_late(std::size_t i) ABBE_RT;
-  void correct_sample(std::size_t i, protocol::HostTime time) ABBE_RT;
-  void note_outstanding_replies(bool paused) ABBE_RT;
+  void on_second_answer(std::size_t i, protocol::HostTime time) ABBE_RT;
+  void judge_answers(bool paused) ABBE_RT;
   void take_position(std::size_t i, std::int64_t count) ABBE_RT;
   void on_node_frame(Axis& axis, const can::CanFrame& frame, protocol::HostTime time) ABBE_RT;
   void on_heartbeat(Axis& axis, can::NodeState state, protocol::HostTime time) ABBE_RT;
@@ -225,7 +237,11 @@ class EncoderReceiver {
   std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
   std::uint32_t cycle_ = 0;
   std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, also too late
-  std::uint8_t doubtful_mask_ = 0;  ///< the answer may belong to another SYNC
+  /// Answered in the latest cycle, but the answer may belong to another SYNC, or came too late.
+  std::uint8_t doubtful_mask_ = 0;
+  std::uint8_t mark_next_mask_ = 0;  ///< doubtful in the next cycle, whatever they answer
+  /// Unsettled axes with an answer in current_, which waits for second answers; 0: it does not wait.
+  std::uint8_t held_for_ = 0;
   bool bus_off_ = false;
   bool bus_error_pending_ = false;  ///< since the previous sample
   bool restarted_pending_ = false;

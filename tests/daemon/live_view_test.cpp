@@ -48,24 +48,6 @@ TEST(LiveView, ShowsTheLatestAxesAndHowFastTheyMove) {
   EXPECT_EQ(live.view().velocity[1], 0.0);
 }
 
-TEST(LiveView, ARetractedAxisLeavesTheOthersUnchanged) {
-  LiveView live{AssemblerOptions{}, kTime};
-  live.take(of(axes_at(kStart, 0.1)));
-  auto sample = axes_at(kStart + 1ms, 0.1001);
-  sample.position[1] += 1e-4;
-  sample.head.flags |= SampleFlag::GapBefore;
-  live.take(of(sample));
-  sample.missing_mask = 0b010;
-  sample.head.flags = static_cast<protocol::SampleFlags>(SampleFlag::AxisMissing);
-
-  EXPECT_TRUE(live.take(of(sample)));
-  EXPECT_EQ(live.view().missing_mask, 0b010);
-  EXPECT_TRUE(has(live.view().head.flags, SampleFlag::AxisMissing));
-  EXPECT_TRUE(has(live.view().head.flags, SampleFlag::GapBefore));
-  EXPECT_NEAR(live.view().velocity[0], 0.1, 1e-9);
-  EXPECT_EQ(live.view().velocity[1], 0.0);
-}
-
 TEST(LiveView, DoesNotShowThePointOfATrackerThatStopped) {
   LiveView live{AssemblerOptions{}, kTime};
   protocol::TrackerPoint point;

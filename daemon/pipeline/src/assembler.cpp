@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <iterator>
 #include <span>
@@ -78,19 +77,12 @@ void Assembler::take(const Batch& batch) {
   for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
-/// After a bus-off or a restart of the bus, a sample may be earlier than the last one; a second
-/// answer of a node gives a second sample of the same instant. Interpolation needs one sample per
-/// instant: the sample with more missing axes is used, independent of the order of arrival.
+/// After a bus-off or a restart of the bus, a sample may be earlier than the last one.
 void Assembler::take(const AxisSample& sample) {
-  const auto same = std::lower_bound(axes_.begin(), axes_.end(), sample.head.time, earlier);
-  if (same == axes_.end() || same->head.time != sample.head.time) {
-    axes_.insert(same, sample);
-  } else if (std::popcount(sample.missing_mask) > std::popcount(same->missing_mask)) {
-    const auto gap = same->head;
-    *same = sample;
-    same->head.lost_before = std::max(gap.lost_before, sample.head.lost_before);
-    if (has(gap.flags, SampleFlag::GapBefore)) same->head.flags |= SampleFlag::GapBefore;
-  }
+  const auto after =
+      std::upper_bound(axes_.begin(), axes_.end(), sample.head.time,
+                       [](HostTime t, const AxisSample& other) { return t < other.head.time; });
+  axes_.insert(after, sample);
 }
 
 bool Assembler::ready(HostTime t) const {

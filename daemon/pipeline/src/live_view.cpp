@@ -62,7 +62,6 @@ bool LiveView::take(const Batch& batch) {
 }
 
 void LiveView::take(const protocol::AxisSample& sample) {
-  if (previous_ && previous_->head.time == sample.head.time) return take_back(sample);
   view_.head = sample.head;
   const auto axes = drivers::latest_axes(previous_ ? &*previous_ : nullptr, sample, interpolation_);
   view_.axis_count = axes.axis_count;
@@ -73,18 +72,6 @@ void LiveView::take(const protocol::AxisSample& sample) {
   correct_for_temperature(view_, use_);
   previous_ = sample;
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
-}
-
-/// A second sample of the same instant has more axes missing: marks these axes missing and leaves
-/// the others unchanged.
-void LiveView::take_back(const protocol::AxisSample& sample) {
-  view_.head.flags |= sample.head.flags;
-  view_.missing_mask |= sample.missing_mask;
-  for (std::size_t axis = 0; axis < view_.axis_count; ++axis) {
-    if ((sample.missing_mask >> axis & 1u) != 0)
-      view_.velocity[axis] = view_.u_position[axis] = 0.0;
-  }
-  previous_ = sample;
 }
 
 /// Removes an old tracker point and an old touch. The published message has one instant, that of

@@ -21,6 +21,7 @@
 #include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
+#include "second_samples.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -121,11 +122,15 @@ std::optional<std::size_t> environment_place(const Config& config, std::string_v
   return std::nullopt;
 }
 
+/// True if the recording was made by the rule `name`, else by that of earlier versions.
+bool has_rule(const RecordingReader& recording, const char* name) {
+  const auto versions = recording.metadata().find("abbe.versions");
+  return versions != recording.metadata().end() && versions->second.contains(name);
+}
+
 /// The datum of the live run: the raw bytes do not contain the time from which it applies.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
-  const auto versions = recording.metadata().find("abbe.versions");
-  const bool asked =
-      versions != recording.metadata().end() && versions->second.contains(kDatumRule);
+  const bool asked = has_rule(recording, kDatumRule);
   Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
 
   for (const auto& attachment : recording.attachments()) {
@@ -293,6 +298,7 @@ class Replay : private PipelineObserver {
     pipeline_.add(*this);
     if (options.source == ReplaySource::Samples) {
       take_samples();
+      if (!has_rule(recording, kAxisSamplesRule)) second_samples_.emplace(recording);
     } else {
       take_bytes();
     }
@@ -363,6 +369,7 @@ class Replay : private PipelineObserver {
   void end_cycle() {
     calibrations_.begin_cycle(batch_.taken);
     if (bytes_) bytes_->end_cycle(batch_);
+    if (second_samples_) second_samples_->combine(batch_);
     pipeline_.cycle(batch_);
     batch_.clear();
   }
@@ -391,6 +398,7 @@ class Replay : private PipelineObserver {
   Pipeline pipeline_;
   SetUpBefore set_up_;
   std::optional<FromBytes> bytes_;
+  std::optional<SecondSamples> second_samples_;
   RecordingSink sink_;
   HostTime begin_{};
   HostTime published_{};  ///< of the message being delivered

@@ -6,10 +6,10 @@
 ///
 /// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive without
 /// delay. A point is assembled as soon as three axis samples at or after its instant have arrived:
-/// the interpolation uses two on either side, and once the third is there the second can no longer
-/// be replaced by another sample of the same instant. If they do not arrive, the point is assembled
-/// from the available samples once any stream has advanced `watermark` beyond it; it is flagged
-/// AxisMissing if they are not enough. Both rules use only the times in the samples, and an axis or
+/// the interpolation uses two on either side, and a sample at a bus-off may be earlier than the one
+/// that arrived before it. If they do not arrive, the point is assembled from the available samples
+/// once any stream has advanced `watermark` beyond it; it is flagged AxisMissing if they are not
+/// enough. Both rules use only the times in the samples, and an axis or
 /// environment sample that arrives late is inserted by its time. Therefore neither the order of
 /// arrival (within the watermark) nor the speed of a replay changes a result. Not for the RT path;
 /// not thread-safe.

@@ -20,6 +20,10 @@ struct RawFromDevice {
   protocol::RawBlock block;
 };
 
+/// Key in the versions of a recording. If present, its axis samples have an instant of their own
+/// each; else a second sample of an instant marks further axes of the first one as missing.
+inline constexpr const char* kAxisSamplesRule = "axis_samples";
+
 struct Batch {
   /// Time of the cycle. It is recorded, so that a replay repeats the same cycles. clear() does not
   /// reset it.

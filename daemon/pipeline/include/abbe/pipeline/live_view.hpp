@@ -43,7 +43,6 @@ class LiveView {
 
  private:
   void take(const protocol::AxisSample& sample);
-  void take_back(const protocol::AxisSample& sample);
   bool forget_what_is_not_current(protocol::HostTime now);
   bool mark_axes_missing(protocol::HostTime now);
 

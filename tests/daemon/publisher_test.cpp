@@ -103,9 +103,10 @@ TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
   EXPECT_EQ(sent[0].age_ns(), 2'000'000);
 }
 
-TEST_F(PublisherTest, ARetractedVectorIsPublishedAtOnce) {
+TEST_F(PublisherTest, AnAxisThatBecomesMissingIsPublishedAtOnce) {
   publish_live(view(), active(), kNow, kWall);
   auto broken = view();
+  broken.head.time += 1ms;
   broken.missing_mask = 0b010;
   publish_live(broken, active(), kNow + 1ms, kWall + 1ms);
   const auto seen = far_->take();
@@ -113,6 +114,14 @@ TEST_F(PublisherTest, ARetractedVectorIsPublishedAtOnce) {
   const auto sent = messages<v1::Compensation>(seen, Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(2));
   EXPECT_EQ(sent[1].state(), ModelStatus::MODEL_STALE);
+}
+
+TEST_F(PublisherTest, AnAxisThatStaysMissingKeepsToTheRate) {
+  auto broken = view();
+  broken.missing_mask = 0b010;
+  for (auto t = 0ms; t < 10ms; t += 1ms)
+    publish_live(t < 1ms ? view() : broken, active(), kNow + t, kWall + t);
+  EXPECT_THAT(taken<v1::Compensation>(Topic::Compensation), SizeIs(2));
 }
 
 TEST_F(PublisherTest, WithAnAxisMissingNoCompensationIsActive) {

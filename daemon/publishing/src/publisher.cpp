@@ -19,10 +19,9 @@ std::chrono::nanoseconds period(double rate_hz) {
 
 /// The next sample is due one period after this one was sent, not after it was due.
 bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
-  const bool invalidates_previous =
-      view.head.time == pace.time && view.missing_mask != pace.missing_mask;
-  if (now < pace.next && !invalidates_previous) return false;
-  pace = {now + period(rate_hz), view.head.time, view.missing_mask};
+  const bool axis_lost = (view.missing_mask & ~pace.missing_mask) != 0;
+  if (now < pace.next && !axis_lost) return false;
+  pace = {now + period(rate_hz), view.missing_mask};
   return true;
 }
 

@@ -82,11 +82,10 @@ class Publisher {
   std::vector<std::byte> payload_;  // reused; keeps its capacity
   std::string refusal_;
   std::uint64_t sequence_number_ = 0;
-  /// Limits the rate of a live topic. A sample that marks axes of the previous sample as missing is
-  /// sent at once.
+  /// Limits the rate of a live topic. A sample with an axis missing that was not missing in the
+  /// sample sent before is sent at once.
   struct Pace {
     WallTime next{};
-    protocol::HostTime time{};
     std::uint8_t missing_mask = 0;
   };
   static bool due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz);

@@ -14,22 +14,18 @@ std::size_t node_of(const can::CanFrame& frame) {
 
 void PendingSync::sent(HostTime at) {
   sent_ = at;
-  substituted_ = Substituted::NotYet;
+  deadlines_.set(Due::Echo, at + answer_within_);
+  deadlines_.set(Due::Transmission, at + kPatience);
 }
 
 void PendingSync::forget() {
   sent_.reset();
-  answers_until_ = {};
+  deadlines_.cancel_all();
   answered_.reset();
 }
 
 bool PendingSync::waits(HostTime now) const {
-  const bool may_leave = sent_ && substituted_ != Substituted::OnAnswer && now < *sent_ + kPatience;
-  return may_leave || now < answers_until_;
-}
-
-HostTime PendingSync::deadline() const {
-  return pending() ? *sent_ + answer_within_ : HostTime::max();
+  return deadlines_.ahead(Due::Transmission, now) || deadlines_.ahead(Due::Answers, now);
 }
 
 std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<ReceivedFrame> out,
@@ -40,11 +36,14 @@ std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<R
       if (const auto sync = settle_echo(received)) out[n++] = *sync;
       continue;
     }
-    if (proves_transmission(received)) out[n++] = substitute(Substituted::OnAnswer);
+    if (proves_transmission(received)) {
+      deadlines_.cancel(Due::Transmission);
+      out[n++] = substitute();
+    }
     if (can::cob::is_tpdo(received.frame)) answered_.set(node_of(received.frame));
     out[n++] = received;
   }
-  if (all_read && now >= deadline()) out[n++] = substitute(Substituted::OnDeadline);
+  if (all_read && now >= deadline()) out[n++] = substitute();
   return n;
 }
 
@@ -52,10 +51,16 @@ std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<R
 std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo) {
   if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // earlier SYNC
   std::optional<ReceivedFrame> sync;
-  if (substituted_ == Substituted::NotYet) sync = echo.time_widened ? as_sent() : echo;
-  // The SYNC was transmitted after its cycle: its answers must not mix with those of the next SYNC.
-  if (substituted_ == Substituted::OnDeadline) answers_until_ = echo.time + period_;
+  if (pending()) {
+    sync = echo.time_widened ? as_sent() : echo;
+  } else if (deadlines_.is_set(Due::Transmission)) {
+    // The SYNC was transmitted after its cycle: its answers must not mix with those of the next.
+    deadlines_.set(Due::Answers, echo.time + period_);
+  }
+
   sent_.reset();
+  deadlines_.cancel(Due::Echo);
+  deadlines_.cancel(Due::Transmission);
   answered_.reset();
   return sync;
 }
@@ -66,8 +71,8 @@ bool PendingSync::proves_transmission(const ReceivedFrame& received) const {
          answered_.test(node_of(received.frame));
 }
 
-ReceivedFrame PendingSync::substitute(Substituted why) {
-  substituted_ = why;
+ReceivedFrame PendingSync::substitute() {
+  deadlines_.cancel(Due::Echo);
   answered_.reset();
   return as_sent();
 }

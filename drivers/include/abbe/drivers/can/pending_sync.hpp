@@ -20,6 +20,7 @@
 
 #include "abbe/drivers/can/can_bus.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
+#include "abbe/drivers/deadlines.hpp"
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/time.hpp"
 
@@ -37,7 +38,7 @@ class PendingSync {
   /// transmitted late and its answers are arriving. A missing echo blocks for at most kPatience.
   [[nodiscard]] bool waits(protocol::HostTime now) const;
   /// When settle() must be called even without new frames; HostTime::max(): not needed.
-  [[nodiscard]] protocol::HostTime deadline() const;
+  [[nodiscard]] protocol::HostTime deadline() const { return deadlines_.at(Due::Echo); }
 
   /// Converts the frames that read() delivered until `now` to the frames for the receiver: every
   /// SYNC exactly once, as an echo, before its answers. `all_read`: CanRead::all. Returns the
@@ -49,20 +50,22 @@ class PendingSync {
   static constexpr std::chrono::nanoseconds kPatience = std::chrono::milliseconds{100};
 
  private:
-  /// Why the receiver has seen the SYNC without its echo.
-  enum class Substituted : std::uint8_t { NotYet, OnAnswer, OnDeadline };
+  enum class Due : std::uint8_t {
+    Echo,          ///< without it by then, the receiver sees the SYNC as sent
+    Transmission,  ///< without an echo by then, the SYNC is taken for lost
+    Answers,       ///< to a SYNC that was transmitted after its cycle: all have arrived by then
+  };
 
-  [[nodiscard]] bool pending() const { return sent_ && substituted_ == Substituted::NotYet; }
+  [[nodiscard]] bool pending() const { return deadlines_.is_set(Due::Echo); }
   [[nodiscard]] std::optional<ReceivedFrame> settle_echo(const ReceivedFrame& echo);
   [[nodiscard]] bool proves_transmission(const ReceivedFrame& received) const;
-  [[nodiscard]] ReceivedFrame substitute(Substituted why);
+  [[nodiscard]] ReceivedFrame substitute();
   [[nodiscard]] ReceivedFrame as_sent() const;
 
   std::chrono::nanoseconds period_;
   std::chrono::nanoseconds answer_within_;
-  std::optional<protocol::HostTime> sent_;
-  Substituted substituted_ = Substituted::NotYet;
-  protocol::HostTime answers_until_{};  ///< to a SYNC that was transmitted after its cycle
+  std::optional<protocol::HostTime> sent_;  ///< until its echo
+  Deadlines<Due::Answers> deadlines_;
   std::bitset<std::size_t{can::kMaxNodeId} + 1> answered_;  ///< nodes, for the previous SYNC
 };
 

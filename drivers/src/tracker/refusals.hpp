@@ -13,8 +13,6 @@ namespace abbe::drivers {
 
 namespace emscon = protocol::emscon;
 
-inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
-
 /// True for a temporary status: the command is repeated later.
 inline bool passes(emscon::Status s) {
   switch (s) {

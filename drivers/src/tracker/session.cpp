@@ -80,23 +80,27 @@ Result<void> check(const TrackerSessionOptions& o) {
 }
 
 TrackerSession::TrackerSession(TrackerSessionOptions options)
-    : options_(std::move(options)), settings_(options_), pause_(options_.first_pause) {}
+    : options_(std::move(options)), settings_(options_), pause_(options_.first_pause) {
+  deadlines_.set(Due::Connect, {});
+}
 
 bool TrackerSession::online() const noexcept {
   return state_ != TrackerState::Disconnected && state_ != TrackerState::Faulted &&
          state_ != TrackerState::Connecting;
 }
 
-protocol::HostTime TrackerSession::deadline() const noexcept {
-  if (stopped_ && !online()) return kNever;
-  if (order_ && !order_begun_ && !pending_) return now_;
-  // Without a beam the next query is sent only after the answer to the pending one. due_ may have
-  // passed meanwhile. It must not count as a deadline, or the device thread would poll without
-  // pause.
-  auto next = pending_ && without_beam() ? kNever : due_;
-  if (pending_) next = std::min(next, pending_->due);
-  if (restart_at_ && !pending_) next = std::min(next, *restart_at_);
-  return next;
+void TrackerSession::without_deadline_of_state() {
+  for (const Due due : kOfState) deadlines_.cancel(due);
+}
+
+void TrackerSession::in_state(Due due, std::chrono::nanoseconds within) {
+  without_deadline_of_state();
+  deadlines_.set(due, now_ + within);
+}
+
+/// A stopped session does not connect again.
+void TrackerSession::connect_after(std::chrono::nanoseconds pause) {
+  stopped_ ? without_deadline_of_state() : in_state(Due::Connect, pause);
 }
 
 TrackerAction TrackerSession::on(const TrackerInput& input, protocol::HostTime now) {
@@ -105,36 +109,41 @@ TrackerAction TrackerSession::on(const TrackerInput& input, protocol::HostTime n
 }
 
 TrackerAction TrackerSession::take(const TrackerTick&) {
-  if (pending_ && now_ >= pending_->due)
-    return pending_->waiting_to_resend ? send_again() : overdue();
-  if (order_ && !order_begun_ && !pending_) return begin_order();
-  if (restart_at_ && !pending_ && now_ >= *restart_at_) return start_again();
-  if (now_ < due_) return TrackerNothing{};
+  const auto due = deadlines_.passed(now_, waiting());
+  if (!due) return TrackerNothing{};
 
-  switch (state_) {
-    case TrackerState::Disconnected:
-    case TrackerState::Faulted:
-      if (stopped_) return TrackerNothing{};
-      state_ = TrackerState::Connecting;
-      due_ = now_ + options_.connect_timeout;
-      return TrackerOpen{};
-    case TrackerState::Connecting:
+  switch (*due) {
+    case Due::Answer:
+      return overdue();
+    case Due::Repeat:
+      return repeat();
+    case Due::Order:
+      return begin_order();
+    case Due::Restart:
+      return start_again();
+    case Due::Connect:
+      return connect();
+    case Due::Connection:
       return give_up(TrackerState::Disconnected,
                      fmt::format("no connection in {:g} s",
                                  std::chrono::duration<double>(options_.connect_timeout).count()));
-    case TrackerState::WaitWarm:
+    case Due::WarmUp:
       return begin();
-    case TrackerState::Streaming:
+    case Due::Points:
       return tick_streaming();
-    case TrackerState::BeamLost:
-    case TrackerState::WaitBeam:
-      return pending_ ? TrackerAction{TrackerNothing{}} : query_status();
-    case TrackerState::Stopping:
-    case TrackerState::Restoring:
-      return plan_done();  // leave_within has passed
-    default:
-      return TrackerNothing{};
+    case Due::Query:
+      return query_status();
+    case Due::Leave:
+      return plan_done();
   }
+
+  return TrackerNothing{};
+}
+
+TrackerAction TrackerSession::connect() {
+  state_ = TrackerState::Connecting;
+  in_state(Due::Connection, options_.connect_timeout);
+  return TrackerOpen{};
 }
 
 TrackerAction TrackerSession::take(const TrackerConnected&) {
@@ -144,7 +153,8 @@ TrackerAction TrackerSession::take(const TrackerConnected&) {
 
 TrackerAction TrackerSession::take(const TrackerConnectionLost& lost) {
   if (state_ == TrackerState::Stopping) {
-    pending_.reset();
+    end_pending();
+    without_deadline_of_state();
     state_ = TrackerState::Disconnected;
     return TrackerNothing{};
   }
@@ -170,14 +180,14 @@ TrackerAction TrackerSession::take(const TrackerStopRequested&) {
   if (may_have_set) plan_restoring(TrackerState::Stopping);
 
   if (plan_.empty() || !connected) {
-    pending_.reset();
-    due_ = kNever;
+    end_pending();
+    without_deadline_of_state();
     state_ = TrackerState::Disconnected;
     return connected ? TrackerAction{TrackerClose{}} : TrackerAction{TrackerNothing{}};
   }
 
   state_ = TrackerState::Stopping;
-  due_ = now_ + options_.leave_within;
+  in_state(Due::Leave, options_.leave_within);
   if (!pending_ || pending_->waiting_to_resend) return next_step();
 
   // One command at a time: the answer to the pending one must arrive first.
@@ -194,11 +204,11 @@ void TrackerSession::note_fault(const std::string& what) {
 TrackerAction TrackerSession::give_up(TrackerState into, const std::string& what) {
   note_fault(what);
   end_order(Outcome::Failed, what);
-  pending_.reset();
-  restart_at_.reset();
+  end_pending();
+  deadlines_.cancel(Due::Restart);
   plan_.clear();
   state_ = into;
-  due_ = stopped_ ? kNever : now_ + pause_;
+  connect_after(pause_);
   pause_ = std::min(2 * pause_, options_.longest_pause);
   return TrackerClose{};
 }
@@ -222,7 +232,7 @@ TrackerAction TrackerSession::take(const emscon::StatusChange& change) {
       return beam_lost("the controller is not ready to measure");
     case Event::DistanceSet:
     case Event::MeasurementReady:
-      if (without_beam() && !restart_at_) restart_at_ = now_ + options_.resume_within;
+      if (without_beam()) restart_when_beam_is_back();
       return TrackerNothing{};
     case Event::LaserWarmedUp:
       return state_ == TrackerState::WaitWarm ? begin() : TrackerAction{TrackerNothing{}};

@@ -20,8 +20,8 @@ using std::chrono::nanoseconds;
 TrackerAction TrackerSession::begin() {
   end_order(Outcome::Failed, "the session with the controller restarted");
   new_plan(Goal::Stay);
-  due_ = kNever;
-  pending_.reset();
+  without_deadline_of_state();
+  end_pending();
   plan(TrackerState::Querying, emscon::GetSystemStatus{});
   return next_step();
 }
@@ -30,7 +30,7 @@ void TrackerSession::new_plan(Goal goal) {
   goal_ = goal;
   plan_.clear();
   step_ = 0;
-  restart_at_.reset();
+  deadlines_.cancel(Due::Restart);
 }
 
 void TrackerSession::plan_sets(std::initializer_list<Command> commands, bool optional) {
@@ -86,15 +86,15 @@ TrackerAction TrackerSession::plan_done() {
       return next_step();
     case Goal::Leave:
       state_ = TrackerState::Disconnected;
-      due_ = kNever;
+      without_deadline_of_state();
       break;
     case Goal::GiveUp:
       state_ = TrackerState::Faulted;
-      due_ = stopped_ ? kNever : now_ + options_.refused_pause;
+      connect_after(options_.refused_pause);
       break;
   }
 
-  pending_.reset();
+  end_pending();
   return TrackerClose{};
 }
 
@@ -140,29 +140,35 @@ TrackerAction TrackerSession::send(const Step& step, bool scripted) {
 }
 
 void TrackerSession::await_answer() {
-  pending_->overdue = now_ + time_for(emscon::command_of(pending_->step.request));
-  const bool first = state_ == TrackerState::Querying;
-  pending_->due =
-      first ? std::min(now_ + options_.ask_again, pending_->overdue) : pending_->overdue;
+  deadlines_.set(Due::Answer, now_ + time_for(emscon::command_of(pending_->step.request)));
+  deadlines_.cancel(Due::Repeat);
+  if (state_ == TrackerState::Querying) deadlines_.set(Due::Repeat, now_ + options_.ask_again);
 }
 
-TrackerAction TrackerSession::send_again() {
-  pending_->waiting_to_resend = false;
-  await_answer();
+/// The command was answered, or its answer is no longer awaited.
+void TrackerSession::end_pending() {
+  pending_.reset();
+  deadlines_.cancel(Due::Answer);
+  deadlines_.cancel(Due::Repeat);
+}
+
+TrackerAction TrackerSession::repeat() {
+  if (std::exchange(pending_->waiting_to_resend, false)) {
+    await_answer();
+  } else {
+    deadlines_.set(Due::Repeat, now_ + options_.ask_again);
+  }
   return TrackerSend{pending_->step.request};
 }
 
 TrackerAction TrackerSession::send_later() {
   pending_->waiting_to_resend = true;
-  pending_->due = now_ + options_.busy_retry;
+  deadlines_.cancel(Due::Answer);
+  deadlines_.set(Due::Repeat, now_ + options_.busy_retry);
   return TrackerNothing{};
 }
 
 TrackerAction TrackerSession::overdue() {
-  if (state_ == TrackerState::Querying && now_ < pending_->overdue) {
-    pending_->due = std::min(now_ + options_.ask_again, pending_->overdue);
-    return TrackerSend{pending_->step.request};
-  }
   const Command command = emscon::command_of(pending_->step.request);
   if (state_ == TrackerState::Stopping || state_ == TrackerState::Restoring) return plan_done();
   const double allowed_s = std::chrono::duration<double>(time_for(command)).count();
@@ -201,7 +207,7 @@ TrackerAction TrackerSession::refused(Status status) {
   const Command command = emscon::command_of(pending_->step.request);
   const std::string text = refusal_text(command, status);
   if (pending_->step.of_order) {
-    pending_.reset();
+    end_pending();
     end_order(Outcome::Refused, text);
     while (step_ < plan_.size() && plan_[step_].of_order) ++step_;
     return next_step();
@@ -210,10 +216,10 @@ TrackerAction TrackerSession::refused(Status status) {
   if (command == Command::StartMeasurement && needs_beam(status)) return wait_for_beam(text);
   if (without_beam()) return start_refused();
   if (status == Status::NotWarmedUp) {
-    pending_.reset();
+    end_pending();
     state_ = TrackerState::WaitWarm;
     cause_ = text;
-    due_ = now_ + options_.warm_poll;
+    in_state(Due::WarmUp, options_.warm_poll);
     return TrackerNothing{};
   }
 
@@ -229,15 +235,16 @@ TrackerAction TrackerSession::refused(Status status) {
 TrackerAction TrackerSession::refuse(const std::string& what) {
   note_fault(what);
   end_order(Outcome::Failed, what);
-  pending_.reset();
+  end_pending();
   new_plan(Goal::GiveUp);
   plan_restoring(TrackerState::Restoring);
-  due_ = now_ + options_.leave_within;
+  in_state(Due::Leave, options_.leave_within);
   return next_step();
 }
 
 TrackerAction TrackerSession::done(const emscon::Answer& answer) {
-  const Pending was = *std::exchange(pending_, std::nullopt);
+  const Pending was = *pending_;
+  end_pending();
   if (const auto* status = std::get_if<emscon::SystemStatusAnswer>(&answer))
     return evaluate(*status);
   if (was.scripted) {
@@ -261,7 +268,7 @@ TrackerAction TrackerSession::evaluate(const emscon::SystemStatusAnswer& status)
     case emscon::LaserStatus::Heating:
       state_ = TrackerState::WaitWarm;
       cause_ = "the laser is heating";
-      due_ = now_ + options_.warm_poll;
+      in_state(Due::WarmUp, options_.warm_poll);
       return TrackerNothing{};
     case emscon::LaserStatus::CommunicationFailed:
       return refuse("the controller has no communication with the laser");

@@ -37,9 +37,9 @@ std::chrono::nanoseconds TrackerSession::silence_allowed() const noexcept {
 void TrackerSession::streaming() {
   state_ = TrackerState::Streaming;
   cause_.clear();
-  restart_at_.reset();
+  deadlines_.cancel(Due::Restart);
   result_came_ = false;
-  due_ = now_ + silence_allowed();
+  in_state(Due::Points, silence_allowed());
 }
 
 TrackerAction TrackerSession::tick_streaming() {
@@ -49,25 +49,30 @@ TrackerAction TrackerSession::tick_streaming() {
 }
 
 TrackerAction TrackerSession::query_status() {
-  due_ = now_ + options_.keep_alive;
+  in_state(without_beam() ? Due::Query : Due::Points, options_.keep_alive);
   if (pending_) return TrackerNothing{};
   return send({state_, emscon::GetTrackerStatus{}, true}, false);
 }
 
+void TrackerSession::restart_when_beam_is_back() {
+  if (!deadlines_.is_set(Due::Restart)) deadlines_.set(Due::Restart, now_ + options_.resume_within);
+}
+
 TrackerAction TrackerSession::start_again() {
-  restart_at_.reset();
+  deadlines_.cancel(Due::Restart);
   if (!online() || stopped_) return TrackerNothing{};
   return send({state_, emscon::StartMeasurement{}, false}, false);
 }
 
 TrackerAction TrackerSession::take(const TrackerPointsArrived&) {
   if (without_beam()) {
-    if (!restart_at_ && now_ - beam_lost_at_ < kLastBurst) return TrackerNothing{};
+    if (!deadlines_.is_set(Due::Restart) && now_ - beam_lost_at_ < kLastBurst)
+      return TrackerNothing{};
     streaming();
   }
   if (state_ != TrackerState::Streaming) return TrackerNothing{};
   pause_ = options_.first_pause;
-  due_ = now_ + silence_allowed();
+  in_state(Due::Points, silence_allowed());
   result_came_ = options_.mode == TrackerMode::Stationary;
   return result_came_ && !pending_ && !order_ ? measure_again() : TrackerAction{TrackerNothing{}};
 }
@@ -75,7 +80,7 @@ TrackerAction TrackerSession::take(const TrackerPointsArrived&) {
 /// Mode Stationary: each StartMeasurement gives one result.
 TrackerAction TrackerSession::measure_again() {
   state_ = TrackerState::Ready;
-  due_ = kNever;
+  without_deadline_of_state();
   return send({TrackerState::Ready, emscon::StartMeasurement{}, false}, false);
 }
 
@@ -85,8 +90,8 @@ TrackerAction TrackerSession::beam_lost(const std::string& why) {
   state_ = TrackerState::BeamLost;
   cause_ = no_beam(why);
   beam_lost_at_ = now_;
-  restart_at_.reset();
-  due_ = now_ + options_.keep_alive;
+  deadlines_.cancel(Due::Restart);
+  in_state(Due::Query, options_.keep_alive);
   return TrackerNothing{};
 }
 
@@ -94,14 +99,14 @@ TrackerAction TrackerSession::beam_lost(const std::string& why) {
 /// back; in case that report is missed, it is queried too. Meanwhile no command is sent that could
 /// disturb the operator with the reflector.
 TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
-  pending_.reset();
+  end_pending();
   if (!without_beam()) {
     state_ = TrackerState::WaitBeam;
     beam_lost_at_ = now_;
   }
   cause_ = no_beam(why);
-  restart_at_.reset();
-  due_ = now_ + options_.keep_alive;
+  deadlines_.cancel(Due::Restart);
+  in_state(Due::Query, options_.keep_alive);
   return TrackerNothing{};
 }
 
@@ -110,7 +115,7 @@ TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
 /// meanwhile, the previous measurement is running and the session streams.
 TrackerAction TrackerSession::start_refused() {
   const TrackerState state = state_;
-  pending_.reset();
+  end_pending();
   return send({state, emscon::StopMeasurement{}, true}, false);
 }
 
@@ -119,9 +124,8 @@ TrackerAction TrackerSession::done_without_beam(const emscon::Answer& answer) {
   if (command == emscon::Command::StartMeasurement) streaming();
   if (command == emscon::Command::StopMeasurement) return query_status();
   const auto* tracker = std::get_if<emscon::TrackerStatusAnswer>(&answer);
-  if (tracker != nullptr && tracker->tracker == emscon::TrackerStatus::Ready && !restart_at_) {
-    restart_at_ = now_ + options_.resume_within;  // the event of the controller was missed
-  }
+  if (tracker != nullptr && tracker->tracker == emscon::TrackerStatus::Ready)
+    restart_when_beam_is_back();  // the event of the controller was missed
   return TrackerNothing{};
 }
 

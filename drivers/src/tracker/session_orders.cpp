@@ -153,26 +153,28 @@ TrackerAction TrackerSession::take(const TrackerOrder& order) {
   }
   order_ = order;
   order_begun_ = false;
+  deadlines_.set(Due::Order, now_);
   return pending_ ? TrackerAction{TrackerNothing{}} : begin_order();
 }
 
 TrackerAction TrackerSession::begin_order() {
   using enum TrackerState;
   order_begun_ = true;
+  deadlines_.cancel(Due::Order);
   const TrackerOrder& order = *order_;
   const bool measuring = state_ == Streaming || state_ == BeamLost;
 
   if (order.what == TrackerOrder::What::ListReflectors) {
-    const auto restart_at = restart_at_;  // keep a planned StartMeasurement
+    const auto restart_at = deadlines_.at(Due::Restart);  // keep a planned StartMeasurement
     new_plan(Goal::Stay);
-    restart_at_ = restart_at;
+    deadlines_.set(Due::Restart, restart_at);
     plan(std::nullopt, emscon::GetReflector{}, true, true);
     plan(std::nullopt, emscon::GetReflectors{}, false, true);
     return next_step();
   }
 
   new_plan(Goal::Stream);
-  due_ = kNever;
+  without_deadline_of_state();
   cause_ = fmt::format("\"{}\" was asked for", name_of(order.what));
   if (measuring) plan(Moving, emscon::StopMeasurement{}, true);
 
@@ -227,6 +229,7 @@ void TrackerSession::end_order(Outcome outcome, const std::string& text) {
   report_ = std::move(report);
   order_.reset();
   order_begun_ = false;
+  deadlines_.cancel(Due::Order);
 }
 
 }  // namespace abbe::drivers

@@ -22,14 +22,17 @@
 /// command that moves the tracker, so as not to disturb the operator with the reflector. Each
 /// setting is read before it is set, and restored when the session ends.
 
+#include <array>
 #include <chrono>
 #include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "abbe/drivers/deadlines.hpp"
 #include "abbe/drivers/error.hpp"
 #include "abbe/drivers/tracker/order.hpp"
 #include "abbe/drivers/tracker/receiver.hpp"
@@ -148,7 +151,7 @@ class TrackerSession {
 
   [[nodiscard]] TrackerState state() const noexcept { return state_; }
   /// When the next TrackerTick is due.
-  [[nodiscard]] protocol::HostTime deadline() const noexcept;
+  [[nodiscard]] protocol::HostTime deadline() const noexcept { return deadlines_.next(waiting()); }
 
   struct Fault {
     std::uint64_t count = 0;  ///< since construction
@@ -178,10 +181,25 @@ class TrackerSession {
     Step step;
     bool scripted = false;
     bool waiting_to_resend = false;
-    protocol::HostTime due{};       ///< of the answer, or of repeating the command
-    protocol::HostTime overdue{};   ///< without an answer by then: a fault
     protocol::HostTime patience{};  ///< "busy" is tolerated until then
   };
+  enum class Due {
+    Answer,   ///< to the pending command; none by then: a fault
+    Repeat,   ///< sends the pending command again
+    Order,    ///< begins the accepted order
+    Restart,  ///< sends StartMeasurement after the beam is back
+    // Of the state: at most one of the following.
+    Connect,
+    Connection,  ///< none by then: a fault
+    WarmUp,      ///< status query while the laser is heating
+    Points,      ///< none by then: a fault, or a status query
+    Query,       ///< status query while there is no beam
+    Leave,       ///< the settings are restored by then, or it is given up
+  };
+  static constexpr std::array kOfState{Due::Connect, Due::Connection, Due::WarmUp,
+                                       Due::Points,  Due::Query,      Due::Leave};
+  /// One command at a time: these send one, after the answer to the pending command.
+  static constexpr std::array kAfterAnswer{Due::Order, Due::Restart, Due::Query};
 
   TrackerAction take(const TrackerTick&);
   TrackerAction take(const TrackerConnected&);
@@ -194,6 +212,14 @@ class TrackerSession {
   TrackerAction take(const TrackerStopRequested&);
   TrackerAction take(const TrackerOrder& order);
 
+  /// Sets the deadline of the state; that of the previous state ends.
+  void in_state(Due due, std::chrono::nanoseconds within);
+  void without_deadline_of_state();
+  [[nodiscard]] std::span<const Due> waiting() const noexcept {
+    return pending_ ? std::span<const Due>{kAfterAnswer} : std::span<const Due>{};
+  }
+  TrackerAction connect();
+  void connect_after(std::chrono::nanoseconds pause);
   TrackerAction begin();
   void plan_set_up(bool initialised);
   void plan_sets(std::initializer_list<emscon::Command> commands, bool optional = false);
@@ -207,7 +233,8 @@ class TrackerSession {
   TrackerAction next_step();
   TrackerAction plan_done();
   TrackerAction send(const Step& step, bool scripted);
-  TrackerAction send_again();
+  void end_pending();
+  TrackerAction repeat();
   TrackerAction send_later();
   TrackerAction refused(emscon::Status status);
   TrackerAction refuse(const std::string& what);
@@ -232,6 +259,8 @@ class TrackerSession {
   TrackerAction overdue();
   TrackerAction tick_streaming();
   TrackerAction measure_again();
+  /// The controller reports the beam: StartMeasurement follows, unless a point arrives before.
+  void restart_when_beam_is_back();
   TrackerAction start_again();
   TrackerAction query_status();
   TrackerAction beam_lost(const std::string& why);
@@ -250,12 +279,9 @@ class TrackerSession {
   protocol::HostTime now_{};
   std::size_t step_ = 0;
   std::optional<Pending> pending_;
-  /// Deadline of the state: reconnecting, connection, warm-up, points, keep-alive.
-  protocol::HostTime due_{};
+  Deadlines<Due::Leave> deadlines_;
   std::chrono::nanoseconds pause_{};
   protocol::HostTime beam_lost_at_{};
-  /// The beam is back: StartMeasurement is sent then, unless a point arrives before.
-  std::optional<protocol::HostTime> restart_at_;
   bool result_came_ = false;  ///< Stationary: the latest StartMeasurement gave its result
   bool stopped_ = false;
   Fault fault_;

@@ -70,10 +70,11 @@ Result<void> check(const IppSessionOptions& o) {
 IppSession::IppSession(IppSessionOptions options)
     : options_(std::move(options)), pause_(options_.first_pause), may_home_(options_.home) {
   write_script();
+  deadlines_.set(Due::Connect, {});
   if (options_.held.empty()) return;
   (void)hold(options_.held);
   moving_ = options_.moving;
-  if (moving_) due_ = {};  // connect at once to send AbortE
+  if (moving_) deadlines_.set(Due::Connect, {});  // at once, to send AbortE
 }
 
 void IppSession::write_script() {
@@ -102,9 +103,14 @@ void IppSession::without_move_reports() {
   write_script();
 }
 
-protocol::HostTime IppSession::deadline() const noexcept {
-  if (stopped_ && !open_) return ipp_text::kNever;
-  return pending_ ? std::min(pending_->due, due_) : due_;
+void IppSession::wait_only_for(Due due, protocol::HostTime at) {
+  deadlines_.cancel_all();
+  deadlines_.set(due, at);
+}
+
+void IppSession::end_pending() {
+  pending_.reset();
+  deadlines_.cancel(Due::Answer);
 }
 
 IppAction IppSession::on(const IppInput& input, protocol::HostTime now) {
@@ -132,10 +138,11 @@ IppAction IppSession::give_up(IppState into, const std::string& what) {
 
 IppAction IppSession::close(IppState into) {
   pending_.reset();
+  deadlines_.cancel_all();
   open_ = in_session_ = false;
   state_ = held_ && !stopped_ ? IppState::AwaitingRelease : into;
   // An unfinished motion is aborted on the next connection, held or not.
-  due_ = stopped_ || (held_ && !moving_) ? ipp_text::kNever : now_ + pause_;
+  if (!stopped_ && (!held_ || moving_)) deadlines_.set(Due::Connect, now_ + pause_);
   pause_ = std::min(2 * pause_, options_.longest_pause);
   return IppClose{};
 }
@@ -143,42 +150,44 @@ IppAction IppSession::close(IppState into) {
 // --- the connection
 
 IppAction IppSession::take(const IppTick&) {
-  if (state_ == IppState::Aborting)
-    return now_ < due_ ? IppAction{IppNothing{}} : abort_unanswered();
-  if (pending_ && now_ >= pending_->due) {
-    if (state_ == IppState::Stopping) return close(IppState::Disconnected);
-    const auto patience = pending_->step.moves ? options_.motion_timeout : options_.command_timeout;
-    return give_up(IppState::Faulted, fmt::format("no answer to {} in {:g} s",
-                                                  ipp_text::method_name(pending_->step.method),
-                                                  ipp_text::seconds(patience)));
-  }
+  const auto due = deadlines_.passed(now_);
+  if (!due) return IppNothing{};
 
-  if (stopped_ || now_ < due_ || pending_) return IppNothing{};
-  switch (state_) {
-    case IppState::Disconnected:
-    case IppState::Faulted:
+  switch (*due) {
+    case Due::Abort:
+      return abort_unanswered();
+    case Due::Answer:
+      return unanswered();
+    case Due::Connect:
       return connect();
-    case IppState::Connecting:
+    case Due::Connection:
       return give_up(
           IppState::Disconnected,
           fmt::format("no connection in {:g} s", ipp_text::seconds(options_.connect_timeout)));
-    case IppState::Ready:
+    case Due::Poll:
       return send(
           {.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
-    case IppState::AwaitingRelease:  // GetErrStatusE checks that the server still answers
-      if (!open_) return connect();
+    case Due::Watch:
       return send({.state = IppState::AwaitingRelease,
                    .method = "GetErrStatusE()",
                    .purpose = Purpose::Watch,
                    .event = kWatchTag});
-    default:
-      return IppNothing{};
   }
+
+  return IppNothing{};
+}
+
+IppAction IppSession::unanswered() {
+  if (state_ == IppState::Stopping) return close(IppState::Disconnected);
+  const auto patience = pending_->step.moves ? options_.motion_timeout : options_.command_timeout;
+  return give_up(IppState::Faulted, fmt::format("no answer to {} in {:g} s",
+                                                ipp_text::method_name(pending_->step.method),
+                                                ipp_text::seconds(patience)));
 }
 
 IppAction IppSession::connect() {
   state_ = IppState::Connecting;
-  due_ = now_ + options_.connect_timeout;
+  wait_only_for(Due::Connection, now_ + options_.connect_timeout);
   return IppOpen{};
 }
 
@@ -187,7 +196,7 @@ IppAction IppSession::take(const IppConnected&) {
   open_ = true;
   step_ = 0;
   tag_ = 0;
-  due_ = ipp_text::kNever;
+  deadlines_.cancel_all();
   if (!moving_ || (session_first_ && !held_)) return next_step();
   if (!held_) note("the connection was lost while the machine was moving");
   return stop_motion(false);
@@ -220,9 +229,9 @@ IppAction IppSession::send(const Step& step) {
   moving_ = moving_ || step.moves;
   if (!step.event) tag_ = tag_ % kLastTag + 1;
   const ippdme::Tag tag = step.event.value_or(ippdme::Tag{false, tag_});
-  due_ = ipp_text::kNever;  // no other command until this one is complete
   const auto patience = step.moves ? options_.motion_timeout : options_.command_timeout;
-  pending_ = Pending{.step = step, .tag = tag, .due = now_ + patience};
+  wait_only_for(Due::Answer, now_ + patience);  // no other command until this one is complete
+  pending_ = Pending{.step = step, .tag = tag, .sent = now_};
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
 }
 
@@ -230,7 +239,7 @@ IppAction IppSession::next_step() {
   if (step_ < script_.size()) return send(script_[step_++]);
   pause_ = options_.first_pause;
   may_home_ = false;
-  due_ = now_;
+  wait_only_for(Due::Poll, now_);
   return ready();
 }
 
@@ -321,7 +330,8 @@ IppAction IppSession::take(const IppProtocolError& malformed) {
 }
 
 IppAction IppSession::done() {
-  const Pending was = *std::exchange(pending_, std::nullopt);
+  const Pending was = *pending_;
+  end_pending();
   if (was.step.moves) moving_ = false;
   const bool tolerated = was.step.purpose == Purpose::End || was.step.purpose == Purpose::Watch;
   if (was.error && !tolerated) return failed(was);
@@ -338,12 +348,11 @@ IppAction IppSession::done() {
     case Purpose::IsHomed:
       return check_homed(was.data);
     case Purpose::Get:
-      // One poll period after the command was sent.
-      due_ = was.due - options_.command_timeout + options_.poll_period;
+      wait_only_for(Due::Poll, was.sent + options_.poll_period);
       return ready();
     case Purpose::Move:
     case Purpose::Touch:
-      due_ = now_;
+      wait_only_for(Due::Poll, now_);
       return ready();
     case Purpose::Watch:
       return await_release();

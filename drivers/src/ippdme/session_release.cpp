@@ -15,7 +15,7 @@ IppAction IppSession::stop_motion(bool close_then) {
   close_then_ = close_then;
   stop_reason_ = last_note_;
   state_ = IppState::Aborting;
-  due_ = now_ + options_.command_timeout;
+  wait_only_for(Due::Abort, now_ + options_.command_timeout);
   return IppSend{ippdme::to_string(ippdme::kAbort) + " AbortE()\r\n"};
 }
 
@@ -52,7 +52,7 @@ IppAction IppSession::abort_refused(const IppError& error) {
   session_first_ = false;
   const bool retry = in_session_;  // the next connection sends AbortE outside a session
   (void)close(IppState::AwaitingRelease);
-  if (!retry) due_ = ipp_text::kNever;
+  if (!retry) deadlines_.cancel_all();
 
   return IppClose{};
 }
@@ -71,8 +71,9 @@ IppAction IppSession::hold(const std::string& what) {
 
 IppAction IppSession::await_release() {
   pending_.reset();
+  deadlines_.cancel_all();
   state_ = IppState::AwaitingRelease;
-  due_ = open_ && in_session_ ? now_ + 10 * options_.poll_period : ipp_text::kNever;
+  if (open_ && in_session_) deadlines_.set(Due::Watch, now_ + 10 * options_.poll_period);
   return IppNothing{};
 }
 
@@ -108,7 +109,7 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   if (open_) return close(IppState::Disconnected);
   if (state_ == IppState::Connecting) return IppNothing{};
   state_ = IppState::Disconnected;
-  due_ = now_;
+  wait_only_for(Due::Connect, now_);
 
   return IppNothing{};
 }
@@ -122,7 +123,7 @@ IppAction IppSession::take(const IppStopRequested&) {
 
 IppAction IppSession::end_session() {
   const bool connecting = state_ == IppState::Connecting;
-  due_ = ipp_text::kNever;
+  deadlines_.cancel_all();
   pending_.reset();
   if (open_)
     return send({.state = IppState::Stopping, .method = "EndSession()", .purpose = Purpose::End});

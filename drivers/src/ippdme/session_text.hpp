@@ -8,7 +8,6 @@
 
 namespace abbe::drivers::ipp_text {
 
-inline constexpr protocol::HostTime kNever = protocol::HostTime::max();
 inline constexpr int kRepairable = 2;  ///< severity: from this value on the command has failed
 inline constexpr int kUserNeeded = 3;  ///< severity: from this value on a motion is aborted
 inline constexpr int kAborted = 6;     ///< code: the command was ended by AbortE

@@ -36,6 +36,7 @@
 #include <variant>
 #include <vector>
 
+#include "abbe/drivers/deadlines.hpp"
 #include "abbe/drivers/error.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/protocol/time.hpp"
@@ -116,7 +117,7 @@ class IppSession {
 
   [[nodiscard]] IppAction on(const IppInput& input, protocol::HostTime now);
   /// When the next IppTick is due.
-  [[nodiscard]] protocol::HostTime deadline() const noexcept;
+  [[nodiscard]] protocol::HostTime deadline() const noexcept { return deadlines_.next(); }
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
   /// True until the machine is released; also while its motion is still being stopped.
@@ -150,10 +151,20 @@ class IppSession {
   struct Pending {
     Step step;
     ippdme::Tag tag;
-    protocol::HostTime due{};
+    protocol::HostTime sent{};
     bool acknowledged = false;
     std::string data;
     std::optional<IppError> error;
+  };
+
+  enum class Due {
+    Abort,   ///< answer to AbortE; none by then: the machine may still be moving
+    Answer,  ///< to the pending command; none by then: a fault
+    // Of the state: at most one of the following, and none while a command is pending.
+    Connect,
+    Connection,  ///< none by then: a fault
+    Poll,        ///< requests the position
+    Watch,       ///< checks during a hold that the server still answers
   };
 
   void write_script();
@@ -174,6 +185,10 @@ class IppSession {
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
   [[nodiscard]] IppAction unexpected_response(std::string_view what, ippdme::Tag tag);
   [[nodiscard]] IppAction send(const Step& step);
+  /// The only deadline from now on.
+  void wait_only_for(Due due, protocol::HostTime at);
+  void end_pending();
+  [[nodiscard]] IppAction unanswered();
   [[nodiscard]] IppAction connect();
   [[nodiscard]] IppAction next_step();
   [[nodiscard]] IppAction done();
@@ -199,7 +214,7 @@ class IppSession {
   std::size_t step_ = 0;
   IppState state_ = IppState::Disconnected;
   protocol::HostTime now_{};
-  protocol::HostTime due_{};
+  Deadlines<Due::Watch> deadlines_;
   std::chrono::nanoseconds pause_;
   std::uint32_t tag_ = 0;
   std::optional<Pending> pending_;

@@ -50,82 +50,78 @@ const char* name_of(CardState state) noexcept {
 CounterCardSession::CounterCardSession(const CounterCardSessionOptions& options)
     : options_(options),
       set_up_(options.set_up_serial.has_value()),
-      serial_(options.set_up_serial.value_or("")) {}
+      serial_(options.set_up_serial.value_or("")) {
+  planned_.set(Plan::Open, {});
+}
 
 CardAction CounterCardSession::on(const CardInput& input, HostTime now) {
   return std::visit([&](const auto& i) { return take(i, now); }, input);
 }
 
-HostTime CounterCardSession::deadline() const {
-  if (state_ == CardState::Closed) return open_at_;
-  if (state_ == CardState::Opening) return asked_at_ + options_.open_timeout;
-  if (asked_ || stopping_bulk_) {
-    const auto overdue = asked_at_ + options_.control_timeout;
-    return expects_scans() ? std::min(overdue, last_scans_ + options_.silence) : overdue;
-  }
-  if (state_ == CardState::Streaming && !halt_) {
-    const auto silent = recovering_ ? retry_at_ : last_scans_ + options_.silence;
-    return std::min(silent, next_status_);
-  }
-  return asked_at_;
+/// One request at a time, and no restart of a scan that is being restarted.
+std::span<const CounterCardSession::Plan> CounterCardSession::waiting() const {
+  if (asked_ || stopping_bulk_) return kAfterAnswer;
+  const bool streaming = state_ == CardState::Streaming && !halt_;
+  return streaming ? std::span<const Plan>{} : std::span<const Plan>{kWhileStreaming};
 }
 
 CardAction CounterCardSession::take(const CardTick& tick, HostTime now) {
-  const HostTime until = std::min(now, tick.read_until);
-  switch (state_) {
-    case CardState::Closed:
-      if (now < open_at_) return CardNothing{};
-      enter(CardState::Opening);
-      asked_at_ = now;
-      return CardOpen{};
-    case CardState::Opening:
-      if (until - asked_at_ < options_.open_timeout) return CardNothing{};
+  const auto missing = awaited_.passed(std::min(now, tick.read_until));
+  if (missing) return is_missing(*missing, now);
+  const auto plan = planned_.passed(now, waiting());
+  if (!plan) return CardNothing{};
+
+  switch (*plan) {
+    case Plan::Open:
+      return open(now);
+    case Plan::Step:
+      planned_.cancel(Plan::Step);
+      return state_ == CardState::Streaming ? halt(now) : next_step(now);
+    case Plan::Retry:
+      return restart_scan(now, {});
+    case Plan::Status:
+      planned_.set(Plan::Status, now + options_.status_period);
+      return send(quad08::read(quad08::Register::Acquisition), now);
+  }
+
+  return CardNothing{};
+}
+
+CardAction CounterCardSession::is_missing(Input input, HostTime now) {
+  switch (input) {
+    case Input::Opened:
       return fail(now,
                   fmt::format("open: no answer in {}", in_milliseconds(options_.open_timeout)));
-    case CardState::Testing:
-    case CardState::SettingUp:
-    case CardState::Loading:
-    case CardState::Arming:
-    case CardState::Streaming:
-    case CardState::Halting:
-      break;
+    case Input::ControlDone:
+    case Input::BulkStopped:
+      return fail(
+          now, fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
+    case Input::Scans:  // also while a status request is pending: a failed card does not answer it
+      return restart_scan(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
   }
 
-  if (asked_ || stopping_bulk_) {
-    if (until - asked_at_ < options_.control_timeout)
-      return silent(until) ? restart_after_silence(now) : CardAction{CardNothing{}};
-    return fail(now,
-                fmt::format("request: no answer in {}", in_milliseconds(options_.control_timeout)));
-  }
-
-  if (state_ != CardState::Streaming) return next_step(now);
-  return !halt_ && silent(until) ? restart_after_silence(now) : watch(now);
+  return CardNothing{};
 }
 
-bool CounterCardSession::expects_scans() const {
-  return state_ == CardState::Streaming && !halt_ && !recovering_;
+CardAction CounterCardSession::open(HostTime now) {
+  enter(CardState::Opening);
+  planned_.cancel(Plan::Open);
+  awaited_.set(Input::Opened, now + options_.open_timeout);
+  return CardOpen{};
 }
 
-bool CounterCardSession::silent(HostTime until) const {
-  return expects_scans() && until - last_scans_ >= options_.silence;
-}
-
-/// Also called while a status request is pending: a card that has failed does not answer it.
-CardAction CounterCardSession::restart_after_silence(HostTime now) {
-  return restart_scan(now, fmt::format("no scans for {}", in_milliseconds(options_.silence)));
-}
-
-/// Called while streaming, with no pending request.
-CardAction CounterCardSession::watch(HostTime now) {
-  if (halt_) return halt(now);
-  if (recovering_ && now >= retry_at_) return restart_scan(now, {});
-  if (now < next_status_) return CardNothing{};
-  next_status_ = now + options_.status_period;
-  return send(quad08::read(quad08::Register::Acquisition), now);
+/// Halts the scan as soon as no control transfer is pending.
+CardAction CounterCardSession::halt_soon(HostTime now) {
+  halt_ = true;
+  awaited_.cancel(Input::Scans);
+  planned_.cancel(Plan::Status);
+  planned_.set(Plan::Step, now);
+  return asked_ ? CardAction{CardNothing{}} : halt(now);
 }
 
 CardAction CounterCardSession::halt(HostTime now) {
   halt_ = false;
+  planned_.cancel(Plan::Step);
   enter(CardState::Halting);
   load(quad08::stop_sequence());
   return next_step(now);
@@ -133,6 +129,7 @@ CardAction CounterCardSession::halt(HostTime now) {
 
 CardAction CounterCardSession::take(const UsbOpened& opened, HostTime now) {
   if (state_ != CardState::Opening) return CardNothing{};
+  awaited_.cancel(Input::Opened);
   if (set_up_ && opened.serial != serial_) {
     set_up_ = false;
     report(
@@ -165,7 +162,7 @@ CardAction CounterCardSession::next_step(HostTime now) {
 
 CardAction CounterCardSession::send(const usb::Setup& setup, HostTime now) {
   asked_ = true;
-  asked_at_ = now;
+  awaited_.set(Input::ControlDone, now + options_.control_timeout);
   tries_ = 1;
   return CardControl{setup};
 }
@@ -198,13 +195,13 @@ CardAction CounterCardSession::stage_done(HostTime now) {
     case CardState::Loading:
       enter(CardState::Arming);
       load(quad08::arm_sequence());
-      asked_at_ = now;
+      planned_.set(Plan::Step, now);
       return CardStartBulk{};
     case CardState::Arming:
       return send(quad08::read(quad08::Register::Acquisition), now);
     case CardState::Halting:
       stopping_bulk_ = true;
-      asked_at_ = now;
+      awaited_.set(Input::BulkStopped, now + options_.control_timeout);
       return CardStopBulk{};
     case CardState::Closed:
     case CardState::Opening:
@@ -246,6 +243,7 @@ void CounterCardSession::enter_setting_up() {
 CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
   if (!asked_) return CardNothing{};
   asked_ = false;
+  awaited_.cancel(Input::ControlDone);
   if (auto again = send_again(done, now)) return *again;
 
   if (step_ < steps_.size()) {
@@ -260,9 +258,12 @@ CardAction CounterCardSession::take(const UsbControlDone& done, HostTime now) {
 
   if (state_ == CardState::Arming && done.setup == quad08::start_pacer()) {
     enter(CardState::Streaming);
-    last_scans_ = now;
-    next_status_ = now + options_.status_period;
-    if (recovering_) retry_at_ = now + options_.retry_after;
+    planned_.set(Plan::Status, now + options_.status_period);
+    if (recovering()) {
+      planned_.set(Plan::Retry, now + options_.retry_after);
+    } else {
+      awaited_.set(Input::Scans, now + options_.silence);
+    }
     return CardNothing{};
   }
 
@@ -305,6 +306,7 @@ CardAction CounterCardSession::on_status(quad08::Status status, HostTime now) {
 CardAction CounterCardSession::take(const UsbBulkStopped&, HostTime now) {
   if (state_ != CardState::Halting) return CardNothing{};
   stopping_bulk_ = false;
+  awaited_.cancel(Input::BulkStopped);
   if (!set_up_) {
     enter_setting_up();
     return next_step(now);
@@ -323,8 +325,9 @@ CardAction CounterCardSession::take(const UsbLost& lost, HostTime now) {
 
 CardAction CounterCardSession::take(const CardScans& scans, HostTime now) {
   if (scans.count == 0) return CardNothing{};
-  last_scans_ = now;
-  recovering_ = resuming_ = false;
+  planned_.cancel(Plan::Retry);
+  if (state_ == CardState::Streaming && !halt_) awaited_.set(Input::Scans, now + options_.silence);
+  resuming_ = false;
   scans_since_fault_ = true;
   return CardNothing{};
 }
@@ -338,9 +341,9 @@ CardAction CounterCardSession::take(const CardRestarted& restarted, HostTime now
 CardAction CounterCardSession::set_up_again(HostTime now, const std::string& seen) {
   report(fmt::format("{}: its counters did not continue{}{}: they are set up and restart at 0",
                      options_.peer, seen.empty() ? "" : ", ", seen));
-  set_up_ = resuming_ = recovering_ = false;
-  halt_ = true;
-  return asked_ ? CardAction{CardNothing{}} : watch(now);
+  set_up_ = resuming_ = false;
+  planned_.cancel(Plan::Retry);
+  return halt_soon(now);
 }
 
 /// Bytes that are shifted within the stream also look like a stopped clock (another counter is read
@@ -361,20 +364,20 @@ CardAction CounterCardSession::take(const CardBulkFailed& failed, HostTime now) 
 /// Restarts the scan; the counters continue. Further faults before the next scan are not reported:
 /// they belong to the same fault.
 CardAction CounterCardSession::restart_scan(HostTime now, std::string text) {
-  if (recovering_ && now < retry_at_) return CardNothing{};
-  if (!recovering_) report(fmt::format("{}: {}", options_.peer, text));
-  recovering_ = true;
-  retry_at_ = now + options_.retry_after;
+  if (planned_.ahead(Plan::Retry, now)) return CardNothing{};
+  if (!recovering()) report(fmt::format("{}: {}", options_.peer, text));
+  planned_.set(Plan::Retry, now + options_.retry_after);
   ++restarts_;
-  halt_ = true;
-  return asked_ ? CardAction{CardNothing{}} : watch(now);
+  return halt_soon(now);
 }
 
 CardAction CounterCardSession::fail(HostTime now, std::string text) {
   if (!text.empty()) report(fmt::format("{}: {}", options_.peer, text));
   enter(CardState::Closed);
-  asked_ = stopping_bulk_ = halt_ = recovering_ = resuming_ = false;
-  open_at_ = now + options_.reopen_after;
+  asked_ = stopping_bulk_ = halt_ = resuming_ = false;
+  awaited_.cancel_all();
+  planned_.cancel_all();
+  planned_.set(Plan::Open, now + options_.reopen_after);
   return CardClose{};
 }
 

@@ -5,15 +5,19 @@
 /// the clock count has not continued. Sans-I/O: inputs and a time in, one action out. After each
 /// input, call on(CardTick) until it returns CardNothing. Not for the RT path. One thread.
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "abbe/drivers/counter_card/wiring.hpp"
+#include "abbe/drivers/deadlines.hpp"
 #include "abbe/drivers/usb/usb_link.hpp"
 #include "abbe/protocol/quad08/sequences.hpp"
 
@@ -91,7 +95,9 @@ class CounterCardSession {
 
   [[nodiscard]] CardAction on(const CardInput& input, protocol::HostTime now);
   /// When the next CardTick is due.
-  [[nodiscard]] protocol::HostTime deadline() const;
+  [[nodiscard]] protocol::HostTime deadline() const {
+    return std::min(awaited_.next(), planned_.next(waiting()));
+  }
 
   [[nodiscard]] CardState state() const { return state_; }
   /// The device is connected, its identity matches, and it has passed the self-test.
@@ -110,6 +116,19 @@ class CounterCardSession {
 
  private:
   using Now = protocol::HostTime;
+  /// An input that must arrive by then: else it is a fault.
+  enum class Input : std::uint8_t { Opened, ControlDone, BulkStopped, Scans };
+  /// What the session does at that time.
+  enum class Plan : std::uint8_t {
+    Open,
+    Step,    ///< the next request of the stage, or the halt of the scan
+    Retry,   ///< restarts the scan again: no scans have arrived since the last restart
+    Status,  ///< status query
+  };
+  static constexpr std::array kAfterAnswer{Plan::Step, Plan::Retry, Plan::Status};
+  static constexpr std::array kWhileStreaming{Plan::Retry};
+  [[nodiscard]] std::span<const Plan> waiting() const;
+  CardAction is_missing(Input input, Now now);
   CardAction take(const CardTick& tick, Now now);
   CardAction take(const UsbOpened& opened, Now now);
   CardAction take(const UsbControlDone& done, Now now);
@@ -130,10 +149,10 @@ class CounterCardSession {
   CardAction set_up_again(Now now, const std::string& seen = {});
   CardAction refused_step(const quad08::Step& step, const UsbControlDone& done, Now now);
   CardAction on_status(quad08::Status status, Now now);
-  [[nodiscard]] bool expects_scans() const;
-  [[nodiscard]] bool silent(Now until) const;
-  CardAction restart_after_silence(Now now);
-  CardAction watch(Now now);
+  /// No scans have arrived since the latest restart.
+  [[nodiscard]] bool recovering() const { return planned_.is_set(Plan::Retry); }
+  CardAction open(Now now);
+  CardAction halt_soon(Now now);
   CardAction halt(Now now);
   CardAction restart_scan(Now now, std::string text);
   CardAction fail(Now now, std::string text);
@@ -145,8 +164,7 @@ class CounterCardSession {
   std::size_t step_ = 0;
   bool asked_ = false;  ///< a control transfer is pending
   bool stopping_bulk_ = false;
-  bool halt_ = false;        ///< halt the scan as soon as the pending control transfer is answered
-  bool recovering_ = false;  ///< no scans since the restart; next restart not before retry_at_
+  bool halt_ = false;  ///< halt the scan as soon as the pending control transfer is answered
   bool scans_since_fault_ = false;
   bool set_up_ = false;  ///< this session or an earlier run has set the counters up
   std::string serial_;   ///< of the card whose counters were set up
@@ -155,11 +173,8 @@ class CounterCardSession {
   bool resumed_again_ = false;  ///< the scan was restarted once because they were out of step
   unsigned status_tries_ = 0;
   unsigned tries_ = 0;  ///< of the pending control transfer
-  Now open_at_{};
-  Now asked_at_{};
-  Now last_scans_{};
-  Now next_status_{};
-  Now retry_at_{};
+  Deadlines<Input::Scans> awaited_;
+  Deadlines<Plan::Status> planned_;
   Fault fault_;
   std::uint64_t restarts_ = 0;
 };

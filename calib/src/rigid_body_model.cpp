@@ -1,5 +1,7 @@
 #include "abbe/calib/rigid_body_model.hpp"
 
+#include "rigid_body_effects.hpp"
+
 namespace abbe::calib {
 namespace {
 
@@ -10,34 +12,15 @@ struct AxisStates {
 };
 
 AxisStates axis_states(const ParameterLayout& layout, const Vector3& q, const Vector3& t) {
-  AxisStates at;
-  Vector3 l = t;
-  const std::array<Axis, 3>& order = layout.chain().order_w_to_t();
-  for (std::size_t i = 3; i-- > 0;) {
-    const std::size_t a = index(order[i]);
-    const auto k = static_cast<Eigen::Index>(a);
-    at.lever_m[a] = l;
-    at.basis[a] = basis_row(layout.nodes()[a].nodes_m, q(k));
-    l(k) += q(k);
+  AxisStates at{levers_m(layout.chain(), q, t), {}};
+  for (std::size_t a = 0; a < 3; ++a) {
+    at.basis[a] = basis_row(layout.nodes()[a].nodes_m, q(static_cast<Eigen::Index>(a)));
   }
   return at;
 }
 
-/// Displacement of the target per unit of an error: the unit vector for a translation, its cross
-/// product with the lever for a rotation.
-Vector3 effect(ErrorMotion e, const Vector3& lever_m) {
-  const Vector3 unit = Vector3::Unit(static_cast<Eigen::Index>(direction(e.motion)));
-  return is_rotation(e.motion) ? Vector3(unit.cross(lever_m)) : unit;
-}
-
 void push(DesignColumns& columns, std::size_t parameter, const Vector3& dV_dU) {
   columns.column[columns.count++] = {parameter, dV_dU};
-}
-
-/// Displacements per unit of EA0Z, EB0Z, EC0Y. These tilt only the direction of motion, so that the
-/// lever has no effect.
-std::array<Vector3, 3> squareness_effects(const Vector3& q) {
-  return {Vector3(0, -q.z(), 0), Vector3(q.z(), 0, 0), Vector3(-q.y(), 0, 0)};
 }
 
 }  // namespace

@@ -12,17 +12,13 @@
 #include <cstddef>
 #include <span>
 
+#include "abbe/calib/estimation/model_columns.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/parameter_layout.hpp"
 
 namespace abbe::calib {
 
-/// Derivative of V with respect to one parameter.
-struct Column {
-  std::size_t parameter = 0;
-  /// dimensionless for a parameter in m; in m/rad for a parameter in rad
-  Vector3 dV_dU = Vector3::Zero();
-};
+using estimation::Column;
 
 /// The non-zero columns of M B at one axis position, sorted by parameter index. No allocation.
 struct DesignColumns {

@@ -1,0 +1,73 @@
+#pragma once
+/// Interpolation of a function between its values U at the nodes of an axis. All of them are
+/// linear in U and reproduce constants and straight lines exactly; the gauge conditions depend on
+/// it. In the cell from x_k to x_k+1, of length h:
+///     u = (q - x_k) / h,  b = u,  a = 1 - u
+///     linear:  f = a U_k + b U_k+1
+///     cubic:   f = a U_k + b U_k+1 + ((a^3 - a) U''_k + (b^3 - b) U''_k+1) h^2 / 6,   U'' = M U
+/// The cubic has continuous first and second derivatives ([Press 2007] section 3.3). Its matrix M
+/// follows from the continuity of the first derivative at the inner nodes,
+///     h_i-1 U''_i-1 + 2 (h_i-1 + h_i) U''_i + h_i U''_i+1
+///         = 6 ((U_i+1 - U_i) / h_i - (U_i - U_i-1) / h_i-1),
+/// and an end condition:
+/// - natural: U'' = 0 at both ends,
+/// - not-a-knot: the third derivative is continuous at the second and at the last but one node.
+///   With three nodes this is one parabola, with two a straight line.
+/// Outside the nodes, the formula of the nearest cell is extrapolated.
+
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "abbe/calib/error.hpp"
+
+namespace abbe::calib::estimation {
+
+enum class Interpolation { Linear, NaturalCubic, NotAKnotCubic };
+[[nodiscard]] std::string_view name(Interpolation);
+
+/// Weights of the nodes at one position. Refers to the AxisInterpolation from which it comes.
+class NodeWeights {
+ public:
+  [[nodiscard]] std::size_t first() const { return first_; }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// Weight of node first() + i.
+  [[nodiscard]] double operator[](std::size_t i) const {
+    const double near = i == cell_ ? a_ : (i == cell_ + 1 ? b_ : 0.0);
+    return below_ == nullptr ? near : near + curve_a_ * below_[i] + curve_b_ * above_[i];
+  }
+
+ private:
+  friend class AxisInterpolation;
+  std::size_t first_ = 0, count_ = 2, cell_ = 0;  ///< cell_: counted from first_
+  double a_ = 1.0, b_ = 0.0, curve_a_ = 0.0, curve_b_ = 0.0;
+  const double *below_ = nullptr, *above_ = nullptr;  ///< rows k and k + 1 of M; null: linear
+};
+
+/// Immutable value.
+class AxisInterpolation {
+ public:
+  /// A cubic has a weight for every node: 500 nodes are 2 MB.
+  static constexpr std::size_t kMostCubicNodes = 500;
+
+  /// BadInput or NotFinite for nodes that check_nodes() refuses, or for too many of a cubic.
+  [[nodiscard]] static Result<AxisInterpolation> of(std::span<const double> nodes_m, Interpolation);
+
+  [[nodiscard]] Interpolation kind() const { return kind_; }
+  [[nodiscard]] std::size_t size() const { return nodes_m_.size(); }
+  /// Largest number of nodes that have a weight at one position.
+  [[nodiscard]] std::size_t most_weights() const {
+    return kind_ == Interpolation::Linear ? 2 : size();
+  }
+
+  /// No allocation.
+  [[nodiscard]] NodeWeights at(double position_m) const;
+
+ private:
+  std::vector<double> nodes_m_;
+  Interpolation kind_ = Interpolation::Linear;
+  std::vector<double> curvature_;  ///< M by rows; empty: linear
+};
+
+}  // namespace abbe::calib::estimation

@@ -1,0 +1,60 @@
+#pragma once
+/// Error tables with nodes as columns: the rigid-body model of rigid_body_model.hpp with linear or
+/// cubic interpolation, and with tables that depend on the direction of travel. Parameters:
+/// 1. those of ParameterLayout: nodes of the tables, then squareness,
+/// 2. for TravelDependence::Backlash one value b per table, for Tables one difference D per node, in
+///    the order of the tables.
+/// The value of a table, with s = 1 forward, -1 backward and 0 before the first motion of its axis:
+///     U(q) + s b / 2    or    U(q) + s D(q) / 2
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "abbe/calib/estimation/axis_interpolation.hpp"
+#include "abbe/calib/estimation/machine_state.hpp"
+#include "abbe/calib/estimation/model_columns.hpp"
+#include "abbe/calib/parameter_layout.hpp"
+
+namespace abbe::calib::estimation {
+
+enum class TravelDependence { None, Backlash, Tables };
+
+struct TableOptions {
+  std::array<Interpolation, 3> interpolation{};  ///< of the tables of X, Y, Z
+  TravelDependence travel = TravelDependence::None;
+};
+
+/// Immutable value.
+class TableBasis {
+ public:
+  /// BadInput for too many nodes of a cubic.
+  [[nodiscard]] static Result<TableBasis> of(ParameterLayout, const TableOptions& = {});
+
+  [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
+  [[nodiscard]] const AxisInterpolation& interpolation(Axis a) const { return axis_[index(a)]; }
+  [[nodiscard]] TravelDependence travel() const { return travel_; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  /// Largest number of columns at one state.
+  [[nodiscard]] std::size_t most_columns() const { return most_columns_; }
+
+  /// Appends the columns. No allocation; needs space for most_columns().
+  void append_columns(const MachineState&, ModelColumns&) const;
+  /// V = M B U. No allocation.
+  [[nodiscard]] Vector3 V_m(const MachineState&, std::span<const double> U) const;
+
+  /// "EXX at -0.300 m", "EC0Y", "backlash of EXX", "travel difference of EXX at -0.300 m".
+  [[nodiscard]] std::string label(std::size_t parameter) const;
+
+ private:
+  explicit TableBasis(ParameterLayout layout) : layout_(std::move(layout)) {}
+  void append_travel_columns(const MachineState&, ModelColumns&) const;
+
+  ParameterLayout layout_;
+  std::array<AxisInterpolation, 3> axis_;
+  TravelDependence travel_ = TravelDependence::None;
+  std::size_t size_ = 0, most_columns_ = 0;
+};
+
+}  // namespace abbe::calib::estimation

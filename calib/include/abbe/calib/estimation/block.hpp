@@ -1,0 +1,29 @@
+#pragma once
+/// What `observe` of a method yields: observations that share noise and nuisances,
+///     y = A U + L c + noise,   c ~ N(0, diag u^2),   noise ~ N(0, C)
+/// U: unknowns that other blocks share (parameters of the model, scale of an instrument, artefact),
+/// c: nuisances of this block alone (pose, offset, clock).
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace abbe::calib::estimation {
+
+/// A nuisance without a prior.
+inline constexpr double kNoPrior = std::numeric_limits<double>::infinity();
+
+struct Block {
+  std::vector<std::size_t> unknowns;  ///< index in U of each column of A
+  Eigen::MatrixXd A;                  ///< rows x unknowns.size()
+  Eigen::MatrixXd L{};                ///< rows x nuisances; without columns: no nuisances
+  std::vector<double> u_nuisance{};   ///< standard deviation of the prior, or kNoPrior
+  Eigen::VectorXd y;
+  /// of y: rows x rows, or one column with the variances of independent rows
+  Eigen::MatrixXd covariance;
+  /// what is left out together in cross-validation; noise is independent between groups
+  std::size_t group = 0;
+};
+
+}  // namespace abbe::calib::estimation

@@ -1,0 +1,111 @@
+#include "estimation/triangle_update.hpp"
+
+#include <cmath>
+#include <vector>
+
+namespace abbe::calib::estimation {
+namespace {
+
+/// The reflection I - tau v v^T that moves a column of [triangle; rows] to its diagonal element.
+/// v = 1 at the diagonal.
+struct Reflection {
+  double tau = 0.0;
+  std::vector<double*> rows;  ///< rows that are not zero in the column
+  std::vector<double> v;      ///< of these rows
+};
+
+/// Computes the reflection of a column and the new diagonal element, which is not negative.
+void reflect_column(Reflection& r, double& diagonal, double* rows, std::size_t count,
+                    std::size_t width, std::size_t column) {
+  r.rows.clear();
+  r.v.clear();
+  double squares = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    double* row = rows + i * width;
+    if (const double value = row[column]; value != 0.0) {
+      r.rows.push_back(row);
+      r.v.push_back(value);
+      squares += value * value;
+      row[column] = 0.0;
+    }
+  }
+
+  if (r.rows.empty()) {
+    return;
+  }
+
+  // The column becomes -norm times the unit vector: no digits cancel, as the diagonal is not
+  // negative. The sign of the row is changed afterwards.
+  const double norm = std::sqrt(diagonal * diagonal + squares);
+  const double pivot = diagonal + norm;
+  r.tau = pivot / norm;
+  for (double& v : r.v) {
+    v /= pivot;
+  }
+  diagonal = norm;
+}
+
+/// sum = top + rows^T v, over the columns from `begin` to `end`. Four rows at a time: the sum is
+/// read and written less often. Each element is summed in the order of the rows.
+void project(const Reflection& r, const double* top, double* __restrict sum, std::size_t begin,
+             std::size_t end) {
+  const std::size_t n = r.rows.size();
+  for (std::size_t c = begin; c < end; ++c) {
+    sum[c] = top[c];
+  }
+
+  std::size_t i = 0;
+  for (; i + 4 <= n; i += 4) {
+    const double *a = r.rows[i], *b = r.rows[i + 1], *c = r.rows[i + 2], *d = r.rows[i + 3];
+    const double va = r.v[i], vb = r.v[i + 1], vc = r.v[i + 2], vd = r.v[i + 3];
+    for (std::size_t k = begin; k < end; ++k) {
+      sum[k] = sum[k] + va * a[k] + vb * b[k] + vc * c[k] + vd * d[k];
+    }
+  }
+
+  for (; i < n; ++i) {
+    const double* row = r.rows[i];
+    const double v = r.v[i];
+    for (std::size_t k = begin; k < end; ++k) {
+      sum[k] += v * row[k];
+    }
+  }
+}
+
+/// Applies the reflection with the projection `sum`; the row of the triangle changes its sign.
+void apply(const Reflection& r, double* top, double* __restrict sum, std::size_t begin,
+           std::size_t end) {
+  for (std::size_t c = begin; c < end; ++c) {
+    sum[c] *= r.tau;
+    top[c] = sum[c] - top[c];
+  }
+
+  for (std::size_t i = 0; i < r.rows.size(); ++i) {
+    double* __restrict row = r.rows[i];
+    const double v = r.v[i];
+    for (std::size_t c = begin; c < end; ++c) {
+      row[c] -= v * sum[c];
+    }
+  }
+}
+
+}  // namespace
+
+void update_triangle(double* triangle, double* rows, std::size_t count, std::size_t unknowns) {
+  const std::size_t width = unknowns + 1;
+  std::vector<double> sum(width);
+  Reflection r;
+  r.rows.reserve(count);
+  r.v.reserve(count);
+
+  for (std::size_t column = 0; column < unknowns; ++column) {
+    double* top = triangle + column * width;
+    reflect_column(r, top[column], rows, count, width, column);
+    if (!r.rows.empty()) {
+      project(r, top, sum.data(), column + 1, width);
+      apply(r, top, sum.data(), column + 1, width);
+    }
+  }
+}
+
+}  // namespace abbe::calib::estimation

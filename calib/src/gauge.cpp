@@ -6,6 +6,8 @@
 #include <iterator>
 #include <vector>
 
+#include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
 #include "message.hpp"
@@ -22,37 +24,69 @@ using Condition = Eigen::RowVectorXd;
 /// changes by the gradient times 1e-6 cells: 0.25 nm at the steepest gradient of 5 mm/m and 50 mm.
 constexpr double kAtNode = 1e-6;
 
-Condition zero_at(const ParameterLayout& layout, const Table& table, double position_m) {
-  Condition k = Condition::Zero(static_cast<Eigen::Index>(layout.fit_size()));
-  const BasisRow b = basis_row(layout.nodes()[index(table.motion.axis)].nodes_m, position_m);
-  const auto first = static_cast<Eigen::Index>(table.offset + b.first);
-  if (std::abs(b.weight[1]) < kAtNode) {
+Condition zero_at(const estimation::TableBasis& basis, const Table& table, double position_m,
+                  std::size_t unknowns) {
+  Condition k = Condition::Zero(static_cast<Eigen::Index>(unknowns));
+  const BasisRow cell =
+      basis_row(basis.layout().nodes()[index(table.motion.axis)].nodes_m, position_m);
+  const auto first = static_cast<Eigen::Index>(table.offset + cell.first);
+  if (std::abs(cell.weight[1]) < kAtNode) {
     k(first) = 1.0;
-  } else if (std::abs(b.weight[0]) < kAtNode) {
+  } else if (std::abs(cell.weight[0]) < kAtNode) {
     k(first + 1) = 1.0;
   } else {
-    k(first) = b.weight[0];
-    k(first + 1) = b.weight[1];
+    const estimation::NodeWeights weights = basis.interpolation(table.motion.axis).at(position_m);
+    for (std::size_t i = 0; i < weights.count(); ++i) {
+      k(static_cast<Eigen::Index>(table.offset + weights.first() + i)) = weights[i];
+    }
   }
   return k;
 }
 
+/// Linear tables of a layout. They cannot fail: only a cubic limits the number of nodes.
+estimation::TableBasis linear_basis(const ParameterLayout& layout) {
+  return *estimation::TableBasis::of(layout);
+}
+
+/// Adds complete data of one target: all three components at every node position.
+void add_complete_data(estimation::Information& data, const ParameterLayout& layout,
+                       const Vector3& target_m, std::size_t target) {
+  estimation::RowBatch batch(data.unknowns());
+  for (const Vector3& q : tensor_grid(layout.nodes())) {
+    const DesignColumns columns = design_columns_with_rigid(layout, q, target_m);
+    for (Eigen::Index component = 0; component < 3; ++component) {
+      std::vector<estimation::RowEntry> row;
+      for (const Column& c : columns.span()) {
+        row.push_back({c.parameter, c.dV_dU(component)});
+      }
+      if (target > 0) {
+        row.push_back(
+            {layout.fit_size() + 3 * (target - 1) + static_cast<std::size_t>(component), 1.0});
+      }
+      batch.append(row, 0.0, 1.0);
+      if (batch.full()) {
+        data.add(batch);
+      }
+    }
+  }
+  data.add(batch);
+}
+
 }  // namespace
 
-Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout& layout) {
+Eigen::MatrixXd gauge_conditions(Gauge, const estimation::TableBasis& basis, std::size_t unknowns) {
   std::vector<Condition> conditions;
-  for (const Table& table : layout.tables()) {
-    const AxisNodes& axis = layout.nodes()[index(table.motion.axis)];
+  for (const Table& table : basis.layout().tables()) {
+    const AxisNodes& axis = basis.layout().nodes()[index(table.motion.axis)];
     if (is_straightness(table.motion)) {
-      conditions.push_back(zero_at(layout, table, axis.nodes_m.front()));
-      conditions.push_back(zero_at(layout, table, axis.nodes_m.back()));
+      conditions.push_back(zero_at(basis, table, axis.nodes_m.front(), unknowns));
+      conditions.push_back(zero_at(basis, table, axis.nodes_m.back(), unknowns));
     } else {
-      conditions.push_back(zero_at(layout, table, axis.reference_m));
+      conditions.push_back(zero_at(basis, table, axis.reference_m, unknowns));
     }
   }
 
-  Eigen::MatrixXd K(static_cast<Eigen::Index>(conditions.size()),
-                    static_cast<Eigen::Index>(layout.fit_size()));
+  Eigen::MatrixXd K(std::ssize(conditions), static_cast<Eigen::Index>(unknowns));
   for (std::size_t i = 0; i < conditions.size(); ++i) {
     K.row(static_cast<Eigen::Index>(i)) = conditions[i];
   }
@@ -60,43 +94,18 @@ Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout& layout) {
   return K;
 }
 
+Eigen::MatrixXd gauge_conditions(Gauge gauge, const ParameterLayout& layout) {
+  return gauge_conditions(gauge, linear_basis(layout), layout.fit_size());
+}
+
 Eigen::MatrixXd unobservable_combinations(const ParameterLayout& layout,
                                           std::span<const Vector3> targets_m) {
-  const auto parameters = static_cast<Eigen::Index>(layout.fit_size());
-  const Eigen::Index n = parameters + 3 * std::max<Eigen::Index>(0, std::ssize(targets_m) - 1);
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-
+  const std::size_t more_targets = targets_m.empty() ? 0 : targets_m.size() - 1;
+  estimation::Information data(layout.fit_size() + 3 * more_targets);
   for (std::size_t target = 0; target < targets_m.size(); ++target) {
-    for (const Vector3& q : tensor_grid(layout.nodes())) {
-      const DesignColumns columns = design_columns_with_rigid(layout, q, targets_m[target]);
-      std::vector<Column> row(columns.span().begin(), columns.span().end());
-      for (std::size_t k = 0; k < 3 && target > 0; ++k) {
-        row.push_back({layout.fit_size() + 3 * (target - 1) + k,
-                       Vector3::Unit(static_cast<Eigen::Index>(k))});
-      }
-      for (const Column& i : row) {
-        for (const Column& j : row) {
-          H(static_cast<Eigen::Index>(i.parameter), static_cast<Eigen::Index>(j.parameter)) +=
-              i.dV_dU.dot(j.dV_dU);
-        }
-      }
-    }
+    add_complete_data(data, layout, targets_m[target], target);
   }
-
-  const Eigen::VectorXd scale =
-      H.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 1.0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H *
-                                                             scale.asDiagonal());
-
-  // The scaled eigenvalues of complete data form two groups for any order of the axes: above 5e-3,
-  // and at rounding level (1e-15). Any threshold between them is suitable.
-  constexpr double kZero = 1e-11;
-  Eigen::Index nullity = 0;
-  while (nullity < n && eigen.eigenvalues()(nullity) < kZero * eigen.eigenvalues()(n - 1)) {
-    ++nullity;
-  }
-
-  return (scale.asDiagonal() * eigen.eigenvectors().leftCols(nullity)).topRows(parameters);
+  return estimation::null_space(data).basis.topRows(static_cast<Eigen::Index>(layout.fit_size()));
 }
 
 Result<Eigen::VectorXd> to_gauge(Gauge gauge, const ParameterLayout& layout,
@@ -110,8 +119,8 @@ Result<Eigen::VectorXd> to_gauge(Gauge gauge, const ParameterLayout& layout,
                 layout.tables().size(), " tables undetermined, the gauge fixes ", K.rows(),
                 "; 18 tables need three offsets that are not on a line"));
   }
-  const Eigen::VectorXd z = (K * N).colPivHouseholderQr().solve(-(K * U));
-  return U + N * z;
+  return estimation::Datum(K).transformation(N).map(
+      [&](const Eigen::MatrixXd& S) -> Eigen::VectorXd { return S * U; });
 }
 
 }  // namespace abbe::calib

@@ -19,6 +19,7 @@
 #include <span>
 #include <string_view>
 
+#include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/parameter_layout.hpp"
 
@@ -37,7 +38,11 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
   return "G1";
 }
 
-/// Matrix K of gauge G1: one row per condition, fit_size() columns. The last six columns belong to
+/// Matrix K of gauge G1 for tables: one row per condition, `unknowns` columns. The columns behind
+/// those of the nodes are zero: squareness, differences between directions of travel, nuisances.
+[[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const estimation::TableBasis&,
+                                               std::size_t unknowns);
+/// The same for linear tables: one row per condition, fit_size() columns. The last six columns belong to
 /// the rigid unknowns and are zero.
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 

@@ -1,6 +1,7 @@
 /// Square-root information against its peers: the rows of one on-the-fly run (9,200 rows of 169
 /// unknowns, 38 entries each) are accumulated
 /// - by Householder reflections in batches (estimation::Information),
+/// - the same, rows of one cell first (estimation::information_of),
 /// - as normal equations, sparse,
 /// - by Eigen's dense QR of all rows at once,
 /// and the solutions are compared with that of the dense QR. Then four parts are merged, as in the
@@ -19,6 +20,7 @@
 
 #include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/estimation/information.hpp"
+#include "abbe/calib/estimation/sparse_information.hpp"
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
@@ -92,6 +94,14 @@ Information information_of(const Run& run, std::size_t part, std::size_t parts) 
   return data;
 }
 
+Information information_by_cell(const Run& run) {
+  std::vector<estimation::WeightedRow> rows;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    rows.push_back({run.rows[i], run.y[i], 1.0});
+  }
+  return estimation::information_of(run.layout.fit_size(), rows);
+}
+
 struct Squared {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
@@ -147,9 +157,13 @@ int main(int argc, char** argv) {
   Information data(unknowns);
   Squared squared;
   estimation::DatumSolution solution;
+  Eigen::VectorXd U;
   const double householder_ms = median_ms(runs, [&] { data = information_of(run, 0, 1); });
+  const double by_cell_ms = median_ms(runs, [&] { data = information_by_cell(run); });
   const double normal_ms = median_ms(runs, [&] { squared = normal_equations_of(run); });
   const double solve_ms = median_ms(runs, [&] { solution = datum.solve(data).value(); });
+
+  const double estimate_ms = median_ms(runs, [&] { U = datum.estimate(data).value(); });
 
   std::vector<Information> parts;
   for (std::size_t part = 0; part < 5; ++part) {
@@ -174,10 +188,12 @@ int main(int argc, char** argv) {
              solution.condition, solution.rank);
   fmt::print("  Householder in batches {:7.1f} ms, {:.0f} ns per row\n", householder_ms,
              1e6 * householder_ms / static_cast<double>(run.rows.size()));
+  fmt::print("  the same, by cells     {:7.1f} ms\n", by_cell_ms);
   fmt::print("  normal equations       {:7.1f} ms\n", normal_ms);
   fmt::print("  dense QR (Eigen)       {:7.1f} ms\n", dense_ms);
   fmt::print("  merge of four parts    {:7.1f} ms\n", merge_ms);
   fmt::print("  solution and covariance{:7.1f} ms\n", solve_ms);
+  fmt::print("  solution alone         {:7.1f} ms\n", estimate_ms);
   const double difference = (solution.U - dense).norm() / dense.norm();
   fmt::print("  solution against dense QR: {:.1e} relative (asked 1e-12)\n", difference);
 

@@ -61,6 +61,14 @@ TEST(Datum, CovarianceOfTheMeanIsThePseudoInverse) {
   EXPECT_LT((s.covariance - s.cofactor_Q * H * s.cofactor_Q).norm(), 1e-14);
 }
 
+TEST(Datum, EstimateIsTheSolutionWithoutItsCovariance) {
+  const Information data = Levelling().information();
+  for (const Datum& datum : {first_point_is_zero(), mean_is_zero()}) {
+    EXPECT_LT((*datum.estimate(data) - datum.solve(data)->U).norm(), 1e-15);
+  }
+  EXPECT_EQ(Datum(Eigen::MatrixXd(0, 4)).estimate(data).error().code, ErrorCode::RankDeficient);
+}
+
 TEST(Datum, SolutionDoesNotDependOnTheWeightOfTheConditions) {
   const Levelling net;
   const DatumSolution s = *mean_is_zero().solve(net.information());

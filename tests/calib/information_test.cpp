@@ -7,6 +7,7 @@
 #include <random>
 
 #include "abbe/calib/estimation/null_space.hpp"
+#include "abbe/calib/estimation/sparse_information.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -96,6 +97,42 @@ TEST(Information, IsTheSameFromSparseRowsInBatches) {
   information.add(batch);
   EXPECT_LT(difference(triangle(information), dense_triangle(r)), kRounding);
   EXPECT_EQ(information.rows(), 100u);
+}
+
+/// Sparse rows whose first column is 0, 1 or 2, as rows of three cells of an axis.
+std::vector<std::vector<RowEntry>> rows_of_three_cells(const Rows& r) {
+  std::vector<std::vector<RowEntry>> rows;
+  for (Eigen::Index i = 0; i < r.A.rows(); ++i) {
+    const Eigen::Index cell = i % 3;
+    std::vector<RowEntry>& row = rows.emplace_back();
+    for (const Eigen::Index j : {cell, cell + 1, cell + 5, Eigen::Index{9}}) {
+      row.push_back({static_cast<std::size_t>(j), r.A(i, j)});
+    }
+  }
+  return rows;
+}
+
+TEST(SparseInformation, IsThatOfAllRowsInOneTriangle) {
+  const Rows values = random_rows(90, 10, 6);
+  const std::vector<std::vector<RowEntry>> entries = rows_of_three_cells(values);
+  std::vector<WeightedRow> rows;
+  Rows dense{Eigen::MatrixXd::Zero(90, 10), 2.0 * values.y};
+  for (Eigen::Index i = 0; i < 90; ++i) {
+    rows.push_back({entries[static_cast<std::size_t>(i)], values.y(i), 2.0});
+    for (const RowEntry& e : entries[static_cast<std::size_t>(i)]) {
+      dense.A(i, static_cast<Eigen::Index>(e.column)) = 2.0 * e.value;
+    }
+  }
+
+  const Information information = information_of(10, rows);
+  EXPECT_LT(
+      difference(information.R().transpose() * information.R(), dense.A.transpose() * dense.A),
+      kRounding);
+  EXPECT_LT(
+      difference(information.R().transpose() * information.z(), dense.A.transpose() * dense.y),
+      kRounding);
+  EXPECT_NEAR(information.rest(), of_rows(dense).rest(), 1e-11);
+  EXPECT_EQ(information.rows(), 90u);
 }
 
 TEST(Information, OfAllRowsIsTheSumOfItsPartsInAnyGrouping) {
@@ -229,7 +266,8 @@ TEST(InformationByGroup, LeavesOutAGroup) {
   EXPECT_EQ(parts.of(7).rows(), 0u);
 }
 
-/// NIST StRD, Longley: observations and certified parameters (https://www.itl.nist.gov/div898/strd).
+/// NIST StRD, Longley: observations and certified parameters
+/// (https://www.itl.nist.gov/div898/strd).
 struct Longley {
   Rows rows{Eigen::MatrixXd(16, 7), Eigen::VectorXd(16)};
   Eigen::VectorXd certified{Eigen::VectorXd(7)};
@@ -319,12 +357,31 @@ TEST(NullSpace, SpansTheCombinationsThatNoRowSees) {
   Rows r = random_rows(80, 6, 7);
   r.A.col(2) = 1e3 * (r.A.col(0) - r.A.col(4));
   const NullSpace null = null_space(of_rows(r));
-  ASSERT_EQ(null.spectrum.rank, 5u);
+  ASSERT_EQ(null.rank, 5u);
   ASSERT_EQ(null.basis.cols(), 1);
   EXPECT_LT((r.A * null.basis).norm(), 1e-13);
   EXPECT_NEAR(null.basis(0, 0) / null.basis(2, 0), -1e3, 1e-8);
   EXPECT_LT(null.share(1), 1e-20);
   EXPECT_GT(null.share(0), 0.1);
+}
+
+TEST(PivotedRank, IsThatOfTheSingularValues) {
+  Rows r = random_rows(80, 6, 7);
+  EXPECT_EQ(pivoted_rank(of_rows(r)), 6u);
+  r.A.col(2) = 1e3 * (r.A.col(0) - r.A.col(4));
+  EXPECT_EQ(pivoted_rank(of_rows(r)), 5u);
+}
+
+/// With a datum defect of half the unknowns, and with columns of zeros.
+TEST(Spectrum, CountsTheRankOfAMatrixWithManyZeroSingularValues) {
+  const Rows r = random_rows(80, 24, 7);
+  Rows half = r;
+  half.A.rightCols(12) = r.A.leftCols(12) * r.A.topLeftCorner(12, 12);
+  half.A.col(3).setZero();
+  const Spectrum s = spectrum(of_rows(half));
+  EXPECT_EQ(s.rank, 12u);
+  EXPECT_LT(s.singular_values(12), 1e-14);
+  EXPECT_EQ(null_space(of_rows(half)).basis.cols(), 12);
 }
 
 /// A singular value of 1e-9 is far above rounding; squared it would be lost.

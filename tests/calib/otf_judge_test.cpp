@@ -143,7 +143,7 @@ TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
 
 /// Assigns every row of the parameter with the fewest rows to one fold; returns their number.
 std::size_t give_a_node_to_one_fold(Observations& o, std::size_t folds) {
-  std::vector<std::size_t> rows_of(o.layout.fit_size() - 6, 0);
+  std::vector<std::size_t> rows_of(o.basis.size(), 0);
   const auto each = [&](auto&& take) {
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       for (const auto& e : o.A.row(i)) {

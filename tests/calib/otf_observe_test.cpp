@@ -56,7 +56,8 @@ TEST(SampleCovariance, IsTheSphericalOneThroughItsJacobian) {
 /// A block that crosses a node: its row is the mean of the rows, not the row of the mean.
 TEST(DesignRows, AreAveragedOverTheBlock) {
   const Machine machine = case_a_machine();
-  Observations o{.layout = layout_of(machine), .target_offset_m = machine.target_offset_m};
+  Observations o{.basis = *estimation::TableBasis::of(layout_of(machine)),
+                 .target_offset_m = machine.target_offset_m};
   const std::vector<Vector3> sub{
       {0.045, 0.1, -0.1}, {0.049, 0.1, -0.1}, {0.053, 0.1, -0.1}, {0.057, 0.1, -0.1}};
   PointOnPath point;
@@ -69,8 +70,7 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
 
   for (const Vector3& q : sub) {
     mean +=
-        volumetric_error(o.layout, {U.data(), o.layout.model_size()}, q, machine.target_offset_m) /
-        4.0;
+        volumetric_error(o.layout(), {U.data(), o.basis.size()}, q, machine.target_offset_m) / 4.0;
   }
 
   U.conservativeResizeLike(Eigen::VectorXd::Zero(169));
@@ -82,7 +82,7 @@ TEST(DesignRows, AreAveragedOverTheBlock) {
     EXPECT_NEAR(predicted, o.rows[i].direction.dot(mean), 1e-18);
   }
 
-  const Vector3 at_mean = volumetric_error(o.layout, {U.data(), o.layout.model_size()},
+  const Vector3 at_mean = volumetric_error(o.layout(), {U.data(), o.basis.size()},
                                            point.axis_position_m, machine.target_offset_m);
   EXPECT_GT((at_mean - mean).norm(), 0.1e-6);  // the error of a row at the mean
 }

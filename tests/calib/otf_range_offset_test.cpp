@@ -44,7 +44,7 @@ struct Dense {
 /// motion and the gauge.
 Dense dense_solution(const Observations& o) {
   const auto rows = static_cast<Eigen::Index>(o.rows.size()),
-             n = static_cast<Eigen::Index>(o.layout.fit_size());
+             n = static_cast<Eigen::Index>(o.unknowns());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(rows + 1, n + 1);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(rows + 1);
   constexpr double kUnit_m = 1e-6;  // of the offset

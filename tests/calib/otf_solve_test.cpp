@@ -50,12 +50,12 @@ TEST(Identification, EndsWhenItIsStoppedWhereverItIs) {
 
 TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {
   const Observations o = observed(make_run({}));
-  const NormalEquations N = normal_equations(o);
-  const Adjustment reference = *adjust(N, o.layout, 1.0);
-  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, o.layout);
+  const RowInformation rows = information_of(o);
+  const Adjustment reference = *adjust(rows, o, 1.0);
+  const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, o.basis, o.unknowns());
 
   for (const double weight : {1e-3, 1e-1, 10.0, 1e3}) {
-    const Adjustment a = *adjust(N, o.layout, weight);
+    const Adjustment a = *adjust(rows, o, weight);
     EXPECT_LT((K * a.U).cwiseAbs().maxCoeff(), 1e-15) << weight;  // rounding of 1e-4
     EXPECT_LT((a.U - reference.U).cwiseAbs().maxCoeff(), 1e-12)
         << weight;  // of 1e-4: rounding x condition
@@ -67,18 +67,18 @@ TEST(Adjustment, MeetsTheGaugeExactlyWhateverItsWeight) {
 
 TEST(Adjustment, KnowsRankAndNullSpaceOfTheData) {
   const Observations o = observed(make_run({}));
-  const Adjustment a = *adjust(normal_equations(o), o.layout);
+  const Adjustment a = *adjust(information_of(o), o);
   EXPECT_EQ(a.datum_defect, 20u);
-  EXPECT_EQ(a.rank, o.layout.fit_size() - 20);
+  EXPECT_EQ(a.rank, o.unknowns() - 20);
   EXPECT_GT(a.condition, 1.0);
   EXPECT_LT(a.condition, 1e3);
 }
 
 TEST(Adjustment, HasNoUncertaintyWhereTheGaugeFixesAValue) {
   const Observations o = observed(make_run({}));
-  const Adjustment a = *adjust(normal_equations(o), o.layout);
+  const Adjustment a = *adjust(information_of(o), o);
   const auto first_straightness =
-      static_cast<Eigen::Index>(o.layout.find({Motion::Y, Axis::X})->offset);
+      static_cast<Eigen::Index>(o.layout().find({Motion::Y, Axis::X})->offset);
   EXPECT_EQ(a.U(first_straightness), 0.0);
   EXPECT_EQ(a.covariance.row(first_straightness).norm(), 0.0);
   EXPECT_GT(a.covariance(first_straightness + 1, first_straightness + 1), 0.0);
@@ -93,7 +93,7 @@ TEST(Adjustment, HasNoNegativeVarianceWhereRoundingPutsANodeBesideTheReference) 
                  [](double node_m) { return std::abs(node_m) < 0.301; });
     run.machine.nodes[0].nodes_m = within;
     const Observations o = observed(run);
-    const Adjustment a = *adjust(normal_equations(o), o.layout);
+    const Adjustment a = *adjust(information_of(o), o);
     EXPECT_GE(a.covariance.diagonal().minCoeff(), 0.0) << half_m;
     EXPECT_TRUE(solve(o, run.options)) << half_m;
   }
@@ -103,12 +103,12 @@ TEST(Adjustment, HasNoNegativeVarianceWhereRoundingPutsANodeBesideTheReference) 
 /// is valid for wrong weights too.
 TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
   Observations o = observed(make_run({}));
-  const Adjustment right = *adjust(normal_equations(o), o.layout);
+  const Adjustment right = *adjust(information_of(o), o);
   for (Observation& r : o.rows) {
     r.weight *= r.leg % 2 == 0 ? 4.0 : 0.25;
   }
 
-  const Adjustment wrong = *adjust(normal_equations(o), o.layout);
+  const Adjustment wrong = *adjust(information_of(o), o);
   // Gauss-Markov: no other weights give a smaller variance, in any direction.
   const Eigen::MatrixXd excess = wrong.covariance - right.covariance;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(excess, Eigen::EigenvaluesOnly);
@@ -120,7 +120,7 @@ TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
     r.weight = 7.0 / (r.sigma_m * r.sigma_m);
   }
 
-  EXPECT_TRUE(adjust(normal_equations(o), o.layout)->covariance.isApprox(right.covariance, 1e-9));
+  EXPECT_TRUE(adjust(information_of(o), o)->covariance.isApprox(right.covariance, 1e-9));
 }
 
 /// Same design, new white noise of the stated size, 40 times: k = 2 intervals must hold for 95.45 %
@@ -128,11 +128,10 @@ TEST(Adjustment, StatesTheCovarianceOfWrongWeights) {
 TEST(Adjustment, UncertaintyCoversTheTruth) {
   MadeRun run = make_run({});
   Observations o = observed(run);
-  Eigen::VectorXd with_rigid =
-      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.layout.fit_size()));
+  Eigen::VectorXd with_rigid = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
   with_rigid.head(run.truth.size()) = run.truth;
   const Eigen::VectorXd truth =
-      *to_gauge(Gauge::G1, o.layout, std::array{o.target_offset_m}, with_rigid);
+      *to_gauge(Gauge::G1, o.layout(), std::array{o.target_offset_m}, with_rigid);
   std::mt19937_64 random(99);
   std::normal_distribution<double> normal;
   std::size_t inside = 0, all = 0;
@@ -146,7 +145,7 @@ TEST(Adjustment, UncertaintyCoversTheTruth) {
       }
     }
 
-    const Adjustment a = *adjust(normal_equations(o), o.layout);
+    const Adjustment a = *adjust(information_of(o), o);
     for (Eigen::Index i = 0; i < truth.size(); ++i) {
       if (const double u = std::sqrt(a.covariance(i, i)); u > 0) {
         const double z = (a.U(i) - truth(i)) / u;
@@ -176,12 +175,12 @@ TEST(Adjustment, NamesNodesWithoutData) {
 TEST(Adjustment, RefusesAPathAlongTheAxesOnly) {
   const MadeRun run = make_run({});
   Observations o = observed(run);
-  const NormalEquations N = normal_equations(o, [&](const Observation& r) {
+  const RowInformation rows = information_of(o, [&](const Observation& r) {
     const Vector3 d = (run.path.vertices_m[r.leg + 1] - run.path.vertices_m[r.leg]).normalized();
     return d.cwiseAbs().maxCoeff() > 0.999;
   });
-  ASSERT_GT(N.rows, o.layout.fit_size());
-  const Result<Adjustment> a = adjust(N, o.layout);
+  ASSERT_GT(rows.data.rows(), o.unknowns());
+  const Result<Adjustment> a = adjust(rows, o);
   ASSERT_FALSE(a);
   EXPECT_EQ(a.error().code, ErrorCode::RankDeficient);
 }

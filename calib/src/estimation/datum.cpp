@@ -61,78 +61,129 @@ Eigen::MatrixXd scaled_conditions(const Eigen::MatrixXd& K, const Eigen::VectorX
   return rows;
 }
 
-/// Sets unknowns to exactly zero, in value and covariance, if a condition consists of this unknown
-/// alone.
-void set_fixed_to_zero(const Eigen::MatrixXd& K, DatumSolution& s) {
+/// Unknowns with a condition of their own: they are exactly zero, in value and covariance.
+std::vector<Eigen::Index> fixed_alone(const Eigen::MatrixXd& K) {
+  std::vector<Eigen::Index> fixed;
   for (Eigen::Index i = 0; i < K.rows(); ++i) {
-    if ((K.row(i).array() != 0).count() != 1) {
-      continue;
+    if ((K.row(i).array() != 0).count() == 1) {
+      K.row(i).cwiseAbs().maxCoeff(&fixed.emplace_back());
     }
-    Eigen::Index fixed = 0;
-    K.row(i).cwiseAbs().maxCoeff(&fixed);
-    s.U(fixed) = 0.0;
-    s.covariance.row(fixed).setZero();
-    s.covariance.col(fixed).setZero();
-    s.cofactor_Q.row(fixed).setZero();
   }
+  return fixed;
+}
+
+Result<void> check_solvable(const Information& data, const DatumOptions& options) {
+  if (!(options.weight > 0)) {
+    return failure(ErrorCode::BadInput,
+                   message("adjustment: gauge weight ", options.weight, " must be positive"));
+  }
+  return check_every_unknown(data, options);
+}
+
+Result<void> check_rank(const Information& data, std::size_t rank, Eigen::Index conditions,
+                        const DatumOptions& options) {
+  const std::size_t fixed = static_cast<std::size_t>(conditions);
+  if (rank + fixed >= data.unknowns()) {
+    return {};
+  }
+  return failure(ErrorCode::RankDeficient,
+                 message("adjustment: rank ", rank, " from ", data.rows(), " observations, needs ",
+                         data.unknowns() - fixed, "; not determined: combinations of ",
+                         largest_shares(null_space(data).share, options)));
+}
+
+/// Triangle T of [R; sqrt(mu) K] of the unknowns divided by `scale`.
+struct BorderedTriangle {
+  Eigen::VectorXd scale;
+  Eigen::MatrixXd T;
+  Eigen::VectorXd z;
+};
+
+Result<BorderedTriangle> bordered_triangle(const Information& data, const Eigen::MatrixXd& K,
+                                           double weight) {
+  const Eigen::VectorXd scale = column_scale(data);
+  Information bordered(data.unknowns());
+  bordered.add_rows(data.R() * scale.asDiagonal(), data.z());
+  bordered.add_rows(scaled_conditions(K, scale, weight), Eigen::VectorXd::Zero(K.rows()));
+
+  // A combination that neither data nor conditions determine leaves only rounding on the diagonal.
+  constexpr double kZero = 1e-11;
+  BorderedTriangle result{scale, bordered.R(), bordered.z()};
+  if (!(result.T.diagonal().minCoeff() > kZero)) {
+    return failure(
+        ErrorCode::RankDeficient,
+        message("adjustment: the conditions of the gauge do not fix all combinations of ",
+                data.unknowns(), " unknowns that the data leave undetermined"));
+  }
+  return result;
 }
 
 }  // namespace
 
 Result<DatumSolution> Datum::solve(const Information& data, const DatumOptions& options) const {
-  if (!(options.weight > 0)) {
-    return failure(ErrorCode::BadInput,
-                   message("adjustment: gauge weight ", options.weight, " must be positive"));
-  }
-
-  if (Result<void> valid = check_every_unknown(data, options); !valid) {
+  if (Result<void> valid = check_solvable(data, options); !valid) {
     return tl::unexpected(valid.error());
   }
 
   const Spectrum of_data = spectrum(data);
-  const auto conditions = static_cast<std::size_t>(K_.rows());
-  const std::size_t unknowns = data.unknowns();
-  if (of_data.rank + conditions < unknowns) {
-    return failure(
-        ErrorCode::RankDeficient,
-        message("adjustment: rank ", of_data.rank, " from ", data.rows(), " observations, needs ",
-                unknowns - conditions, "; not determined: combinations of ",
-                largest_shares(null_space(data).share, options)));
+  if (Result<void> valid = check_rank(data, of_data.rank, K_.rows(), options); !valid) {
+    return tl::unexpected(valid.error());
   }
 
-  // [R; sqrt(mu) K] of the scaled unknowns.
-  const Eigen::VectorXd scale = column_scale(data);
-  const Eigen::MatrixXd R = data.R() * scale.asDiagonal();
-  Information bordered(unknowns);
-  bordered.add_rows(R, data.z());
-  bordered.add_rows(scaled_conditions(K_, scale, options.weight), Eigen::VectorXd::Zero(K_.rows()));
-  // A combination that neither data nor conditions determine leaves only rounding on the diagonal.
-  const Eigen::MatrixXd T = bordered.R();
-  if (!(T.diagonal().minCoeff() > of_data.threshold)) {
-    return failure(
-        ErrorCode::RankDeficient,
-        message("adjustment: the conditions of the gauge do not fix all combinations of ", unknowns,
-                " unknowns that the data leave undetermined"));
+  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options.weight);
+  if (!bordered) {
+    return tl::unexpected(bordered.error());
   }
 
-  const auto n = static_cast<Eigen::Index>(unknowns);
+  const Eigen::VectorXd& scale = bordered->scale;
+  const auto n = scale.size();
   const Eigen::MatrixXd T_inverse =
-      T.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
+      bordered->T.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
   const Eigen::MatrixXd noise =
-      options.noise == nullptr ? R : Eigen::MatrixXd(options.noise->R() * scale.asDiagonal());
+      (options.noise == nullptr ? data : *options.noise).R() * scale.asDiagonal();
   const Eigen::MatrixXd scaled_T_inverse = scale.asDiagonal() * T_inverse;
   const Eigen::MatrixXd G = scaled_T_inverse * (noise * T_inverse).transpose();
 
   DatumSolution s;
-  s.U = scaled_T_inverse * bordered.z();
+  s.U = scaled_T_inverse * bordered->z;
   s.covariance = G * G.transpose();
   s.cofactor_Q = scaled_T_inverse * scaled_T_inverse.transpose();
   s.rank = of_data.rank;
-  s.datum_defect = unknowns - of_data.rank;
+  s.datum_defect = data.unknowns() - of_data.rank;
   s.condition = of_data.condition;
-  set_fixed_to_zero(K_, s);
+  for (const Eigen::Index fixed : fixed_alone(K_)) {
+    s.U(fixed) = 0.0;
+    s.covariance.row(fixed).setZero();
+    s.covariance.col(fixed).setZero();
+    s.cofactor_Q.row(fixed).setZero();
+  }
 
   return s;
+}
+
+Result<Eigen::VectorXd> Datum::estimate(const Information& data,
+                                        const DatumOptions& options) const {
+  if (Result<void> valid = check_solvable(data, options); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  if (Result<void> valid = check_rank(data, pivoted_rank(data), K_.rows(), options); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options.weight);
+  if (!bordered) {
+    return tl::unexpected(bordered.error());
+  }
+
+  Eigen::VectorXd U =
+      bordered->scale.asDiagonal() *
+      Eigen::VectorXd(bordered->T.triangularView<Eigen::Upper>().solve(bordered->z));
+  for (const Eigen::Index fixed : fixed_alone(K_)) {
+    U(fixed) = 0.0;
+  }
+
+  return U;
 }
 
 Result<Eigen::MatrixXd> Datum::transformation(const Eigen::MatrixXd& null_space) const {

@@ -168,6 +168,21 @@ Information& Information::operator+=(const Information& other) {
   return *this;
 }
 
+void Information::add(const Information& part, std::span<const std::size_t> at) {
+  std::vector<double> rows(part.unknowns_ * (unknowns_ + 1));
+  for (std::size_t i = 0; i < part.unknowns_; ++i) {
+    double* to = rows.data() + i * (unknowns_ + 1);
+    for (std::size_t k = i; k < part.unknowns_; ++k) {
+      to[at[k]] = part.row(i)[k];
+    }
+    to[unknowns_] = part.row(i)[part.unknowns_];
+  }
+
+  add_dense(rows.data(), part.unknowns_);
+  rest_ += part.rest_;
+  rows_ += part.rows_;
+}
+
 void Information::forget(double factor) {
   const double root = std::sqrt(factor);
   for (double& value : values_) {

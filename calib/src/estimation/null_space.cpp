@@ -1,6 +1,9 @@
 #include "abbe/calib/estimation/null_space.hpp"
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Householder>
+#include <Eigen/QR>
+
 #include <cmath>
 #include <limits>
 
@@ -9,32 +12,54 @@
 namespace abbe::calib::estimation {
 namespace {
 
-using SingularValues = Eigen::BDCSVD<Eigen::MatrixXd>;
-
 Eigen::MatrixXd scaled_R(const Information& data) {
   return data.R() * column_scale(data).asDiagonal();
 }
 
-Spectrum spectrum_of(const SingularValues& svd, const Information& data) {
-  Spectrum s;
-  s.singular_values = svd.singularValues();
-  const Eigen::Index n = s.singular_values.size();
+double rounding_of(const Information& data) {
+  return static_cast<double>(data.unknowns()) * std::sqrt(static_cast<double>(data.rows())) *
+         std::numeric_limits<double>::epsilon();
+}
+
+/// Entries d_1 e_1 d_2 e_2 .. d_n of the upper bidiagonal matrix with the singular values of A
+/// ([Golub 2013] section 5.4.8): one Householder reflection from the left and one from the right
+/// for every row.
+Eigen::VectorXd bidiagonal(Eigen::MatrixXd A) {
+  const Eigen::Index n = A.rows();
+  Eigen::VectorXd entries(2 * n - 1), work(n), v(n);
+  double tau = 0.0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index rest = n - k - 1;
+    auto below = v.head(rest);
+    A.col(k).tail(rest + 1).makeHouseholder(below, tau, entries(2 * k));
+    A.bottomRightCorner(rest + 1, rest).applyHouseholderOnTheLeft(below, tau, work.data());
+    if (rest > 0) {
+      auto right = v.head(rest - 1);
+      A.row(k).tail(rest).transpose().makeHouseholder(right, tau, entries(2 * k + 1));
+      A.bottomRightCorner(rest, rest).applyHouseholderOnTheRight(right, tau, work.data());
+    }
+  }
+  return entries;
+}
+
+/// Singular values of a square matrix, descending, with an error of eps times the largest. They are
+/// the non-negative eigenvalues of the tridiagonal matrix with a zero diagonal and the entries of
+/// the bidiagonal one beside it ([Golub 2013] section 8.6.1): nothing is squared. (Eigen 3.4's
+/// BDCSVD fails an assertion for some singular matrices; its JacobiSVD is slower.)
+Eigen::VectorXd singular_values_of(const Eigen::MatrixXd& A) {
+  const Eigen::Index n = A.rows();
   if (n == 0) {
-    return s;
+    return {};
   }
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen;
+  eigen.computeFromTridiagonal(Eigen::VectorXd::Zero(2 * n), bidiagonal(A), Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues().tail(n).reverse().cwiseMax(0.0);
+}
 
-  s.threshold = static_cast<double>(n) * std::sqrt(static_cast<double>(data.rows())) *
-                std::numeric_limits<double>::epsilon() * s.singular_values(0);
-  while (static_cast<Eigen::Index>(s.rank) < n &&
-         s.singular_values(static_cast<Eigen::Index>(s.rank)) > s.threshold) {
-    ++s.rank;
-  }
-
-  if (s.rank > 0) {
-    s.condition = s.singular_values(0) / s.singular_values(static_cast<Eigen::Index>(s.rank) - 1);
-  }
-
-  return s;
+Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(const Information& data) {
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled_R(data));
+  qr.setThreshold(rounding_of(data));
+  return qr;
 }
 
 }  // namespace
@@ -49,18 +74,47 @@ Eigen::VectorXd column_scale(const Information& data) {
 }
 
 Spectrum spectrum(const Information& data) {
-  return spectrum_of(SingularValues(scaled_R(data)), data);
+  Spectrum s;
+  s.singular_values = singular_values_of(scaled_R(data));
+  const Eigen::Index n = s.singular_values.size();
+  if (n == 0) {
+    return s;
+  }
+
+  s.threshold = rounding_of(data) * s.singular_values(0);
+  while (static_cast<Eigen::Index>(s.rank) < n &&
+         s.singular_values(static_cast<Eigen::Index>(s.rank)) > s.threshold) {
+    ++s.rank;
+  }
+
+  if (s.rank > 0) {
+    s.condition = s.singular_values(0) / s.singular_values(static_cast<Eigen::Index>(s.rank) - 1);
+  }
+
+  return s;
+}
+
+std::size_t pivoted_rank(const Information& data) {
+  return static_cast<std::size_t>(pivoted(data).rank());
 }
 
 NullSpace null_space(const Information& data) {
-  const SingularValues svd(scaled_R(data), Eigen::ComputeFullV);
-  NullSpace result{.spectrum = spectrum_of(svd, data)};
-  const Eigen::Index n = svd.matrixV().cols();
-  const Eigen::MatrixXd null =
-      svd.matrixV().rightCols(n - static_cast<Eigen::Index>(result.spectrum.rank));
-  result.basis = column_scale(data).asDiagonal() * null;
-  result.share = null.rowwise().squaredNorm();
-  return result;
+  // R P = Q [R11 R12; 0 0]: the columns of P [-R11^-1 R12; I] span the null space.
+  const auto qr = pivoted(data);
+  const Eigen::Index n = qr.cols(), rank = qr.rank();
+  Eigen::MatrixXd null(n, n - rank);
+  null.topRows(rank) = -qr.matrixQR()
+                            .topLeftCorner(rank, rank)
+                            .triangularView<Eigen::Upper>()
+                            .solve(qr.matrixQR().topRightCorner(rank, n - rank));
+  null.bottomRows(n - rank).setIdentity();
+  null = qr.colsPermutation() * null;
+
+  const Eigen::HouseholderQR<Eigen::MatrixXd> orthogonal(null);
+  null = orthogonal.householderQ() * Eigen::MatrixXd::Identity(n, n - rank);
+  return {.rank = static_cast<std::size_t>(rank),
+          .basis = column_scale(data).asDiagonal() * null,
+          .share = null.rowwise().squaredNorm()};
 }
 
 }  // namespace abbe::calib::estimation

@@ -71,7 +71,7 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
     }
     case Cause::Backlash:
       for (const Axis axis : kAllAxes) {
-        const Vector3 l = lever(o_.layout.chain(), axis, row.axis_position_m, o_.target_offset_m);
+        const Vector3 l = lever(o_.layout().chain(), axis, row.axis_position_m, o_.target_offset_m);
         const Vector3 moment = l.cross(row.direction);
         const double half = 0.5 * direction_[row.leg][index(axis)];
         for (std::size_t k = 0; k < 3; ++k) {
@@ -110,7 +110,7 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
 AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> residual_m) const {
   constexpr std::size_t kPlaces = 100, kMargin = 2;
   const std::size_t rows = o_.rows.size(), stride = std::max<std::size_t>(2, rows / kPlaces);
-  AddedColumns sum(kRigid, o_.layout.fit_size());
+  AddedColumns sum(kRigid, o_.unknowns());
   Family before;
   Values v{};
 
@@ -146,8 +146,7 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
     if (const auto found = std::find_if(last, end, is_same); found != end) {
       return *found;
     }
-    return all[family].emplace_back(Added{cause, place},
-                                    AddedColumns(columns, o_.layout.fit_size()));
+    return all[family].emplace_back(Added{cause, place}, AddedColumns(columns, o_.unknowns()));
   };
 
   Values v{};

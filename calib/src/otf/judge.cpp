@@ -12,6 +12,7 @@
 #include "certainty.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/gauge_of.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -28,15 +29,14 @@ struct Remainder {
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
-/// Number of parameters of the best-fit rigid motion. It fits this many rows or fewer exactly for
-/// any model; their residuals are only rounding and cannot be used for a comparison.
-constexpr std::size_t kRigidUnknowns = 6;
-
-/// The last six entries of a row belong to the rigid unknowns.
-Vector6 rigid_row(std::span<const SparseRows::Entry> row) {
-  Vector6 r;
-  for (std::size_t k = 0; k < 6; ++k) {
-    r(static_cast<Eigen::Index>(k)) = row[row.size() - 6 + k].value;
+/// The entries of the rigid unknowns. A best-fit rigid motion fits kRigidUnknowns rows or fewer
+/// exactly for any model; their residuals are only rounding and cannot be used for a comparison.
+Vector6 rigid_row(const Observations& o, std::size_t row) {
+  Vector6 r = Vector6::Zero();
+  for (const SparseRows::Entry& e : o.A.row(row)) {
+    if (e.column >= o.rigid_offset()) {
+      r(static_cast<Eigen::Index>(e.column - o.rigid_offset())) = e.value;
+    }
   }
   return r;
 }
@@ -48,7 +48,7 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 g = Vector6::Zero();
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Vector6 a = rigid_row(o.A.row(rows[i]));
+    const Vector6 a = rigid_row(o, rows[i]);
     const double sigma_m = o.rows[rows[i]].sigma_m, weight = 1.0 / (sigma_m * sigma_m);
     H.noalias() += weight * a * a.transpose();
     g += weight * residual_m[i] * a;
@@ -58,7 +58,7 @@ void add_without_rigid(Remainder& total, const Observations& o, std::span<const 
   // motion; the undetermined part is then set to zero.
   const Vector6 rigid = H.completeOrthogonalDecomposition().solve(g);
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const double rest_m = residual_m[i] - rigid_row(o.A.row(rows[i])).dot(rigid);
+    const double rest_m = residual_m[i] - rigid_row(o, rows[i]).dot(rigid);
     const double whitened = rest_m / o.rows[rows[i]].sigma_m;
     total.whitened_squares += whitened * whitened;
     total.squares_m2 += rest_m * rest_m;
@@ -111,25 +111,28 @@ std::vector<double> residuals(const Observations& o, std::span<const std::size_t
   return r;
 }
 
-std::vector<NormalEquations> equations_by_fold(const Observations& o, std::size_t folds) {
-  std::vector<NormalEquations> parts;
+std::vector<RowInformation> information_by_fold(const Observations& o, std::size_t folds) {
+  std::vector<RowInformation> parts;
   for (std::size_t f = 0; f < folds; ++f) {
-    parts.push_back(normal_equations(o, [&](const Observation& r) { return r.leg % folds == f; }));
+    parts.push_back(information_of(o, [&](const Observation& r) { return r.leg % folds == f; }));
   }
   return parts;
 }
 
 /// Marks the legs of the fold that observe a parameter without observations in the other folds.
-std::vector<bool> legs_needed(const Observations& o, const NormalEquations& others,
+std::vector<bool> legs_needed(const Observations& o, const estimation::Information& others,
                               std::size_t fold, std::size_t folds) {
-  std::vector<bool> needed(o.rows.back().leg + 1, false);
+  std::vector<bool> needed(o.rows.back().leg + 1, false), unseen(o.unknowns());
+  for (std::size_t unknown = 0; unknown < unseen.size(); ++unknown) {
+    unseen[unknown] = !(others.squared_length(unknown) > 0.0);
+  }
+
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].leg % folds != fold) {
       continue;
     }
     for (const SparseRows::Entry& e : o.A.row(i)) {
-      const auto column = static_cast<Eigen::Index>(e.column);
-      if (e.value != 0.0 && !(others.H(column, column) > 0.0)) {
+      if (e.value != 0.0 && unseen[e.column]) {
         needed[o.rows[i].leg] = true;
       }
     }
@@ -145,31 +148,32 @@ struct HeldOutFold {
 
 /// Fits U without the legs of a fold. A leg with the only observations of a node remains in the
 /// fit. If the model is not determined even then, the result has no held-out rows.
-Result<HeldOutFold> hold_out(const std::vector<NormalEquations>& parts, std::size_t fold,
+Result<HeldOutFold> hold_out(const std::vector<RowInformation>& parts, std::size_t fold,
                              const Observations& o, const Options& options) {
-  NormalEquations training(o.layout.fit_size());
+  estimation::Information training(o.unknowns());
   for (std::size_t f = 0; f < parts.size(); ++f) {
     if (f != fold) {
-      training += parts[f];
+      training += parts[f].data;
     }
   }
 
   const std::vector<bool> needed = legs_needed(o, training, fold, parts.size());
   if (std::find(needed.begin(), needed.end(), true) != needed.end()) {
-    training += normal_equations(o, [&](const Observation& r) { return needed[r.leg]; });
+    training += information_of(o, [&](const Observation& r) { return needed[r.leg]; }).data;
   }
 
-  const Result<Adjustment> a = adjust(training, o.layout, options.gauge_weight);
-  if (!a && a.error().code == ErrorCode::RankDeficient) {
+  const Result<Eigen::VectorXd> U =
+      gauge_of(o).estimate(training, {.weight = options.gauge_weight});
+  if (!U && U.error().code == ErrorCode::RankDeficient) {
     return HeldOutFold{};
   }
 
-  if (!a) {
-    return failure(a.error().code, message("held-out test without fold ", fold, " of ",
-                                           parts.size(), ": ", a.error().text));
+  if (!U) {
+    return failure(U.error().code, message("held-out test without fold ", fold, " of ",
+                                           parts.size(), ": ", U.error().text));
   }
 
-  HeldOutFold held{a->U, {}};
+  HeldOutFold held{*U, {}};
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     if (o.rows[i].leg % parts.size() == fold && !needed[o.rows[i].leg]) {
       held.rows.push_back(i);
@@ -214,7 +218,7 @@ void require_plausible_scale(Verdict& verdict, double scale, double most) {
 
 /// Notes for scale errors that residuals do not show and for which no uncertainty is given.
 void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
-  const std::vector<Vector3> at = tensor_grid(o.layout.nodes());
+  const std::vector<Vector3> at = tensor_grid(o.layout().nodes());
   Vector3 centre = Vector3::Zero();
   for (const Vector3& q : at) {
     centre += q / static_cast<double>(at.size());
@@ -270,7 +274,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
   }
 
   const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
-  const std::vector<NormalEquations> parts = equations_by_fold(o, folds);
+  const std::vector<RowInformation> parts = information_by_fold(o, folds);
   Remainder none, candidate, other, candidate_beside;
 
   for (std::size_t f = 0; f < folds; ++f) {
@@ -340,7 +344,7 @@ Result<Verdict> judge(const Observations& measured, const Solution& solution,
   Verdict verdict = decide(solution.model, *figures, limits, active);
   add_alternatives(verdict, *others);
   require_plausible_scale(verdict, common_scale_error(solution.model), limits.max_scale_error);
-  require_orientation(verdict, {o.vertices_m}, o.layout.nodes(), o.target_offset_m,
+  require_orientation(verdict, {o.vertices_m}, o.layout().nodes(), o.target_offset_m,
                       o.alignment.T_machine_tracker, options.orientation);
   const CorrectionSize size = correction_size(solution.model);
   require_certainty(verdict, size.V_m, size.u_m);

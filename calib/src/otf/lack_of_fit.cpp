@@ -92,7 +92,7 @@ RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
 struct Fit {
   const Observations& o;
   const std::vector<double>& residual_m;
-  Adjustment adjustment;
+  const Adjustment& adjustment;
   ResidualNoise noise;
   std::size_t degrees_of_freedom = 0;
   double chi2 = 0.0;
@@ -105,20 +105,15 @@ struct Fit {
   }
 };
 
-Result<Fit> fit_of(const Observations& o, const Solution& solution, const Options& options) {
-  Result<Adjustment> a = adjust(normal_equations(o), o.layout, options.gauge_weight);
-  if (!a) {
-    return tl::unexpected(a.error());
-  }
-
+Fit fit_of(const Observations& o, const Solution& solution) {
   const std::size_t dof = solution.statistics.degrees_of_freedom;
   Fit fit{.o = o,
           .residual_m = solution.residuals.after_m,
-          .adjustment = *std::move(a),
+          .adjustment = solution.adjustment,
           .noise = residual_noise(o, solution.residuals.after_m, dof),
           .degrees_of_freedom = dof,
           .chi2 = solution.statistics.chi2,
-          .norm = rigid_free_norm(o.layout, o.target_offset_m)};
+          .norm = rigid_free_norm(o.layout(), o.target_offset_m)};
   fit.u_white_m = fit.norm.rms_u_m(fit.adjustment.covariance);
 
   return fit;
@@ -224,16 +219,18 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
                                                 Result<ParameterLayout> layout, Cause cause,
                                                 std::string text, const Options& options) {
   constexpr std::size_t kMostUnknowns = 800;  // the adjustment then takes one second
-  if (!layout || layout->fit_size() > kMostUnknowns) {
+  Result<estimation::TableBasis> basis =
+      std::move(layout).and_then([](ParameterLayout l) { return estimation::TableBasis::of(l); });
+  if (!basis || basis->size() > kMostUnknowns) {
     return std::nullopt;
   }
 
-  const Observations other = with_layout(fit.o, *std::move(layout));
+  const Observations other = with_basis(fit.o, *std::move(basis));
   if (Result<void> running = check_stopped(options.stopped); !running) {
     return tl::unexpected(running.error());
   }
 
-  const Result<Adjustment> a = adjust(normal_equations(other), other.layout, options.gauge_weight);
+  const Result<Adjustment> a = adjust(information_of(other), other, options.gauge_weight);
   if (!a || other.rows.size() <= a->rank) {
     return std::nullopt;
   }
@@ -253,15 +250,14 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
 
   std::vector<Vector3> points, difference;
   const Vector3& t = fit.o.target_offset_m;
-  for (const Vector3& q : sparse_grid(other.layout.nodes())) {
+  for (const Vector3& q : sparse_grid(other.layout().nodes())) {
     points.push_back(q + t);
-    difference.push_back(
-        solution.model.V_at(q, t) -
-        volumetric_error(other.layout, {a->U.data(), other.layout.model_size()}, q, t));
+    difference.push_back(solution.model.V_at(q, t) -
+                         volumetric_error(other.layout(), {a->U.data(), other.basis.size()}, q, t));
   }
 
   const auto bias = rigid_free(points, difference);
-  const double u_m = rigid_free_norm(other.layout, t).rms_u_m(a->covariance) * std::sqrt(factor);
+  const double u_m = rigid_free_norm(other.layout(), t).rms_u_m(a->covariance) * std::sqrt(factor);
 
   // Tables with too wide nodes have errors everywhere. A change of V that is covered by the stated
   // (increased) uncertainty must not refuse the model.
@@ -278,7 +274,7 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
                                                const Options& options) {
   std::array<char, 3> order{'X', 'Y', 'Z'};
   std::string used;
-  for (const Axis a : fit.o.layout.chain().order_w_to_t()) {
+  for (const Axis a : fit.o.layout().chain().order_w_to_t()) {
     used += letter(a);
   }
 
@@ -294,7 +290,7 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
       continue;
     }
     auto found = other_design(
-        fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout.nodes()),
+        fit, solution, ParameterLayout::observable_with_one_target(*chain, fit.o.layout().nodes()),
         Cause::ChainOrder,
         message("the order of the axes from workpiece to tool is ", letters, ", not ", used,
                 " as in the machine's chain"),
@@ -312,7 +308,7 @@ Result<std::optional<Alternative>> other_order(const Fit& fit, const Solution& s
 
 Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& solution,
                                                 const Options& options) {
-  MachineNodes closer = fit.o.layout.nodes();
+  MachineNodes closer = fit.o.layout().nodes();
   double widest_m = 0.0;
   for (AxisNodes& axis : closer) {
     std::vector<double> nodes_m;
@@ -325,7 +321,7 @@ Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& 
     axis.nodes_m = std::move(nodes_m);
   }
 
-  auto layout = ParameterLayout::observable_with_one_target(fit.o.layout.chain(), closer);
+  auto layout = ParameterLayout::observable_with_one_target(fit.o.layout().chain(), closer);
   return other_design(fit, solution, std::move(layout), Cause::NodeSpacing,
                       message("the nodes are too far apart (", 1e3 * widest_m,
                               " mm) for the errors of this machine"),
@@ -418,19 +414,15 @@ std::string_view name(Cause cause) {
 
 Result<std::vector<Alternative>> alternatives(const Observations& o, const Solution& solution,
                                               const Options& options) {
-  const Result<Fit> fit = fit_of(o, solution, options);
-  if (!fit) {
-    return tl::unexpected(fit.error());
-  }
-
+  const Fit fit = fit_of(o, solution);
   const AlternativeColumns columns(o);
   std::vector<Alternative> found;
   for (const auto& family : columns.sums(solution.residuals.after_m)) {
     const bool has_prior = o.u_range_offset_m > 0.0 && !family.empty() &&
                            family.front().first.cause == Cause::RangeOffset;
     Result<std::optional<Alternative>> best =
-        has_prior ? offset_beyond_prior(*fit, columns, family, solution.range_offset)
-                  : best_of(*fit, columns, family, options);
+        has_prior ? offset_beyond_prior(fit, columns, family, solution.range_offset)
+                  : best_of(fit, columns, family, options);
     if (!best) {
       return tl::unexpected(best.error());
     }
@@ -439,9 +431,9 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
     }
   }
 
-  if (fit->noise.variance_factor() > kSuspicious && fit->excess() > 0.0) {
+  if (fit.noise.variance_factor() > kSuspicious && fit.excess() > 0.0) {
     for (const auto design : {other_order, closer_nodes}) {
-      Result<std::optional<Alternative>> better = design(*fit, solution, options);
+      Result<std::optional<Alternative>> better = design(fit, solution, options);
       if (!better) {
         return tl::unexpected(better.error());
       }
@@ -456,16 +448,16 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   });
 
   constexpr double kHalf = 0.5;
-  if (fit->noise.correlation > kSuspicious && fit->noise.variance_factor() > kSuspicious &&
+  if (fit.noise.correlation > kSuspicious && fit.noise.variance_factor() > kSuspicious &&
       (found.empty() || found.front().explained < kHalf)) {
     found.insert(
         found.begin(),
         {.cause = Cause::CorrelatedNoise,
-         .text = message("the residuals are correlated over ", fit->noise.correlation,
+         .text = message("the residuals are correlated over ", fit.noise.correlation,
                          " blocks: air turbulence, vibration, or an effect that is not modelled"),
          .explained = 1.0,
          .bias_m = 0.0,
-         .u_m = fit->u_white_m * std::sqrt(fit->noise.variance_factor())});
+         .u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor())});
   }
 
   return found;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abbe/calib/rigid_body_model.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
 
@@ -13,19 +12,20 @@ namespace {
 /// Columns of M B averaged over positions, sorted by parameter index.
 class MeanColumns {
  public:
-  void add(std::span<const Column> columns) {
+  void add(std::span<const estimation::Column> columns) {
     if (++count_ == 1) {
       sum_.assign(columns.begin(), columns.end());
       return;
     }
 
     auto at = sum_.begin();
-    for (const Column& c : columns) {
-      at = std::lower_bound(
-          at, sum_.end(), c.parameter,
-          [](const Column& s, std::size_t parameter) { return s.parameter < parameter; });
+    for (const estimation::Column& c : columns) {
+      at = std::lower_bound(at, sum_.end(), c.parameter,
+                            [](const estimation::Column& s, std::size_t parameter) {
+                              return s.parameter < parameter;
+                            });
       if (at == sum_.end() || at->parameter != c.parameter) {
-        at = sum_.insert(at, Column{c.parameter, Vector3::Zero()});
+        at = sum_.insert(at, estimation::Column{c.parameter, Vector3::Zero()});
       }
       at->dV_dU += c.dV_dU;
     }
@@ -34,24 +34,40 @@ class MeanColumns {
   [[nodiscard]] std::vector<SparseRows::Entry> along(const Vector3& direction) const {
     std::vector<SparseRows::Entry> row;
     row.reserve(sum_.size());
-    for (const Column& c : sum_) {
+    for (const estimation::Column& c : sum_) {
       row.push_back({c.parameter, direction.dot(c.dV_dU) / static_cast<double>(count_)});
     }
     return row;
   }
 
  private:
-  std::vector<Column> sum_;
+  std::vector<estimation::Column> sum_;
   std::size_t count_ = 0;
 };
 
-MeanColumns mean_columns(const ParameterLayout& layout, const Vector3& t,
-                         std::span<const Vector3> sub_points_m) {
-  MeanColumns columns;
-  for (const Vector3& q : sub_points_m) {
-    columns.add(design_columns_with_rigid(layout, q, t).span());
+/// Columns of T and r of a target at p.
+void append_rigid_columns(estimation::ModelColumns& columns, std::size_t first, const Vector3& p) {
+  const Matrix3 rotation = rotation_effect(p);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    columns.push(first++, Vector3::Unit(k));
   }
-  return columns;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    columns.push(first++, rotation.col(k));
+  }
+}
+
+MeanColumns mean_columns(const estimation::TableBasis& basis, const Vector3& t,
+                         std::span<const Vector3> sub_points_m) {
+  std::vector<estimation::Column> memory(basis.most_columns() + kRigidUnknowns);
+  estimation::ModelColumns columns(memory);
+  MeanColumns mean;
+  for (const Vector3& q : sub_points_m) {
+    columns.clear();
+    basis.append_columns({.q_m = q, .tool_offset_m = t}, columns);
+    append_rigid_columns(columns, basis.size(), q + t);
+    mean.add(columns.span());
+  }
+  return mean;
 }
 
 Result<void> check(const Noise& noise) {
@@ -171,8 +187,14 @@ std::span<const SparseRows::Entry> SparseRows::row(std::size_t i) const {
   return std::span(entries_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
 }
 
+std::string Observations::label(std::size_t unknown) const {
+  constexpr std::array<std::string_view, kRigidUnknowns> kNames{"tx", "ty", "tz", "rx", "ry", "rz"};
+  return unknown < rigid_offset() ? basis.label(unknown)
+                                  : std::string(kNames.at(unknown - rigid_offset()));
+}
+
 void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m) {
-  const MeanColumns columns = mean_columns(o.layout, o.target_offset_m, sub_points_m);
+  const MeanColumns columns = mean_columns(o.basis, o.target_offset_m, sub_points_m);
   const std::size_t first = o.sub_points_m.size();
   o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
   const auto append = [&](const Vector3& a, double sigma_m) {
@@ -201,9 +223,9 @@ Observations without_range_offset(Observations o, double range_offset_m) {
   return o;
 }
 
-Observations with_layout(const Observations& o, ParameterLayout layout) {
+Observations with_basis(const Observations& o, estimation::TableBasis basis) {
   Observations other = o;
-  other.layout = std::move(layout);
+  other.basis = std::move(basis);
   other.A = {};
   MeanColumns columns;
 
@@ -212,7 +234,7 @@ Observations with_layout(const Observations& o, ParameterLayout layout) {
     // The rows of a block have the same sub-points and the same columns.
     if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {
       columns =
-          mean_columns(other.layout, o.target_offset_m,
+          mean_columns(other.basis, o.target_offset_m,
                        std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
     }
     other.A.append(columns.along(row.direction));
@@ -237,10 +259,11 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
     valid = check_travel(series, options);
   }
 
-  Result<ParameterLayout> layout =
-      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
-  if (!valid || !layout) {
-    return tl::unexpected(valid ? layout.error() : valid.error());
+  Result<estimation::TableBasis> basis =
+      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
+          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
+  if (!valid || !basis) {
+    return tl::unexpected(valid ? basis.error() : valid.error());
   }
 
   Result<Alignment> alignment = align(series, machine, path, options);
@@ -248,7 +271,7 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
     return tl::unexpected(alignment.error());
   }
 
-  Observations o{.layout = *std::move(layout),
+  Observations o{.basis = *std::move(basis),
                  .target_offset_m = machine.target_offset_m,
                  .alignment = *std::move(alignment),
                  .vertices_m = path.vertices_m,

@@ -46,7 +46,7 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   s.blocks = o.blocks;
   s.blocks_used = o.blocks_used;
   s.observations = o.rows.size();
-  s.unknowns = o.layout.fit_size();
+  s.unknowns = o.unknowns();
   s.rank = a.rank;
   s.gauge_conditions = a.datum_defect;
   s.degrees_of_freedom = s.observations - s.rank;
@@ -83,8 +83,9 @@ Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
 
 /// Change of U per relative change of the scale of an axis: its positioning table changes with
 /// slope 1 and is zero at the reference.
-Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
+  const ParameterLayout& layout = o.layout();
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
   const AxisNodes& nodes = layout.nodes()[index(axis)];
   const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
   for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
@@ -98,7 +99,7 @@ Eigen::VectorXd dU_daxis_scale(const ParameterLayout& layout, Axis axis) {
 /// `residual_m`.
 AddedColumns::Estimate range_offset(const Observations& o, const Adjustment& a,
                                     std::span<const double> residual_m, double factor) {
-  AddedColumns sums(1, o.layout.fit_size());
+  AddedColumns sums(1, o.unknowns());
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const double c = drow_drange_offset(o, o.rows[i]);
     sums.add(o.rows[i], o.A.row(i), residual_m[i], std::span(&c, 1));
@@ -137,7 +138,7 @@ double chi2(const Observations& o, std::span<const double> r) {
 }
 
 Result<Solution> solve(const Observations& o, const Options& options) {
-  const std::size_t needed = o.layout.fit_size();
+  const std::size_t needed = o.unknowns();
   if (o.rows.size() <= needed) {
     return failure(
         ErrorCode::TooFewObservations,
@@ -145,14 +146,14 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   }
 
   report(options, 0.0);
-  const NormalEquations N = normal_equations(o);
+  const RowInformation rows = information_of(o);
   report(options, 0.5);
 
   if (Result<void> running = check_stopped(options.stopped); !running) {
     return tl::unexpected(running.error());
   }
 
-  Result<Adjustment> a = adjust(N, o.layout, options.gauge_weight);
+  Result<Adjustment> a = adjust(rows, o, options.gauge_weight);
   if (!a) {
     return tl::unexpected(a.error());
   }
@@ -162,6 +163,7 @@ Result<Solution> solve(const Observations& o, const Options& options) {
     return tl::unexpected(validity.error());
   }
 
+  const Adjustment of_rows = *a;
   Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
   Statistics figures = statistics(o, *a, residuals);
   RangeOffset offset;
@@ -184,14 +186,14 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   }
 
   for (const Axis axis : kAllAxes) {
-    const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o.layout, axis);
+    const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o, axis);
     a->covariance += moved * moved.transpose();
   }
 
-  const auto n = static_cast<Eigen::Index>(o.layout.model_size());
-  Result<VolumetricModel> model =
-      VolumetricModel::from_vector(o.layout, Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
-                                   a->covariance.topLeftCorner(n, n), *std::move(validity));
+  const auto n = static_cast<Eigen::Index>(o.basis.size());
+  Result<VolumetricModel> model = VolumetricModel::from_vector(
+      o.layout(), Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
+      a->covariance.topLeftCorner(n, n), *std::move(validity));
 
   if (!model) {
     return tl::unexpected(model.error());
@@ -199,8 +201,9 @@ Result<Solution> solve(const Observations& o, const Options& options) {
 
   report(options, 1.0);
   return Solution{.model = *std::move(model),
-                  .rigid = a->U.tail<6>(),
+                  .rigid = a->U.segment<kRigidUnknowns>(n),
                   .covariance_with_rigid = a->covariance,
+                  .adjustment = of_rows,
                   .T_machine_tracker = o.alignment.T_machine_tracker,
                   .statistics = figures,
                   .residuals = std::move(residuals),

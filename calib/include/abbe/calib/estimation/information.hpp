@@ -46,6 +46,9 @@ class Information {
   void add_prior(std::size_t unknown, double value, double u);
   /// Adds independent observations of the same unknowns.
   Information& operator+=(const Information&);
+  /// The same for information about some of the unknowns: `at`: index here of each unknown of
+  /// `part`, ascending.
+  void add(const Information& part, std::span<const std::size_t> at);
   /// Multiplies all weights by `factor`, 0 to 1: older observations count less.
   void forget(double factor);
 

@@ -2,8 +2,8 @@
 /// Error tables with nodes as columns: the rigid-body model of rigid_body_model.hpp with linear or
 /// cubic interpolation, and with tables that depend on the direction of travel. Parameters:
 /// 1. those of ParameterLayout: nodes of the tables, then squareness,
-/// 2. for TravelDependence::Backlash one value b per table, for Tables one difference D per node, in
-///    the order of the tables.
+/// 2. for TravelDependence::Backlash one value b per table, for Tables one difference D per node,
+///    in the order of the tables.
 /// The value of a table, with s = 1 forward, -1 backward and 0 before the first motion of its axis:
 ///     U(q) + s b / 2    or    U(q) + s D(q) / 2
 

@@ -8,21 +8,20 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "abbe/calib/estimation/row_batch.hpp"
+#include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/path_frame.hpp"
-#include "abbe/calib/parameter_layout.hpp"
 
 namespace abbe::calib::otf {
 
 /// Rows of a sparse design matrix, columns ascending within a row.
 class SparseRows {
  public:
-  struct Entry {
-    std::size_t column;
-    double value;
-  };
+  using Entry = estimation::RowEntry;
   void append(std::span<const Entry> row);
   [[nodiscard]] std::size_t rows() const { return begin_.size() - 1; }
   [[nodiscard]] std::span<const Entry> row(std::size_t i) const;
@@ -45,10 +44,14 @@ struct Observation {
   std::size_t sub_points = 0;
 };
 
+/// Number of unknowns of the rigid motion T, r of the tracker station:
+///     measured error = V + T + r x p,   p = axis position + target offset
+inline constexpr std::size_t kRigidUnknowns = 6;
+
 struct Observations {
-  ParameterLayout layout;
+  estimation::TableBasis basis;
   Vector3 target_offset_m = Vector3::Zero();
-  SparseRows A{};  ///< fit_size() columns, rigid unknowns last
+  SparseRows A{};  ///< unknowns() columns
   std::vector<Observation> rows{};
   std::vector<Vector3> sub_points_m{};  ///< nominal axis positions; rows are averaged over them
   Alignment alignment{};
@@ -61,6 +64,13 @@ struct Observations {
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
+
+  [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
+  /// Index of T, r in U: behind the parameters of the model.
+  [[nodiscard]] std::size_t rigid_offset() const { return basis.size(); }
+  [[nodiscard]] std::size_t unknowns() const { return basis.size() + kRigidUnknowns; }
+  /// Name of an unknown for messages: "EXX at -0.300 m", "EC0Y", "rx".
+  [[nodiscard]] std::string label(std::size_t unknown) const;
 };
 
 /// One measured point (or block mean) relative to the path.
@@ -82,9 +92,9 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// The observations that result if this offset is subtracted from all ranges.
 [[nodiscard]] Observations without_range_offset(Observations, double range_offset_m);
 
-/// The same observations with the design matrix of another layout: another order of the axes, other
+/// The same observations with the design matrix of another basis: another order of the axes, other
 /// nodes.
-[[nodiscard]] Observations with_layout(const Observations&, ParameterLayout);
+[[nodiscard]] Observations with_basis(const Observations&, estimation::TableBasis);
 
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});

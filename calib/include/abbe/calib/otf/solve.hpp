@@ -2,9 +2,9 @@
 /// Stage two: computes the parameters and their covariance from weighted observations. The
 /// adjustment minimises
 ///     |W (A U - y)|^2 + mu |K U|^2
-/// with normal equations ([Sanders 2023] eq. (7); the pseudo-inverse used there gives the same fit
-/// in another gauge). The conditions K U = 0 do not change the residuals, so that they are met
-/// exactly and the solution does not depend on mu (minimal constraints).
+/// in square-root form (estimation/information.hpp; the pseudo-inverse of [Sanders 2023] eq. (7)
+/// gives the same fit in another gauge). The conditions K U = 0 do not change the residuals, so that
+/// they are met exactly and the solution does not depend on mu (estimation/datum.hpp).
 ///
 /// Covariance, with H = A^T W^2 A and Q = (H + mu K^T K)^-1:
 ///     Cov = Q H Q                      if the weights are 1/sigma^2
@@ -28,9 +28,10 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <string>
+#include <optional>
 #include <string_view>
 
+#include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/otf/observe.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
@@ -41,35 +42,26 @@ inline constexpr std::string_view kEstimator = "two-step";
 /// In files: the adjustment is a linear problem, solved without iteration.
 inline constexpr std::string_view kStopReason = "direct";
 
-/// H = A^T W^2 A and g = A^T W^2 y for fit_size() unknowns; additive over observations. The rows
-/// are summed in their order: the same input gives bit-identical results.
-struct NormalEquations {
-  Eigen::MatrixXd H;  ///< lower triangle, the rest is zero
-  /// A^T W^2 C W^2 A, lower triangle; equal to H if the weights are 1/sigma^2
-  Eigen::MatrixXd H_noise;
-  Eigen::VectorXd g;
-  std::size_t rows = 0;
+/// What rows state about the unknowns of Observations.
+struct RowInformation {
+  estimation::Information data;  ///< weighted with `weight`
+  /// weighted with weight^2 sigma^2 (the noise of the weighted rows); absent if all weights are
+  /// 1/sigma^2
+  std::optional<estimation::Information> noise;
 
-  explicit NormalEquations(std::size_t unknowns);
-  void add(std::span<const SparseRows::Entry> row, const Observation&);
-  NormalEquations& operator+=(const NormalEquations&);
+  explicit RowInformation(std::size_t unknowns) : data(unknowns) {}
+  RowInformation& operator+=(const RowInformation&);
 };
-/// Normal equations of the rows for which `take` returns true; of all rows if `take` is empty.
-[[nodiscard]] NormalEquations normal_equations(
+/// Of the rows for which `take` returns true; of all rows if `take` is empty. The rows are added in
+/// a fixed order: the same input gives bit-identical results.
+[[nodiscard]] RowInformation information_of(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
-struct Adjustment {
-  Eigen::VectorXd U;           ///< fit_size(), in gauge G1
-  Eigen::MatrixXd covariance;  ///< fit_size() squared
-  Eigen::MatrixXd cofactor_Q;  ///< cofactor matrix Q = dU/dg
-  std::size_t rank = 0;
-  std::size_t datum_defect = 0;  ///< number of combinations fixed by the gauge: 20 for 14 tables
-  /// condition of the column-scaled design matrix within its rank: sqrt of the eigenvalue ratio
-  double condition = 0.0;
-};
+/// U in gauge G1, with the covariance of the rows' noise.
+using Adjustment = estimation::DatumSolution;
 /// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
 /// text names parameters that are not determined.
-[[nodiscard]] Result<Adjustment> adjust(const NormalEquations&, const ParameterLayout&,
+[[nodiscard]] Result<Adjustment> adjust(const RowInformation&, const Observations&,
                                         double gauge_weight = 1.0);
 
 struct ResidualStatistics {
@@ -117,6 +109,7 @@ struct Solution {
   VolumetricModel model;            ///< gauge G1, without the rigid unknowns
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::MatrixXd covariance_with_rigid;
+  Adjustment adjustment;  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
   Residuals residuals;  ///< in after_m the range offset is subtracted, too

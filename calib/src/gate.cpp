@@ -15,8 +15,8 @@ namespace {
 /// the validity volume. There the nodes alone are not sufficient, because a thin or tilted hull can
 /// pass between them; vertices and midpoints are added.
 std::vector<Vector3> evaluation_points(const VolumetricModel& model) {
-  std::vector<Vector3> found = tensor_grid(model.layout().nodes());
-  if (model.polynomials() == nullptr) {
+  std::vector<Vector3> found = tensor_grid(model.nodes());
+  if (model.linear_between_nodes()) {
     return found;
   }
   std::erase_if(found, [&](const Vector3& q) { return !model.validity().contains(q); });
@@ -56,7 +56,7 @@ double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, c
 /// two axes, so that its derivative is largest on the grid lines.
 double max_slope_of_tables(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;
-  const MachineNodes& nodes = model.layout().nodes();
+  const MachineNodes& nodes = model.nodes();
   for (const Vector3& q : tensor_grid(nodes)) {
     for (const Axis a : kAllAxes) {
       const auto k = static_cast<Eigen::Index>(index(a));
@@ -262,8 +262,8 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   const Vector3 t = candidate.tool_offsets_m().front();
   const std::vector<Vector3> at = evaluation_points(candidate);
   verdict.max_error_m = max_error_m(candidate, at, t);
-  verdict.max_gradient = candidate.polynomials() == nullptr ? max_slope_of_tables(candidate, t)
-                                                            : max_slope(candidate, at, t);
+  verdict.max_gradient = candidate.linear_between_nodes() ? max_slope_of_tables(candidate, t)
+                                                          : max_slope(candidate, at, t);
 
   if (at.empty()) {
     verdict.refuse("nowhere",

@@ -114,8 +114,8 @@ Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Inde
 }  // namespace
 
 InterpolationGrid interpolation_grid(const VolumetricModel& model, std::size_t most_nodes) {
-  return model.polynomials() == nullptr ? of_tables(model.layout().nodes(), most_nodes)
-                                        : of_polynomials(model, most_nodes);
+  return model.linear_between_nodes() ? of_tables(model.nodes(), most_nodes)
+                                      : of_polynomials(model, most_nodes);
 }
 
 Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGrid& grid,

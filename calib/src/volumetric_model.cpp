@@ -2,10 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
-#include "abbe/calib/rigid_body_model.hpp"
 #include "message.hpp"
 
 namespace abbe::calib {
@@ -13,18 +13,21 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+/// Columns of all 18 tables and squareness at one position: memory on the stack.
+constexpr std::size_t kMostColumns = 18 * 2 + 3;
+
 /// sum_ij v_i C_ij v_j^T over the non-zero columns.
-Matrix3 propagate(const DesignColumns& columns, const Eigen::MatrixXd& covariance) {
+Matrix3 propagate(std::span<const estimation::Column> columns, const Eigen::MatrixXd& covariance) {
   const double* data = covariance.data();
   const auto stride = static_cast<std::size_t>(covariance.rows());
   Matrix3 half = Matrix3::Zero();  // half + half^T is the result
 
-  for (std::size_t j = 0; j < columns.count; ++j) {
-    const Column& cj = columns.column[j];
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const estimation::Column& cj = columns[j];
     const double* row = data + cj.parameter * stride;
     Vector3 sum = 0.5 * row[cj.parameter] * cj.dV_dU;
     for (std::size_t i = 0; i < j; ++i) {
-      sum += row[columns.column[i].parameter] * columns.column[i].dV_dU;
+      sum += row[columns[i].parameter] * columns[i].dV_dU;
     }
     half.noalias() += sum * cj.dV_dU.transpose();
   }
@@ -249,7 +252,12 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
     }
   }
 
-  VolumetricModel model(layout);
+  Result<estimation::TableBasis> basis = estimation::TableBasis::of(layout);
+  if (!basis) {
+    return tl::unexpected(basis.error());
+  }
+
+  VolumetricModel model(*std::move(basis), layout.nodes());
   model.gauge_ = gauge;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
   const ToolSpan tools = tool_span(tool_offsets_m);
@@ -274,19 +282,22 @@ Result<VolumetricModel> VolumetricModel::from_polynomials(evemu::EvemuModel mode
                    "model: gauge G1 is for tables; polynomials need gauge Ball1");
   }
 
-  Result<ParameterLayout> layout =
-      ParameterLayout::with_tables(model.design().equivalent().chain(), grid_over(validity), {});
-  if (!layout) {
-    return failure(layout.error().code, message("model: ", layout.error().text));
+  MachineNodes nodes = grid_over(validity);
+  for (const Axis a : kAllAxes) {
+    if (Result<void> valid = check_nodes(nodes[index(a)].nodes_m); !valid) {
+      return failure(valid.error().code,
+                     message("model: axis ", letter(a), ": ", valid.error().text));
+    }
   }
 
-  VolumetricModel result(*std::move(layout));
+  Eigen::VectorXd c_m = model.c_m();
+  Eigen::MatrixXd covariance_m2 = model.covariance_m2();
+  VolumetricModel result(std::move(model), std::move(nodes));
   result.gauge_ = gauge;
   result.tool_offsets_m_ = {tool_offset_m};
-  result.U_ = model.c_m();
-  result.covariance_ = model.covariance_m2();
+  result.U_ = std::move(c_m);
+  result.covariance_ = std::move(covariance_m2);
   result.validity_ = std::move(validity);
-  result.polynomials_ = std::move(model);
 
   return result;
 }
@@ -395,18 +406,20 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
     return e;
   }
 
-  if (polynomials_) {
-    polynomials_->V_and_cov_at(axis_position_m, e.V_m, e.cov_V_m2);
+  if (const evemu::EvemuModel* model = polynomials()) {
+    model->V_and_cov_at(axis_position_m, e.V_m, e.cov_V_m2);
     return e;
   }
 
-  const DesignColumns columns =
-      design_columns(layout_, axis_position_m, lever_offset_m(tool_offset_m));
-  for (const Column& c : columns.span()) {
+  std::array<estimation::Column, kMostColumns> memory;
+  estimation::ModelColumns columns(memory);
+  tables()->append_columns({.q_m = axis_position_m, .tool_offset_m = lever_offset_m(tool_offset_m)},
+                           columns);
+  for (const estimation::Column& c : columns.span()) {
     e.V_m += c.dV_dU * U_(static_cast<Eigen::Index>(c.parameter));
   }
 
-  e.cov_V_m2 = propagate(columns, covariance_);
+  e.cov_V_m2 = propagate(columns.span(), covariance_);
   return e;
 }
 
@@ -414,11 +427,11 @@ Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& too
   if (!holds_for_tool(tool_offset_m)) {
     return Vector3::Constant(kNaN);
   }
-  if (polynomials_) {
-    return polynomials_->V_at(axis_position_m);
+  if (const evemu::EvemuModel* model = polynomials()) {
+    return model->V_at(axis_position_m);
   }
-  return volumetric_error(layout_, {U_.data(), layout_.model_size()}, axis_position_m,
-                          lever_offset_m(tool_offset_m));
+  return tables()->V_m({.q_m = axis_position_m, .tool_offset_m = lever_offset_m(tool_offset_m)},
+                       {U_.data(), static_cast<std::size_t>(U_.size())});
 }
 
 Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
@@ -454,22 +467,27 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
 }
 
 std::vector<Parameter> VolumetricModel::parameters() const {
-  return polynomials_ ? named(*polynomials_) : named(layout_, U_, covariance_);
+  return tables() == nullptr ? named(*polynomials()) : named(tables()->layout(), U_, covariance_);
+}
+
+const KinematicChain& VolumetricModel::chain() const {
+  return tables() == nullptr ? polynomials()->design().equivalent().chain()
+                             : tables()->layout().chain();
 }
 
 ModelDescription VolumetricModel::description() const {
   ModelDescription d;
-  d.chain = layout_.chain();
-  d.nodes = layout_.nodes();
+  d.chain = chain();
+  d.nodes = nodes_;
   d.gauge = gauge_;
   d.tool_offsets_m = tool_offsets_m_;
   d.parameters = parameters();
   d.covariance = covariance_;
   d.validity_hull_m.assign(validity_.vertices_m().begin(), validity_.vertices_m().end());
 
-  if (polynomials_) {
-    d.polynomials = PolynomialForm{polynomials_->design().equivalent().order(),
-                                   polynomials_->design().box(), polynomials_->ball1_m()};
+  if (const evemu::EvemuModel* model = polynomials()) {
+    d.polynomials = PolynomialForm{model->design().equivalent().order(), model->design().box(),
+                                   model->ball1_m()};
   }
 
   return d;

@@ -113,12 +113,12 @@ double print_errors(const fs::path& model_json) {
   if (!document) return kNone;
   const auto& model = document->model;
   const calib::Vector3 tool_m = model.tool_offsets_m().front();
-  const auto U = true_parameters(model.layout(), tool_m);
+  const auto U = true_parameters(model.tables()->layout(), tool_m);
   std::vector<calib::Vector3> points_m, difference_m, true_m;
 
-  for (const auto& q_m : calib::tensor_grid(model.layout().nodes())) {
-    true_m.push_back(calib::volumetric_error(model.layout(),
-                                             {U.data(), model.layout().model_size()}, q_m, tool_m));
+  for (const auto& q_m : calib::tensor_grid(model.nodes())) {
+    true_m.push_back(calib::volumetric_error(
+        model.tables()->layout(), {U.data(), model.tables()->layout().model_size()}, q_m, tool_m));
     difference_m.push_back(model.V_at(q_m, tool_m) - true_m.back());
     points_m.push_back(q_m + tool_m);
   }

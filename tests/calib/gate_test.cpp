@@ -122,10 +122,10 @@ VolumetricModel lower_part(const VolumetricModel& whole, double share) {
   std::vector<Vector3> corners(whole.validity().vertices_m().begin(),
                                whole.validity().vertices_m().end());
   for (Vector3& v : corners) {
-    v.z() = share * v.z() + (1 - share) * whole.layout().nodes()[2].nodes_m.front();
+    v.z() = share * v.z() + (1 - share) * whole.nodes()[2].nodes_m.front();
   }
-  return *VolumetricModel::from_vector(whole.layout(), whole.gauge(), whole.tool_offsets_m(),
-                                       whole.U(), whole.covariance(),
+  return *VolumetricModel::from_vector(whole.tables()->layout(), whole.gauge(),
+                                       whole.tool_offsets_m(), whole.U(), whole.covariance(),
                                        *ValidityVolume::hull_of(corners));
 }
 
@@ -178,8 +178,9 @@ TEST(Gate, TakesTwoSetupsByHandForOneVolume) {
 }
 
 VolumetricModel with_volume(const VolumetricModel& model, ValidityVolume volume) {
-  return *VolumetricModel::from_vector(model.layout(), model.gauge(), model.tool_offsets_m(),
-                                       model.U(), model.covariance(), std::move(volume));
+  return *VolumetricModel::from_vector(model.tables()->layout(), model.gauge(),
+                                       model.tool_offsets_m(), model.U(), model.covariance(),
+                                       std::move(volume));
 }
 
 TEST(Gate, NotesARimThatIsLostAndRefusesMore) {

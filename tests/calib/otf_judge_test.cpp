@@ -87,7 +87,7 @@ TEST(Judge, ComparesWhereTheActiveModelHoldsOnly) {
 
   // Right inside its volume, wrong above it, where it must not be used.
   Eigen::VectorXd U = m.U();
-  const ParameterLayout& layout = m.layout();
+  const ParameterLayout& layout = m.tables()->layout();
   const auto& z_nodes = layout.nodes()[2].nodes_m;
   const std::vector<Parameter> parameters = m.parameters();
 
@@ -121,11 +121,11 @@ TEST(Judge, DoesNotDependOnTheGaugeOfTheActiveModel) {
 
   // The same machine in another gauge: any unobservable combination is added.
   const Eigen::MatrixXd N =
-      unobservable_combinations(model.layout(), std::array{run.machine.target_offset_m});
-  const auto n = static_cast<Eigen::Index>(model.layout().model_size());
+      unobservable_combinations(model.tables()->layout(), std::array{run.machine.target_offset_m});
+  const auto n = static_cast<Eigen::Index>(model.tables()->layout().model_size());
   const Eigen::VectorXd shift = N.rowwise().sum() / N.cwiseAbs().maxCoeff() * 1e-4;
   const VolumetricModel shifted = *VolumetricModel::from_vector(
-      model.layout(), Gauge::G1, model.tool_offsets_m(), model.U() + shift.head(n),
+      model.tables()->layout(), Gauge::G1, model.tool_offsets_m(), model.U() + shift.head(n),
       model.covariance(), model.validity());
   const double as_stated = held_out(id.observations, &model, run.options)->active.value();
   const double in_other_gauge = held_out(id.observations, &shifted, run.options)->active.value();
@@ -136,8 +136,9 @@ TEST(Judge, LeavesOutAnActiveModelOfAnotherTool) {
   const MadeRun run = make_run({});
   const Identification id = identified(run);
   const VolumetricModel& m = id.solution.model;
-  const VolumetricModel other = *VolumetricModel::from_vector(
-      m.layout(), Gauge::G1, std::array{Vector3(0, 0, -0.5)}, m.U(), m.covariance(), m.validity());
+  const VolumetricModel other = *VolumetricModel::from_vector(m.tables()->layout(), Gauge::G1,
+                                                              std::array{Vector3(0, 0, -0.5)},
+                                                              m.U(), m.covariance(), m.validity());
   EXPECT_FALSE(held_out(id.observations, &other, run.options)->active);
 }
 
@@ -197,7 +198,7 @@ TEST(Judge, ComparesNothingWhereARigidMotionFitsAnyModel) {
   }
 
   const VolumetricModel active =
-      *VolumetricModel::from_vector(m.layout(), Gauge::G1, m.tool_offsets_m(), m.U(),
+      *VolumetricModel::from_vector(m.tables()->layout(), Gauge::G1, m.tool_offsets_m(), m.U(),
                                     m.covariance(), *ValidityVolume::hull_of(around));
   ASSERT_TRUE(active.validity().contains(at));
   const auto held = held_out(id.observations, &active, run.options);

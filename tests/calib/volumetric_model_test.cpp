@@ -208,6 +208,34 @@ TEST(VolumetricModel, AcceptsTheCovarianceOfFixedAndOfFullyCorrelatedValues) {
   EXPECT_TRUE(VolumetricModel::from_description(d));
 }
 
+TEST(VolumetricModel, OfTablesHasTheirNodesAndNoPolynomials) {
+  const Made m = random_model(1e-4);
+  const VolumetricModel model = model_of(m);
+  ASSERT_NE(model.tables(), nullptr);
+  EXPECT_EQ(model.polynomials(), nullptr);
+  EXPECT_EQ(model.nodes()[0].nodes_m, m.layout.nodes()[0].nodes_m);
+  EXPECT_EQ(model.chain().text(), m.layout.chain().text());
+  EXPECT_TRUE(model.linear_between_nodes());
+}
+
+/// The nodes of polynomials are a grid over the bounding box of the validity volume.
+TEST(VolumetricModel, OfPolynomialsHasNodesOverItsVolumeAndNoTables) {
+  const Made m = random_model(1e-4);
+  const auto design =
+      evemu::ScaledDesign::of(m.layout.chain(), 2, {{0.0, 0.0, -0.2}, {0.3, 0.25, 0.2}});
+  const auto n = static_cast<Eigen::Index>(design->size());
+  const auto polynomials =
+      evemu::EvemuModel::of(*design, Vector3::Zero(), Eigen::VectorXd::Constant(n, 1e-5),
+                            Eigen::MatrixXd::Identity(n, n) * 1e-12);
+  const auto model =
+      VolumetricModel::from_polynomials(*polynomials, Gauge::Ball1, kTool, whole_volume(m.layout));
+  ASSERT_TRUE(model) << model.error().text;
+  EXPECT_EQ(model->tables(), nullptr);
+  EXPECT_NEAR(model->nodes()[0].nodes_m.front(), m.layout.nodes()[0].nodes_m.front(), 1e-9);
+  EXPECT_EQ(model->chain().text(), m.layout.chain().text());
+  EXPECT_FALSE(model->linear_between_nodes());
+}
+
 TEST(RigidFreeDifference, IsZeroBetweenTwoGaugesOfOneMachine) {
   const Made m = random_model(1e-4);
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(m.layout.fit_size()));

@@ -172,7 +172,7 @@ TEST(ModelDocument, IsRefusedWithACovarianceThatIsNotPositive) {
       2.0 * std::sqrt(covariance(i, i) * covariance(i + 1, i + 1));
   auto changed = document;
   changed.model =
-      calib::VolumetricModel::from_vector(document.model.layout(), document.model.gauge(),
+      calib::VolumetricModel::from_vector(document.model.tables()->layout(), document.model.gauge(),
                                           document.model.tool_offsets_m(), document.model.U(),
                                           covariance, document.model.validity())
           .value();

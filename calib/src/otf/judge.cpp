@@ -199,7 +199,7 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) 
 }
 
 double common_scale_error(const VolumetricModel& model) {
-  const std::vector<Vector3> at = tensor_grid(model.layout().nodes());
+  const std::vector<Vector3> at = tensor_grid(model.nodes());
   std::vector<Vector3> V_m;
   for (const Vector3& q : at) {
     V_m.push_back(model.V_at(q, model.tool_offsets_m().front()));

@@ -383,7 +383,8 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
 }
 
 CorrectionSize correction_size(const VolumetricModel& model) {
-  const RigidFreeNorm norm = rigid_free_norm(model.layout(), model.tool_offsets_m().front());
+  const RigidFreeNorm norm =
+      rigid_free_norm(model.tables()->layout(), model.tool_offsets_m().front());
   return {norm.rms_m(model.U()), norm.rms_u_m(model.covariance())};
 }
 

@@ -258,7 +258,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
 void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
   fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
-             outcome.document.model.layout().tables().size(), outcome.document.machine);
+             outcome.document.model.tables()->layout().tables().size(), outcome.document.machine);
   fmt::print("samples     {}, {} lost; {} of {} blocks used\n", s.samples, s.lost_samples,
              outcome.blocks_used, outcome.blocks);
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",

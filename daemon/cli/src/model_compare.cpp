@@ -30,7 +30,7 @@ struct Comparison {
 std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
                                           const calib::VolumetricModel& b) {
   std::vector<calib::Vector3> points;
-  for (const auto* nodes : {&a.layout().nodes(), &b.layout().nodes()}) {
+  for (const auto* nodes : {&a.nodes(), &b.nodes()}) {
     for (const calib::Vector3& q : calib::tensor_grid(*nodes)) {
       if (a.validity().contains(q) && b.validity().contains(q)) points.push_back(q);
     }

@@ -85,7 +85,7 @@ void print_entry(const StoreEntry& entry) {
 void print_model(const ModelDocument& document) {
   const auto& s = document.statistics;
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
-             to_text(document.created), document.machine, document.model.layout().chain().text(),
+             to_text(document.created), document.machine, document.model.chain().text(),
              document.method, document.estimator, name(document.model.gauge()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);

@@ -43,9 +43,8 @@ class Canonical {
 };
 
 void add_frame(Canonical& out, const calib::VolumetricModel& model) {
-  const auto& layout = model.layout();
-  out.text(layout.chain().text());
-  for (const auto& axis : layout.nodes()) {
+  out.text(model.chain().text());
+  for (const auto& axis : model.nodes()) {
     out.count(axis.nodes_m.size());
     for (const double node_m : axis.nodes_m) out.number(node_m);
     out.number(axis.reference_m);
@@ -66,8 +65,10 @@ void add_frame(Canonical& out, const calib::VolumetricModel& model) {
 }
 
 void add_values(Canonical& out, const calib::VolumetricModel& model) {
-  out.count(model.layout().tables().size());
-  for (const auto& table : model.layout().tables()) out.text(name(table.motion));
+  const auto tables = model.tables() != nullptr ? model.tables()->layout().tables()
+                                                : std::span<const calib::Table>{};
+  out.count(tables.size());
+  for (const auto& table : tables) out.text(name(table.motion));
   const auto& U = model.U();
   const auto& covariance = model.covariance();
   out.count(static_cast<std::size_t>(U.size()));

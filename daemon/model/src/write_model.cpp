@@ -60,11 +60,11 @@ void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
                   vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
 }
 
-void write_axes(JsonText& out, const calib::ParameterLayout& layout) {
+void write_axes(JsonText& out, const calib::MachineNodes& machine_nodes) {
   out.key("basis");
   out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", calib::kLinearBasis));
   for (const auto axis : calib::kAllAxes) {
-    const auto& nodes = layout.nodes()[index(axis)];
+    const auto& nodes = machine_nodes[index(axis)];
     out.raw(fmt::format("{}\n    \"{}\": {{\"nodes_mm\": {}, \"reference_mm\": {}}}",
                         index(axis) > 0 ? "," : "", letter(axis), numbers(nodes.nodes_m, kMm),
                         to_decimal(nodes.reference_m, kMm)));
@@ -156,7 +156,7 @@ std::string to_json(const ModelDocument& document) {
   out.member("estimator", document.estimator);
   out.member("machine", document.machine);
   out.member("machine_hash", document.machine_hash);
-  out.member("chain", model.layout().chain().text());
+  out.member("chain", model.chain().text());
   out.member("gauge", name(model.gauge()));
   out.member("squareness", "travel");
   out.key("tool_offsets_mm");
@@ -164,7 +164,7 @@ std::string to_json(const ModelDocument& document) {
   if (const auto* polynomials = model.polynomials())
     write_polynomials(out, *polynomials);
   else
-    write_axes(out, model.layout());
+    write_axes(out, model.nodes());
   write_statistics(out, document.statistics);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);

@@ -92,7 +92,6 @@ v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset u
 }
 
 v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
-  const auto& layout = active.model.layout();
   v1::ErrorModel m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -100,7 +99,7 @@ v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
   m.method(active.method);
   m.estimator(active.estimator);
   m.gauge(std::string{calib::name(active.model.gauge())});
-  m.chain(layout.chain().text());
+  m.chain(active.model.chain().text());
   m.basis(active.model.polynomials() == nullptr ? "linear" : "legendre");
   m.squareness("travel");
   m.tool_offset_m(array(active.model.tool_offsets_m().front()));
@@ -115,7 +114,7 @@ v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
   }
 
   for (const calib::Axis a : calib::kAllAxes) {
-    const auto& nodes_m = layout.nodes()[calib::index(a)].nodes_m;
+    const auto& nodes_m = active.model.nodes()[calib::index(a)].nodes_m;
     v1::AxisRange range;
     range.axis(std::string{calib::letter(a)});
     range.min_m(nodes_m.front());

@@ -58,7 +58,7 @@ void add_model_origin(HtmlReport& page, const ModelDocument& document,
   page.heading("Model");
   std::vector<std::pair<std::string, std::string>> facts{
       {"machine", document.machine},
-      {"kinematic chain (ISO 10791-6)", document.model.layout().chain().text()},
+      {"kinematic chain (ISO 10791-6)", document.model.chain().text()},
       {"model", model_id(document)},
       {"method", fmt::format("{}, {}", document.method, document.estimator)},
       {"gauge", std::string{calib::name(document.model.gauge())}},

@@ -10,15 +10,18 @@
 /// outside the validity volume.
 ///
 /// A model has one of two forms: tables with nodes (rigid-body model), or polynomials without
-/// tables (equivalent model of a ball array). Values and uncertainties refer to the stated gauge;
-/// compare two models with rigid_free_difference().
+/// tables (equivalent model of a ball array). Gate, grid, comparison and export need not know which
+/// one: nodes() and linear_between_nodes() describe both. Values and uncertainties refer to the
+/// stated gauge; compare two models with rigid_free_difference().
 
 #include <Eigen/Core>
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/evemu/model.hpp"
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/geometry.hpp"
@@ -106,12 +109,18 @@ class VolumetricModel {
                                                       const Vector3& tool_offset_m) const;
 
   [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
-  /// For a polynomial model the layout has no tables; its nodes are a grid over the bounding box of
-  /// the validity volume, which is used to check and to publish the model.
-  [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
-  /// Null for a model with tables.
+  [[nodiscard]] const KinematicChain& chain() const;
+  /// Positions at which the model is checked, compared and published. Tables: their nodes;
+  /// polynomials: a grid over the bounding box of the validity volume.
+  [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
+  /// V is linear between nodes() along each axis.
+  [[nodiscard]] bool linear_between_nodes() const { return tables() != nullptr; }
+  /// Null for a model of another form.
+  [[nodiscard]] const estimation::TableBasis* tables() const {
+    return std::get_if<estimation::TableBasis>(&form_);
+  }
   [[nodiscard]] const evemu::EvemuModel* polynomials() const {
-    return polynomials_ ? &*polynomials_ : nullptr;
+    return std::get_if<evemu::EvemuModel>(&form_);
   }
   [[nodiscard]] Gauge gauge() const { return gauge_; }
   [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
@@ -122,11 +131,13 @@ class VolumetricModel {
   [[nodiscard]] ModelDescription description() const;
 
  private:
-  VolumetricModel(ParameterLayout layout) : layout_(std::move(layout)) {}
+  using Form = std::variant<estimation::TableBasis, evemu::EvemuModel>;
+  VolumetricModel(Form form, MachineNodes nodes)
+      : form_(std::move(form)), nodes_(std::move(nodes)) {}
   [[nodiscard]] Vector3 lever_offset_m(const Vector3& offset_m) const;
 
-  ParameterLayout layout_;
-  std::optional<evemu::EvemuModel> polynomials_;
+  Form form_;
+  MachineNodes nodes_;
   Gauge gauge_ = Gauge::G1;
   std::vector<Vector3> tool_offsets_m_;
   bool holds_for_any_tool_ = false;

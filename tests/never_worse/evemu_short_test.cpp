@@ -9,6 +9,7 @@
 
 namespace {
 using namespace abbe::tests::never_worse;
+namespace calib = abbe::calib;
 
 Campaign<EvemuRun> ball_array(const std::vector<std::string>& parts) {
   Campaign<EvemuRun> campaign{"ball array", evemu_faults(), random_evemu_run,
@@ -55,6 +56,38 @@ TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
   const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();
   EXPECT_EQ(screw.accepted, 0) << screw.largest_left_over_u;
   EXPECT_EQ(screw.named, 1) << screw.other_reason;
+}
+
+// The array is flat. The likelihood hardly distinguishes noise from a scale of the axis across the
+// array; the estimate with the scale leaves 36 um of a machine of 11 um.
+TEST(NeverWorseBallArray, NoiseThatLooksLikeAScaleIsRefused) {
+  const auto slow = tallies_of(ball_array({"slow noise"}), 1, 579).front();
+  EXPECT_EQ(slow.runs, 1);
+  EXPECT_EQ(slow.accepted, 0) << slow.largest_left_over_u;
+}
+
+// The likelihood ratio of the drift of the first run is e^10.7, and the drift moves the model by
+// 3.1 u. The drift of the second run is certain and moves the model by 0.8 u.
+TEST(NeverWorseBallArray, DriftThatTheUncertaintyDoesNotCoverIsNamed) {
+  for (const std::uint64_t seed : {82u, 665u}) {
+    const auto drift = tallies_of(ball_array({"drifts"}), 1, seed).front();
+    EXPECT_EQ(drift.accepted, 0) << drift.largest_left_over_u;
+    EXPECT_EQ(drift.named, 1) << drift.other_reason;
+  }
+}
+
+TEST(NeverWorseBallArray, TheUncertaintyCoversEstimatesThatTheDataDoNotDistinguish) {
+  EvemuRun run = random_evemu_run(579);
+  run.slow_noise_m = 9e-6;
+  const auto seen =
+      calib::evemu::observe(touches_of(run), run.calibrator, run.machine, run.observe);
+  ASSERT_TRUE(seen);
+  const auto solution = calib::evemu::solve(*seen);
+  ASSERT_TRUE(solution);
+  const double u_m = calib::evemu::correction_size(*seen, *solution).u_m;
+  constexpr double kRounding = 1e-6;
+  EXPECT_GT(solution->statistics.comparable_m, 0.0);
+  EXPECT_GE(u_m, (1.0 - kRounding) * solution->statistics.comparable_m);
 }
 
 TEST(NeverWorseBallArray, SoundRunsAreAccepted) {

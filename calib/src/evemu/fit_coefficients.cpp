@@ -4,6 +4,7 @@
 
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
+#include "evemu/norm_over_balls.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -130,6 +131,33 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   }
 
   return fit;
+}
+
+double cover_comparable(Fit& fit, const FitProblem& problem) {
+  const Observations& o = problem.observations;
+  const std::size_t positions = o.positions();
+  const LinearGaussian gaussian(white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)),
+                                white_rows(o, problem.y));
+  const RigidFreeNorm norm = norm_over_balls(o, problem.design);
+  Eigen::VectorXd farthest_m = Eigen::VectorXd::Zero(fit.c_m.size());
+
+  for (const HyperParameters& h :
+       comparable_parameters(*fit.hyper, problem.design, positions, gaussian)) {
+    const Eigen::VectorXd prior =
+        prior_variances(PriorKind::BayesPose, problem.design, positions, h);
+    const Eigen::VectorXd difference_m =
+        gaussian.posterior(prior, h.s_m * h.s_m).mean.head(fit.c_m.size()) - fit.c_m;
+    if (norm.rms_m(difference_m) > norm.rms_m(farthest_m)) {
+      farthest_m = difference_m;
+    }
+  }
+
+  const double d_m = norm.rms_m(farthest_m), u_m = norm.rms_u_m(fit.covariance_m2);
+  if (d_m > u_m) {
+    fit.covariance_m2 += (1.0 - u_m * u_m / (d_m * d_m)) * farthest_m * farthest_m.transpose();
+  }
+
+  return d_m;
 }
 
 FitProblem problem_of(const Observations& o, const ScaledDesign& design,

@@ -102,7 +102,7 @@ void note_artefact(const Observations& o, Verdict& verdict) {
 
 /// Largest accepted error of a model in units of its stated uncertainty. An alternative that
 /// exceeds it refuses the model.
-constexpr double kCoveredByU = 1.5;
+constexpr double kCoveredByU = 1.25;
 
 /// True if the uncertainty of the model covers the effect of the alternative. False for NaN.
 bool is_covered(const Alternative& other, const CorrectionSize& size) {

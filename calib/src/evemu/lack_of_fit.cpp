@@ -17,6 +17,7 @@
 #include "elementary.hpp"
 #include "evemu/alternative_columns.hpp"
 #include "evemu/fit_coefficients.hpp"
+#include "evemu/norm_over_balls.hpp"
 #include "evemu/refit.hpp"
 #include "evemu/screen.hpp"
 #include "evemu/slow_noise.hpp"
@@ -30,18 +31,11 @@ namespace {
 
 /// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
+/// The same for alternatives that change the model by more than kLarge standard uncertainties. In a
+/// run without a fault they are rare; one that is overlooked makes the stated uncertainty wrong.
+constexpr double kFalseAlarmIfLarge = 1e-2;
+constexpr double kLarge = 2.0;
 constexpr double kCauses = 13.0;
-
-RigidFreeNorm norm_over_balls(const Observations& o, const ScaledDesign& design) {
-  Eigen::MatrixXd B(static_cast<Eigen::Index>(3 * o.rows.size()),
-                    static_cast<Eigen::Index>(design.size()));
-  std::vector<Vector3> points;
-  for (Eigen::Index i = 0; i < std::ssize(o.rows); ++i) {
-    points.push_back(o.rows[static_cast<std::size_t>(i)].reading_m);
-    B.middleRows<3>(3 * i) = design.B(points.back());
-  }
-  return {B, points};
-}
 
 /// Whitened rows of a run, and the hyper-parameters of bayes-pose without any alternative.
 struct Rows {
@@ -126,8 +120,8 @@ Result<Refit> base_of(const Rows& rows) {
   return refit(rows, rows.design, rows.X, Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
 }
 
-double threshold(double family) {
-  return natural_logarithm(kCauses * family / kFalseAlarm);
+double threshold(double family, double false_alarm = kFalseAlarm) {
+  return natural_logarithm(kCauses * family / false_alarm);
 }
 
 /// A comparison that failed. The alternative may be true: the model is refused.
@@ -160,6 +154,13 @@ struct Comparisons {
   void add(Alternative alternative) {
     (alternative.comparison == Comparison::Made ? found : not_made)
         .push_back(std::move(alternative));
+  }
+  /// `family`: number of alternatives of the same cause.
+  void add_if_significant(Alternative alternative, double family) {
+    const bool large = alternative.bias_m > kLarge * rows.norm.rms_u_m(base.covariance_m2);
+    if (alternative.log_likelihood > threshold(family, large ? kFalseAlarmIfLarge : kFalseAlarm)) {
+      add(std::move(alternative));
+    }
   }
 };
 
@@ -213,14 +214,13 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
     return {};
   }
 
-  const double gain = with->hyper.log_likelihood - all.base.hyper.log_likelihood;
-  if (gain > threshold(static_cast<double>(family.size() * Screen::kSizes_m.size()))) {
-    all.add({.cause = added.cause,
-             .text = text_of(added, with->d_m, rows.o),
-             .log_likelihood = gain,
-             .bias_m = rows.norm.rms_m(with->c_m - all.base.c_m),
-             .u_m = rows.norm.rms_u_m(with->covariance_m2)});
-  }
+  all.add_if_significant(
+      {.cause = added.cause,
+       .text = text_of(added, with->d_m, rows.o),
+       .log_likelihood = with->hyper.log_likelihood - all.base.hyper.log_likelihood,
+       .bias_m = rows.norm.rms_m(with->c_m - all.base.c_m),
+       .u_m = rows.norm.rms_u_m(with->covariance_m2)},
+      static_cast<double>(family.size() * Screen::kSizes_m.size()));
 
   return {};
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "elementary.hpp"
 #include "evemu/refit.hpp"
@@ -114,8 +115,12 @@ struct Objective {
   }
 };
 
-/// Sets those components of a direction to zero that would leave the bounds.
-void keep_inside(const Theta& theta, const Theta& gradient, Theta& direction) {
+/// Sets those components of a direction to zero that would leave the bounds or the fixed value.
+void keep_inside(const Theta& theta, const Theta& gradient, std::optional<Eigen::Index> fixed,
+                 Theta& direction) {
+  if (fixed) {
+    direction(*fixed) = 0.0;
+  }
   for (Eigen::Index i = 0; i < theta.size(); ++i) {
     const bool at_low = theta(i) <= bounds().low(i) && gradient(i) > 0;
     const bool at_high = theta(i) >= bounds().high(i) && gradient(i) < 0;
@@ -130,8 +135,9 @@ struct Minimum {
   double value = std::numeric_limits<double>::infinity();
 };
 
-/// BFGS with backtracking, steps of at most a factor e^2 in any parameter.
-Minimum descend(Objective& f, const Theta& start) {
+/// BFGS with backtracking, steps of at most a factor e^2 in any parameter. `fixed`: a parameter that
+/// keeps its starting value.
+Minimum descend(Objective& f, const Theta& start, std::optional<Eigen::Index> fixed = {}) {
   constexpr int kMostIterations = 60;
   // Gradient of the log likelihood by theta (logarithms): far below a significant difference.
   constexpr double kFlat = 1e-4;
@@ -142,12 +148,12 @@ Minimum descend(Objective& f, const Theta& start) {
 
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     Theta free = gradient;
-    keep_inside(at.theta, gradient, free);
+    keep_inside(at.theta, gradient, fixed, free);
     if (free.cwiseAbs().maxCoeff() < kFlat) {
       break;
     }
     Theta direction = -inverse_hessian * free;
-    keep_inside(at.theta, gradient, direction);
+    keep_inside(at.theta, gradient, fixed, direction);
     if (!(direction.dot(free) < 0.0)) {
       inverse_hessian = 0.05 * Theta5x5::Identity();
       direction = -0.05 * free;
@@ -181,6 +187,27 @@ Minimum descend(Objective& f, const Theta& start) {
   }
 
   return at;
+}
+
+/// Follows the likelihood away from `from` in steps of one parameter, the others re-estimated, as
+/// long as the data do not distinguish them. Adds the places to `comparable`.
+void follow(Objective& f, const Minimum& from, Eigen::Index along, double step,
+            std::vector<HyperParameters>& comparable) {
+  constexpr int kMostSteps = 8;
+  Theta at = from.theta;
+
+  for (int i = 0; i < kMostSteps; ++i) {
+    at(along) += step;
+    if (at(along) < bounds().low(along) || at(along) > bounds().high(along)) {
+      return;
+    }
+    const Minimum next = descend(f, at, along);
+    if (!(next.value <= from.value + kComparable)) {
+      return;
+    }
+    comparable.push_back(parameters(next.theta));
+    at = next.theta;
+  }
 }
 
 }  // namespace
@@ -257,6 +284,23 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design,
   h.log_likelihood = -best.value;
   h.evaluations = f.evaluations;
   return h;
+}
+
+std::vector<HyperParameters> comparable_parameters(const HyperParameters& most_likely,
+                                                   const ScaledDesign& design,
+                                                   std::size_t positions,
+                                                   const LinearGaussian& problem) {
+  Objective f{PriorKind::BayesPose, design, positions, problem, {}};
+  const Minimum highest{logarithms(most_likely), -most_likely.log_likelihood};
+  const double factor_2 = natural_logarithm(2.0);
+  std::vector<HyperParameters> comparable;
+
+  for (const Eigen::Index along : {kSd, kRho, kSa, kW}) {
+    follow(f, highest, along, factor_2, comparable);
+    follow(f, highest, along, -factor_2, comparable);
+  }
+
+  return comparable;
 }
 
 Result<HyperParameters> most_likely_near(const HyperParameters& start, const ScaledDesign& design,

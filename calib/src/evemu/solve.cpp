@@ -251,7 +251,11 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   }
 
   const Eigen::VectorXd residuals = residuals_of(problem, *fit);
-  const Statistics statistics = statistics_of(problem, *fit, residuals);
+  Statistics statistics = statistics_of(problem, *fit, residuals);
+  if (options.estimator == Estimator::BayesPose) {
+    statistics.comparable_m = cover_comparable(*fit, problem);
+  }
+
   const Eigen::VectorXd raw_c_m = fit->c_m;
   const MeanRotation rotation = set_gauge(problem, *fit);
   Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));

@@ -81,8 +81,9 @@ struct Watch {
   std::function<bool()> stopped;
 };
 
-/// The significant alternatives (family-wise error probability 1e-4), the most likely first. Those
-/// that change the model by less than a tenth of its uncertainty come after the others. At most one
+/// The significant alternatives, the most likely first: family-wise error probability 1e-4, and 1e-2
+/// for those that change the model by more than twice its uncertainty. Those that change the model
+/// by less than a tenth of its uncertainty come after the others. At most one
 /// alternative of each cause; of Scatter up to two, after the others. Then the comparisons that
 /// were not made. Only the columns of one alternative at a time are in memory. NotConverged if the
 /// estimate itself has no likelihood, or when stopped.

@@ -16,6 +16,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <vector>
 
 #include "abbe/calib/evemu/linear_gaussian.hpp"
 #include "abbe/calib/evemu/scaled_design.hpp"
@@ -50,6 +51,18 @@ struct HyperParameters {
                                                   std::size_t positions,
                                                   const LinearGaussian& problem,
                                                   std::span<const double> added = {});
+/// Natural logarithm of a likelihood ratio up to which the data hardly distinguish two sets of
+/// hyper-parameters: about the 95 % interval of one parameter.
+inline constexpr double kComparable = 2.0;
+
+/// Hyper-parameters of bayes-pose that the data hardly distinguish from the most likely ones: each
+/// of s_d, rho, s_a, w is changed in steps of a factor of 2 in both directions, at most 8 times, and
+/// the others are estimated again, until the likelihood is lower by more than e^kComparable.
+[[nodiscard]] std::vector<HyperParameters> comparable_parameters(const HyperParameters& most_likely,
+                                                                 const ScaledDesign&,
+                                                                 std::size_t positions,
+                                                                 const LinearGaussian& problem);
+
 /// prior_variances() with the variances of added columns inserted between design and rotations.
 [[nodiscard]] Eigen::VectorXd with_added(const Eigen::VectorXd& variances, std::size_t design_size,
                                          std::span<const double> added);

@@ -22,9 +22,13 @@
 /// The bootstrap draws them once per run. Their effect on the residuals also enlarges s and w and
 /// is therefore counted twice.
 ///
-/// Not in the covariance: the uncertainty of the hyper-parameters (with nearly coplanar positions,
-/// a twentieth of the tilt of [Li OMM], the likelihood can attribute slopes of V to pose
-/// rotations), and errors of the machine that are not polynomials.
+/// Hyper-parameters are not exactly known: the likelihood can be flat from one explanation by noise
+/// to another one by errors of the machine. The covariance of bayes-pose is therefore enlarged until
+/// the rms uncertainty over the balls is not smaller than the largest difference to an estimate
+/// with comparable hyper-parameters (Statistics::comparable_m). Most runs need no enlargement.
+///
+/// Not in the covariance: the rest of the uncertainty of the hyper-parameters, and errors of the
+/// machine that are not polynomials.
 
 #include <cstddef>
 #include <cstdint>
@@ -111,6 +115,9 @@ struct Statistics {
   double chi2_per_dof = 0.0;          ///< chi-square of whitened residuals / s; 0 without s
   ResidualFigures before, after;
   int iterations = 0;
+  /// Largest rms difference of V over the balls between the estimate and those with other sizes of
+  /// noise and errors that the data hardly distinguish (comparable_parameters()); bayes-pose only.
+  double comparable_m = 0.0;
 };
 
 /// Fit of a rotation reference to the model.

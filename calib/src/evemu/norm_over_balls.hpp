@@ -1,0 +1,13 @@
+#pragma once
+/// The norm that compares models of a ball array with each other and with their uncertainty.
+
+#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/scaled_design.hpp"
+#include "rigid_free_norm.hpp"
+
+namespace abbe::calib::evemu {
+
+/// Over the readings of all balls at all positions; for coefficients of the design.
+[[nodiscard]] RigidFreeNorm norm_over_balls(const Observations&, const ScaledDesign&);
+
+}  // namespace abbe::calib::evemu

@@ -33,7 +33,7 @@ TEST(Deadlines, IsDueAtItsInstantAndNotBefore) {
   deadlines.set(Due::Repeat, kStart);
   EXPECT_EQ(deadlines.passed(kStart - 1ns), std::nullopt);
   EXPECT_EQ(deadlines.passed(kStart), Due::Repeat);
-  EXPECT_EQ(deadlines.passed(kStart + 1h), Due::Repeat) << "until it is set anew or cancelled";
+  EXPECT_EQ(deadlines.passed(kStart + 1h), Due::Repeat) << "until it is set again or cancelled";
 }
 
 TEST(Deadlines, SettingAPurposeAgainReplacesItsInstant) {

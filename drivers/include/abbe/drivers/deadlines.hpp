@@ -1,6 +1,6 @@
 #pragma once
 /// The deadlines of one state machine: for each purpose one instant at most, after which something
-/// happens unless it is set anew or cancelled. One rule decides when the machine acts next, and on
+/// happens unless it is set again or cancelled. One rule decides when the machine acts next, and on
 /// what: next() and passed(). Time is handed in. No allocation; usable in real time. One thread.
 ///
 /// `kLast` is the last enumerator of the purposes, whose values are 0, 1, 2 ... If several deadlines
@@ -47,7 +47,7 @@ class Deadlines {
     }
     return earliest;
   }
-  /// What is due at `now`. It stays set: its handling sets it anew or cancels it.
+  /// What is due at `now`. It stays set: its handling sets it again or cancels it.
   [[nodiscard]] std::optional<Purpose> passed(HostTime now,
                                               std::span<const Purpose> waiting = {}) const ABBE_RT {
     for (std::size_t i = 0; i < at_.size(); ++i) {

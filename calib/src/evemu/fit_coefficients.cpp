@@ -24,6 +24,12 @@ Eigen::MatrixXd without_ball1(const Observations& o, const Eigen::MatrixXd& rows
   return rows(kept, Eigen::all);
 }
 
+/// Whitened rows of coefficients and pose rotations.
+LinearGaussian gaussian_of(const FitProblem& problem) {
+  const Observations& o = problem.observations;
+  return {white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)), white_rows(o, problem.y)};
+}
+
 }  // namespace
 
 Eigen::MatrixXd white_rows(const Observations& o, const Eigen::MatrixXd& rows) {
@@ -87,8 +93,7 @@ Result<Fit> fit_ols(const FitProblem& problem) {
 Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   const Observations& o = problem.observations;
   const std::size_t positions = o.positions();
-  const auto white = [&](const Eigen::MatrixXd& rows) { return white_rows(o, rows); };
-  const LinearGaussian gaussian(white(problem.X), white(pose_rotation_rows(o)), white(problem.y));
+  const LinearGaussian gaussian = gaussian_of(problem);
   const Result<HyperParameters> hyper = most_likely(kind, problem.design, positions, gaussian);
 
   if (!hyper) {
@@ -111,7 +116,7 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   fit.covariance_m2 = p.covariance.topLeftCorner(n, n);
 
   if (problem.A.cols() > 0) {
-    fit.artefact_m = gaussian.response(prior, h.s_m * h.s_m, white(problem.A)).topRows(n);
+    fit.artefact_m = gaussian.response(prior, h.s_m * h.s_m, white_rows(o, problem.A)).topRows(n);
   }
 
   fit.s_m = h.s_m;
@@ -136,8 +141,7 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
 double cover_comparable(Fit& fit, const FitProblem& problem) {
   const Observations& o = problem.observations;
   const std::size_t positions = o.positions();
-  const LinearGaussian gaussian(white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)),
-                                white_rows(o, problem.y));
+  const LinearGaussian gaussian = gaussian_of(problem);
   const RigidFreeNorm norm = norm_over_balls(o, problem.design);
   Eigen::VectorXd farthest_m = Eigen::VectorXd::Zero(fit.c_m.size());
 

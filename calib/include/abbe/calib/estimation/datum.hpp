@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "abbe/calib/error.hpp"
 #include "abbe/calib/estimation/information.hpp"

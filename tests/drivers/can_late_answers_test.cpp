@@ -134,7 +134,9 @@ TEST(EncoderReceiver, AnAxisIsSettledAfterAHundredRegularCycles) {
   HostTime sync = kStart + 2ms;
   for (int i = 0; i < 101; ++i, sync += 1ms) {  // the first answers are doubtful
     line.cycle(sync, 2000);
-    if (i > 0) EXPECT_NE(line.samples.back().head.time, sync) << i;
+    if (i > 0) {
+      EXPECT_NE(line.samples.back().head.time, sync) << i;
+    }
   }
   line.cycle(sync, 3000);
   EXPECT_EQ(line.samples.back().head.time, sync);

@@ -154,8 +154,8 @@ TEST_P(EncodersOnVcan, ReportThatTheInterfaceIsDownAndRecoverWhenItIsUp) {
   EXPECT_LE(device->status().faults, faults + 1)
       << "one refusal is one fault, however often it is tried";
   collect();  // the last samples of the closed connection
-  vcan.up();
   samples.clear();
+  vcan.up();
   const auto up = time.now();
   ASSERT_TRUE(until([&] { return !samples.empty() && complete(samples.back()); }));
   EXPECT_LT(time.now() - up, 3s);  // an emulated processor; measured in deadlines_test.cpp

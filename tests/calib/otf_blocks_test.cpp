@@ -26,7 +26,37 @@ TEST(Blocks, AreMeansOfConsecutiveSamples) {
   ASSERT_EQ(series->blocks.size(), 10u);
   EXPECT_NEAR(series->blocks[3].mean_tracker_m.x(), 1e-3 * (300 + 399) / 2, 1e-15);
   EXPECT_EQ(series->blocks[3].samples, 100u);
-  EXPECT_NEAR(series->start_tracker_m.x(), 1e-3 * 19 / 2, 1e-15);
+}
+
+TEST(Blocks, StartAtTheMeanOfTheStandstill) {
+  std::vector<TrackerObservation> samples = straight(1000);
+  for (std::size_t i = 0; i < 25; ++i) {
+    samples[i].p_tracker_m.x() = i % 2 == 0 ? 1e-6 : -1e-6;
+  }
+  const Result<BlockSeries> series = make_blocks(samples, {});
+  ASSERT_TRUE(series) << series.error().text;
+  EXPECT_NEAR(series->start_tracker_m.x(), 0.0, 1e-15);
+}
+
+TEST(Blocks, SamplesAfterAShortStandstillDoNotMoveTheStart) {
+  // 25 samples at 50 points per second would be half a second; here the machine stood for 0.1 s.
+  std::vector<TrackerObservation> samples = straight(1000);
+  for (std::size_t i = 0; i < 5; ++i) {
+    samples[i].p_tracker_m.x() = 0.005;
+  }
+  const Result<BlockSeries> series = make_blocks(samples, {});
+  ASSERT_TRUE(series) << series.error().text;
+  EXPECT_NEAR(series->start_tracker_m.x(), 0.005, 1e-3);
+}
+
+TEST(Blocks, OfFewSamplesHaveTheirSamplesAsSubPoints) {
+  Options options;
+  options.block_samples = 2;
+  const Result<BlockSeries> series = make_blocks(straight(100), options);
+  ASSERT_TRUE(series) << series.error().text;
+  ASSERT_EQ(series->sub_points, 2u);
+  EXPECT_NEAR(series->sub_points_tracker_m[6].x(), 6e-3, 1e-15);
+  EXPECT_NEAR(series->sub_points_tracker_m[7].x(), 7e-3, 1e-15);
 }
 
 TEST(Blocks, SubPointsHaveTheMeanOfTheBlock) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "abbe/calib/otf/blocks.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -105,6 +106,35 @@ TEST(Observe, RefusesBlocksThatStraddleCorners) {
   const auto o = observe(run.samples, run.machine, run.path, run.noise, run.options);
   ASSERT_FALSE(o);
   EXPECT_THAT(o.error().text, HasSubstr("use at most 12"));
+}
+
+/// A tracker of few points per second: every `keep`-th sample of the run.
+MadeRun slow_run(std::size_t keep) {
+  MadeRun run = make_run({});
+  std::vector<TrackerObservation> samples;
+  for (std::size_t i = 0; i < run.samples.size(); i += keep) {
+    samples.push_back(run.samples[i]);
+  }
+  run.samples = std::move(samples);
+  run.options.block_samples = suitable_block_samples(run.samples);
+  return run;
+}
+
+TEST(Observe, TakesPointsSixteenMillimetresApart) {
+  const MadeRun run = slow_run(10);
+  const Result<Observations> o =
+      observe(run.samples, run.machine, run.path, run.noise, run.options);
+  ASSERT_TRUE(o) << o.error().text;
+  EXPECT_GT(o->blocks_used, o->blocks / 2);
+}
+
+TEST(Observe, RefusesPointsTooFarApartWithTheFactorNeeded) {
+  const MadeRun run = slow_run(15);
+  const Result<Observations> o =
+      observe(run.samples, run.machine, run.path, run.noise, run.options);
+  ASSERT_FALSE(o);
+  EXPECT_THAT(o.error().text, HasSubstr("points are 23.9"));
+  EXPECT_THAT(o.error().text, HasSubstr("1.2 times as many points per second"));
 }
 
 TEST(Observe, RefusesNoiseThatIsNotPositive) {

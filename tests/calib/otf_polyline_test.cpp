@@ -97,14 +97,25 @@ TEST(BlockLength, IsTheTravelOfEightMillimetres) {
   }
 }
 
-TEST(BlockLength, StaysBetweenTenAndAThousand) {
+TEST(BlockLength, StaysBetweenOneAndAThousand) {
   std::vector<TrackerObservation> standing(1000);
   EXPECT_EQ(suitable_block_samples(standing), 1000u);
   EXPECT_EQ(suitable_block_samples({}), 10u);
   std::vector<TrackerObservation> racing;
   for (int i = 0; i < 1000; ++i)
     racing.push_back({.time_s = 0.01 * i, .p_tracker_m = {0.02 * i, 0, 0}});
-  EXPECT_EQ(suitable_block_samples(racing), 10u);
+  EXPECT_EQ(suitable_block_samples(racing), 1u);
+}
+
+TEST(BlockLength, OfASlowTrackerIgnoresCornersOfThePath) {
+  // 2 mm per sample along legs of 30 mm, back and forth: the chord over 50 samples is shorter.
+  std::vector<TrackerObservation> zigzag;
+  for (int i = 0; i < 1000; ++i) {
+    const int along = i % 30;
+    zigzag.push_back({.time_s = 0.05 * i,
+                      .p_tracker_m = {2e-3 * std::min(along, 30 - along), 1e-3 * (i / 15), 1.0}});
+  }
+  EXPECT_EQ(suitable_block_samples(zigzag), 4u);
 }
 
 }  // namespace

@@ -1,38 +1,58 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "abbe/calib/otf/blocks.hpp"
 
 namespace abbe::calib::otf {
+namespace {
 
-std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) {
-  constexpr double kBlockTravel_m = 8.33e-3;
-  constexpr std::size_t kChord = 50;
+constexpr double kBlockTravel_m = 8.33e-3;
 
-  // the design rows of a block are averaged over ten sub-points
-  constexpr std::size_t kSmallest = 10;
-  constexpr std::size_t kLargest = 1000;
-  std::vector<double> travel_m;  // per sample
-
-  for (std::size_t i = kChord; i < samples.size(); i += kChord) {
-    if (samples[i].valid && samples[i - kChord].valid) {
-      travel_m.push_back((samples[i].p_tracker_m - samples[i - kChord].p_tracker_m).norm() /
-                         double{kChord});
+/// Upper quartile of the travel per sample, from chords over `chord` samples; nullopt: no chord.
+std::optional<double> travel_per_sample_m(std::span<const TrackerObservation> samples,
+                                          std::size_t chord) {
+  std::vector<double> travel_m;
+  for (std::size_t i = chord; i < samples.size(); i += chord) {
+    if (samples[i].valid && samples[i - chord].valid) {
+      travel_m.push_back((samples[i].p_tracker_m - samples[i - chord].p_tracker_m).norm() /
+                         static_cast<double>(chord));
     }
   }
 
   if (travel_m.empty()) {
-    return kSmallest;
+    return std::nullopt;
   }
 
   const auto quartile = travel_m.begin() + static_cast<std::ptrdiff_t>(3 * travel_m.size() / 4);
   std::nth_element(travel_m.begin(), quartile, travel_m.end());
-  if (!(*quartile * double{kLargest} > kBlockTravel_m)) {
+  return *quartile;
+}
+
+}  // namespace
+
+std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) {
+  constexpr std::size_t kLargest = 1000, kUnknownTravel = 10;
+  std::size_t chord = 50;
+  std::optional<double> travel_m = travel_per_sample_m(samples, chord);
+
+  // The chord of a slow tracker would cut the corners of the path.
+  while (chord > 1 && travel_m && *travel_m * static_cast<double>(chord) > kBlockTravel_m) {
+    chord = std::max<std::size_t>(1, chord / 5);
+    travel_m = travel_per_sample_m(samples, chord);
+  }
+
+  if (!travel_m) {
+    return kUnknownTravel;
+  }
+
+  if (!(*travel_m * double{kLargest} > kBlockTravel_m)) {
     return kLargest;
   }
 
-  return std::clamp(static_cast<std::size_t>(std::lround(kBlockTravel_m / *quartile)), kSmallest,
-                    kLargest);
+  const auto suitable = static_cast<std::size_t>(std::lround(kBlockTravel_m / *travel_m));
+  return std::clamp<std::size_t>(suitable, 1, kLargest);
 }
 
 }  // namespace abbe::calib::otf

@@ -57,8 +57,8 @@ class BlockCutter {
  public:
   BlockCutter(std::size_t expected_blocks, const Options& options) : options_(options) {
     series_.blocks.reserve(expected_blocks);
-    series_.sub_points = options.row_points;
-    series_.sub_points_tracker_m.reserve(expected_blocks * options.row_points);
+    series_.sub_points = std::min(options.row_points, options.block_samples);
+    series_.sub_points_tracker_m.reserve(expected_blocks * series_.sub_points);
   }
 
   void add(const TrackerObservation& sample) {
@@ -108,12 +108,12 @@ class BlockCutter {
     ticks_ = 0;
   }
 
-  /// Appends the midpoints of row_points equal parts of the block. Their mean is the mean of the
-  /// block; with points at both ends it would not be.
+  /// Appends the midpoints of equal parts of the block. Their mean is the mean of the block; with
+  /// points at both ends it would not be. With one part per sample they are the samples.
   void push_sub_points() {
     const double step =
-        static_cast<double>(in_block_.size()) / static_cast<double>(options_.row_points);
-    for (std::size_t k = 0; k < options_.row_points; ++k) {
+        static_cast<double>(in_block_.size()) / static_cast<double>(series_.sub_points);
+    for (std::size_t k = 0; k < series_.sub_points; ++k) {
       const double place = (static_cast<double>(k) + 0.5) * step - 0.5;
       const auto i = static_cast<std::size_t>(std::max(0.0, std::floor(place)));
       const std::size_t next = std::min(i + 1, in_block_.size() - 1);
@@ -129,25 +129,34 @@ class BlockCutter {
   std::size_t ticks_ = 0;
 };
 
-/// Mean of the first `count` valid samples in [begin, end).
+/// Mean of the first valid samples in [begin, end): of at most `count`, and of those before the
+/// machine has moved. A slow tracker sees few points of a short standstill; the mean of 20 would be
+/// far from the vertex.
 template <class Iterator>
 Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
-  Vector3 sum = Vector3::Zero();
+  constexpr double kMoved_m = 1e-3;  // more than noise, less than the limit of the alignment
+  Vector3 first = Vector3::Zero(), sum = Vector3::Zero();
   std::size_t found = 0;
+
   for (; begin != end && found < count; ++begin) {
-    if (begin->valid) {
-      sum += begin->p_tracker_m;
-      ++found;
+    if (!begin->valid) {
+      continue;
     }
+    if (found == 0) {
+      first = begin->p_tracker_m;
+    }
+    if ((begin->p_tracker_m - first).norm() > kMoved_m) {
+      break;
+    }
+    sum += begin->p_tracker_m;
+    ++found;
   }
 
-  if (found < count) {
-    return failure(
-        ErrorCode::TooFewObservations,
-        message("tracker blocks: ", found, " valid samples, the standstill needs ", count));
+  if (found == 0) {
+    return failure(ErrorCode::TooFewObservations, "tracker blocks: no valid samples");
   }
 
-  return Vector3(sum / static_cast<double>(count));
+  return Vector3(sum / static_cast<double>(found));
 }
 
 }  // namespace

@@ -99,9 +99,8 @@ Result<void> check(const Noise& noise) {
   return {};
 }
 
-/// BadInput if the travel of a block is longer than twice the corner exclusion: such a block could
-/// extend over a corner and still be used.
-Result<void> check_travel(const BlockSeries& series, const Options& options) {
+/// Median travel from one usable block to the next; 0 without two such blocks.
+double travel_per_block_m(const BlockSeries& series) {
   std::vector<double> travel_m;
   for (std::size_t i = 0; i + 1 < series.blocks.size(); ++i) {
     if (series.blocks[i].usable && series.blocks[i + 1].usable) {
@@ -111,21 +110,37 @@ Result<void> check_travel(const BlockSeries& series, const Options& options) {
   }
 
   if (travel_m.empty()) {
-    return {};
+    return 0.0;
   }
 
   const auto middle = travel_m.begin() + std::ssize(travel_m) / 2;
   std::nth_element(travel_m.begin(), middle, travel_m.end());
-  if (0.5 * *middle <= options.corner_m) {
+  return *middle;
+}
+
+/// BadInput if the travel of a block is longer than twice the corner exclusion: such a block could
+/// extend over a corner and still be used.
+Result<void> check_travel(const BlockSeries& series, const Options& options) {
+  const double travel_m = travel_per_block_m(series), most_m = 2.0 * options.corner_m;
+  if (travel_m <= most_m) {
     return {};
   }
 
-  const double most = 2.0 * options.corner_m / *middle * static_cast<double>(options.block_samples);
+  const double too_far = travel_m / most_m;
+  const double most_samples = std::floor(static_cast<double>(options.block_samples) / too_far);
+  if (most_samples >= 1.0) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker blocks: ", options.block_samples, " samples travel ",
+                           1e3 * travel_m, " mm, limit ", 1e3 * most_m, " mm: use at most ",
+                           most_samples, " samples per block"));
+  }
+
+  const double between_m = travel_m / static_cast<double>(options.block_samples);
+  const double more_points = std::ceil(10.0 * between_m / most_m) / 10.0;
   return failure(ErrorCode::BadInput,
-                 message("tracker blocks: ", options.block_samples, " samples travel ",
-                         1e3 * *middle, " mm, more than twice the corner exclusion of ",
-                         1e3 * options.corner_m, " mm: use at most ", std::floor(most),
-                         " samples per block, or increase the exclusion"));
+                 message("tracker: the points are ", 1e3 * between_m, " mm apart, limit ",
+                         1e3 * most_m, " mm: drive slower, or measure with at least ", more_points,
+                         " times as many points per second"));
 }
 
 PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,

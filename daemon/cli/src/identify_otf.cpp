@@ -348,7 +348,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block; default: blocks of 8.3 mm of travel")
-      ->check(CLI::Range(10, 1000));
+      ->check(CLI::Range(1, 1000));
   command->add_flag("--json", arguments->json, "print the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")
       ->required();

@@ -81,8 +81,9 @@ struct Options {
   /// uncertain and the machine accelerates. 10 mm also exceeds half the travel of a block, so that
   /// no used block extends over a corner.
   double corner_m = 0.010;
-  /// Number of standstill samples at each end of the run. Their means are the measured first and
-  /// last vertex. 20 samples are 40 ms at 500 Hz.
+  /// Largest number of standstill samples at each end of the run. Their means are the measured
+  /// first and last vertex. 20 samples are 40 ms at 500 Hz; samples of a machine that has left the
+  /// vertex are not used.
   std::size_t standstill_samples = 20;
   /// Number of sub-points of a block over which design rows are averaged. With 10 the result does
   /// not differ from that with all samples.

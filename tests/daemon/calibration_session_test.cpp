@@ -248,6 +248,33 @@ TEST(CalibrationSession, TheStandstillOfASlowTrackerLastsTwentyPoints) {
   EXPECT_EQ(acquisition_options(config).stand_before, AcquisitionOptions{}.stand_before);
 }
 
+TEST(CalibrationSession, ATooShortStandstillAtTheStartIsTheReasonGiven) {
+  Config config;
+  config.tracker.emplace().point_rate_hz = 5.0;
+  CalibrationSession session{{acquisition_options(config), {}}};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 1s);
+  EXPECT_THAT(session.status().reason, testing::HasSubstr("mm for 4.0 s"));
+
+  drive.move(kPath[1]);
+  drive.pause(1h);
+  drive.stand(kPath[1], 1s);
+  EXPECT_THAT(session.status().reason,
+              AllOf(testing::HasSubstr("did not stand at (0.000, 0.000, 0.000) mm for 4.0 s"),
+                    testing::HasSubstr("the longest time was 1.0 s")));
+}
+
+TEST(CalibrationSession, AMachineThatStaysAtTheStartIsTheReasonGiven) {
+  AcquisitionOptions options;
+  options.wait_for_start = 5s;
+  CalibrationSession session{{options, {}}};
+  ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
+  Drive drive{session};
+  drive.stand(kPath[0], 6s);
+  EXPECT_THAT(session.status().reason, testing::HasSubstr("did not drive off from (0.000"));
+}
+
 TEST(CalibrationSession, RefusesWhenAnotherPathIsDriven) {
   CalibrationSession session;
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
@@ -412,7 +439,7 @@ TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
   Drive drive{session};
   drive.stand(kPath[0], 1s);
   drive.move({0.05, 0, 0});
-  for (int i = 0; i < 60; ++i) {  // a point now and then: the tracker goes on
+  for (int i = 0; i < 60; ++i) {  // a point now and then: the tracker continues
     drive.pause(20s);
     drive.stand({0.05, 0, 0}, kPeriod);
   }

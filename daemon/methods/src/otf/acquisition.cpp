@@ -63,8 +63,9 @@ OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOpti
       path_(otf_path(path_m_)),
       driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
       options_(std::move(options)) {
-  reason_ = fmt::format("waiting for the machine to stand at {} with the tracker streaming",
-                        text(path_.path().vertices_m.front()));
+  reason_ =
+      fmt::format("waiting for the machine to stand at {} for {:.1f} s with the tracker streaming",
+                  text(path_.path().vertices_m.front()), in_seconds(options_.stand_before));
 }
 
 double OtfAcquisition::progress() const noexcept {
@@ -160,9 +161,7 @@ bool OtfAcquisition::in_order(const RunPoint& point) {
 
 void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
   if (phase_ == Phase::WaitingAtStart && point_time - from_ > options_.wait_for_start) {
-    fail(fmt::format("the machine did not stand at {} and drive off within {:.0f} min",
-                     text(path_.path().vertices_m.front()),
-                     in_seconds(options_.wait_for_start) / 60.0));
+    fail(no_start());
   } else if (phase_ == Phase::Running && point_time - axes_known_at_ > options_.silence) {
     fail(fmt::format("no axis positions for {:.1f} s in the middle of the run",
                      in_seconds(point_time - axes_known_at_)));
@@ -170,6 +169,20 @@ void OtfAcquisition::give_up_if_stuck(HostTime point_time) {
     fail(fmt::format("the machine has stood still on its path for {:.0f} min",
                      in_seconds(options_.longest_stop) / 60.0));
   }
+}
+
+/// The reason why no run began within wait_for_start.
+std::string OtfAcquisition::no_start() const {
+  const std::string start = text(path_.path().vertices_m.front());
+  const double minutes = in_seconds(options_.wait_for_start) / 60.0;
+  const double needed_s = in_seconds(options_.stand_before);
+
+  if (longest_stand_ >= options_.stand_before)
+    return fmt::format("the machine did not drive off from {} within {:.0f} min", start, minutes);
+  return fmt::format(
+      "the machine did not stand at {} for {:.1f} s within {:.0f} min; the longest time was {:.1f} "
+      "s",
+      start, needed_s, minutes, in_seconds(longest_stand_));
 }
 
 void OtfAcquisition::track_standstill(const RunPoint& point, const Vector3& q) {
@@ -199,6 +212,7 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
   if ((q - path_.path().vertices_m.front()).norm() > options_.vertex_tolerance_m || !point.usable)
     return;
   before_.push_back(point);
+  longest_stand_ = std::max(longest_stand_, before_.back().time - before_.front().time);
 
   while (before_.back().time - before_.front().time > options_.keep_before) before_.pop_front();
 }

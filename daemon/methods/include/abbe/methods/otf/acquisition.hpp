@@ -116,6 +116,7 @@ class OtfAcquisition {
  private:
   [[nodiscard]] bool in_order(const RunPoint& point);
   void give_up_if_stuck(protocol::HostTime point_time);
+  [[nodiscard]] std::string no_start() const;
   void keep(const RunPoint& point);
   void wait_at_start(const RunPoint& point, const calib::Vector3& q);
   void run(const RunPoint& point, const calib::Vector3& q);
@@ -135,6 +136,7 @@ class OtfAcquisition {
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
   std::deque<RunPoint> before_;  // the last keep_before of the standstill at the first vertex
+  std::chrono::nanoseconds longest_stand_{};  // at the first vertex, before the run
   RunPoints points_;
   MeanEffect environment_;
   VertexReadings readings_{options_.reading_tolerance_m};

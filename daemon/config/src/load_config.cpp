@@ -74,14 +74,26 @@ std::string reading_text(const ReferenceConfig& reference) {
 
 }  // namespace
 
-Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
+namespace {
+
+Result<Config> parse(std::string_view text, const std::filesystem::path& file, Origin origin) {
   const auto table = parse_toml(text, file.string());
   if (!table) return tl::make_unexpected(table.error());
   Faults faults(file.string(), kMostConfigFaults);
-  Section root(&*table, "", {1, 1}, faults);
+  Section root(&*table, "", {1, 1}, faults, origin);
   auto config = read_all(root, file.parent_path());
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return config;
+}
+
+}  // namespace
+
+Result<Config> parse_config(std::string_view text, const std::filesystem::path& file) {
+  return parse(text, file, Origin::Written);
+}
+
+Result<Config> parse_recorded_config(std::string_view text, const std::filesystem::path& file) {
+  return parse(text, file, Origin::Recorded);
 }
 
 Result<Config> load_config(const std::filesystem::path& file) {

@@ -13,21 +13,24 @@ namespace abbe::daemon {
 void check_travel_length(Section& axis, std::string_view key, const AxisConfig& config) {
   const double travel_m = config.max - config.min;
   if (config.kind != AxisKind::Linear || travel_m <= 0.0 || travel_m >= kShortestTravel_m) return;
-  axis.fault(key, fmt::format("the travel is only {:g} mm, but must be at least {:g} mm: the axis "
-                              "of no machine is shorter. min_mm and max_mm are in mm",
-                              travel_m * kMmPerM, kShortestTravel_m * kMmPerM));
+  axis.implausible(key,
+                   fmt::format("the travel is only {:g} mm, but must be at least {:g} mm: the axis "
+                               "of no machine is shorter. min_mm and max_mm are in mm",
+                               travel_m * kMmPerM, kShortestTravel_m * kMmPerM));
 }
 
 void check_step(Section& section, double step, bool linear) {
   if (std::abs(step) <= (linear ? kLargestStep_m : kLargestStep_rad)) return;
   if (linear)
-    section.fault("step_nm", fmt::format("one count is {:g} mm, but must be at most {:g} mm: no "
-                                         "scale is coarser. step_nm is in nanometres",
-                                         step * kMmPerM, kLargestStep_m * kMmPerM));
+    section.implausible("step_nm",
+                        fmt::format("one count is {:g} mm, but must be at most {:g} mm: no "
+                                    "scale is coarser. step_nm is in nanometres",
+                                    step * kMmPerM, kLargestStep_m * kMmPerM));
   else
-    section.fault("step_nrad", fmt::format("one count is {:g} rad, but must be at most {:g} rad: "
-                                           "no encoder is coarser. step_nrad is in nanoradians",
-                                           step, kLargestStep_rad));
+    section.implausible("step_nrad",
+                        fmt::format("one count is {:g} rad, but must be at most {:g} rad: "
+                                    "no encoder is coarser. step_nrad is in nanoradians",
+                                    step, kLargestStep_rad));
 }
 
 namespace {
@@ -75,7 +78,7 @@ std::string printable(std::string text) {
 bool get_host(Section& section, std::string_view key, std::string& out, Need need) {
   if (!section.get(key, out, need)) return false;
   const std::string fault = fault_of_host(out);
-  if (!fault.empty()) section.fault(key, fmt::format("\"{}\" {}", printable(out), fault));
+  if (!fault.empty()) section.implausible(key, fmt::format("\"{}\" {}", printable(out), fault));
   return true;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-/// Limits of what a real machine has. A value beyond them is a slip of the unit or of the finger,
-/// and is a fault of the configuration.
+/// Limits of what a real machine has. A value beyond them is a mistake in the unit or a typing
+/// error, and is a fault of a configuration that a person wrote. A recorded configuration is not
+/// judged by them (Section::implausible()).
 
 #include <string_view>
 

@@ -138,7 +138,7 @@ void read_transport(Section& encoder, EncoderConfig& out) {
     encoder.get_integer("local_port", out.local_port, 0, 65535);
     get_host(encoder, "peer_host", out.peer_host, Need::Required);
     if (std::ranges::count(out.peer_host, ':') > 1)
-      encoder.fault(
+      encoder.implausible(
           "peer_host",
           "is an IPv6 address, but CAN over UDP uses IPv4: give an IPv4 address or a name");
     encoder.get_integer("peer_port", out.peer_port, 1, 65535, Need::Required);

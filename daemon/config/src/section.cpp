@@ -33,8 +33,8 @@ std::optional<double> number_in(const toml::node& node) {
 }  // namespace
 
 Section::Section(const toml::table* table, std::string path, toml::source_position where,
-                 Faults& faults)
-    : table_(table), path_(std::move(path)), where_(where), faults_(&faults) {}
+                 Faults& faults, Origin origin)
+    : table_(table), path_(std::move(path)), where_(where), faults_(&faults), origin_(origin) {}
 
 std::string Section::full(std::string_view key) const {
   if (path_.empty()) return std::string{key};
@@ -48,6 +48,10 @@ void Section::fault_at(toml::source_position at, std::string_view key, std::stri
 void Section::fault(std::string_view key, std::string_view what) {
   const toml::node* node = table_ != nullptr ? table_->get(key) : nullptr;
   fault_at(node != nullptr ? node->source().begin : where_, key, what);
+}
+
+void Section::implausible(std::string_view key, std::string_view what) {
+  if (origin_ == Origin::Written) fault(key, what);
 }
 
 bool Section::has(std::string_view key) const {
@@ -79,7 +83,7 @@ Section Section::child(std::string_view key, Need need) {
     node = nullptr;
   }
   const auto where = node != nullptr ? node->source().begin : where_;
-  return {node != nullptr ? node->as_table() : nullptr, full(key), where, *faults_};
+  return {node != nullptr ? node->as_table() : nullptr, full(key), where, *faults_, origin_};
 }
 
 std::vector<Section> Section::children(std::string_view key) {
@@ -97,7 +101,8 @@ std::vector<Section> Section::children(std::string_view key) {
   for (const auto& element : *node->as_array()) {
     const auto name = fmt::format("{}[{}]", key, index++);
     if (element.is_table())
-      result.emplace_back(element.as_table(), full(name), element.source().begin, *faults_);
+      result.emplace_back(element.as_table(), full(name), element.source().begin, *faults_,
+                          origin_);
     else
       fault_at(element.source().begin, name,
                fmt::format("must be a table, not {}", type_text(element)));

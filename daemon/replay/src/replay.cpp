@@ -424,7 +424,7 @@ Result<Config> recorded_config(const RecordingReader& recording, const std::stri
                                                  "checksum is wrong): give the file it was "
                                                  "recorded with",
                                                  file));
-  return parse_config(recording.info().configuration, file + " (recorded configuration)");
+  return parse_recorded_config(recording.info().configuration, file + " (recorded configuration)");
 }
 
 Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,

@@ -413,6 +413,11 @@ struct Config {
 /// of relative paths.
 [[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
 
+/// Same as parse_config() for the text in a recording: values that no machine has are accepted (a
+/// travel below 1 mm, a step above 1 mm, a host that no resolver accepts).
+[[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
+                                                   const std::filesystem::path& file);
+
 /// SHA-256 in hex over the configuration that a model depends on: the machine (name, chain, axes,
 /// target, basis, nodes) and the meaning of a scale reading (node and axis, step, offset,
 /// correction by the control). A stored model is ACTIVE only if its hash is equal to this one.

@@ -42,9 +42,14 @@ inline constexpr Bounds kNotNegative{0.0, std::numeric_limits<double>::infinity(
 
 enum class Need { Optional, Required };
 
+/// Recorded: the file of a run that has taken place. Its values are not judged by what is plausible
+/// for a machine, so that a limit which is added later does not make the recording unreadable.
+enum class Origin { Written, Recorded };
+
 class Section {
  public:
-  Section(const toml::table* table, std::string path, toml::source_position where, Faults& faults);
+  Section(const toml::table* table, std::string path, toml::source_position where, Faults& faults,
+          Origin origin = Origin::Written);
 
   [[nodiscard]] bool present() const noexcept { return table_ != nullptr; }
   [[nodiscard]] bool has(std::string_view key) const;  ///< also marks the key as known
@@ -75,6 +80,8 @@ class Section {
 
   /// Adds a fault at the position of the key, or of the table if the key is absent.
   void fault(std::string_view key, std::string_view what);
+  /// fault() for a value that can be used, but that no machine has; none in a recorded file.
+  void implausible(std::string_view key, std::string_view what);
   /// Adds a fault for every key that was not read. Call it last.
   void close();
 
@@ -91,6 +98,7 @@ class Section {
   std::string path_;
   toml::source_position where_;
   Faults* faults_;
+  Origin origin_;
   mutable std::vector<std::string> known_;
 };
 

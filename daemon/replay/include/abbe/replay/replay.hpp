@@ -73,7 +73,7 @@ struct ReplayReport {
 void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
 
 /// The recorded configuration. BadInput if its checksum is wrong; else the errors of
-/// parse_config().
+/// parse_recorded_config().
 [[nodiscard]] Result<Config> recorded_config(const RecordingReader& recording,
                                              const std::string& file);
 

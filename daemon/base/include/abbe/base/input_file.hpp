@@ -1,8 +1,9 @@
 #pragma once
 /// What every file reader returns or reports beside the content.
 
-#include <functional>
 #include <string>
+
+#include "abbe/protocol/table/number_table.hpp"
 
 namespace abbe::daemon {
 
@@ -14,7 +15,6 @@ struct InputFile {
   friend bool operator==(const InputFile&, const InputFile&) = default;
 };
 
-/// Called while a file is read, with ascending 0 <= fraction <= 1. May be empty.
-using ReadProgress = std::function<void(double fraction)>;
+using protocol::ReadProgress;
 
 }  // namespace abbe::daemon

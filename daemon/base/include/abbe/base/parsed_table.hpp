@@ -7,10 +7,14 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/faults.hpp"
 #include "abbe/base/input_file.hpp"
-#include "abbe/base/number_table.hpp"
+#include "abbe/protocol/table/number_table.hpp"
 
 namespace abbe::daemon {
+
+using protocol::NumberTable;
+using protocol::TableForm;
 
 struct ParsedTable {
   InputFile source;

@@ -1,12 +1,10 @@
-#include "table_recognition.hpp"
-
-#include <fmt/format.h>
+#include "table/recognition.hpp"
 
 #include <array>
 #include <optional>
 #include <string>
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 namespace {
 
 struct Signature {
@@ -31,10 +29,11 @@ constexpr std::array kSeparators{Separator{';', "semicolons"}, Separator{'\t', "
                                  Separator{' ', "spaces"}};
 
 std::string separated_by(const Separator& separator) {
-  return fmt::format(
-      "{} separate the values: write commas (in a spreadsheet: export as CSV with field separator "
-      "\",\"; in a text editor: first make decimal commas points, then replace the {} by commas)",
-      separator.name, separator.name);
+  const std::string name(separator.name);
+  return name +
+         " separate the values: write commas (in a spreadsheet: export as CSV with field separator "
+         "\",\"; in a text editor: first make decimal commas points, then replace the " +
+         name + " by commas)";
 }
 
 std::string_view unquoted(std::string_view cell) {
@@ -125,7 +124,7 @@ void add_missing_header(std::size_t line, std::size_t columns, const std::vector
                         Faults& faults) {
   std::string headers;
   for (const TableForm& form : forms)
-    headers += fmt::format("{}{}", headers.empty() ? "" : "  or  ", header_of(form, columns));
+    headers += (headers.empty() ? "" : "  or  ") + header_of(form, columns);
   faults.add(line, 1, "",
              "the header line is missing: insert a line with the names of the columns, in their "
              "order, before this one: " +
@@ -141,8 +140,9 @@ bool has_no_names(const std::vector<Cell>& cells, const std::vector<TableForm>& 
 void add_decimal_commas(std::string_view line, std::size_t number, char separator, Faults& faults) {
   for (const Cell& cell : unquoted_cells(line, separator)) {
     if (!has_decimal_comma(cell.text)) continue;
-    faults.add_kind("decimal comma", number, cell.column, "",
-                    fmt::format("\"{}\" has a decimal comma: {}", cell.text, kWritePoints));
+    faults.add_kind(
+        "decimal comma", number, cell.column, "",
+        '"' + std::string(cell.text) + "\" has a decimal comma: " + std::string(kWritePoints));
     return;
   }
 }
@@ -205,4 +205,4 @@ bool has_decimal_commas(std::string_view line, const TableForm& form, std::size_
   });
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -1,14 +1,12 @@
-#include "abbe/base/number_table.hpp"
-
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include "abbe/protocol/table/number_table.hpp"
 
 #include <algorithm>
+#include <string>
 
-#include "table_recognition.hpp"
-#include "table_text.hpp"
+#include "table/recognition.hpp"
+#include "table/text.hpp"
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 
 namespace {
 
@@ -29,6 +27,19 @@ std::size_t choose_form(const std::vector<TableForm>& forms, const std::vector<C
     return count_present(a, header) < count_present(b, header);
   });
   return static_cast<std::size_t>(best - forms.begin());
+}
+
+std::string joined(const std::vector<std::string_view>& words, std::string_view between) {
+  std::string text;
+  for (const std::string_view word : words) {
+    if (!text.empty()) text += between;
+    text += word;
+  }
+  return text;
+}
+
+std::string quoted(std::string_view text) {
+  return '"' + std::string(text) + '"';
 }
 
 std::vector<std::string_view> names(const TableForm& form) {
@@ -58,8 +69,7 @@ std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cel
 
   for (std::size_t column = 0; column < form.size(); ++column)
     if (form[column].required && !seen[column])
-      faults.add(line, 1, form[column].name,
-                 fmt::format("missing column; needed: {}", fmt::join(known, ",")));
+      faults.add(line, 1, form[column].name, "missing column; needed: " + joined(known, ","));
 
   return target;
 }
@@ -105,11 +115,11 @@ class RowReader {
   }
 
   void add_count(std::string_view line, std::size_t number, std::size_t count) {
-    auto what = fmt::format("{} values, expected {}", count, target_.size());
+    auto what = std::to_string(count) + " values, expected " + std::to_string(target_.size());
     const bool commas = count > target_.size() && has_decimal_commas(line, form_, target_.size());
     if (commas)
-      what += fmt::format(", and no decimal point: if commas are the decimal separator, {}",
-                          kWritePoints);
+      what += ", and no decimal point: if commas are the decimal separator, " +
+              std::string(kWritePoints);
     faults_.add_kind(commas ? "decimal comma" : "values", number, line.size() + 1, "", what);
   }
 
@@ -117,12 +127,11 @@ class RowReader {
     if (fill_cell(cell.text, column, row)) return;
     const auto& words = form_[column].words;
     if (!words.empty())
-      return faults_.add_kind(
-          "word", number, cell.column, form_[column].name,
-          fmt::format("\"{}\": must be {}", cell.text, fmt::join(words, " or ")));
+      return faults_.add_kind("word", number, cell.column, form_[column].name,
+                              quoted(cell.text) + ": " + "must be " + joined(words, " or "));
     const auto fault = parse_cell(cell.text, row[column]);
     faults_.add_kind(fault, number, cell.column, form_[column].name,
-                     fmt::format("\"{}\": {}", cell.text, fault));
+                     quoted(cell.text) + ": " + std::string(fault));
   }
 
   const TableForm& form_;
@@ -186,4 +195,4 @@ std::optional<NumberTable> parse_numbers(std::string_view text, const std::vecto
   return table;
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

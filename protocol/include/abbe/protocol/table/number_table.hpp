@@ -6,15 +6,14 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <vector>
 
-#include "abbe/base/faults.hpp"
-#include "abbe/base/input_file.hpp"
+#include "abbe/protocol/table/faults.hpp"
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 
 struct ColumnRule {
   std::string_view name;
@@ -55,10 +54,13 @@ class NumberTable {
   std::vector<bool> sound_;
 };
 
+/// Called while a text is read, with ascending 0 <= fraction <= 1. May be empty.
+using ReadProgress = std::function<void(double fraction)>;
+
 /// Adds one fault to `faults` for each error in the text. nullopt if the header is invalid.
 [[nodiscard]] std::optional<NumberTable> parse_numbers(std::string_view text,
                                                        const std::vector<TableForm>& forms,
                                                        Faults& faults,
                                                        const ReadProgress& progress = {});
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -5,11 +5,11 @@
 
 #include <string_view>
 
-#include "abbe/base/faults.hpp"
-#include "abbe/base/number_table.hpp"
-#include "table_text.hpp"
+#include "abbe/protocol/table/faults.hpp"
+#include "abbe/protocol/table/number_table.hpp"
+#include "table/text.hpp"
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 
 /// Adds a fault and returns true if the bytes are not plain text: UTF-16, or a spreadsheet file.
 [[nodiscard]] bool recognised_bytes(std::string_view text, Faults& faults);
@@ -32,4 +32,4 @@ inline constexpr std::string_view kWritePoints =
     "write 0.5, not 0,5 (in a spreadsheet: export with a language that has decimal points, for "
     "example English)";
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

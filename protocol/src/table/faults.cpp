@@ -1,11 +1,9 @@
-#include "abbe/base/faults.hpp"
-
-#include <fmt/format.h>
+#include "abbe/protocol/table/faults.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 
 namespace {
 
@@ -29,15 +27,17 @@ void Faults::add(std::size_t line, std::size_t column, std::string_view key,
 void Faults::add_kind(std::string_view kind_name, std::size_t line, std::size_t column,
                       std::string_view key, std::string_view what) {
   ++count_;
-  Kind& kind = kind_named(fmt::format("{}\n{}", without_indices(key), kind_name));
+  Kind& kind = kind_named(without_indices(key) + "\n" + std::string(kind_name));
   auto& first = kind.first;
   if (first.size() == kEach && first.back().line < line) {
     ++kind.count;
     return;
   }
 
-  auto text =
-      fmt::format("{}:{}:{}: {}{}{}", file_, line, column, key, key.empty() ? "" : ": ", what);
+  auto text = file_ + ":" + std::to_string(line) + ":" + std::to_string(column) + ": ";
+  if (!key.empty()) text += std::string(key) + ": ";
+  text += what;
+
   for (auto& fault : first) {
     if (fault.line != line || fault.text != text) continue;
     ++fault.times;
@@ -89,20 +89,19 @@ std::vector<std::string> Faults::lines() const {
   std::size_t more = count_ - repeated_;
   for (const auto& [fault, stands_for] : shown()) {
     std::string line = fault->text;
-    if (fault->times > 1) line += fmt::format(" ({} times)", fault->times);
-    if (stands_for > 1) line += fmt::format(", and {} more like this", stands_for - 1);
+    if (fault->times > 1) line += " (" + std::to_string(fault->times) + " times)";
+    if (stands_for > 1) line += ", and " + std::to_string(stands_for - 1) + " more like this";
     lines.push_back(std::move(line));
     more -= stands_for;
   }
 
-  if (more > 0) lines.push_back(fmt::format("{}: and {} more", file_, more));
+  if (more > 0) lines.push_back(file_ + ": and " + std::to_string(more) + " more");
   return lines;
 }
 
-Error Faults::to_error() const {
+std::string Faults::heading() const {
   const std::size_t different = count_ - repeated_;
-  return {ErrorCode::BadInput,
-          fmt::format("{}: {} fault{}", file_, different, different == 1 ? "" : "s"), lines()};
+  return file_ + ": " + std::to_string(different) + (different == 1 ? " fault" : " faults");
 }
 
 namespace {
@@ -145,7 +144,7 @@ std::string_view nearest(std::string_view word, const std::vector<std::string_vi
 
 std::string suggestion(std::string_view word, const std::vector<std::string_view>& known) {
   const auto best = nearest(word, known);
-  return best.empty() ? std::string{} : fmt::format(" (did you mean \"{}\"?)", best);
+  return best.empty() ? std::string{} : " (did you mean \"" + std::string(best) + "\"?)";
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <vector>
 
-namespace abbe::daemon {
+namespace abbe::protocol {
 
 [[nodiscard]] inline std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
@@ -96,4 +96,4 @@ class Cells {
   return {};
 }
 
-}  // namespace abbe::daemon
+}  // namespace abbe::protocol

@@ -1,52 +1,49 @@
-#include <array>
+#include <cmath>
 
+#include "abbe/protocol/table/number_table.hpp"
 #include "abbe/sim/path_motion.hpp"
-#include "csv.hpp"
+#include "table_error.hpp"
 #include "units.hpp"
 
 namespace abbe::sim {
 namespace {
 
 constexpr double kMetresPerSecondPerFeed = 1e-3 / 60.0;  // mm/min
-constexpr std::array<std::string_view, 4> kPathColumns{"x_mm", "y_mm", "z_mm", "feed_mm_per_min"};
+constexpr std::size_t kFeed = 3;                         // column
 
-bool header_is_right(const CsvTable& table) {
-  const std::size_t n = table.header.size();
-  return (n == 3 || n == 4) &&
-         std::equal(table.header.begin(), table.header.end(), kPathColumns.begin());
-}
-
-void read_feed(const CsvTable& table, const CsvRow& row, PathVertex& vertex, CsvErrors& errors) {
-  if (row.cells.size() < 4 || row.cells[3].empty()) return;
-  const auto feed = csv_number(table, row, 3, errors);
-  if (!feed) return;
-  if (*feed <= 0.0) errors.add(row.line, "column feed_mm_per_min: must be positive");
-  vertex.feed_m_per_s = *feed * kMetresPerSecondPerFeed;
+/// 0, the feed of the plan, if the file has none for this leg.
+double feed_m_per_s(const protocol::NumberTable& table, std::size_t row, protocol::Faults& faults) {
+  if (!table.has(kFeed) || std::isnan(table.at(row, kFeed))) return 0.0;
+  if (table.at(row, kFeed) <= 0.0)
+    faults.add(table.line(row), 1, "feed_mm_per_min", "must be positive");
+  return table.at(row, kFeed) * kMetresPerSecondPerFeed;
 }
 
 }  // namespace
 
 Result<std::vector<PathVertex>> parse_path_csv(std::string_view text, std::string_view name) {
-  CsvErrors errors(name);
-  const CsvTable table = split_csv(text, errors);
-  if (!table.header.empty() && !header_is_right(table)) {
-    errors.add(1, "the header must be x_mm,y_mm,z_mm[,feed_mm_per_min]");
-    return tl::unexpected(errors.error());
-  }
+  protocol::Faults faults{std::string(name)};
+  const auto table = protocol::parse_numbers(
+      text,
+      {{{"x_mm"},
+        {"y_mm"},
+        {"z_mm"},
+        {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}},
+      faults);
+  if (!table) return tl::unexpected(table_error(faults));
 
   std::vector<PathVertex> vertices;
-  for (const CsvRow& row : table.rows) {
+  for (std::size_t row = 0; row < table->rows(); ++row) {
+    if (!table->sound(row)) continue;
     PathVertex vertex;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto value = csv_number(table, row, k, errors);
-      if (value) vertex.q_m[static_cast<Eigen::Index>(k)] = *value * kMPerMm;
-    }
-    read_feed(table, row, vertex, errors);
+    for (std::size_t k = 0; k < 3; ++k)
+      vertex.q_m[static_cast<Eigen::Index>(k)] = table->at(row, k) * kMPerMm;
+    vertex.feed_m_per_s = feed_m_per_s(*table, row, faults);
     vertices.push_back(vertex);
   }
 
-  if (vertices.empty()) errors.add(1, "no points");
-  if (errors.any()) return tl::unexpected(errors.error());
+  if (table->rows() == 0) faults.add(1, 1, "", "no points");
+  if (faults.any()) return tl::unexpected(table_error(faults));
   return vertices;
 }
 

@@ -2,17 +2,24 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
+#include <span>
+#include <string>
+#include <vector>
 
-#include "csv.hpp"
+#include "abbe/protocol/table/number_table.hpp"
+#include "table_error.hpp"
 #include "units.hpp"
 
 namespace abbe::sim {
 namespace {
 
 constexpr double kMicro = 1e-6;  // um in m, urad in rad
-constexpr std::array<std::string_view, 4> kTruthColumns{"name", "position_mm", "value", "unit"};
+constexpr std::array<std::string_view, 3> kSquareness{"A0Z", "B0Z", "C0Y"};
+constexpr std::array<std::string_view, 2> kUnits{"um", "urad"};
+enum Column : std::size_t { kName, kPosition, kValue, kUnit };
 constexpr std::string_view kBacklash = ".backlash";
 
 struct Place {
@@ -28,14 +35,26 @@ std::optional<Place> place_of(std::string_view name) {
   return Place{*axis, motion};
 }
 
+/// All names that column "name" may hold.
+std::vector<std::string> error_names() {
+  std::vector<std::string> names(kSquareness.begin(), kSquareness.end());
+  for (const Axis axis : kAxes) {
+    for (std::size_t m = 0; m < kMotions; ++m) {
+      names.push_back(motion_name(m, axis));
+      names.push_back(motion_name(m, axis) + std::string(kBacklash));
+    }
+  }
+  return names;
+}
+
 std::string_view unit_of(std::size_t motion) {
   return motion < 3 ? "um" : "urad";
 }
 
 double* squareness_of(Squareness& s, std::string_view name) {
-  if (name == "A0Z") return &s.A0Z_rad;
-  if (name == "B0Z") return &s.B0Z_rad;
-  if (name == "C0Y") return &s.C0Y_rad;
+  if (name == kSquareness[0]) return &s.A0Z_rad;
+  if (name == kSquareness[1]) return &s.B0Z_rad;
+  if (name == kSquareness[2]) return &s.C0Y_rad;
   return nullptr;
 }
 
@@ -43,8 +62,9 @@ double* squareness_of(Squareness& s, std::string_view name) {
 /// file.
 class TruthReader {
  public:
-  TruthReader(const CsvTable& table, TruthMachine into, CsvErrors& errors)
-      : table_(table), truth_(std::move(into)), errors_(errors) {
+  TruthReader(const protocol::NumberTable& table, std::span<const std::string> names,
+              TruthMachine into, protocol::Faults& faults)
+      : table_(table), names_(names), truth_(std::move(into)), faults_(faults) {
     truth_.squareness = {};
     for (AxisTruth& axis : truth_.axes) {
       axis.error = {};
@@ -52,29 +72,23 @@ class TruthReader {
     }
   }
 
-  void read(const CsvRow& row) {
-    const auto value = csv_number(table_, row, 2, errors_);
-    const std::string_view name = row.cells[0];
+  void read(std::size_t row) {
+    const std::string_view name = names_[static_cast<std::size_t>(table_.at(row, kName))];
+    const double value = table_.at(row, kValue) * kMicro;
     if (double* square = squareness_of(truth_.squareness, name)) {
       expect_unit(row, "urad");
-      *square = value.value_or(0.0) * kMicro;
+      *square = value;
       return;
     }
 
     const bool backlash = name.ends_with(kBacklash);
-    const auto place = place_of(backlash ? name.substr(0, name.size() - kBacklash.size()) : name);
-    if (!place)
-      return errors_.add(row.line,
-                         fmt::format("column name: \"{}\" is not an error of this machine", name));
-    expect_unit(row, unit_of(place->motion));
+    const Place place = *place_of(backlash ? name.substr(0, name.size() - kBacklash.size()) : name);
+    expect_unit(row, unit_of(place.motion));
 
-    if (backlash) {
-      truth_.axis(place->axis).backlash[place->motion] = value.value_or(0.0) * kMicro;
-      return;
-    }
-
-    const auto position = csv_number(table_, row, 1, errors_);
-    if (position && value) add_node(row, *place, *position * kMPerMm, *value * kMicro);
+    if (backlash)
+      truth_.axis(place.axis).backlash[place.motion] = value;
+    else
+      add_node(row, place, value);
   }
 
   TruthMachine finish(Shape shape) {
@@ -83,7 +97,7 @@ class TruthReader {
         Nodes& nodes = nodes_[static_cast<std::size_t>(axis)][m];
         if (nodes.at_m.empty()) continue;
         if (nodes.at_m.size() < 2) {
-          errors_.add(nodes.line, motion_name(m, axis) + " needs at least two nodes");
+          faults_.add(nodes.line, 1, "", motion_name(m, axis) + " needs at least two nodes");
           continue;
         }
         truth_.axis(axis).error[m] =
@@ -100,25 +114,27 @@ class TruthReader {
     std::size_t line = 0;
   };
 
-  void expect_unit(const CsvRow& row, std::string_view unit) {
-    if (row.cells[3] != unit) {
-      errors_.add(row.line,
-                  fmt::format("column unit: \"{}\" instead of \"{}\"", row.cells[3], unit));
-    }
+  void expect_unit(std::size_t row, std::string_view unit) {
+    const std::string_view given = kUnits[static_cast<std::size_t>(table_.at(row, kUnit))];
+    if (given != unit)
+      faults_.add(table_.line(row), 1, "unit",
+                  fmt::format("\"{}\" instead of \"{}\"", given, unit));
   }
-  void add_node(const CsvRow& row, Place place, double at_m, double value) {
+  void add_node(std::size_t row, Place place, double value) {
     Nodes& nodes = nodes_[static_cast<std::size_t>(place.axis)][place.motion];
-    if (!nodes.at_m.empty() && at_m <= nodes.at_m.back()) {
-      return errors_.add(row.line, "column position_mm: nodes of one error must ascend");
-    }
-    nodes.line = row.line;
+    const double at_m = table_.at(row, kPosition) * kMPerMm;
+    if (std::isnan(at_m)) return faults_.add(table_.line(row), 1, "position_mm", "empty");
+    if (!nodes.at_m.empty() && at_m <= nodes.at_m.back())
+      return faults_.add(table_.line(row), 1, "position_mm", "nodes of one error must ascend");
+    nodes.line = table_.line(row);
     nodes.at_m.push_back(at_m);
     nodes.value.push_back(value);
   }
 
-  const CsvTable& table_;
+  const protocol::NumberTable& table_;
+  std::span<const std::string> names_;
   TruthMachine truth_;
-  CsvErrors& errors_;
+  protocol::Faults& faults_;
   std::array<std::array<Nodes, kMotions>, 3> nodes_;
 };
 
@@ -126,17 +142,22 @@ class TruthReader {
 
 Result<TruthMachine> parse_truth_csv(std::string_view text, std::string_view name,
                                      TruthMachine into, Shape shape) {
-  CsvErrors errors(name);
-  const CsvTable table = split_csv(text, errors);
-  if (!std::equal(table.header.begin(), table.header.end(), kTruthColumns.begin(),
-                  kTruthColumns.end())) {
-    errors.add(1, "the header must be name,position_mm,value,unit");
-    return tl::unexpected(errors.error());
-  }
-  TruthReader reader(table, std::move(into), errors);
-  for (const CsvRow& row : table.rows) reader.read(row);
+  protocol::Faults faults{std::string(name)};
+  const std::vector<std::string> names = error_names();
+  const auto table =
+      protocol::parse_numbers(text,
+                              {{{.name = "name", .words = {names.begin(), names.end()}},
+                                {.name = "position_mm", .may_be_empty = true},
+                                {"value"},
+                                {.name = "unit", .words = {kUnits.begin(), kUnits.end()}}}},
+                              faults);
+  if (!table) return tl::unexpected(table_error(faults));
+
+  TruthReader reader(*table, names, std::move(into), faults);
+  for (std::size_t row = 0; row < table->rows(); ++row)
+    if (table->sound(row)) reader.read(row);
   TruthMachine truth = reader.finish(shape);
-  if (errors.any()) return tl::unexpected(errors.error());
+  if (faults.any()) return tl::unexpected(table_error(faults));
   return truth;
 }
 

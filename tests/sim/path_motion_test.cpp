@@ -86,9 +86,29 @@ TEST(PathCsv, ReadsMillimetresAndFeed) {
 TEST(PathCsv, NamesEveryBadLine) {
   const auto path = parse_path_csv("x_mm,y_mm,z_mm\n1,2\n1,2,x\n1,2,inf\n", "p.csv");
   ASSERT_FALSE(path);
-  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:2: 2 columns"));
-  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:3: column z_mm: \"x\""));
-  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:4: column z_mm: \"inf\""));
+  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:2:4: 2 values, expected 3"));
+  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:3:5: z_mm: \"x\": not a number"));
+  EXPECT_THAT(path.error().text, testing::HasSubstr("p.csv:4:5: z_mm: \"inf\": must be finite"));
+}
+
+TEST(PathCsv, OfASpreadsheetIsRefusedByName) {
+  const auto fault = [](std::string_view text) {
+    const auto path = parse_path_csv(text, "p.csv");
+    return path ? std::string{} : path.error().text;
+  };
+  EXPECT_THAT(fault("x_mm;y_mm;z_mm\n1;2;3\n"), testing::HasSubstr("semicolons"));
+  EXPECT_THAT(fault("x_mm\ty_mm\tz_mm\n1\t2\t3\n"), testing::HasSubstr("tabs"));
+  EXPECT_THAT(fault("x_mm;y_mm;z_mm\n1,5;2;3\n"), testing::HasSubstr("decimal comma"));
+  EXPECT_THAT(fault("1,2,3\n4,5,6\n"), testing::HasSubstr("the header line is missing"));
+  EXPECT_THAT(fault("\xFF\xFEx"), testing::HasSubstr("UTF-16"));
+}
+
+TEST(PathCsv, WithARepeatedFaultNamesItOnceWithItsCount) {
+  std::string text = "x_mm,y_mm,z_mm\n";
+  for (int i = 0; i < 400; ++i) text += "1,2,x\n";
+  const auto path = parse_path_csv(text, "p.csv");
+  ASSERT_FALSE(path);
+  EXPECT_EQ(path.error().text, "p.csv:2:5: z_mm: \"x\": not a number, and 399 more like this");
 }
 
 TEST(PathCsv, WithAnotherHeaderIsRefused) {

@@ -168,15 +168,23 @@ TEST(TruthCsv, IsReadAsItWasWritten) {
   EXPECT_LT((error_m(*again, q, condition) - error_m(truth, q, condition)).norm(), 1e-16);
 }
 
+TEST(TruthCsv, OfASpreadsheetIsRefusedByName) {
+  const auto truth = parse_truth_csv("name;position_mm;value;unit\nEXX;0;1,5;um\n", "t.csv",
+                                     small_machine(), Shape::Linear);
+  ASSERT_FALSE(truth);
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("t.csv:1:5: semicolons"));
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("t.csv:2:7: \"1,5\" has a decimal comma"));
+}
+
 TEST(TruthCsv, NamesEveryBadLine) {
   const auto truth = parse_truth_csv(
       "name,position_mm,value,unit\nEXX,0,1,um\nEXX,0,2,um\nEQX,0,1,um\nEAX,0,1,um\nEYX,0,nan,um\n",
       "bad.csv", small_machine(), Shape::Linear);
   ASSERT_FALSE(truth);
-  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:3: column position_mm"));
-  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:4: column name: \"EQX\""));
-  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:5: column unit"));
-  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:6: column value"));
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:3:1: position_mm"));
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:4:1: name: \"EQX\": unknown"));
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:5:1: unit: \"um\" instead of"));
+  EXPECT_THAT(truth.error().text, testing::HasSubstr("bad.csv:6:7: value: \"nan\""));
 }
 
 }  // namespace

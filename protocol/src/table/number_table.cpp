@@ -1,6 +1,7 @@
 #include "abbe/protocol/table/number_table.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "table/recognition.hpp"
@@ -40,6 +41,13 @@ std::string joined(const std::vector<std::string_view>& words, std::string_view 
 
 std::string quoted(std::string_view text) {
   return '"' + std::string(text) + '"';
+}
+
+/// What a cell with this text should hold instead.
+std::string expected(std::string_view text, const std::vector<std::string_view>& words) {
+  constexpr std::size_t kFew = 6;
+  return words.size() <= kFew ? "must be " + joined(words, " or ")
+                              : "unknown" + suggestion(text, words);
 }
 
 std::vector<std::string_view> names(const TableForm& form) {
@@ -99,6 +107,10 @@ class RowReader {
 
   [[nodiscard]] bool fill_cell(std::string_view text, std::size_t column, double* row) const {
     const auto& words = form_[column].words;
+    if (text.empty() && form_[column].may_be_empty) {
+      row[column] = std::numeric_limits<double>::quiet_NaN();
+      return true;
+    }
     if (words.empty()) return parse_cell(text, row[column]).empty();
     const auto found = std::find(words.begin(), words.end(), text);
     row[column] = static_cast<double>(found - words.begin());
@@ -128,7 +140,7 @@ class RowReader {
     const auto& words = form_[column].words;
     if (!words.empty())
       return faults_.add_kind("word", number, cell.column, form_[column].name,
-                              quoted(cell.text) + ": " + "must be " + joined(words, " or "));
+                              quoted(cell.text) + ": " + expected(cell.text, words));
     const auto fault = parse_cell(cell.text, row[column]);
     faults_.add_kind(fault, number, cell.column, form_[column].name,
                      quoted(cell.text) + ": " + std::string(fault));

@@ -20,12 +20,14 @@ struct ColumnRule {
   bool required = true;
   /// if not empty: the cell holds one of these words, and the value is the index of the word
   std::vector<std::string_view> words = {};
+  bool may_be_empty = false;  ///< an empty cell is valid, and its value is NaN
 };
 
 /// The columns of one variant of a file format. The header decides which variant a file has.
 using TableForm = std::vector<ColumnRule>;
 
-/// Rows of finite numbers, in the column order of the form. An absent optional column holds 0.
+/// Rows of finite numbers, in the column order of the form. An empty cell holds NaN if the column
+/// allows it. An absent optional column holds 0.
 class NumberTable {
  public:
   NumberTable(std::size_t form, std::vector<bool> present)

@@ -1,10 +1,12 @@
 #include "toml_section.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/protocol/table/faults.hpp"
 #include "abbe/protocol/toml_nesting.hpp"
 #include "files.hpp"
 
@@ -152,8 +154,15 @@ void TomlSection::refuse_unknown_keys() {
   if (table_ == nullptr) return;
   for (const auto& [key, node] : *table_) {
     if (known_.find(key.str()) == known_.end())
-      faults_.add(&node, path_of(key.str()), "unknown key");
+      faults_.add(&node, path_of(key.str()), unknown(key.str()));
   }
+}
+
+std::string TomlSection::unknown(std::string_view key) const {
+  const std::string similar = protocol::suggestion(key, {known_.begin(), known_.end()});
+  return "unknown key" +
+         (similar.empty() ? fmt::format("; the keys of this table are {}", fmt::join(known_, ", "))
+                          : similar);
 }
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& file) {

@@ -61,12 +61,13 @@ class TomlSection {
   bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
 
   void fault(std::string_view key, std::string_view what);
-  /// Adds a fault for every key that has not been read.
+  /// Adds a fault for every key that has not been read; it names a similar key, or all.
   void refuse_unknown_keys();
 
  private:
   const toml::node* find(std::string_view key);
   [[nodiscard]] std::string path_of(std::string_view key) const;
+  [[nodiscard]] std::string unknown(std::string_view key) const;
 
   const toml::table* table_;
   std::string name_;

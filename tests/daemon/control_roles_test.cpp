@@ -45,7 +45,7 @@ TEST(ControlRoles, ARefusalNamesRoleUserGroupAndRemedy) {
             "\"plugdev\" ([control] "
             "move_group): gpasswd -a anna plugdev, then log in again");
   EXPECT_THAT(refused(anna({}), Role::Change, {.change_group = "abbe-none", .move_group = ""}),
-              AllOf(HasSubstr("changes what is in force"), HasSubstr("\"abbe-none\""),
+              AllOf(HasSubstr("changes models or calibrates"), HasSubstr("\"abbe-none\""),
                     HasSubstr("does not exist on this computer")));
   EXPECT_THAT(refused(anna({}), Role::Move, {.move_group = ""}), HasSubstr("names no group"));
 }

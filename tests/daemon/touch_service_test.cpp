@@ -85,7 +85,7 @@ TEST(TouchService, AJobHasALimit) {
   const std::vector<TouchRequest> touches(TouchJob::kMostTouches);
   EXPECT_TRUE(touch_job(touches));
   EXPECT_THAT(touch_job(std::vector<TouchRequest>(touches.size() + 1)).error().text,
-              HasSubstr("more than one request may hold"));
+              HasSubstr("exceed the limits of one request"));
   TouchRequest roundabout;
   roundabout.way.resize(TouchJob::kMostPlaces);
   EXPECT_EQ(touch_job({roundabout}).error().code, ErrorCode::Usage);

@@ -159,7 +159,7 @@ TEST_F(UnstoredModel, CancelDiscardsAModelWhileTheStoreDoesNotRespond) {
   cycle_until([this] { return service_->held_out().has_value(); });
   const auto early = service_->cancel("anna", now_);
   ASSERT_FALSE(early);
-  EXPECT_THAT(early.error().text, HasSubstr("being put into the store"));
+  EXPECT_THAT(early.error().text, HasSubstr("already being stored"));
   now_ += 6s;
   (void)service_->cycle({}, now_);
   EXPECT_THAT(service_->not_stored(), HasSubstr("the store has not answered for 5 s"));

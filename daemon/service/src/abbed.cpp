@@ -49,9 +49,9 @@ namespace {
 using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
-constexpr auto kTidyPeriod = 1h;    // old recordings are looked for this often
+constexpr auto kTidyPeriod = 1h;    // period of the search for old recordings
 constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
-constexpr auto kHubTimeout = 1s;    // thousands of cycles; a hub that is silent for this long hangs
+constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer for this long it hangs
 // for the control socket (3 s at most), the journal and the hub to end
 constexpr auto kEndTimeout = 5s;
 constexpr int kHubHangs = number(ExitCode::Internal);

@@ -45,14 +45,14 @@ namespace {
 
 using BackgroundTask = std::function<void()>;
 
-/// The mutex is between the dispatcher and the threads that work, ordinary ones all of them.
+/// Only ordinary threads take the mutex: the dispatcher and the threads that run tasks.
 class BackgroundThreads {
  public:
   BackgroundThreads() : dispatcher_([this] { dispatch(); }) {}
   BackgroundThreads(const BackgroundThreads&) = delete;
   BackgroundThreads& operator=(const BackgroundThreads&) = delete;
   ~BackgroundThreads() {
-    if (::getpid() != process_) {  // in a forked child there are no such threads
+    if (::getpid() != process_) {  // a forked child does not have these threads
       dispatcher_.detach();
       return;
     }
@@ -96,12 +96,12 @@ class BackgroundThreads {
     lock.unlock();
     try {
       threads_.emplace_back([this] { serve(); });
-    } catch (const std::system_error&) {  // the system has none left: one that is there takes it
+    } catch (const std::system_error&) {  // no further thread is possible: another one runs it
       if (threads_.empty()) work_here();
     }
   }
 
-  /// On the dispatcher: later than wanted, not never.
+  /// Runs the task on the dispatcher, which then dispatches later tasks late.
   void work_here() {
     std::unique_lock lock{mutex_};
     BackgroundTask work = std::move(waiting_.front());

@@ -89,7 +89,7 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
         ErrorCode::Refused,
         fmt::format(
             "calibrate {}: the control already corrects these axes (axes_compensated = true): "
-            "switch its compensation off first, and say so in the configuration",
+            "switch its compensation off first, and set axes_compensated = false",
             method_of(task)));
   }
 
@@ -136,7 +136,7 @@ Result<void> CalibrationService::cancel(const std::string& who, HostTime now) {
   if (task_.valid() && !state_->discard()) follow_task(now);
   const bool stalls = store_stalls(now);
   if (storing() && !stalls)
-    return fail(ErrorCode::Refused, "cancel: the model is being put into the store already");
+    return fail(ErrorCode::Refused, "cancel: the model is already being stored");
   state_->stopped = true;
   const std::string late =
       stalls ? fmt::format("; the store does not answer and may still take model {}", to_keep_->id)

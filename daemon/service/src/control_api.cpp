@@ -233,11 +233,10 @@ constexpr std::array kVerbs{
     Verb{"reference", "cancel", Role::Change, cancel_reference},
     Verb{"reference", "", Role::Change, reference},
     Verb{"verification", "", Role::Look, verification},
-    Verb{"touch", "cancel", Role::Look,
-         cancel_touching},  // a stop needs no more than the role Look
+    Verb{"touch", "cancel", Role::Look, cancel_touching},  // the role Look is enough for a stop
     Verb{"touch", "where", Role::Look, where_it_stands},
     Verb{"touch", "", Role::Move, begin_touching},
-    Verb{"touches", "", Role::Move, look_at_touches},  // keeps a motion going
+    Verb{"touches", "", Role::Move, look_at_touches},  // continues a motion
     Verb{"machine", "release", Role::Move, release_machine},
     Verb{"machine", "stop", Role::Look, stop_machine},
     Verb{"machine", "", Role::Look, machine_state},

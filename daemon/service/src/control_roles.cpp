@@ -54,7 +54,7 @@ RoleWords words_of(Role role, const ControlConfig& control) {
     case Role::Look:
       return {"looks at the daemon", "look_group", control.look_group};
     case Role::Change:
-      return {"changes what is in force", "change_group", control.change_group};
+      return {"changes models or calibrates", "change_group", control.change_group};
     case Role::Move:
       break;
   }

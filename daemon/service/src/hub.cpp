@@ -233,7 +233,7 @@ void Hub::run_calls() {
     }
     try {
       call->task();
-    } catch (...) {  // a member of the wrong type in the request: the caller gets it
+    } catch (...) {  // a member of the wrong type in the request: rethrown to the caller
       call->thrown = std::current_exception();
     }
     call->done.signal();  // the caller frees it now

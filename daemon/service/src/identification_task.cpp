@@ -23,7 +23,7 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
       if (wanted.wait_for(kLookForStop) == std::future_status::ready) return wanted.get();
     return {.gap = stopped ? "abbed ended before the recorder answered"
                            : "the recorder did not answer: its disk stalls"};
-  } catch (const std::exception&) {  // a broken promise
+  } catch (const std::exception&) {  // std::future_error: the recorder has ended
     return {.gap = "the recorder failed"};
   }
 }
@@ -32,7 +32,7 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
 /// a recording with a gap is therefore added at the end.
 void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   if (recording.bytes == 0) return;
-  // The hash is that of the first `bytes` bytes: the recording goes on.
+  // The hash is that of the first `bytes` bytes: the recording continues.
   const auto name =
       fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});

@@ -12,22 +12,22 @@ namespace {
 
 using protocol::HostTime;
 
-// A model file that cannot be used may be made readable or put back from a backup; the store does
-// not change by that.
+// A person may repair a model file that cannot be used, or restore it from a backup. The stamp of
+// the store does not change then.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
-/// Why the model may be used: a person who forced it answers for it by name.
+/// Why the model may be used: the gate accepted it, or a user, who is named, forced it.
 std::string reason_of(const StoreEvent& activation) {
-  const auto said_by = [&activation](std::string_view what) {
+  const auto done_by = [&activation](std::string_view what) {
     const auto& [who, why, when] = activation.actor;
     return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
   };
 
   switch (activation.action) {
     case StoreAction::Forced:
-      return said_by("forced");
+      return done_by("forced");
     case StoreAction::RolledBack:
-      return said_by(activation.accepted ? "rolled back"
+      return done_by(activation.accepted ? "rolled back"
                                          : "rolled back to a model the gate did not accept,");
     case StoreAction::Added:
     case StoreAction::Activated:
@@ -93,7 +93,7 @@ void ModelAuthority::begin_to_look(HostTime now) {
                               now]() mutable -> Result<Look> {
     Look look{.stamp = keeper.stamp()};
     if (look.stamp == seen && !read_anyway) return look;
-    // Only at the second look: another process may be writing the file now.
+    // Only at the second reading: another process may be writing the file now.
     auto active =
         look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
     if (active)
@@ -104,7 +104,8 @@ void ModelAuthority::begin_to_look(HostTime now) {
   });
 }
 
-/// What is in force stays; reported in standing() and in health(), and read again by the next look.
+/// The active model stays active. The fault is reported in standing() and in health(), and the next
+/// call reads the store again.
 ModelAuthority::Following ModelAuthority::report_look(std::string fault) {
   fault_ = std::move(fault);
   read_again_ = true;
@@ -140,7 +141,7 @@ ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axe
                                        std::chrono::nanoseconds patience) const {
   ModelStanding s = standing_by_store(now, axes_known_at, patience);
   if (!fault_.empty() && fault_ != s.reason)
-    s.reason += fmt::format("; not known what was activated since: {}", fault_);
+    s.reason += fmt::format("; later activations are not known: {}", fault_);
   return s;
 }
 

@@ -25,7 +25,7 @@ OnHub with_touching(std::function<Reply(TouchService&)> task) {
   };
 }
 
-/// What became of a job; of each touch only what is answered.
+/// The outcome of a job; of each touch only the fields of the answer.
 struct SeenTouches {
   struct Made {
     std::array<double, 3> at_m{};

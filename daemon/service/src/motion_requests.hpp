@@ -1,7 +1,7 @@
 #pragma once
 /// Requests that move a measuring machine, stop it or ask where it stands: what
-/// `abbe calibrate artefact` and `abbe machine` send. All run on the thread that asks; what they
-/// return runs on the hub's.
+/// `abbe calibrate artefact` and `abbe machine` send. All run on the client's thread; the step
+/// that they return runs on the hub's thread.
 
 #include "on_hub.hpp"
 

@@ -1,6 +1,7 @@
 #pragma once
-/// The three steps of a control request: the thread that asks reads it, however large it is; what
-/// the hub's thread does or copies for it is short; the thread that asks writes the answer.
+/// The three steps of a control request: the client's thread reads it, a short step runs on the
+/// hub's thread, and the client's thread writes the answer. Only the first and the third depend on
+/// the size of the request.
 
 #include <functional>
 #include <nlohmann/json.hpp>

@@ -19,7 +19,7 @@ struct ObservedPart {
 
 namespace {
 
-// One MESSAGE_ID a kind of part, as `journalctl --new-id128` makes them.
+// One MESSAGE_ID for each kind of part, made with `journalctl --new-id128`.
 constexpr std::string_view kDeviceId = "5f0c8a7be4f94c0f9d0e6a3f1b7c2d41";
 constexpr std::string_view kRecorderId = "8d3b1f6a27c54e0b9a4f7c5e2d1a6b93";
 constexpr std::string_view kStoreId = "c1e7d0948b3a4f52a6f0b9d47e5c8132";
@@ -191,7 +191,7 @@ std::optional<JournalEntry> StateObserver::compare(const ObservedPart& part, Wal
                      .fields = part.fields};
   if (part.counted > r.counted && !r.logged.empty())
     entry.message += fmt::format("; {} faults or lost samples more", part.counted - r.counted);
-  // The change that is logged now is not one of those left out, unless it is the old state again.
+  // The change that is logged now does not count as left out, unless it returns to the old state.
   const std::uint64_t is_one_of_them = !changed && part.state != r.logged ? 1 : 0;
   if (const auto left_out = r.suppressed - is_one_of_them; left_out > 0) {
     entry.message += fmt::format("; {} changes before this were not logged", left_out);

@@ -72,7 +72,7 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
   return out;
 }
 
-/// The model in force as the hub saw it.
+/// A copy of the active model's state.
 struct SeenModel {
   explicit SeenModel(const ModelStanding& standing)
       : status(standing.status), reason(standing.reason), known(standing.model != nullptr) {
@@ -97,7 +97,7 @@ json model_json(const SeenModel& model) {
   return out;
 }
 
-/// NaN has no place in JSON.
+/// JSON has no NaN: null in its place.
 json number_or_null(double value) {
   return std::isnan(value) ? json{} : json(value);
 }
@@ -152,7 +152,7 @@ json reference_json(const SeenReference& reference, const MachineConfig& machine
   return {{"running", reference.running}, {"axes", std::move(axes)}};
 }
 
-/// A position that is not current is null: the last one would pass for where the axis is.
+/// A position that is not current is null: a client could take an old one for the current one.
 json positions_json(const protocol::Snapshot& live, bool old) {
   json positions = json::array();
   for (std::size_t axis = 0; axis < live.axis_count; ++axis) {

@@ -24,8 +24,8 @@ Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
     return fail(
         ErrorCode::Usage,
         fmt::format(
-            "touch: {} touches with {} places are more than one request may hold ({} and {}): "
-            "ask for them one part after the other",
+            "touch: {} touches with {} places exceed the limits of one request ({} and {}): "
+            "send several requests",
             touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
   TouchJob job{.touches = std::move(touches), .leave = std::move(leave), .made = {}};
   job.made.reserve(job.touches.size());
@@ -36,7 +36,7 @@ Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
 Result<void> TouchService::start(TouchJob&& job) {
   const auto stands = where();
   if (!configured_) return tl::unexpected(stands.error());
-  if (status_.running) return fail(ErrorCode::Refused, "touch: touches are under way already");
+  if (status_.running) return fail(ErrorCode::Refused, "touch: touches are already running");
   if (!stands) return tl::unexpected(stands.error());
   status_.running = true;
   status_.asked = job.touches.size();
@@ -53,7 +53,7 @@ Result<void> TouchService::start(TouchJob&& job) {
 }
 
 Result<void> TouchService::cancel() {
-  if (!status_.running) return fail(ErrorCode::Refused, "touch: no touches are under way");
+  if (!status_.running) return fail(ErrorCode::Refused, "touch: no touches are running");
   stop("cancelled");
   return {};
 }
@@ -84,7 +84,7 @@ void TouchService::stopping(const Batch& batch, std::size_t points_left) {
 std::string TouchService::tip_text() const {
   constexpr double kMillimetresPerMetre = 1e3;
   const auto tip = devices_.tip_place();
-  if (!tip) return "the machine did not report where the tip stands";
+  if (!tip) return "the machine did not report the position of the tip";
   const auto mm = [&](std::size_t axis) { return kMillimetresPerMetre * tip->at_m[axis]; };
   return fmt::format("the tip was reported at X {:.3f}, Y {:.3f}, Z {:.3f} mm {:.1f} s before",
                      mm(0), mm(1), mm(2), std::chrono::duration<double>(tip->age).count());

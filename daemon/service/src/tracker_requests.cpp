@@ -79,7 +79,7 @@ Result<TrackerOrder> tracker_order_from_json(const json& request) {
     order.reflector = request.at("reflector").get<std::string>();
 
   if (order.what == TrackerOrder::What::FindReflector) {
-    const json distance = request.value("distance_m", json{});  // NaN has no place in JSON
+    const json distance = request.value("distance_m", json{});  // JSON has no NaN
     order.distance_m =
         distance.is_number() ? distance.get<double>() : std::numeric_limits<double>::quiet_NaN();
   }

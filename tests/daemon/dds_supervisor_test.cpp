@@ -164,7 +164,7 @@ TEST(DdsSupervisor, ADelayOfTheHubDoesNotCountAsSilenceOfTheChild) {
   EXPECT_EQ(process.silent_for(), 0ns);
 }
 
-/// As all of abbed after SIGSTOP and SIGCONT: the answer to the beat before lies unread.
+/// As after SIGSTOP and SIGCONT of the whole abbed: the answer to the last beat is not read yet.
 TEST(DdsProcess, AfterAPauseOfTheHubTheSilenceTimerRestarts) {
   DdsProcess process;
   process.started(4711, WallTime{1s});

@@ -394,7 +394,7 @@ Batch warm_run(const CalibrationRequest& request) {
   return batch;
 }
 
-/// As the daemon does it while the run goes on.
+/// As in the daemon, while the run continues.
 EvemuRun live_run(const CalibrationRequest& request, const Batch& batch, const Config& config) {
   Assembler assembler{assembler_options(config)};
   CalibrationSession session{Methods::options(config)};

@@ -80,7 +80,7 @@ TEST_F(MachineHold, APipeInItsPlaceHoldsTheMachineAndDoesNotBlockTheStart) {
   EXPECT_THAT(awaited(), AllOf(HasSubstr("unknown reason"), HasSubstr("is not a regular file")));
 }
 
-// Written before a motion under way had a line of its own: the reason alone, or nothing at all.
+// The earlier format has no line for a running motion: only the reason, or an empty file.
 TEST_F(MachineHold, TheOldFormatHoldsTheMachine) {
   test::write_text(file(), "since before the restart: AbortE was refused");
   EXPECT_EQ(awaited(), "cmm 127.0.0.1:1: since before the restart: AbortE was refused");

@@ -264,8 +264,8 @@ TEST_F(ModelStoreTest, ReportsThatTheStateIsDamaged) {
   EXPECT_THAT(store.error().text, HasSubstr("state.json"));
 }
 
-// A process that does nothing but activate is killed at ever later moments; whatever it was doing,
-// the store opens and one of the two models is active.
+// A process that only activates models is killed at ever later moments. After each kill the store
+// opens and one of the two models is active.
 TEST_F(ModelStoreTest, SurvivesAKillAtAnyMoment) {
   const auto a = add(1), b = add(2);
   ASSERT_TRUE(open().activate(a, actor("start")));

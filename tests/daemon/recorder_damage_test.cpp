@@ -172,8 +172,8 @@ TEST(RecordingReader, RefusesAFileThatIsNoRecording) {
   }
 }
 
-/// Lets a recorder finish `chunks` chunks and kills it while it goes on. How many messages it had
-/// in finished chunks.
+/// Kills a recorder after it has finished `chunks` chunks and while it records. Returns the number
+/// of messages in finished chunks.
 std::uint64_t killed_recorder(const std::filesystem::path& directory, unsigned chunks) {
   int pipe_ends[2];
   if (::pipe(pipe_ends) != 0) return 0;

@@ -79,8 +79,8 @@ class EncoderConformancePeer {
   /// The cable, not the peer: what the device sends gets lost.
   void unplug() {}
   void plug_in() { peer_.drain(); }
-  /// A cycle gives one sample whatever the nodes send; only a bus that goes off and on gives many
-  /// at once.
+  /// A cycle gives one sample for any number of answers; only a bus that is switched off and on
+  /// gives many at once.
   void flood() {
     std::vector<can::CanFrame> frames;
     for (int i = 0; i < 200; ++i) {

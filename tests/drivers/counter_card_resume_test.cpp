@@ -1,4 +1,4 @@
-// The program ends, the card goes on counting or does not, another run of the program finds it.
+// The program ends. The card continues to count, or does not. The next run of the program finds it.
 
 #include <gmock/gmock.h>
 

@@ -101,8 +101,8 @@ TEST(InterpolateAxes, AddsSpeedTimesTimeUncertainty) {
   EXPECT_NEAR(at->u_position[0], 0.2 * 50e-6, 1e-12);
 }
 
-// Any motion within the acceleration bound stays within the bound stated: acceleration drawn anew
-// every 0.1 ms, at its worst (plus or minus the bound), which is harder than any machine.
+// Any motion within the acceleration bound stays within the bound stated: a new random
+// acceleration every 0.1 ms of the largest size (plus or minus the bound), worse than any machine.
 TEST(InterpolateAxes, KeepsItsErrorWithinTheStatedBound) {
   constexpr double kBound = 5.0;
   constexpr double kStep_s = 1e-4;

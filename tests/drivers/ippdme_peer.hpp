@@ -61,7 +61,7 @@ class IppDmePeer {
     gathered_.clear();
     machine_->disconnected();
   }
-  /// As a machine does whose power is gone: what is sent to it from now on is refused.
+  /// As a machine without power: later data are refused.
   void reset_connection() {
     const linger at_once{.l_onoff = 1, .l_linger = 0};
     ::setsockopt(client_.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);

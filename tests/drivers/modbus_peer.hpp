@@ -60,7 +60,7 @@ class ModbusPeer {
   std::map<std::uint16_t, std::uint16_t> registers = small_registers();
   std::uint16_t proving_from = 100;  ///< registers from here on are answered at once
 
-  /// Lets a client in, hears it.
+  /// Accepts a client and reads its requests.
   void serve() {
     if (listener_) {
       sim::Socket accepted(

@@ -77,7 +77,7 @@ TEST_F(TrackerDeviceTest, StreamsFromTheSimulatedController) {
   make_device();
   ASSERT_TRUE(run_until_state("streaming"));
   run(20s);
-  EXPECT_GT(points_.size(), 9'000u);  // 500 per second, the last burst still under way
+  EXPECT_GT(points_.size(), 9'000u);  // 500 per second, the last burst not received yet
   EXPECT_TRUE(device_->status().connected);
   EXPECT_TRUE(device_->status().clock.settled);
   EXPECT_EQ(device_->status().faults, 0u);

@@ -51,7 +51,7 @@ class TrackerPeer {
   [[nodiscard]] sim::TrackerDevice& controller() { return *controller_; }
   [[nodiscard]] std::size_t packets_ready() const { return points_.size(); }
 
-  /// Lets a client in, hears it, does what is due, answers. Points are gathered.
+  /// Accepts a client, reads its requests, executes what is due, answers. Points are collected.
   void serve(HostTime now) {
     accept_client(now);
     hear(now);

@@ -44,7 +44,7 @@ class TrackerSessionTest : public testing::Test {
     return on(emscon::Answer{emscon::Acknowledge{sent_.back(), status}});
   }
   TrackerAction say(Event event) { return on(emscon::StatusChange{event}); }
-  /// Time goes on to every deadline on the way.
+  /// Steps the time to each deadline in between.
   void let_pass(std::chrono::nanoseconds d) {
     const HostTime end = now_ + d;
     while (session_.deadline() <= end) {

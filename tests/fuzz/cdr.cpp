@@ -1,5 +1,5 @@
 // Any bytes as a payload of any type: refused with a reason, or a value that encodes and decodes to
-// itself. A key is found in whatever we encode. The first byte chooses the type.
+// itself. A key is found in every encoded value. The first byte chooses the type.
 
 #include <cstddef>
 #include <cstdint>

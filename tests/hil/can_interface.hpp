@@ -57,7 +57,7 @@ class CanInterface {
   std::string name_;
 };
 
-/// A virtual bus of its own, gone with the test.
+/// A virtual bus of its own, removed after the test.
 class VirtualCan : public CanInterface {
  public:
   explicit VirtualCan(int mtu = CANFD_MTU, const std::string& name = "vcan7") : CanInterface(name) {

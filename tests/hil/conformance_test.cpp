@@ -65,8 +65,8 @@ class VcanConformancePeer {
     vcan_.up();
     nodes_.drain();
   }
-  /// A cycle gives one sample whatever the nodes send; only a bus that goes off and on gives many
-  /// at once.
+  /// A cycle gives one sample for any number of answers; only a bus that is switched off and on
+  /// gives many at once.
   void flood() {
     for (int i = 0; i < 100; ++i) {
       (void)nodes_.socket().send_condition(can::BusCondition::BusOff);

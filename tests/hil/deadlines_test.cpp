@@ -191,7 +191,7 @@ TEST_P(DeadlinesInVirtualTime, FiveAxesAtOneKilohertzLoseNothingAndAreInTime) {
   EXPECT_LT(report("SYNC period off", kernel ? "200 us" : "500 us", jitter),
             kernel ? kPeriod / 5 : kPeriod / 2);
 
-  // All five axes carry the time of the SYNC: what the sample says is where the machine was then.
+  // All five axes carry the time of the SYNC, and the position of the machine at that time.
   EXPECT_LT(report("time of the sample off", "50 us", time_error), 50us);
   EXPECT_LT(report("data ready to sample in ring", "1 period, 1000 us", seen.ready_to_ring),
             kPeriod);

@@ -1,6 +1,6 @@
 // The encoder driver with its own thread against the simulated nodes on a virtual CAN bus: SYNC by
 // the device thread and by the kernel. Real time on an emulated processor: these tests must
-// pass whatever the delays. The deadlines are in deadlines_test.cpp.
+// pass with any delay. The deadlines are in deadlines_test.cpp.
 
 #include <gmock/gmock.h>
 #include <algorithm>

@@ -222,7 +222,7 @@ TEST_F(CardThroughLibusb, GivesEveryScanOfEightCountersAt33kHz) {
                rate_hz, lost, after.gaps - before.gaps);
 
   EXPECT_NEAR(rate_hz, kScans_hz,
-              0.02 * kScans_hz);  // the last transfer under way, and when we looked
+              0.02 * kScans_hz);  // the last transfer is not complete; time of the reading
   EXPECT_EQ(lost, 0u);
   EXPECT_EQ(after.gaps, before.gaps);
   EXPECT_EQ(after.dropped, 0u);

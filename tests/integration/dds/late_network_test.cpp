@@ -23,7 +23,7 @@ bool run(const std::string& command) {
   return std::system((command + " 2>/dev/null").c_str()) == 0;
 }
 
-/// Two computers and a cable; gone with the test.
+/// Two network namespaces and a link between them, removed after the test.
 class TwoHosts {
  public:
   TwoHosts() {

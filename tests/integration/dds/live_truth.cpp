@@ -198,7 +198,7 @@ void LiveTruth::expect_all_apply(HostNs since, const std::string& what) {
   figures_.longest_return_s = std::max(figures_.longest_return_s, seconds(now_ns() - begin));
 }
 
-/// Returns when the blow is over; no subscriber may apply vectors of `dead` during it.
+/// Returns when the disturbance is over; no subscriber may apply vectors of `dead` during it.
 void LiveTruth::strike(Blow blow, double duration_s, const std::vector<Machine*>& dead) {
   Machine& a = *machines_.front();
   const pid_t child = announced_child(*a.feeder);

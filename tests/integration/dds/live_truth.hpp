@@ -23,7 +23,7 @@ class SubscriberRecord {
   void take(const std::string& line);
   void forget();
 
-  /// First line since `from` after which the machine counts as dead: not alive, or a state that is
+  /// First line since `from` after which the machine counts as ended: not alive, or a state that is
   /// not ACTIVE.
   [[nodiscard]] HostNs dead_since(const std::string& machine, HostNs from) const;
   [[nodiscard]] HostNs last_apply(const std::string& machine) const;
@@ -47,7 +47,7 @@ class SubscriberRecord {
 /// What happened in all rounds so far.
 struct LiveTruthFigures {
   int rounds = 0;
-  double longest_hold_s = 0.0;  ///< of an ACTIVE of a dead machine
+  double longest_hold_s = 0.0;  ///< of the state ACTIVE of a machine that has ended
   int held_too_long = 0;        ///< longer than 1.5 s
   double longest_return_s = 0.0;
   int orphaned = 0;  ///< subscribers that did not apply again within 10 s

@@ -1,5 +1,6 @@
-// Two machines on one domain: no subscriber holds an ACTIVE of a dead machine for more than 1.5 s,
-// none applies a vector whose age is understated by more than 1 ms, none stays orphaned. A few
+// Two machines on one domain: no subscriber keeps the state ACTIVE of a machine that has ended for
+// more than 1.5 s, none applies a vector whose age is understated by more than 1 ms, and all
+// receive data again. A few
 // rounds; `scripts/soak live-truth` runs ABBE_LIVE_TRUTH_ROUNDS random ones.
 #include "live_truth.hpp"
 

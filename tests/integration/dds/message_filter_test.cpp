@@ -154,7 +154,7 @@ TEST(MessageFilterInput, LeavesAWithdrawalWithoutAListAlone) {
   EXPECT_EQ(message, untouched);
 }
 
-/// With AddressSanitizer: every cut, and every length that lies.
+/// With AddressSanitizer: every truncation, and every wrong length.
 TEST(MessageFilterInput, NeverReadsBeyondTheMessage) {
   const Bytes whole = announcement(kPublications, {kTopicName, kTypeObject, kTypeInformation});
   for (std::size_t cut = 0; cut <= whole.size(); ++cut) {

@@ -106,8 +106,8 @@ int publish_types(std::uint32_t domain) {
   for (;;) ::pause();
 }
 
-/// A message that begins like RTPS and goes on as it likes: submessage ids that exist, entities
-/// that exist, lengths that lie.
+/// A message with the header of RTPS and random content: existing submessage ids and entities,
+/// wrong lengths.
 class Garbage {
  public:
   const std::vector<std::uint8_t>& next() {

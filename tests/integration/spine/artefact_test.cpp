@@ -89,8 +89,8 @@ struct ArtefactRun : CounterCardRun {
     const auto answer = daemon::ask_daemon(file("run/control.sock"), {{"do", "machine"}});
     return answer ? *answer : json{{"release_awaited", false}};
   }
-  /// The tip stays where it is while fifty positions would have been reported, and the status says
-  /// what to do.
+  /// The tip does not move during fifty reports of its position, and the status contains the
+  /// instruction to release it.
   void expect_standing_until_released() const {
     const json tip = machine()["tip_m"];
     EXPECT_TRUE(machine()["release_awaited"]) << machine().dump();

@@ -34,7 +34,7 @@ struct CountingRun : CounterCardRun {
     ASSERT_TRUE(
         eventually([&] { return text_of(kept()).find("reading_at_zero") != std::string::npos; }));
   }
-  /// Else whatever the counters begin at would count as referenced.
+  /// Without this any start of the counters would count as referenced.
   void without_zero_here() const {
     write("abbed.toml", replaced(text_of(file("abbed.toml")), "zero = \"here\"\n", ""));
   }

@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-/// The simulated machine on its port, in real time, in a thread of its own. It goes on with its
+/// The simulated machine on its port, in real time, in a thread of its own. It continues its
 /// motion when the connection closes.
 class MachineInAThread {
  public:
@@ -74,7 +74,7 @@ bool moves_or_clears(const std::string& command) {
 }
 
 struct KilledWhileMoving : Spine {
-  /// Slow: whatever it does, it does for a minute.
+  /// Slow: each of its motions takes a minute.
   static sim::IppDmeOptions slow_machine() {
     sim::IppDmeOptions machine;
     machine.machine.spheres = {{.centre_m = {0.05, 0.05, -0.15}, .radius_m = 12.5e-3}};
@@ -91,8 +91,8 @@ struct KilledWhileMoving : Spine {
   [[nodiscard]] auto ask(const json& request) const {
     return daemon::ask_daemon(directory_ / "run" / "control.sock", request);
   }
-  /// Killed in `motion`, started again: the machine hears AbortE first, stands, and waits for a
-  /// person.
+  /// Killed in `motion`, started again: the machine receives AbortE first, stops, and waits for
+  /// a release.
   void expect_stopped_by_the_next_start(MachineInAThread& machine, const std::string& motion) {
     ASSERT_TRUE(machine.moving());
     abbed_->signal(SIGKILL);

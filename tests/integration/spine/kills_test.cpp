@@ -60,7 +60,7 @@ class Kills : public Spine {
         {ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")},
         "calibrate");
   }
-  /// Looks on until the moment has come. The simulator goes on once the session waits for it.
+  /// Waits until the moment has come. The simulator starts to move when the session waits for it.
   void look_on(std::chrono::milliseconds moment) {
     const auto until = std::chrono::steady_clock::now() + moment;
     while (std::chrono::steady_clock::now() < until && abbed_->running()) {
@@ -133,7 +133,7 @@ class Kills : public Spine {
     abbed_->signal(SIGKILL);
     (void)abbed_->wait_for_end();
   }
-  /// abbed goes on, and is stopped as systemd does it.
+  /// abbed continues, and is stopped in the way of systemd.
   void kill_abbe_dds() {
     look_on(some_moment(kWholeRun / 2));
     pid_t child = 0;

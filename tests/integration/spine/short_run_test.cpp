@@ -102,7 +102,7 @@ TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
 }
 
 struct WrongPath : Spine {
-  /// Begins where the machine does, then goes elsewhere.
+  /// Begins at the first vertex of the driven path and then differs from it.
   static Vertices other_path() {
     Vertices other = path();
     other.resize(3);

@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
 const fs::path kGolden = ABBE_GOLDEN_RECORDINGS;
-// lines of a device that goes on when its recording is over
+// lines of a device that continues after the end of its recording
 constexpr std::size_t kMoreThanEnough = 4;
 constexpr std::chrono::seconds kRecordedAndRead{40};
 
@@ -120,8 +120,8 @@ class WireRun {
     EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
     const Lines found = recorded();
 
-    // How often the position of a measuring machine is requested depends on when it is told to
-    // touch.
+    // How often the position of a measuring machine is requested depends on the times of the
+    // touch requests.
     const Lines kinds =
         artefact_ ? Lines{"touch"} : Lines{"point", "weather", "axes", "air", "touch"};
     for (const std::string& kind : kinds) {

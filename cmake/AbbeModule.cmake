@@ -8,7 +8,7 @@ target_compile_options(abbe_warnings INTERFACE
   -Wno-sign-conversion              # indices: Eigen counts signed, std unsigned
   -Wno-missing-field-initializers   # designated initialisers leave the other members at their defaults on purpose
   $<$<CXX_COMPILER_ID:Clang>:-Wthread-safety>
-  # GCC 12 at -O3 sees overlaps and bounds that are not there in inlined std::string (GCC bug 105651)
+  # GCC 12 at -O3 gives false warnings of overlaps and bounds in inlined std::string (GCC bug 105651)
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-restrict$<SEMICOLON>-Wno-array-bounds$<SEMICOLON>-Wno-stringop-overflow>)
 
 if(ABBE_SANITIZE)
@@ -20,8 +20,8 @@ if(ABBE_SANITIZE)
   endif()
 endif()
 
-# Identification gives the same bits on every processor. Eigen without vectors sums in one order, whatever the width of the
-# registers, where the data lie in memory and how large the caches are; nothing is fused into one rounding.
+# Identification gives the same bits on every processor. Eigen without vectors sums in one order, independent of the width
+# of the registers, the place of the data in memory and the size of the caches; no fused multiply-add.
 add_compile_options(-ffp-contract=off)
 # OFF in the preset campaign, which also turns warnings off: GCC 12 has false ones in its own AVX-512 headers.
 option(ABBE_SAME_BITS "Eigen without vectors: the same bits on every processor" ON)
@@ -33,7 +33,7 @@ function(abbe_same_bits target)
                              EIGEN_DEFAULT_L2_CACHE_SIZE=262144 EIGEN_DEFAULT_L3_CACHE_SIZE=2097152)
 endfunction()
 
-# For code that computes little: in sanitizer builds the optimizer would take longer than it saves.
+# For code that computes little: in sanitizer builds the optimizer takes longer than it saves at run time.
 function(abbe_compile_fast target)
   if(ABBE_SANITIZE)
     target_compile_options(${target} PRIVATE -O0)

@@ -86,7 +86,11 @@ calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t
 }  // namespace
 
 Result<PathFile> read_path_csv(const std::filesystem::path& file) {
-  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}, {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}});
+  auto parsed =
+      parse_table(file, {{{"x_mm"},
+                          {"y_mm"},
+                          {"z_mm"},
+                          {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 2, "vertices");
   check_path(*parsed);

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <string>
 
 #include "chi2_bound.hpp"
 #include "elementary.hpp"
+#include "evemu/ball_of_radius.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -19,50 +22,154 @@ double count_of_touches(const std::vector<FeatureResiduals>& all) {
   return count;
 }
 
+/// The feature with the most significant touch.
+struct Suspect {
+  const FeatureResiduals* feature = nullptr;
+  double w = 0.0;  ///< residual of the touch in units of its standard deviation
+};
+
+Suspect most_suspect(const std::vector<FeatureResiduals>& all, double sigma_m) {
+  Suspect worst;
+  for (const FeatureResiduals& f : all) {
+    for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
+      const double w = std::abs(f.r_m(k)) / (sigma_m * std::sqrt(f.free(k)));
+      if (f.free(k) >= kLeastFree && w > worst.w) {
+        worst = {&f, w};
+      }
+    }
+  }
+  return worst;
+}
+
+/// With fewer touches than this, the radius of a ball comes from its other positions: four
+/// unknowns do not tell which of five or six touches is false.
+constexpr Eigen::Index kFewTouches = 7;
+
+/// Median radius of a ball over the positions; the false touch is in one of them.
+double radius_at_all_positions_m(const std::vector<FeatureResiduals>& all, std::size_t ball) {
+  std::vector<double> radii;
+  for (const FeatureResiduals& f : all) {
+    if (f.feature == Feature::Ball && f.index == ball) {
+      radii.push_back(f.radius_m);
+    }
+  }
+  const auto middle = radii.begin() + std::ssize(radii) / 2;
+  std::nth_element(radii.begin(), middle, radii.end());
+  return *middle;
+}
+
+/// The surface through all touches of a feature but one.
+struct WithoutOne {
+  Eigen::Index touch = 0;   ///< the one that is left out
+  double off_m = 0.0;       ///< its distance from the surface, outward
+  double squares_m2 = 0.0;  ///< of the residuals of the others
+};
+
+std::optional<WithoutOne> face_without(const std::vector<Vector3>& others, const Vector3& left_out,
+                                       const Vector3& outward) {
+  const auto plane = fit::fit_plane(others, outward);
+  if (!plane) {
+    return std::nullopt;
+  }
+  const double rms_m = plane->residuals.rms;
+  return WithoutOne{.off_m = plane->normal.dot(left_out - plane->point),
+                    .squares_m2 = rms_m * rms_m * static_cast<double>(others.size())};
+}
+
+/// `radius_m`: the known radius; nullopt: unknown.
+std::optional<WithoutOne> ball_without(const std::vector<Vector3>& others, const Vector3& left_out,
+                                       const Vector3& centre_m, std::optional<double> radius_m) {
+  if (radius_m) {
+    const auto ball = fit_ball_of_radius(others, *radius_m, centre_m);
+    return ball ? std::optional(WithoutOne{.off_m = (left_out - ball->centre_m).norm() - *radius_m,
+                                           .squares_m2 = ball->squares_m2})
+                : std::nullopt;
+  }
+
+  const auto sphere = fit::fit_sphere(others);
+  if (!sphere) {
+    return std::nullopt;
+  }
+  const double rms_m = sphere->residuals.rms;
+  return WithoutOne{.off_m = (left_out - sphere->centre).norm() - sphere->radius,
+                    .squares_m2 = rms_m * rms_m * static_cast<double>(others.size())};
+}
+
+/// Without each of the touches, the smallest sum of squares first. The surface is fitted again: a
+/// touch that is 0.5 mm off moves a ball so far that linearised residuals are wrong by um.
+std::vector<WithoutOne> without_each(const FeatureResiduals& f, std::optional<double> radius_m) {
+  std::vector<WithoutOne> found;
+  for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
+    std::vector<Vector3> others = f.points_m;
+    others.erase(others.begin() + k);
+    const Vector3& left_out = f.points_m[static_cast<std::size_t>(k)];
+    auto one = f.feature == Feature::Ball ? ball_without(others, left_out, f.centre_m, radius_m)
+                                          : face_without(others, left_out, f.normals.row(0));
+    if (one) {
+      one->touch = k;
+      found.push_back(*one);
+    }
+  }
+
+  std::stable_sort(found.begin(), found.end(), [](const WithoutOne& a, const WithoutOne& b) {
+    return a.squares_m2 < b.squares_m2;
+  });
+  return found;
+}
+
+/// True if no other touch explains the residuals nearly as well.
+bool is_clear(const std::vector<WithoutOne>& without, double sigma_m) {
+  constexpr double kClear = 10.0;  // twice the difference of the log likelihoods
+  return without.size() < 2 ||
+         without[1].squares_m2 - without[0].squares_m2 > kClear * sigma_m * sigma_m;
+}
+
+std::string text_of(const Observations& o, const FeatureResiduals& f, const WithoutOne& false_one,
+                    bool clear, double sigma_m) {
+  const std::string noise = message(" (noise of a touch ", sigma_m * kUmPerM, " um)");
+  if (clear) {
+    return message(place_of(o, f), ": touch ", false_one.touch + 1, " of ", f.r_m.size(), " lies ",
+                   false_one.off_m * kUmPerM, " um off the surface of the others", noise,
+                   ": dirt or a false trigger; clean and touch there again");
+  }
+  return message(place_of(o, f), ": one of its ", f.r_m.size(),
+                 " touches lies off the surface of the others", noise,
+                 ", too few to find which one: dirt or a false trigger; clean and touch this ",
+                 f.feature == Feature::Ball ? "ball" : "face", " again");
+}
+
 }  // namespace
 
 std::optional<TouchFinding> false_touch(const Observations& o,
                                         const std::vector<FeatureResiduals>& all, double sigma_m,
                                         double false_alarm) {
-  const FeatureResiduals* worst = nullptr;
-  Eigen::Index touch = 0;
-  double w = 0.0;
-
-  for (const FeatureResiduals& f : all) {
-    for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
-      if (f.free(k) < kLeastFree) {
-        continue;
-      }
-      const double w_k = std::abs(f.r_m(k)) / (sigma_m * std::sqrt(f.free(k)));
-      if (w_k > w) {
-        worst = &f, touch = k, w = w_k;
-      }
-    }
-  }
+  const auto [feature, w] = most_suspect(all, sigma_m);
 
   // The two-sided tail probability of the normal distribution is below exp(-w^2 / 2).
-  if (worst == nullptr || !(0.5 * w * w > natural_logarithm(count_of_touches(all) / false_alarm))) {
+  if (feature == nullptr ||
+      !(0.5 * w * w > natural_logarithm(count_of_touches(all) / false_alarm))) {
     return std::nullopt;
   }
 
-  const FeatureResiduals& f = *worst;
-  const double size_m = f.r_m(touch) / f.free(touch);
-  const double rest_m2 = f.r_m.squaredNorm() - f.r_m(touch) * size_m;
+  const FeatureResiduals& f = *feature;
+  const bool known_radius = f.feature == Feature::Ball && f.r_m.size() < kFewTouches;
+  const std::vector<WithoutOne> without = without_each(
+      f, known_radius ? std::optional(radius_at_all_positions_m(all, f.index)) : std::nullopt);
+  const double dof = f.dof() - (known_radius ? 0.0 : 1.0);
   const double x = natural_logarithm(static_cast<double>(all.size()) / false_alarm);
 
-  if (rest_m2 > sigma_m * sigma_m * chi2_bound(std::max(0.0, f.dof() - 1.0), x)) {
+  if (without.empty() ||
+      without[0].squares_m2 > sigma_m * sigma_m * chi2_bound(std::max(0.0, dof), x)) {
     return std::nullopt;  // more than one touch is wrong
   }
 
-  const Eigen::VectorXd along = size_m * Eigen::VectorXd::Unit(f.r_m.size(), touch);
-  return TouchFinding{
-      .cause = Cause::Touch,
-      .text =
-          message(place_of(o, f), ": touch ", touch + 1, " of ", f.r_m.size(), " lies ",
-                  size_m * kUmPerM, " um off the surface of the others (noise of a touch ",
-                  sigma_m * kUmPerM, " um): dirt or a false trigger; clean and touch there again"),
-      .log_likelihood = 0.5 * w * w,
-      .rows_m = effect_m(o, f, along)};
+  const WithoutOne& false_one = without[0];
+  const Eigen::VectorXd along =
+      false_one.off_m * Eigen::VectorXd::Unit(f.r_m.size(), false_one.touch);
+  return TouchFinding{.cause = Cause::Touch,
+                      .text = text_of(o, f, false_one, is_clear(without, sigma_m), sigma_m),
+                      .log_likelihood = 0.5 * w * w,
+                      .rows_m = effect_m(o, f, along)};
 }
 
 }  // namespace abbe::calib::evemu

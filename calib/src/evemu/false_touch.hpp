@@ -9,7 +9,8 @@
 
 namespace abbe::calib::evemu {
 
-/// The most significant single touch, provided the others of its feature fit without it.
+/// The most significant single touch, provided the others of its feature fit without it. The text
+/// names the touch; if its feature has too few to find which one is false, only the feature.
 /// `false_alarm`: probability over all touches.
 [[nodiscard]] std::optional<TouchFinding> false_touch(const Observations&,
                                                       const std::vector<FeatureResiduals>&,

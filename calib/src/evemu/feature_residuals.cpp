@@ -35,7 +35,11 @@ std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
     return std::nullopt;
   }
 
-  FeatureResiduals f{.feature = Feature::Ball, .index = ball};
+  FeatureResiduals f{.feature = Feature::Ball,
+                     .index = ball,
+                     .points_m = points,
+                     .centre_m = sphere->centre,
+                     .radius_m = sphere->radius};
   const auto n = std::ssize(points);
   Eigen::MatrixXd design(n, 4);
   f.normals.resize(n, 3);
@@ -61,7 +65,7 @@ std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t bloc
     return std::nullopt;
   }
 
-  FeatureResiduals f{.feature = Feature::Block, .index = block};
+  FeatureResiduals f{.feature = Feature::Block, .index = block, .points_m = points};
   const auto n = std::ssize(points);
   const Vector3 x = plane->normal.unitOrthogonal(), y = plane->normal.cross(x);
   Eigen::MatrixXd design(n, 3);

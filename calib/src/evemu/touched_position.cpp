@@ -120,14 +120,16 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
+/// With at most this many touches, two or fewer residuals do not tell which touch is false.
+constexpr std::size_t kFewTouches = 6;
+
 /// The touch without which the others fit a sphere much better, and the radius of that sphere is at
 /// most half as far from `radius_m`. nullopt if there is none.
 std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
-  constexpr std::size_t kUnknowns = 4, kRedundant = 2;
   constexpr double kClear = 3.0;  // ratio of rms; machine errors of some mm deform the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
 
-  if (!all || points_m.size() <= kUnknowns + kRedundant) {
+  if (!all || points_m.size() <= kFewTouches) {
     return std::nullopt;
   }
 
@@ -148,13 +150,37 @@ std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, d
   return found;
 }
 
+bool has_its_radius(const fit::Sphere& ball, double expected_m, const ObserveOptions& options) {
+  return std::abs(ball.radius - expected_m) <= options.max_radius_mismatch_m;
+}
+
+std::size_t balls_of_another_radius(std::span<const fit::Sphere> balls, const Calibrator& c,
+                                    const ObserveOptions& options) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
+    count += has_its_radius(balls[i], expected_m, options) ? 0 : 1;
+  }
+  return count;
+}
+
 std::string why_another_radius(std::span<const fit::Sphere> balls,
                                std::span<const Vector3> points_m, double expected_m,
-                               const Calibrator& c) {
+                               const Calibrator& c, const ObserveOptions& options) {
   if (const auto k = touch_off_radius(points_m, expected_m)) {
     return message("without touch ", *k + 1, " of ", points_m.size(),
                    " it comes nearer to that radius: a false trigger, or dirt; touch there again");
   }
+
+  if (balls.size() > 1 && balls_of_another_radius(balls, c, options) == 1) {
+    const std::string one_ball = "the other balls fit: ";
+    return points_m.size() > kFewTouches
+               ? one_ball + "check the radius of this ball in the calibrator file, and clean it"
+               : one_ball + message("one of its ", points_m.size(),
+                                    " touches is a false trigger, or on dirt, too few to find "
+                                    "which one; clean this ball and touch it again");
+  }
+
   return "calibrator file of another artefact, or another tip" + radii_fit_with(balls, c);
 }
 
@@ -162,13 +188,13 @@ Result<void> check_radii(int position, const Touched& touched, std::span<const f
                          const Calibrator& c, const ObserveOptions& options) {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double expected_m = c.balls[i].radius_m + c.tip_radius_m;
-    if (!(std::abs(balls[i].radius - expected_m) <= options.max_radius_mismatch_m)) {
+    if (!has_its_radius(balls[i], expected_m, options)) {
       const auto& points_m = touched.at({Feature::Ball, c.balls[i].number}).points_m;
       return at_position(
           position, ErrorCode::BadInput,
           message("ball ", i + 1, " has radius ", balls[i].radius * kMmPerM, " mm, calibrator \"",
                   c.name, "\" and tip give ", expected_m * kMmPerM,
-                  " mm: ", why_another_radius(balls, points_m, expected_m, c)));
+                  " mm: ", why_another_radius(balls, points_m, expected_m, c, options)));
     }
   }
   return {};

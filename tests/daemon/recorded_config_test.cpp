@@ -42,6 +42,7 @@ TEST(RecordedConfig, OfARecordingIsReadWithValuesThatNoMachineHas) {
   {
     auto recorder = Recorder::open(example_options(folder.path()), info, Recorder::WallTime{});
     ASSERT_TRUE(recorder) << recorder.error().text;
+    recorder->record(example_axes(0), "encoder");  // a recording without a message is removed
     ASSERT_TRUE(recorder->close());
   }
 

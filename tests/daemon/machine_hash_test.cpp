@@ -1,0 +1,88 @@
+// A stored model is only ACTIVE on a machine with its hash: a hash that changes with the program
+// would end every model. The values are those of earlier versions.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "abbe/config/config.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+const std::string kMill = R"([machine]
+name = "mill"
+chain = "[w X' b Y Z (C1) t]"
+[axes.X]
+min_mm = -300
+max_mm = 300
+[axes.Y]
+min_mm = -250
+max_mm = 250
+[axes.Z]
+min_mm = -400
+max_mm = -100
+[target]
+offset_mm = [20, -15, -120]
+[model]
+node_spacing_mm = 50
+)";
+
+std::string hash_with(const std::string& devices) {
+  const auto config = parse_config(kMill + devices, "abbed.toml");
+  EXPECT_TRUE(config) << ::testing::PrintToString(config.error().details);
+  return config ? machine_hash(*config) : "";
+}
+
+TEST(MachineHash, WithEncodersStays) {
+  EXPECT_EQ(hash_with(R"([encoder]
+transport = "socketcan"
+interface = "can0"
+nodes = [
+  { axis = "X", node = 1, step_nm = 10 },
+  { axis = "Y", node = 2, step_nm = 10, offset_mm = 1.5 },
+  { axis = "Z", node = 3, step_nm = 10, invert = true },
+]
+)"),
+            "f43f8407c6be8a957ec6dd0c0857fec1ba461f6863b708fbe95e20ceb89b56fe");
+}
+
+TEST(MachineHash, WithACardAndReferenceMarksStays) {
+  EXPECT_EQ(hash_with(R"([counter_card]
+transport = "usb"
+serial_number = "01ABBE08"
+axes_compensated = true
+axes = [
+  { axis = "X", channel = 0, step_nm = 10 },
+  { axis = "Y", channel = 1, step_nm = 10 },
+  { axis = "Z", channel = 2, step_nm = 10, invert = true, offset_mm = 3 },
+]
+[reference]
+transport = "usb"
+serial_number = "01ABBE09"
+axes = [{ axis = "X", channel = 0, signal_period_um = 20, increment = 1000, length_mm = 620 }]
+)"),
+            "f7aa146602ef8cd9d090f464b1defb85c845803c039bd69d35feb35a192ad323");
+}
+
+TEST(MachineHash, WithAMeasuringMachineAndAThermometerStays) {
+  EXPECT_EQ(hash_with(R"([cmm]
+host = "10.0.0.9"
+axes_compensated = false
+[[environment]]
+name = "rtd"
+map = "icpdas-zt2005-c8"
+serial = "/dev/ttyUSB0"
+inputs = ["scale_x"]
+[[thermal]]
+axis = "X"
+temperature = "scale_x"
+alpha_um_per_m_K = 8
+u_alpha_um_per_m_K = 0.5
+u_temperature_K = 0.2
+fixed_mm = -300
+)"),
+            "be07aafbfa3d0fb94615b92fea982d1c40870ebbff8166ad6e25ccee2b07141e");
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -13,15 +13,16 @@ namespace abbe::daemon {
 
 Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
+  StreamNames names;
   read_machine(root, config.machine);
   read_daemon(root, base, config);  // before the devices: they depend on [daemon] simulated
-  read_tracker(root, config);
-  read_encoder(root, config);
-  read_counter_card(root, config);
-  read_reference(root, config);
-  read_probe(root, config);
-  read_cmm(root, config);
-  read_environment(root, config);  // after the devices: all names must differ
+  read_tracker(root, config, names);
+  read_encoder(root, config, names);
+  read_counter_card(root, config, names);
+  read_reference(root, config, names);
+  read_probe(root, config, names);
+  read_cmm(root, config, names);
+  read_environment(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
   read_recording(root, base, config);

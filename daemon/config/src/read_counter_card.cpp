@@ -156,7 +156,7 @@ bool same_card(const CounterCardConfig& a, const CounterCardConfig& b) {
 
 }  // namespace
 
-void read_reference(Section& root, Config& out) {
+void read_reference(Section& root, Config& out, StreamNames& names) {
   Section section = root.child("reference");
   if (!section.present()) return;
   ReferenceConfig config;
@@ -187,10 +187,11 @@ void read_reference(Section& root, Config& out) {
   }
 
   section.close();
+  names.take(card.name, section);
   out.reference = std::move(config);
 }
 
-void read_counter_card(Section& root, Config& out) {
+void read_counter_card(Section& root, Config& out, StreamNames& names) {
   Section card = root.child("counter_card");
   if (!card.present()) return;
   CounterCardConfig config;
@@ -215,6 +216,7 @@ void read_counter_card(Section& root, Config& out) {
       card.fault("axes",
                  fmt::format("axis {} is claimed by [encoder] and [counter_card]", axis.name));
   card.close();
+  names.take(config.name, card);
   out.counter_card = std::move(config);
 }
 

@@ -224,7 +224,7 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
 
 }  // namespace
 
-void read_tracker(Section& root, Config& out) {
+void read_tracker(Section& root, Config& out, StreamNames& names) {
   Section tracker = root.child("tracker");
   read_noise(tracker, out.machine);
   read_placement(tracker, out.machine);
@@ -245,10 +245,12 @@ void read_tracker(Section& root, Config& out) {
   if (!has_host && tracker.has("port") && !tracker.has("host"))
     tracker.fault("host", "missing, but a port is given");
   tracker.close();
-  if (has_host) out.tracker = std::move(config);
+  if (!has_host) return;
+  names.take(config.name, tracker);
+  out.tracker = std::move(config);
 }
 
-void read_encoder(Section& root, Config& out) {
+void read_encoder(Section& root, Config& out, StreamNames& names) {
   Section encoder = root.child("encoder");
   if (!encoder.present()) return;
   EncoderConfig config;
@@ -266,6 +268,7 @@ void read_encoder(Section& root, Config& out) {
   encoder.get("axes_compensated", config.axes_compensated);
   read_nodes(encoder, out.machine, config);
   encoder.close();
+  names.take(config.name, encoder);
   out.encoder = std::move(config);
 }
 

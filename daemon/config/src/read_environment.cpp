@@ -250,38 +250,14 @@ void check_line(const EnvironmentConfig& config, const Config& out, Section& sec
   }
 }
 
-/// Health streams must have different names: the devices, and the parts of the daemon in kOwn.
-void take_name(const std::string& name, std::set<std::string>& names, Section& section) {
-  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
-  if (name.empty()) return;
-  if (kOwn.contains(name))
-    section.fault("name", fmt::format("\"{}\" is reserved for a part of the daemon", name));
-  else if (!names.insert(name).second)
-    section.fault("name", fmt::format("two devices are called \"{}\"", name));
-}
-
 }  // namespace
 
-void read_environment(Section& root, Config& out) {
-  std::set<std::string> names;
-  const auto take = [&](const char* table, const auto& device, const auto& name) {
-    if (!device) return;
-    Section section = root.child(table);
-    take_name(name(*device), names, section);
-  };
-
-  const auto own_name = [](const auto& device) { return device.name; };
-  take("tracker", out.tracker, own_name);
-  take("encoder", out.encoder, own_name);
-  take("counter_card", out.counter_card, own_name);
-  take("reference", out.reference, [](const auto& reference) { return reference.card.name; });
-  take("probe", out.probe, own_name);
-  take("cmm", out.cmm, own_name);
+void read_environment(Section& root, Config& out, StreamNames& names) {
   protocol::EnvironmentMask seen = 0;
 
   for (auto& section : root.children("environment")) {
     auto config = read_device(section, out);
-    take_name(config.name, names, section);
+    names.take(config.name, section);
     check_line(config, out, section);
     for (const auto& measured : config.map.measured) {
       const auto bit = drivers::mask_of(measured);

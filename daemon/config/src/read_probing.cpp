@@ -30,7 +30,7 @@ void read_switching(Section& probe, drivers::ProbeSwitching& out) {
 
 }  // namespace
 
-void read_probe(Section& root, Config& out) {
+void read_probe(Section& root, Config& out, StreamNames& names) {
   Section probe = root.child("probe");
   if (!probe.present()) return;
   ProbeConfig config;
@@ -51,10 +51,11 @@ void read_probe(Section& root, Config& out) {
   }
 
   probe.close();
+  names.take(config.name, probe);
   out.probe = std::move(config);
 }
 
-void read_cmm(Section& root, Config& out) {
+void read_cmm(Section& root, Config& out, StreamNames& names) {
   Section cmm = root.child("cmm");
   if (!cmm.present()) return;
   CmmConfig config;
@@ -71,6 +72,7 @@ void read_cmm(Section& root, Config& out) {
 
   if (out.probe) cmm.fault("", "touches come from [probe] already: remove [probe] or [cmm]");
   cmm.close();
+  names.take(config.name, cmm);
   out.cmm = std::move(config);
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 /// One reader per group of tables. Each reader sets the valid values, adds a fault for each invalid
-/// one, and closes its sections.
+/// one, and closes its sections. A reader of devices also takes their names.
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"
+#include "stream_names.hpp"
 
 namespace abbe::daemon {
 
@@ -16,15 +17,15 @@ inline constexpr std::size_t kMostConfigFaults = 1000;
 [[nodiscard]] Config read_all(Section& root, const std::filesystem::path& base);
 
 void read_machine(Section& root, MachineConfig& out);
-void read_tracker(Section& root, Config& out);
-void read_encoder(Section& root, Config& out);
-void read_counter_card(Section& root, Config& out);
-void read_environment(Section& root, Config& out);
+void read_tracker(Section& root, Config& out, StreamNames& names);
+void read_encoder(Section& root, Config& out, StreamNames& names);
+void read_counter_card(Section& root, Config& out, StreamNames& names);
+void read_environment(Section& root, Config& out, StreamNames& names);
 void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
-void read_reference(Section& root, Config& out);
-void read_probe(Section& root, Config& out);
-void read_cmm(Section& root, Config& out);
+void read_reference(Section& root, Config& out, StreamNames& names);
+void read_probe(Section& root, Config& out, StreamNames& names);
+void read_cmm(Section& root, Config& out, StreamNames& names);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
 void read_recording(Section& root, const std::filesystem::path& base, Config& out);
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);

@@ -500,11 +500,11 @@ TEST(ConfigCmm, IsReadInSi) {
   const auto config = parse_config(
       kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n",
       "abbed.toml");
-  ASSERT_TRUE(config && config->cmm);
-  EXPECT_EQ(config->cmm->host, "10.0.0.9");
-  EXPECT_EQ(config->cmm->port, 1294);
-  EXPECT_DOUBLE_EQ(config->cmm->u_position_m, 0.9e-6);
-  EXPECT_FALSE(config->cmm->home);
+  ASSERT_TRUE(config && config->of<CmmConfig>());
+  EXPECT_EQ(config->of<CmmConfig>()->host, "10.0.0.9");
+  EXPECT_EQ(config->of<CmmConfig>()->port, 1294);
+  EXPECT_DOUBLE_EQ(config->of<CmmConfig>()->u_position_m, 0.9e-6);
+  EXPECT_FALSE(config->of<CmmConfig>()->home);
 }
 
 TEST(ConfigCmm, NeedsAHost) {

@@ -119,7 +119,7 @@ class SilentPeer {
 
 TEST_F(MachineHold, IsReportedAndReleasedWhileTheServerIsUnreachable) {
   const SilentPeer peer;
-  config_.cmm->port = peer.port();
+  config_.of<CmmConfig>()->port = peer.port();
   test::write_text(file(), "a motion is under way\n");
   auto devices = DeviceSet::start(config_, time_);
 

@@ -20,7 +20,7 @@ struct Touched {
   std::string reason;
 };
 
-/// The position of the machine's tip, m. Refused: no [cmm], or the machine is not ready.
+/// The position of the machine's tip, m. Refused: no machine, or the machine is not ready.
 [[nodiscard]] Result<calib::Vector3> machine_position(const std::filesystem::path& socket);
 
 /// Returns when the plan is complete, or a touch was refused, or the touching was cancelled

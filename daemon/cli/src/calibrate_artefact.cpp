@@ -16,6 +16,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/calib/evemu/artefact_touches.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "artefact_touching.hpp"
 #include "commands.hpp"
@@ -167,21 +168,24 @@ int calibrate(CalibrateArtefactArguments arguments) {
 
 void add_calibrate_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateArtefactArguments>();
-  auto* command = parent.add_subcommand("artefact",
-                                        "Calibrate a ball array on the measuring machine of the "
-                                        "running daemon ([cmm]): touch the upper half\n"
-                                        "of its balls and the block faces that the file names, and "
-                                        "write the measured array with uncertainties.\n"
-                                        "THE MACHINE MOVES: first straight up from its position, "
-                                        "at the end up again. Its paths lead around\n"
-                                        "the balls and above the whole array; they avoid no other "
-                                        "obstacle. Ctrl-C, a closed terminal, or 2 s\n"
-                                        "without contact between this command and the daemon end "
-                                        "the run after the current touch; the tip may\n"
-                                        "then be low. Exit code 1 in these cases, and if a touch "
-                                        "is refused or machine or daemon do not answer\n"
-                                        "any more: the touches made before are kept "
-                                        "(.partial.csv), files of an earlier run stay unchanged.");
+  auto* command =
+      parent.add_subcommand("artefact",
+                            "Calibrate a ball array on the measuring machine of the "
+                            "running daemon (" +
+                                moving_tables() +
+                                "): touch the upper half\n"
+                                "of its balls and the block faces that the file names, and "
+                                "write the measured array with uncertainties.\n"
+                                "THE MACHINE MOVES: first straight up from its position, "
+                                "at the end up again. Its paths lead around\n"
+                                "the balls and above the whole array; they avoid no other "
+                                "obstacle. Ctrl-C, a closed terminal, or 2 s\n"
+                                "without contact between this command and the daemon end "
+                                "the run after the current touch; the tip may\n"
+                                "then be low. Exit code 1 in these cases, and if a touch "
+                                "is refused or machine or daemon do not answer\n"
+                                "any more: the touches made before are kept "
+                                "(.partial.csv), files of an earlier run stay unchanged.");
   command
       ->add_option(
           "--calibrator", arguments->calibrator,

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "terminal.hpp"
@@ -30,9 +31,9 @@ int release_machine(const DaemonSocket& where) {
   const auto answer = ask_machine(where, {{"release", true}});
   if (!answer) return report(answer.error());
   fmt::print(
-      "released: {}\nthe machine may move again (also to home, if [cmm] home = true); `abbe "
+      "released: {}\nthe machine may move again (also to home, if {} home = true); `abbe "
       "status` shows when it is ready\n",
-      (*answer)["released"].get<std::string>());
+      (*answer)["released"].get<std::string>(), moving_tables());
   return 0;
 }
 
@@ -68,7 +69,7 @@ void add_machine(CLI::App& parent, int& exit) {
       "machine", "Control the measuring machine of the running daemon: where, stop, release");
   group->require_subcommand(1);
 
-  const auto add = [&](const char* name, const char* text, int (*run)(const DaemonSocket&)) {
+  const auto add = [&](const char* name, const std::string& text, int (*run)(const DaemonSocket&)) {
     auto where = std::make_shared<DaemonSocket>();
     auto* command = group->add_subcommand(name, text);
     add_socket_options(*command, *where);
@@ -85,7 +86,8 @@ void add_machine(CLI::App& parent, int& exit) {
       "Confirm that a person has checked the machine. After an error of severity 2 or more, an\n"
       "emergency stop or an aborted motion, abbed moves nothing and clears no error before this\n"
       "command. Then it clears the errors, opens the session again, and sends the machine home if\n"
-      "it is not homed and [cmm] home = true.",
+      "it is not homed and " +
+          moving_tables() + " home = true.",
       release_machine);
 }
 

@@ -10,6 +10,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/bounded_toml.hpp"
+#include "config_kind.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -153,10 +154,12 @@ void doubt_paths(Section& root, const Config& config) {
 }
 
 void doubt_devices(Section& root, const Config& config) {
-  if (!config.encoder && !config.counter_card && !config.cmm)
-    root.fault("", "no [encoder], [counter_card] or [cmm]: no device reads the axes");
-  if (!config.tracker && !config.probe && !config.cmm)
-    root.fault("", "no [tracker] host, [probe] or [cmm]: no device measures the errors");
+  if (!config.encoder && !config.counter_card && axis_readings(config).empty())
+    root.fault("", fmt::format("no [encoder], [counter_card] or {}: no device reads the axes",
+                               axis_tables("or")));
+  if (!config.tracker && !config.probe && !touch_source(config))
+    root.fault("", fmt::format("no [tracker] host, [probe] or {}: no device measures the errors",
+                               touch_tables("or")));
   if (config.daemon.simulated)
     root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
 }

@@ -5,6 +5,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/check_config.hpp"
+#include "config_kind.hpp"
 
 namespace abbe::daemon {
 
@@ -92,8 +93,8 @@ void add_devices(const Config& config, Lines& out) {
     out.push_back(line("reference", card_text(config.reference->card, config.machine)));
   if (config.probe)
     out.push_back(line("probe", fmt::format("id {}, on counter_card", config.probe->delay.id)));
-  if (config.cmm)
-    out.push_back(line("cmm", fmt::format("{}:{}", config.cmm->host, config.cmm->port)));
+  for (const ConfigKind& kind : config_kinds())
+    for (const auto& [what, text] : kind.summary(config)) out.push_back(line(what, text));
   for (const auto& device : config.environment)
     out.push_back(line("environment", fmt::format("\"{}\" ({}) at {}", device.name, device.map.name,
                                                   text_of(device.address))));

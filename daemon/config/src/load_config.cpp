@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -7,6 +8,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/config/bounded_toml.hpp"
+#include "config_kind.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -21,7 +23,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_counter_card(root, config, names);
   read_reference(root, config, names);
   read_probe(root, config, names);
-  read_cmm(root, config, names);
+  for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_environment(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
@@ -51,10 +53,6 @@ std::string reading_text(const EncoderConfig& encoder) {
   for (const auto& node : encoder.nodes)
     text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
   return text;
-}
-
-std::string reading_text(const CmmConfig& cmm) {
-  return cmm.axes_compensated ? "|cmm|compensated" : "|cmm|raw";
 }
 
 std::string reading_text(const CounterCardConfig& card) {
@@ -112,6 +110,12 @@ std::vector<std::string> Config::connected_axes() const {
   return names;
 }
 
+bool Config::axes_compensated() const {
+  return (encoder && encoder->axes_compensated) ||
+         (counter_card && counter_card->axes_compensated) ||
+         std::ranges::any_of(axis_readings(*this), &AxisReadings::compensated);
+}
+
 std::string machine_hash(const Config& config) {
   const MachineConfig& machine = config.machine;
   std::string text = fmt::format("{}|{}|0", machine.name, machine.chain);
@@ -128,7 +132,8 @@ std::string machine_hash(const Config& config) {
   if (config.encoder) text += reading_text(*config.encoder);
   if (config.counter_card) text += reading_text(*config.counter_card);
   if (config.reference) text += reading_text(*config.reference);
-  if (config.cmm_reads_axes()) text += reading_text(*config.cmm);
+  for (const ConfigKind& kind : config_kinds())
+    if (kind.reading_text != nullptr) text += kind.reading_text(config);
   for (const auto& thermal : config.thermal)
     text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K,
                         thermal.fixed_m, config.temperatures[thermal.temperature]);

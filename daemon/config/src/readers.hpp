@@ -25,7 +25,6 @@ void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
 void read_reference(Section& root, Config& out, StreamNames& names);
 void read_probe(Section& root, Config& out, StreamNames& names);
-void read_cmm(Section& root, Config& out, StreamNames& names);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
 void read_recording(Section& root, const std::filesystem::path& base, Config& out);
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);

@@ -118,23 +118,23 @@ Result<std::array<double, 3>> RunningMachine::position() const {
 
 Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.cmm) return nullptr;
-  auto options = device_options(*config.cmm, config.daemon.speed);
+  if (!config.of<CmmConfig>()) return nullptr;
+  auto options = device_options(*config.of<CmmConfig>(), config.daemon.speed);
   keep_hold(config.daemon.data_dir, options);
   auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
   thread.wait_at_most = kMostStopDelay;
   auto running = run(drivers::IppDevice::create(options, start.time), std::move(thread));
   if (!running) return tl::unexpected(running.error());
-  return std::make_unique<RunningMachine>(std::move(*running), config.cmm_reads_axes(), start);
+  return std::make_unique<RunningMachine>(std::move(*running), cmm_reads_axes(config), start);
 }
 
 class MachineDecoder final : public RawDecoders {
  public:
   explicit MachineDecoder(const Config& config)
-      : name_(config.cmm->name),
-        is_the_axes_(config.cmm_reads_axes()),
+      : name_(config.of<CmmConfig>()->name),
+        is_the_axes_(cmm_reads_axes(config)),
         receiver_(std::make_unique<drivers::IppReceiver>(
-            device_options(*config.cmm, config.daemon.speed).receiver)) {}
+            device_options(*config.of<CmmConfig>(), config.daemon.speed).receiver)) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_) return;
@@ -162,15 +162,15 @@ class MachineDecoder final : public RawDecoders {
 };
 
 void name_measuring_machine(const Config& config, DeviceNames& names) {
-  if (!config.cmm) return;
-  names.touches = config.cmm->name;
-  if (config.cmm_reads_axes()) names.axes = config.cmm->name;
-  names.all.push_back(config.cmm->name);
+  if (!config.of<CmmConfig>()) return;
+  names.touches = config.of<CmmConfig>()->name;
+  if (cmm_reads_axes(config)) names.axes = config.of<CmmConfig>()->name;
+  names.all.push_back(config.of<CmmConfig>()->name);
 }
 
 std::unique_ptr<RawDecoders> decoders_of_measuring_machine(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
-  return config.cmm ? std::make_unique<MachineDecoder>(config) : nullptr;
+  return config.of<CmmConfig>() ? std::make_unique<MachineDecoder>(config) : nullptr;
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "abbe/config/capabilities.hpp"
+
 namespace abbe::daemon {
 
 using protocol::TouchFlag;
@@ -11,7 +13,8 @@ using protocol::TouchFlag;
 Result<std::array<double, 3>> TouchService::where() const {
   if (!configured_)
     return fail(ErrorCode::Refused,
-                "touch: there is no measuring machine, [cmm], in the configuration");
+                fmt::format("touch: there is no measuring machine, {}, in the configuration",
+                            moving_tables()));
   return devices_.machine_position();
 }
 

@@ -7,6 +7,7 @@
 
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/tables/evemu_files.hpp"
@@ -51,7 +52,7 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
   if (const auto machine = otf_machine(config.machine)) options.travel = machine->nodes;
   if (config.probe) options.device = config.probe->name;
-  if (config.cmm) options.device = config.cmm->name;
+  if (const auto touches = touch_source(config)) options.device = touches->device;
   options.artefact = config.evemu.artefact;
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
@@ -86,17 +87,21 @@ Result<void> check_size(const EvemuRequest& request) {
 
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (auto fits = check_size(request); !fits) return fits;
-  if (!config.probe && !config.cmm) {
+  const auto touches = touch_source(config);
+  if (!config.probe && !touches) {
     return fail(ErrorCode::Refused,
-                "calibrate evemu: neither [probe] nor [cmm] is in the configuration: there is no "
-                "source of touches");
+                fmt::format("calibrate evemu: neither [probe] nor {} is in the configuration: "
+                            "there is no source of touches",
+                            touch_tables("nor")));
   }
 
-  if (config.cmm && config.cmm->axes_compensated) {
-    return fail(ErrorCode::Refused,
-                "calibrate evemu: the measuring machine corrects the positions it reports ([cmm] "
-                "axes_compensated = true): switch the correction off in the machine and set "
-                "axes_compensated = false");
+  if (touches && touches->compensated) {
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("calibrate evemu: the measuring machine corrects the positions it reports ({} "
+                    "axes_compensated = true): switch the correction off in the machine and set "
+                    "axes_compensated = false",
+                    touches->table));
   }
 
   if (const auto given = require_target(config.machine); !given) return given;

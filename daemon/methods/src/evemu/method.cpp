@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/evemu/document.hpp"
 
@@ -83,6 +84,11 @@ std::string touches_sha256(std::span<const calib::evemu::Touch> touches) {
 }
 
 }  // namespace
+
+MethodNeeds EvemuMethod::needs(const Config& config) {
+  const auto touches = touch_source(config);
+  return {.axis_readings = !touches || !touches->reports_positions};
+}
 
 EvemuMethod::Options EvemuMethod::options(const Config& config) {
   return evemu_acquisition_options(config);

@@ -18,6 +18,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/environment/refractive_index.hpp"
+#include "abbe/config/device_configs.hpp"
 #include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/counter_card/wiring.hpp"
 #include "abbe/drivers/environment/modbus_line.hpp"
@@ -247,22 +248,6 @@ struct ProbeConfig {
   std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
 };
 
-/// [cmm]: a measuring machine with an I++ DME server. The daemon takes its touches, and its
-/// positions as axis readings if no other device reads the axes.
-struct CmmConfig {
-  std::string name = "cmm";
-  std::string host;
-  std::uint16_t port = 1294;
-  std::string tool;            ///< selected before measuring; empty: the current one
-  bool home = false;           ///< abbe may home the machine if it is not homed
-  std::uint32_t probe = 1;     ///< probe number in the recorded touches
-  double u_position_m = 1e-6;  ///< standard uncertainty of a reported position
-  /// True (default): the measuring machine corrects the positions that it reports.
-  bool axes_compensated = true;
-  std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
-  std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
-};
-
 using drivers::RealTimeMode;
 
 /// [daemon]
@@ -372,6 +357,7 @@ struct ControlConfig {
 /// "not connected". The axes come from one device: [encoder] or [counter_card].
 struct Config {
   MachineConfig machine;
+  DeviceConfigs devices;
   std::optional<TrackerConfig> tracker;
   std::optional<EncoderConfig> encoder;
   std::optional<CounterCardConfig> counter_card;
@@ -382,7 +368,6 @@ struct Config {
   AirConfig air;
   std::optional<ReferenceConfig> reference;
   std::optional<ProbeConfig> probe;
-  std::optional<CmmConfig> cmm;
   DaemonConfig daemon;
   RecordingConfig recording;
   DdsConfig dds;
@@ -390,18 +375,21 @@ struct Config {
   EvemuConfig evemu;
   ControlConfig control;
 
+  /// The devices of a kind, as in DeviceConfigs: `config.of<CmmConfig>()->host`.
+  template <class Kind>
+  [[nodiscard]] auto& of() noexcept {
+    return devices_of<Kind>(devices);
+  }
+  template <class Kind>
+  [[nodiscard]] const auto& of() const noexcept {
+    return devices_of<Kind>(devices);
+  }
+
   /// The axes in a sample of [encoder] or [counter_card], in order; empty: neither is configured.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
   /// True if the control already corrects the axis readings, for any device that reads them.
-  [[nodiscard]] bool axes_compensated() const noexcept {
-    return (encoder && encoder->axes_compensated) ||
-           (counter_card && counter_card->axes_compensated) ||
-           (cmm_reads_axes() && cmm->axes_compensated);
-  }
-  /// True if the axis readings are the positions of the measuring machine, because no other device
-  /// reads the axes.
-  [[nodiscard]] bool cmm_reads_axes() const noexcept { return cmm && !encoder && !counter_card; }
+  [[nodiscard]] bool axes_compensated() const;
 };
 
 /// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in

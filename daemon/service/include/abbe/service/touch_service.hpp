@@ -1,5 +1,5 @@
 #pragma once
-/// Touches points with the measuring machine of [cmm], one after the other, and keeps the results:
+/// Touches points with the measuring machine, one after the other, and keeps the results:
 /// the daemon's part of `abbe calibrate artefact`. A job ends at the first touch or approach move
 /// that the machine refuses, or when the connection to the machine is lost, because the position is
 /// not known then. When the job is cancelled, or the client has not called look() for
@@ -52,13 +52,13 @@ class TouchService {
     std::string reason;  ///< why it ended before the last touch; empty: it did not
   };
 
-  /// `configured`: the configuration has [cmm].
+  /// `configured`: the configuration has a measuring machine.
   TouchService(SampleSource& devices, bool configured)
       : devices_(devices), configured_(configured) {}
 
-  /// Position of the machine, m. Refused without [cmm] and while the machine is not ready.
+  /// Position of the machine, m. Refused without a machine and while the machine is not ready.
   [[nodiscard]] Result<std::array<double, 3>> where() const;
-  /// Starts a job. Refused without [cmm], while another job runs, and while the machine is not
+  /// Starts a job. Refused without a machine, while another job runs, and while the machine is not
   /// ready. Afterwards `job` holds the memory of the previous job, which the caller destroys.
   [[nodiscard]] Result<void> start(TouchJob&& job);
   /// Stops the present motion. The job keeps running until the machine stands.

@@ -25,9 +25,7 @@ struct EvemuMethod {
   using Candidate = EvemuCandidate;
 
   /// No axis readings are needed with a measuring machine: it reports the position of each touch.
-  [[nodiscard]] static MethodNeeds needs(const Config& config) {
-    return {.axis_readings = !config.cmm};
-  }
+  [[nodiscard]] static MethodNeeds needs(const Config& config);
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
   /// Members of the plan that are not in the object are taken from [evemu] of `config`; null: the

@@ -1,0 +1,32 @@
+#pragma once
+/// The kinds of devices that a configuration can have, one line each, in the order in which their
+/// tables are read and shown. drivers/docs/adding_a_device.md describes how to add a kind.
+
+#include <optional>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+#include "abbe/config/kinds/measuring_machine.hpp"
+
+namespace abbe::daemon {
+
+/// Of each kind at most one device (optional), or any number of them in the order of the file
+/// (vector).
+using DeviceConfigs = std::tuple<std::optional<CmmConfig>>;
+
+template <class Element, class... Elements>
+[[nodiscard]] constexpr bool has_element(std::type_identity<std::tuple<Elements...>>) noexcept {
+  return (std::is_same_v<Element, Elements> || ...);
+}
+
+/// The element of `devices` for a kind: an optional or a vector of `Kind`.
+template <class Kind, class Devices>
+[[nodiscard]] auto& devices_of(Devices& devices) noexcept {
+  if constexpr (has_element<std::optional<Kind>>(std::type_identity<DeviceConfigs>{}))
+    return std::get<std::optional<Kind>>(devices);
+  else
+    return std::get<std::vector<Kind>>(devices);
+}
+
+}  // namespace abbe::daemon

@@ -479,11 +479,11 @@ TEST(ConfigProbe, IsReadInSi) {
                                        "max_speed_mm_s = 8\nconfirm_ms = 4\n",
                                    "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  ASSERT_TRUE(config->probe);
-  EXPECT_EQ(config->probe->delay.id, 4u);
-  EXPECT_EQ(config->probe->delay.delay, std::chrono::milliseconds{2});
-  EXPECT_EQ(config->probe->approach.max_speed_m_s, 0.008);
-  EXPECT_EQ(config->probe->switching.confirm, std::chrono::milliseconds{4});
+  ASSERT_TRUE(config->of<ProbeConfig>());
+  EXPECT_EQ(config->of<ProbeConfig>()->delay.id, 4u);
+  EXPECT_EQ(config->of<ProbeConfig>()->delay.delay, std::chrono::milliseconds{2});
+  EXPECT_EQ(config->of<ProbeConfig>()->approach.max_speed_m_s, 0.008);
+  EXPECT_EQ(config->of<ProbeConfig>()->switching.confirm, std::chrono::milliseconds{4});
 }
 
 TEST(ConfigProbe, NeedsChannelsOfACounterCard) {

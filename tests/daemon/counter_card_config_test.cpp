@@ -40,7 +40,7 @@ TEST(CounterCardConfig, ReadsItsWiringInSi) {
           "= 48\n"),
       "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  const auto& found = *config->counter_card;
+  const auto& found = config->of<CounterCardConfig>()->card;
   EXPECT_EQ(found.port, 3241);
   EXPECT_EQ(found.serial_number, "01ABBE08");
   EXPECT_DOUBLE_EQ(found.wiring.axes.at(0).scale, 10e-9);
@@ -57,9 +57,9 @@ TEST(CounterCardConfig, ReadsItsWiringInSi) {
 TEST(CounterCardConfig, StretchesTimeOutsWithTheSpeedOfTheSimulation) {
   const auto config = parse_config(card(kAxes), "abbed.toml");
   ASSERT_TRUE(config);
-  const auto real = device_options(*config->counter_card, 1.0).session.silence;
+  const auto real = device_options(*config->of<CounterCardConfig>(), 1.0).session.silence;
   EXPECT_GT(real, std::chrono::milliseconds{0});
-  EXPECT_EQ(device_options(*config->counter_card, 10.0).session.silence, 10 * real);
+  EXPECT_EQ(device_options(*config->of<CounterCardConfig>(), 10.0).session.silence, 10 * real);
 }
 
 TEST(CounterCardConfig, RefusesAnAxisScaleOfZero) {

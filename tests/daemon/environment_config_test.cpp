@@ -54,13 +54,14 @@ std::string faults_of(const std::string& text) {
 
 TEST(EnvironmentConfiguration, FindsDevicesByTheNameOfTheirMap) {
   const auto config = config_of(kAir + kScales);
-  ASSERT_EQ(config.environment.size(), 2u);
-  EXPECT_EQ(std::get<drivers::ModbusTcp>(config.environment[0].address).host, "10.0.0.9");
-  EXPECT_EQ(config.environment[0].map.proving.front().expected, 20961234.0);
-  const auto& line = std::get<drivers::ModbusSerial>(config.environment[1].address);
+  ASSERT_EQ(config.of<EnvironmentConfig>().size(), 2u);
+  EXPECT_EQ(std::get<drivers::ModbusTcp>(config.of<EnvironmentConfig>()[0].address).host,
+            "10.0.0.9");
+  EXPECT_EQ(config.of<EnvironmentConfig>()[0].map.proving.front().expected, 20961234.0);
+  const auto& line = std::get<drivers::ModbusSerial>(config.of<EnvironmentConfig>()[1].address);
   EXPECT_EQ(drivers::text_of(line), "/dev/serial/by-id/rs485 9600 8N2");
   EXPECT_THAT(config.temperatures, ElementsAre("scale_x", "part"));
-  EXPECT_EQ(config.environment[1].map.measured[1].place.address, 2);
+  EXPECT_EQ(config.of<EnvironmentConfig>()[1].map.measured[1].place.address, 2);
 }
 
 TEST(EnvironmentConfiguration, NamesTheTemperatureThatIsOneTooMany) {
@@ -110,8 +111,8 @@ address = 1
 type = "uint16"
 expected = 4711
 )");
-  ASSERT_EQ(config.environment.size(), 1u);
-  const auto& map = config.environment[0].map;
+  ASSERT_EQ(config.of<EnvironmentConfig>().size(), 1u);
+  const auto& map = config.of<EnvironmentConfig>()[0].map;
   EXPECT_EQ(map.base_offset, -1);
   EXPECT_EQ(map.measured[0].offset, 273.15);
   EXPECT_DOUBLE_EQ(map.measured[1].scale, 10.0);

@@ -80,7 +80,8 @@ TEST_F(EnvironmentDevices, AreReadRecordedAndDecodedAgainFromTheirBytes) {
 
   auto reader = RecordingReader::open(folder_.path() / "run.mcap");
   ASSERT_TRUE(reader) << reader.error().text;
-  drivers::EnvironmentReceiver receiver{config.environment[0].map, drivers::modbus::Transport::Tcp};
+  drivers::EnvironmentReceiver receiver{config.of<EnvironmentConfig>()[0].map,
+                                        drivers::modbus::Transport::Tcp};
   std::vector<protocol::EnvironmentSample> samples;
   std::vector<protocol::EnvironmentSample> decoded;
   RecordingSink sink;

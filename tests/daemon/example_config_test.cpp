@@ -73,7 +73,7 @@ TEST(ExampleConfig, ItsCommentedKeysAreValidToo) {
 TEST(ExampleConfig, ItsExampleTablesAreValidToo) {
   ASSERT_EQ(faults(with_modbus_and_cmm()), "");
   const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
-  EXPECT_EQ(config.environment.size(), 3u);
+  EXPECT_EQ(config.of<EnvironmentConfig>().size(), 3u);
   EXPECT_EQ(config.thermal.size(), 1u);
   EXPECT_TRUE(config.of<CmmConfig>());
 }
@@ -82,27 +82,29 @@ TEST(ExampleConfig, ItsCounterCardShowsTheDefaults) {
   ASSERT_EQ(faults(with_counter_card_and_probe()), "");
   const auto config = parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value();
 
-  ASSERT_TRUE(config.counter_card && config.probe && config.reference);
-  EXPECT_EQ(config.reference->axes.size(), 3u);
-  EXPECT_EQ(config.reference->u_alignment, ReferenceConfig{}.u_alignment);
-  EXPECT_EQ(config.reference->tolerance_m, ReferenceConfig{}.tolerance_m);
+  ASSERT_TRUE(config.of<CounterCardConfig>() && config.of<ProbeConfig>() &&
+              config.of<ReferenceConfig>());
+  EXPECT_EQ(config.of<ReferenceConfig>()->marks.axes.size(), 3u);
+  EXPECT_EQ(config.of<ReferenceConfig>()->marks.u_alignment, ReferenceMarks{}.u_alignment);
+  EXPECT_EQ(config.of<ReferenceConfig>()->marks.tolerance_m, ReferenceMarks{}.tolerance_m);
   const CounterCardConfig plain;
-  const auto& card = *config.counter_card;
-  EXPECT_EQ(card.name, plain.name);
-  EXPECT_EQ(card.wiring.clock_channel, plain.wiring.clock_channel);
-  EXPECT_EQ(card.wiring.clock_source, plain.wiring.clock_source);
-  EXPECT_EQ(card.wiring.clock_hz, plain.wiring.clock_hz);
-  EXPECT_EQ(drivers::divisor_of(card.wiring), drivers::divisor_of(plain.wiring));
-  EXPECT_EQ(card.wiring.width, plain.wiring.width);
-  EXPECT_EQ(card.sample_every, plain.sample_every);
-  EXPECT_EQ(card.max_constant_delay, plain.max_constant_delay);
-  EXPECT_EQ(card.axes_compensated, plain.axes_compensated);
+  const auto& counter = *config.of<CounterCardConfig>();
+  EXPECT_EQ(counter.card.name, plain.card.name);
+  EXPECT_EQ(counter.card.wiring.clock_channel, plain.card.wiring.clock_channel);
+  EXPECT_EQ(counter.card.wiring.clock_source, plain.card.wiring.clock_source);
+  EXPECT_EQ(counter.card.wiring.clock_hz, plain.card.wiring.clock_hz);
+  EXPECT_EQ(drivers::divisor_of(counter.card.wiring), drivers::divisor_of(plain.card.wiring));
+  EXPECT_EQ(counter.card.wiring.width, plain.card.wiring.width);
+  EXPECT_EQ(counter.sample_every, plain.sample_every);
+  EXPECT_EQ(counter.card.max_constant_delay, plain.card.max_constant_delay);
+  EXPECT_EQ(counter.axes_compensated, plain.axes_compensated);
 }
 
 TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
   ASSERT_EQ(faults(with_counter_card_and_probe()), "");
-  const auto probe =
-      *parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml").value().probe;
+  const auto probe = *parse_config(with_counter_card_and_probe(), "/etc/abbe/abbed.toml")
+                          .value()
+                          .of<ProbeConfig>();
   const ProbeConfig plain;
 
   EXPECT_EQ(probe.name, plain.name);

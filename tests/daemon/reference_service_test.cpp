@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "abbe/config/capabilities.hpp"
 #include "config_tables.hpp"
 #include "reference_cycle.hpp"
 
@@ -44,14 +45,14 @@ std::vector<std::string> faults_of(const std::string& text) {
 
 TEST(ReferenceConfig, TakesTheStepFromTheCardThatCountsLive) {
   const auto config = config_of(kCard + reference(""));
-  ASSERT_TRUE(config.reference);
-  const auto options = reference_options(*config.reference, *config.counter_card);
+  ASSERT_TRUE(config.of<ReferenceConfig>());
+  const auto options = reference_options(*reference_marks(config), *counted_axes(config));
   ASSERT_EQ(options.axes.size(), 1u);
   EXPECT_EQ(options.axes[0].live_axis, 2);
   EXPECT_EQ(options.axes[0].latched_axis, 0);
   EXPECT_DOUBLE_EQ(options.axes[0].marks.counts_per_period, -80.0);
   EXPECT_EQ(options.axes[0].marks.code.length, 25'000);
-  EXPECT_TRUE(config.reference->card.wiring.axes[0].latch_on_index);
+  EXPECT_TRUE(config.of<ReferenceConfig>()->card.wiring.axes[0].latch_on_index);
 }
 
 TEST(ReferenceConfig, NeedsTheAxesCountedLiveByAnotherCard) {

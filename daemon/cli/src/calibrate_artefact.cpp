@@ -172,7 +172,7 @@ void add_calibrate_artefact(CLI::App& parent, int& exit) {
       parent.add_subcommand("artefact",
                             "Calibrate a ball array on the measuring machine of the "
                             "running daemon (" +
-                                moving_tables() +
+                                tables_with(Capability::Motion) +
                                 "): touch the upper half\n"
                                 "of its balls and the block faces that the file names, and "
                                 "write the measured array with uncertainties.\n"

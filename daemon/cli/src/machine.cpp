@@ -33,7 +33,7 @@ int release_machine(const DaemonSocket& where) {
   fmt::print(
       "released: {}\nthe machine may move again (also to home, if {} home = true); `abbe "
       "status` shows when it is ready\n",
-      (*answer)["released"].get<std::string>(), moving_tables());
+      (*answer)["released"].get<std::string>(), tables_with(Capability::Motion));
   return 0;
 }
 
@@ -87,7 +87,7 @@ void add_machine(CLI::App& parent, int& exit) {
       "emergency stop or an aborted motion, abbed moves nothing and clears no error before this\n"
       "command. Then it clears the errors, opens the session again, and sends the machine home if\n"
       "it is not homed and " +
-          moving_tables() + " home = true.",
+          tables_with(Capability::Motion) + " home = true.",
       release_machine);
 }
 

@@ -10,6 +10,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/bounded_toml.hpp"
+#include "axis_steps.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
 
@@ -72,7 +73,6 @@ void check_paths(Section& root, const Config& config) {
 constexpr double kLongTravel_m = 50.0;
 constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;  // 62.8: a range of 90 is in degrees
 constexpr double kLongTarget_m = 2.0;
-constexpr double kCoarseStep_m = 10e-6, kCoarseStep_rad = 1e-3;
 
 void doubt_axis(Section axis, const AxisConfig& config) {
   const double range = config.max - config.min;
@@ -114,23 +114,6 @@ void doubt_machine(Section& root, const MachineConfig& machine) {
   doubt_nodes(root.child("model"), machine);
 }
 
-/// `table`.`list`: the axes of a device, each with a step per count.
-void doubt_steps(Section& root, const char* table, const char* list, const MachineConfig& machine) {
-  for (auto& section : root.child(table).children(list)) {
-    std::string name;
-    section.get("axis", name);
-    const AxisConfig* axis = machine.find_axis(name);
-    const bool linear = axis == nullptr || axis->kind == AxisKind::Linear;
-    const char* const key = linear ? "step_nm" : "step_nrad";
-    double step = 0.0;
-
-    if (!section.get(key, step, kNano, kAny) || step <= (linear ? kCoarseStep_m : kCoarseStep_rad))
-      continue;
-    section.fault(key, linear ? fmt::format("one count is {:g} um", step * kUmPerM)
-                              : fmt::format("one count is {:g} urad", step * kUradPerRad));
-  }
-}
-
 void doubt_cpus(Section daemon, const DaemonConfig& config, int cpus) {
   for (const auto& [key, cpu] :
        {std::pair{"tracker_cpu", config.tracker_cpu}, std::pair{"encoder_cpu", config.encoder_cpu},
@@ -154,12 +137,12 @@ void doubt_paths(Section& root, const Config& config) {
 }
 
 void doubt_devices(Section& root, const Config& config) {
-  if (!config.encoder && !config.counter_card && axis_readings(config).empty())
-    root.fault("", fmt::format("no [encoder], [counter_card] or {}: no device reads the axes",
-                               axis_tables("or")));
-  if (!config.tracker && !config.probe && !touch_source(config))
-    root.fault("", fmt::format("no [tracker] host, [probe] or {}: no device measures the errors",
-                               touch_tables("or")));
+  if (!config.encoder && axis_readings(config).empty())
+    root.fault("", fmt::format("no [encoder], {}: no device reads the axes",
+                               tables_with(Capability::Axes)));
+  if (!config.tracker && !touch_source(config))
+    root.fault("", fmt::format("no [tracker] host, {}: no device measures the errors",
+                               tables_with(Capability::Touches)));
   if (config.daemon.simulated)
     root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
 }
@@ -171,7 +154,8 @@ std::vector<std::string> warnings_of(const toml::table& table, const Config& con
   Section root(&table, "", {1, 1}, warnings);
   doubt_machine(root, config.machine);
   doubt_steps(root, "encoder", "nodes", config.machine);
-  doubt_steps(root, "counter_card", "axes", config.machine);
+  for (const ConfigKind& kind : config_kinds())
+    if (kind.doubt != nullptr) kind.doubt(root, config);
   doubt_devices(root, config);
   doubt_cpus(root.child("daemon"), config.daemon, cpus);
   doubt_paths(root, config);

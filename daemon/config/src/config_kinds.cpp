@@ -15,15 +15,12 @@ std::array<ConfigKind, sizeof...(Devices)> kinds_of(std::type_identity<std::tupl
   return {Devices::value_type::kKind...};
 }
 
-template <class Condition>
-std::vector<std::string_view> tables_where(const Condition& condition) {
-  std::vector<std::string_view> tables;
-  for (const ConfigKind& kind : config_kinds())
-    if (condition(kind)) tables.push_back(kind.table);
-  return tables;
+std::string table_of(const ConfigKind& kind) {
+  return fmt::format(fmt::runtime(kind.several ? "[[{}]]" : "[{}]"), kind.key);
 }
 
-std::string joined(const std::vector<std::string_view>& tables, std::string_view conjunction) {
+/// "[a], [b] CONJUNCTION [c]".
+std::string joined(const std::vector<std::string>& tables, std::string_view conjunction) {
   std::string text;
   for (std::size_t i = 0; i < tables.size(); ++i) {
     if (i > 0) text += i + 1 == tables.size() ? fmt::format(" {} ", conjunction) : ", ";
@@ -31,6 +28,37 @@ std::string joined(const std::vector<std::string_view>& tables, std::string_view
   }
 
   return text;
+}
+
+bool has(const ConfigKind& kind, Capability capability) {
+  switch (capability) {
+    case Capability::Axes:
+      return kind.axes != nullptr;
+    case Capability::NamedAxes:
+      return kind.axes != nullptr && !kind.axes_if_no_other;
+    case Capability::CountedAxes:
+      return kind.counted != nullptr;
+    case Capability::Marks:
+      return kind.marks != nullptr;
+    case Capability::Touches:
+      return kind.touches != nullptr;
+    case Capability::Motion:
+      return kind.moves;
+    case Capability::Environment:
+      return kind.environment != nullptr;
+  }
+  return false;
+}
+
+/// The result of the first kind that has the capability in this configuration.
+template <class Result>
+Result first_with(Result (*ConfigKind::*capability)(const Config&), const Config& config) {
+  for (const ConfigKind& kind : config_kinds()) {
+    if (kind.*capability == nullptr) continue;
+    if (auto result = (kind.*capability)(config)) return result;
+  }
+
+  return {};
 }
 
 }  // namespace
@@ -43,6 +71,13 @@ std::span<const ConfigKind> config_kinds() {
 std::vector<AxisReadings> axis_readings(const Config& config) {
   const bool own = axes_have_own_device(config);
   std::vector<AxisReadings> all;
+  if (config.encoder) {
+    auto& readings = all.emplace_back();
+    readings.key = "encoder";
+    readings.compensated = config.encoder->axes_compensated;
+    for (const auto& node : config.encoder->nodes) readings.axes.push_back(node.axis);
+  }
+
   for (const ConfigKind& kind : config_kinds()) {
     if (kind.axes == nullptr || (own && kind.axes_if_no_other)) continue;
     if (auto readings = kind.axes(config)) all.push_back(std::move(*readings));
@@ -52,33 +87,45 @@ std::vector<AxisReadings> axis_readings(const Config& config) {
 }
 
 bool axes_have_own_device(const Config& config) {
-  if (config.encoder || config.counter_card) return true;
+  if (config.encoder) return true;
   return std::ranges::any_of(config_kinds(), [&config](const ConfigKind& kind) {
     return kind.axes != nullptr && !kind.axes_if_no_other && kind.axes(config);
   });
 }
 
 std::optional<TouchSource> touch_source(const Config& config) {
+  return first_with(&ConfigKind::touches, config);
+}
+
+std::optional<CountedAxes> counted_axes(const Config& config) {
+  return first_with(&ConfigKind::counted, config);
+}
+
+const ReferenceMarks* reference_marks(const Config& config) {
+  return first_with(&ConfigKind::marks, config);
+}
+
+std::optional<std::chrono::nanoseconds> time_of_axis_samples(const Config& config, double periods) {
   for (const ConfigKind& kind : config_kinds()) {
-    if (kind.touches == nullptr) continue;
-    if (auto source = kind.touches(config)) return source;
+    if (kind.time_of_axis_samples == nullptr) continue;
+    if (const auto time = kind.time_of_axis_samples(config, periods)) return time;
   }
 
   return std::nullopt;
 }
 
-std::string axis_tables(std::string_view conjunction) {
-  return joined(tables_where([](const ConfigKind& kind) { return kind.axes != nullptr; }),
-                conjunction);
+protocol::EnvironmentMask measured_environment(const Config& config) {
+  protocol::EnvironmentMask all = 0;
+  for (const ConfigKind& kind : config_kinds())
+    if (kind.environment != nullptr) all |= kind.environment(config);
+  return all;
 }
 
-std::string touch_tables(std::string_view conjunction) {
-  return joined(tables_where([](const ConfigKind& kind) { return kind.touches != nullptr; }),
-                conjunction);
-}
-
-std::string moving_tables() {
-  return joined(tables_where([](const ConfigKind& kind) { return kind.moves; }), "or");
+std::string tables_with(Capability capability, std::string_view conjunction) {
+  std::vector<std::string> tables;
+  for (const ConfigKind& kind : config_kinds())
+    if (has(kind, capability)) tables.push_back(table_of(kind));
+  return joined(tables, conjunction);
 }
 
 }  // namespace abbe::daemon

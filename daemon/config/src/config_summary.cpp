@@ -5,6 +5,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/check_config.hpp"
+#include "axis_steps.hpp"
 #include "config_kind.hpp"
 
 namespace abbe::daemon {
@@ -45,10 +46,6 @@ void add_machine(const MachineConfig& machine, Lines& out) {
                          : "not given"));
 }
 
-std::string step_text(double step, bool linear) {
-  return fmt::format("{:g} {}", step * 1e9, linear ? "nm" : "nrad");
-}
-
 std::string tracker_text(const TrackerConfig& tracker) {
   const auto mode = tracker.mode == TrackerModeConfig::Stationary
                         ? std::string{"stationary"}
@@ -67,37 +64,11 @@ std::string encoder_text(const EncoderConfig& encoder) {
   return fmt::format("{}, {}", address, fmt::join(nodes, "; "));
 }
 
-std::string card_text(const CounterCardConfig& card, const MachineConfig& machine) {
-  Lines axes;
-  for (const auto& axis : card.wiring.axes) {
-    const AxisConfig* known = machine.find_axis(axis.name);
-    const bool linear = known == nullptr || known->kind == AxisKind::Linear;
-    axes.push_back(fmt::format("{} channel {} step {}", axis.name, axis.channel,
-                               step_text(axis.scale, linear)));
-  }
-
-  const auto address = card.transport == CardTransport::Usb
-                           ? std::string{"USB"}
-                           : fmt::format("{}:{} (USB/IP) {}", card.host, card.port, card.bus_id);
-  const auto serial =
-      card.serial_number.empty() ? std::string{} : " serial number " + card.serial_number;
-  return fmt::format("{}{}, {}", address, serial, fmt::join(axes, "; "));
-}
-
 void add_devices(const Config& config, Lines& out) {
   if (config.tracker) out.push_back(line("tracker", tracker_text(*config.tracker)));
   if (config.encoder) out.push_back(line("encoder", encoder_text(*config.encoder)));
-  if (config.counter_card)
-    out.push_back(line("counter_card", card_text(*config.counter_card, config.machine)));
-  if (config.reference)
-    out.push_back(line("reference", card_text(config.reference->card, config.machine)));
-  if (config.probe)
-    out.push_back(line("probe", fmt::format("id {}, on counter_card", config.probe->delay.id)));
   for (const ConfigKind& kind : config_kinds())
-    for (const auto& [what, text] : kind.summary(config)) out.push_back(line(what, text));
-  for (const auto& device : config.environment)
-    out.push_back(line("environment", fmt::format("\"{}\" ({}) at {}", device.name, device.map.name,
-                                                  text_of(device.address))));
+    for (const auto& text : kind.summary(config)) out.push_back(line(kind.key, text));
 }
 
 void add_folders(const Config& config, Lines& out) {

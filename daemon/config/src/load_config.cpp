@@ -20,11 +20,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_daemon(root, base, config);  // before the devices: they depend on [daemon] simulated
   read_tracker(root, config, names);
   read_encoder(root, config, names);
-  read_counter_card(root, config, names);
-  read_reference(root, config, names);
-  read_probe(root, config, names);
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
-  read_environment(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
   read_recording(root, base, config);
@@ -52,22 +48,6 @@ std::string reading_text(const EncoderConfig& encoder) {
   std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
   for (const auto& node : encoder.nodes)
     text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
-  return text;
-}
-
-std::string reading_text(const CounterCardConfig& card) {
-  std::string text = card.axes_compensated ? "|compensated" : "|raw";
-  for (const auto& axis : card.wiring.axes)
-    text += fmt::format("|{} {} {:.17g} {:.17g}", axis.name, axis.channel, axis.scale, axis.offset);
-  return text;
-}
-
-std::string reading_text(const ReferenceConfig& reference) {
-  std::string text;
-  for (const auto& axis : reference.axes)
-    text +=
-        fmt::format("|marks {} {:.17g} {:.17g} {} {}", axis.axis, axis.zero_mark,
-                    axis.signal_period, axis.code.increment, axis.reversed ? "reversed" : "along");
   return text;
 }
 
@@ -103,17 +83,13 @@ Result<Config> load_config(const std::filesystem::path& file) {
 
 std::vector<std::string> Config::connected_axes() const {
   std::vector<std::string> names;
-  if (encoder)
-    for (const auto& node : encoder->nodes) names.push_back(node.axis);
-  if (counter_card)
-    for (const auto& axis : counter_card->wiring.axes) names.push_back(axis.name);
+  for (const AxisReadings& readings : axis_readings(*this))
+    names.insert(names.end(), readings.axes.begin(), readings.axes.end());
   return names;
 }
 
 bool Config::axes_compensated() const {
-  return (encoder && encoder->axes_compensated) ||
-         (counter_card && counter_card->axes_compensated) ||
-         std::ranges::any_of(axis_readings(*this), &AxisReadings::compensated);
+  return std::ranges::any_of(axis_readings(*this), &AxisReadings::compensated);
 }
 
 std::string machine_hash(const Config& config) {
@@ -130,8 +106,6 @@ std::string machine_hash(const Config& config) {
   }
 
   if (config.encoder) text += reading_text(*config.encoder);
-  if (config.counter_card) text += reading_text(*config.counter_card);
-  if (config.reference) text += reading_text(*config.reference);
   for (const ConfigKind& kind : config_kinds())
     if (kind.reading_text != nullptr) text += kind.reading_text(config);
   for (const auto& thermal : config.thermal)

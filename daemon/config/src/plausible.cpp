@@ -19,20 +19,6 @@ void check_travel_length(Section& axis, std::string_view key, const AxisConfig& 
                                travel_m * kMmPerM, kShortestTravel_m * kMmPerM));
 }
 
-void check_step(Section& section, double step, bool linear) {
-  if (std::abs(step) <= (linear ? kLargestStep_m : kLargestStep_rad)) return;
-  if (linear)
-    section.implausible("step_nm",
-                        fmt::format("one count is {:g} mm, but must be at most {:g} mm: no "
-                                    "scale is coarser. step_nm is in nanometres",
-                                    step * kMmPerM, kLargestStep_m * kMmPerM));
-  else
-    section.implausible("step_nrad",
-                        fmt::format("one count is {:g} rad, but must be at most {:g} rad: "
-                                    "no encoder is coarser. step_nrad is in nanoradians",
-                                    step, kLargestStep_rad));
-}
-
 namespace {
 
 bool is_digit(char c) {

@@ -12,16 +12,10 @@ namespace abbe::daemon {
 
 /// Shorter than any axis of a machine tool or measuring machine. 0.3 mm is 300 mm given in m.
 inline constexpr double kShortestTravel_m = 1e-3;
-/// Readings with steps this large cannot show errors of some um.
-inline constexpr double kLargestStep_m = 1e-3;
-inline constexpr double kLargestStep_rad = 0.1;
 
 /// Adds a fault at `key` (max_mm) if a linear axis with min < max is shorter than
 /// kShortestTravel_m.
 void check_travel_length(Section& axis, std::string_view key, const AxisConfig& config);
-
-/// Adds a fault at step_nm or step_nrad if one count is larger than any scale has.
-void check_step(Section& section, double step, bool linear);
 
 /// Reads the name or address of a device in the network. Adds a fault if it can be neither.
 bool get_host(Section& section, std::string_view key, std::string& out, Need need = Need::Optional);

@@ -6,6 +6,7 @@
 
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
+#include "axis_steps.hpp"
 #include "machine_order.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"

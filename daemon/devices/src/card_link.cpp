@@ -2,12 +2,14 @@
 
 #include <utility>
 
+#include "abbe/config/stretched.hpp"
+#include "abbe/devices/device_options.hpp"
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 
 namespace abbe::daemon {
 
-std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
+std::unique_ptr<drivers::UsbLink> make_link(const UsbCardConfig& config,
                                             const drivers::UsbIdentity& identity,
                                             const drivers::TimeSource& time) {
   if (config.transport == CardTransport::Usb)
@@ -16,6 +18,23 @@ std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
       drivers::UsbipOptions{
           .host = config.host, .port = config.port, .bus_id = config.bus_id, .identity = identity},
       time);
+}
+
+drivers::CounterCardOptions device_options(const UsbCardConfig& config, double speed) {
+  drivers::CounterCardOptions options;
+  options.name = config.name;
+  options.serial = config.serial_number;
+  options.receiver.wiring = config.wiring;
+  options.receiver.clock.max_constant_delay = config.max_constant_delay;
+  options.transfer_time = stretched(options.transfer_time, speed);
+  auto& session = options.session;
+
+  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
+                         &session.status_period, &session.reopen_after, &session.retry_after}) {
+    *time_out = stretched(*time_out, speed);
+  }
+
+  return options;
 }
 
 std::vector<std::string> with_assumption(std::vector<std::string> warnings,

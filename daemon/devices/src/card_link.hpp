@@ -6,14 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "abbe/config/config.hpp"
+#include "abbe/config/usb_card.hpp"
 #include "abbe/drivers/counter_card/device.hpp"
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/drivers/usb/usb_link.hpp"
 
 namespace abbe::daemon {
 
-[[nodiscard]] std::unique_ptr<drivers::UsbLink> make_link(const CounterCardConfig& config,
+[[nodiscard]] std::unique_ptr<drivers::UsbLink> make_link(const UsbCardConfig& config,
                                                           const drivers::UsbIdentity& identity,
                                                           const drivers::TimeSource& time);
 

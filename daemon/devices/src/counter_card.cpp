@@ -2,8 +2,6 @@
 
 #include <string>
 
-#include "abbe/config/stretched.hpp"
-#include "abbe/config/touch_options.hpp"
 #include "abbe/drivers/counter_card/decimation.hpp"
 #include "abbe/drivers/counter_card/receiver.hpp"
 #include "abbe/drivers/sampling/touch_detector.hpp"
@@ -18,9 +16,10 @@ using TouchDetectorPointer = std::unique_ptr<drivers::TouchDetector>;
 
 /// Touch detector of the probe that is connected to the card; null without [probe].
 TouchDetectorPointer touch_detector_of(const Config& config) {
-  if (!config.probe) return nullptr;
-  return std::make_unique<drivers::TouchDetector>(
-      touch_options(*config.probe, *config.counter_card, config.machine));
+  const auto& probe = config.of<ProbeConfig>();
+  if (!probe) return nullptr;
+  const drivers::CounterCardWiring& wiring = config.of<CounterCardConfig>()->card.wiring;
+  return std::make_unique<drivers::TouchDetector>(touch_options(*probe, wiring, config.machine));
 }
 
 class RunningCard final : public RunningDevices {
@@ -64,14 +63,15 @@ class RunningCard final : public RunningDevices {
 
 Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.counter_card) return nullptr;
-  auto options = device_options(*config.counter_card, config.daemon.speed);
+  const auto& counter = config.of<CounterCardConfig>();
+  if (!counter) return nullptr;
+  auto options = device_options(*counter, config.daemon.speed);
   if (start.left) {
     options.receiver.resume_from = start.left;
     options.session.set_up_serial = std::string{start.left->serial_number()};
   }
 
-  auto link = make_link(*config.counter_card, drivers::identity_of(options), start.time);
+  auto link = make_link(counter->card, drivers::identity_of(options), start.time);
   auto detector = touch_detector_of(config);
   auto running =
       run(drivers::CounterCardDevice::create(options, std::move(link), start.time, detector.get()),
@@ -85,10 +85,10 @@ Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& st
 class CardDecoder final : public RawDecoders {
  public:
   CardDecoder(const Config& config, const std::optional<drivers::CounterCardProgress>& left)
-      : name_(config.counter_card->name),
-        decimation_(config.counter_card->sample_every),
+      : name_(config.of<CounterCardConfig>()->card.name),
+        decimation_(config.of<CounterCardConfig>()->sample_every),
         touch_detector_(touch_detector_of(config)) {
-    auto options = device_options(*config.counter_card, config.daemon.speed).receiver;
+    auto options = device_options(*config.of<CounterCardConfig>(), config.daemon.speed).receiver;
     options.resume_from = left;
     receiver_ = std::make_unique<drivers::CounterCardReceiver>(options);
   }
@@ -115,34 +115,23 @@ class CardDecoder final : public RawDecoders {
 };
 
 void name_counter_card(const Config& config, DeviceNames& names) {
-  if (!config.counter_card) return;
-  names.axes = config.counter_card->name;
-  names.all.push_back(config.counter_card->name);
-  if (config.probe) names.touches = config.probe->name;
+  const auto& counter = config.of<CounterCardConfig>();
+  if (!counter) return;
+  names.axes = counter->card.name;
+  names.all.push_back(counter->card.name);
+  if (const auto& probe = config.of<ProbeConfig>()) names.touches = probe->name;
 }
 
 std::unique_ptr<RawDecoders> decoders_of_counter_card(
     const Config& config, const std::optional<drivers::CounterCardProgress>& left) {
-  return config.counter_card ? std::make_unique<CardDecoder>(config, left) : nullptr;
+  return config.of<CounterCardConfig>() ? std::make_unique<CardDecoder>(config, left) : nullptr;
 }
 
 }  // namespace
 
 drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed) {
-  drivers::CounterCardOptions options;
-  options.name = config.name;
-  options.serial = config.serial_number;
-  options.receiver.wiring = config.wiring;
-  options.receiver.clock.max_constant_delay = config.max_constant_delay;
+  auto options = device_options(config.card, speed);
   options.sample_every = config.sample_every;
-  options.transfer_time = stretched(options.transfer_time, speed);
-  auto& session = options.session;
-
-  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
-                         &session.status_period, &session.reopen_after, &session.retry_after}) {
-    *time_out = stretched(*time_out, speed);
-  }
-
   return options;
 }
 

@@ -41,9 +41,10 @@ class RunningEnvironment final : public RunningDevices {
  public:
   [[nodiscard]] static Result<std::unique_ptr<RunningDevices>> of(const DeviceStart& start) {
     auto made = std::make_unique<RunningEnvironment>();
-    made->devices_.resize(start.config.environment.size());
+    const auto& configured = start.config.of<EnvironmentConfig>();
+    made->devices_.resize(configured.size());
     made->first_ = start.first;
-    for (const auto& devices : devices_of_lines(start.config.environment)) {
+    for (const auto& devices : devices_of_lines(configured)) {
       if (auto added = made->add_line(devices, start); !added) return tl::unexpected(added.error());
     }
 
@@ -73,8 +74,9 @@ class RunningEnvironment final : public RunningDevices {
  private:
   Result<void> add_line(const std::vector<std::size_t>& devices, const DeviceStart& start) {
     std::vector<drivers::EnvironmentDeviceOptions> options;
+    const auto& configured = start.config.of<EnvironmentConfig>();
     for (const std::size_t i : devices)
-      options.push_back(device_options(start.config.environment[i], start.config.daemon.speed));
+      options.push_back(device_options(configured[i], start.config.daemon.speed));
     // The line is read once a second: a thread without real-time priority is sufficient.
     auto running = run(drivers::EnvironmentLine::create(options, start.time),
                        thread_options(start.config.daemon, "abbe-environ", 0, std::nullopt));
@@ -93,14 +95,14 @@ class RunningEnvironment final : public RunningDevices {
 };
 
 Result<std::unique_ptr<RunningDevices>> start_environment(const DeviceStart& start) {
-  if (start.config.environment.empty()) return nullptr;
+  if (start.config.of<EnvironmentConfig>().empty()) return nullptr;
   return RunningEnvironment::of(start);
 }
 
 class EnvironmentDecoders final : public RawDecoders {
  public:
   explicit EnvironmentDecoders(const Config& config) {
-    for (const EnvironmentConfig& device : config.environment) {
+    for (const EnvironmentConfig& device : config.of<EnvironmentConfig>()) {
       names_.push_back(device.name);
       receivers_.emplace_back(device.map, drivers::transport_of(device.address));
     }
@@ -119,7 +121,7 @@ class EnvironmentDecoders final : public RawDecoders {
 };
 
 void name_environment(const Config& config, DeviceNames& names) {
-  for (const EnvironmentConfig& device : config.environment) {
+  for (const EnvironmentConfig& device : config.of<EnvironmentConfig>()) {
     names.environment.push_back(device.name);
     names.all.push_back(device.name);
   }
@@ -127,7 +129,8 @@ void name_environment(const Config& config, DeviceNames& names) {
 
 std::unique_ptr<RawDecoders> decoders_of_environment(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
-  return config.environment.empty() ? nullptr : std::make_unique<EnvironmentDecoders>(config);
+  return config.of<EnvironmentConfig>().empty() ? nullptr
+                                                : std::make_unique<EnvironmentDecoders>(config);
 }
 
 }  // namespace

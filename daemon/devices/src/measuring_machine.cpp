@@ -118,8 +118,9 @@ Result<std::array<double, 3>> RunningMachine::position() const {
 
 Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.of<CmmConfig>()) return nullptr;
-  auto options = device_options(*config.of<CmmConfig>(), config.daemon.speed);
+  const auto& cmm = config.of<CmmConfig>();
+  if (!cmm) return nullptr;
+  auto options = device_options(*cmm, config.daemon.speed);
   keep_hold(config.daemon.data_dir, options);
   auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
   thread.wait_at_most = kMostStopDelay;
@@ -162,10 +163,11 @@ class MachineDecoder final : public RawDecoders {
 };
 
 void name_measuring_machine(const Config& config, DeviceNames& names) {
-  if (!config.of<CmmConfig>()) return;
-  names.touches = config.of<CmmConfig>()->name;
-  if (cmm_reads_axes(config)) names.axes = config.of<CmmConfig>()->name;
-  names.all.push_back(config.of<CmmConfig>()->name);
+  const auto& cmm = config.of<CmmConfig>();
+  if (!cmm) return;
+  names.touches = cmm->name;
+  if (cmm_reads_axes(config)) names.axes = cmm->name;
+  names.all.push_back(cmm->name);
 }
 
 std::unique_ptr<RawDecoders> decoders_of_measuring_machine(

@@ -49,8 +49,9 @@ class RunningReferenceCard final : public RunningDevices {
 
 Result<std::unique_ptr<RunningDevices>> start_reference_card(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.reference) return nullptr;
-  const CounterCardConfig& card = config.reference->card;
+  const auto& reference = config.of<ReferenceConfig>();
+  if (!reference) return nullptr;
+  const UsbCardConfig& card = reference->card;
   const auto options = device_options(card, config.daemon.speed);
 
   return RunningReferenceCard::of(start.first, [&](drivers::MarkWatcher& watcher) {
@@ -65,9 +66,9 @@ Result<std::unique_ptr<RunningDevices>> start_reference_card(const DeviceStart& 
 class ReferenceCardDecoder final : public RawDecoders {
  public:
   explicit ReferenceCardDecoder(const Config& config)
-      : name_(config.reference->card.name),
+      : name_(config.of<ReferenceConfig>()->card.name),
         receiver_(std::make_unique<drivers::CounterCardReceiver>(
-            device_options(config.reference->card, config.daemon.speed).receiver)) {}
+            device_options(config.of<ReferenceConfig>()->card, config.daemon.speed).receiver)) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_) return;
@@ -87,12 +88,13 @@ class ReferenceCardDecoder final : public RawDecoders {
 };
 
 void name_reference_card(const Config& config, DeviceNames& names) {
-  if (config.reference) names.all.push_back(config.reference->card.name);
+  if (const auto& reference = config.of<ReferenceConfig>())
+    names.all.push_back(reference->card.name);
 }
 
 std::unique_ptr<RawDecoders> decoders_of_reference_card(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
-  return config.reference ? std::make_unique<ReferenceCardDecoder>(config) : nullptr;
+  return config.of<ReferenceConfig>() ? std::make_unique<ReferenceCardDecoder>(config) : nullptr;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "abbe/pipeline/assembler.hpp"
 
-#include "abbe/drivers/counter_card/wiring.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 
 #include <algorithm>
@@ -52,12 +52,8 @@ AssemblerOptions assembler_options(const Config& config) {
     options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
   }
 
-  if (config.counter_card) {
-    const double sample_rate_hz =
-        drivers::scan_rate_hz(config.counter_card->wiring) / config.counter_card->sample_every;
-    const std::chrono::duration<double> span{kMostLostCycles / sample_rate_hz};
-    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
-  }
+  if (const auto span = time_of_axis_samples(config, kMostLostCycles))
+    options.interpolation.max_span = *span;
 
   return options;
 }

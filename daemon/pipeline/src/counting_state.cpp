@@ -33,7 +33,7 @@ json json_of(const drivers::CounterAxis& axis) {
           {"debounce", json_of(axis.debounce)}};
 }
 
-json json_of(const ReferenceAxisConfig& marks) {
+json json_of(const AxisMarks& marks) {
   return {{"axis", marks.axis},
           {"increment", marks.code.increment},
           {"length", marks.code.length},
@@ -134,12 +134,12 @@ constexpr std::string_view kNotReferenced = "the axes of the counter card are no
 }  // namespace
 
 std::string counting_set_up(const Config& config) {
-  const auto& wiring = config.counter_card->wiring;
+  const drivers::CounterCardWiring& wiring = counted_axes(config)->card.wiring;
   json axes = json::array();
   for (const auto& axis : wiring.axes) axes.push_back(json_of(axis));
   json marks = json::array();
-  if (config.reference)
-    for (const auto& axis : config.reference->axes) marks.push_back(json_of(axis));
+  if (const ReferenceMarks* const found_at = reference_marks(config))
+    for (const AxisMarks& axis : found_at->axes) marks.push_back(json_of(axis));
   const json set_up{
       {"axes", std::move(axes)},
       {"clock", {wiring.clock_channel, static_cast<int>(wiring.clock_source), wiring.clock_hz}},
@@ -194,7 +194,8 @@ Result<CountingState> counting_state_from_text(std::string_view text, std::strin
 }
 
 LeftCounting left_counting(const Config& config, const std::string& boot_id) {
-  if (!config.counter_card) return {};
+  const auto counted = counted_axes(config);
+  if (!counted) return {};
   const auto file = counting_state_file(config.daemon.data_dir);
   remove_half_written(file);
   std::error_code failed;
@@ -218,8 +219,8 @@ LeftCounting left_counting(const Config& config, const std::string& boot_id) {
   if (state->set_up != set_up)
     return because(
         fmt::format("the set-up of the card was changed ({})", differences(state->set_up, set_up)));
-  if (state->counting.progress.axis_count != config.counter_card->wiring.axes.size())
-    return because("its number of axes differs from [counter_card]");
+  if (state->counting.progress.axis_count != counted->axes().size())
+    return because(fmt::format("its number of axes differs from [{}]", counted->key));
   return {.state = std::move(*state), .warning = {}};
 }
 

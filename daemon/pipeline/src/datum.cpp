@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/messages/attachment_content.hpp"
 
 namespace abbe::daemon {
@@ -23,14 +24,15 @@ void set_missing(Sample& sample, std::size_t axis) {
 }  // namespace
 
 bool has_marks(const Config& config, const std::string& axis) {
-  return config.reference &&
-         std::ranges::any_of(config.reference->axes,
-                             [&axis](const auto& marks) { return marks.axis == axis; });
+  const ReferenceMarks* const marks = reference_marks(config);
+  return marks != nullptr &&
+         std::ranges::find(marks->axes, axis, &AxisMarks::axis) != marks->axes.end();
 }
 
 Datum::Datum(const Config& config, WithoutMarks without_marks) {
-  if (!config.counter_card) return;
-  const auto& live = config.counter_card->wiring.axes;
+  const auto counted = counted_axes(config);
+  if (!counted) return;
+  const auto& live = counted->axes();
   for (std::size_t i = 0; i < live.size(); ++i) {
     const bool marks = has_marks(config, live[i].name);
     if (!marks && without_marks == WithoutMarks::Untouched) continue;
@@ -38,7 +40,7 @@ Datum::Datum(const Config& config, WithoutMarks without_marks) {
     axis.place = i;
     axis.step = live[i].scale;
     axis.offset = live[i].offset;
-    axis.zero_is_here = !marks && config.counter_card->zero_is_here;
+    axis.zero_is_here = !marks && counted->zero_is_here;
     if (axis.zero_is_here) axis.in_force = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
   }
 }

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 
 namespace abbe::daemon {
@@ -62,10 +63,7 @@ void forget_before(std::deque<EnvironmentSample>& samples, HostTime t) {
 EnvironmentUseOptions environment_use(const Config& config) {
   EnvironmentUseOptions use;
   use.max_age = config.air.max_age;
-  for (const auto& device : config.environment) {
-    for (const auto& measured : device.map.measured) use.measured |= drivers::mask_of(measured);
-  }
-
+  use.measured = measured_environment(config);
   use.air = config.air;
   if (config.tracker) {
     use.tracker_u_scale = config.tracker->u_scale;

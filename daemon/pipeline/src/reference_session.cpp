@@ -142,26 +142,26 @@ void ReferenceSession::conclude(Axis& axis) {
   axis.result.reason.clear();
 }
 
-ReferenceOptions reference_options(const ReferenceConfig& config, const CounterCardConfig& live) {
-  ReferenceOptions options{.u_alignment = config.u_alignment};
-  for (std::size_t i = 0; i < config.axes.size(); ++i) {
-    const ReferenceAxisConfig& marks = config.axes[i];
-    const auto axis = std::ranges::find(live.wiring.axes, marks.axis, &drivers::CounterAxis::name);
+ReferenceOptions reference_options(const ReferenceMarks& found, const CountedAxes& live) {
+  ReferenceOptions options{.u_alignment = found.u_alignment};
+  for (std::size_t i = 0; i < found.axes.size(); ++i) {
+    const AxisMarks& marks = found.axes[i];
+    const auto axis = std::ranges::find(live.axes(), marks.axis, &drivers::CounterAxis::name);
     const double along = marks.reversed ? -1.0 : 1.0;
     options.axes.push_back(
         {.name = marks.axis,
-         .live_axis = static_cast<std::uint8_t>(axis - live.wiring.axes.begin()),
+         .live_axis = static_cast<std::uint8_t>(axis - live.axes().begin()),
          .latched_axis = static_cast<std::uint8_t>(i),
          .marks = {.code = marks.code,
                    .counts_per_period = along * marks.signal_period / axis->scale},
          .period = marks.signal_period,
-         .max_half_width_counts = config.tolerance_m / std::abs(axis->scale)});
+         .max_half_width_counts = found.tolerance_m / std::abs(axis->scale)});
   }
 
   return options;
 }
 
-double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found) {
+double reading_at_zero(const AxisMarks& marks, const AxisReference& found) {
   return marks.zero_mark + (marks.reversed ? -found.offset : found.offset);
 }
 

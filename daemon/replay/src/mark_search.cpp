@@ -1,5 +1,6 @@
 #include "mark_search.hpp"
 
+#include "abbe/config/capabilities.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/reference_session.hpp"
 
@@ -18,9 +19,9 @@ HostTime began_after(const RecordingReader& recording) {
 
 }  // namespace
 
-MarkSearch::MarkSearch(const Config& config) : config_(&config) {
-  if (config.reference && config.counter_card)
-    options_ = reference_options(*config.reference, *config.counter_card);
+MarkSearch::MarkSearch(const Config& config) : marks_(reference_marks(config)) {
+  const auto counted = counted_axes(config);
+  if (marks_ != nullptr && counted) options_ = reference_options(*marks_, *counted);
   axes_.resize(options_.axes.size());
 }
 
@@ -58,7 +59,7 @@ void MarkSearch::begin() {
 void MarkSearch::note(std::size_t i) {
   const bool found = session_->axis(i).state == AxisReference::State::Found;
   if (found && !axes_[i].found)
-    axes_[i].readings.push_back(reading_at_zero(config_->reference->axes[i], session_->axis(i)));
+    axes_[i].readings.push_back(reading_at_zero(marks_->axes[i], session_->axis(i)));
   axes_[i].found = found;
 }
 

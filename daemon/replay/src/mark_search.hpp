@@ -15,7 +15,7 @@ namespace abbe::daemon {
 
 class MarkSearch {
  public:
-  /// BadInput: the recording's own requests cannot be read. Without [reference] it finds nothing.
+  /// BadInput: the recording's own requests cannot be read. Without marks it finds nothing.
   [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
                                              const Config& config);
 
@@ -37,7 +37,7 @@ class MarkSearch {
   void begin();
   void note(std::size_t axis);
 
-  const Config* config_;
+  const ReferenceMarks* marks_;
   ReferenceOptions options_;
   std::vector<Axis> axes_;
   std::vector<protocol::HostTime> requests_;

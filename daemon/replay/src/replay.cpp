@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/device_kind.hpp"
 #include "abbe/messages/recording_info.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
@@ -114,12 +114,11 @@ class Calibrations {
   std::vector<ReplayedCalibration> done_;
 };
 
-/// Index in Config::environment; nullopt if the sample is the tracker's own weather reading.
-std::optional<std::size_t> environment_place(const Config& config, std::string_view device) {
-  for (std::size_t i = 0; i < config.environment.size(); ++i) {
-    if (config.environment[i].name == device) return i;
-  }
-  return std::nullopt;
+/// Index in DeviceNames::environment; nullopt if the sample is the tracker's own weather reading.
+std::optional<std::size_t> environment_place(const DeviceNames& names, std::string_view device) {
+  const auto found = std::ranges::find(names.environment, device);
+  if (found == names.environment.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.environment.begin());
 }
 
 /// True if the recording was made by the rule `name`, else by that of earlier versions.
@@ -243,10 +242,11 @@ class FromBytes {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
     sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
     sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
-    // Samples of [[environment]] are used only after the watermark, so that a difference of one
-    // cycle has no effect.
-    sink_.environment = [this, &config](const auto& e, std::string_view device) {
-      if (!environment_place(config, device)) expect(weather_, e);
+    // Samples of the environment devices are used only after the watermark, so that a difference of
+    // one cycle has no effect.
+    sink_.environment = [this, names = device_names(config)](const auto& e,
+                                                             std::string_view device) {
+      if (!environment_place(names, device)) expect(weather_, e);
     };
   }
   FromBytes(const FromBytes&) = delete;
@@ -288,6 +288,7 @@ class Replay : private PipelineObserver {
          Attached attached)
       : recording_(recording),
         config_(config),
+        names_(device_names(config)),
         options_(options),
         datum_(std::move(attached.datum)),
         marks_(std::move(attached.marks)),
@@ -339,7 +340,7 @@ class Replay : private PipelineObserver {
     };
   }
   void take(const protocol::EnvironmentSample& sample, std::string_view device) {
-    if (const auto measuring = environment_place(config_, device)) {
+    if (const auto measuring = environment_place(names_, device)) {
       batch_.measured_environment.push_back({*measuring, sample});
     } else {
       batch_.environment.push_back(sample);
@@ -391,6 +392,7 @@ class Replay : private PipelineObserver {
 
   const RecordingReader& recording_;
   const Config& config_;
+  DeviceNames names_;
   const ReplayOptions& options_;
   Datum datum_;
   MarkSearch marks_;

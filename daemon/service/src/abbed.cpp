@@ -26,6 +26,7 @@
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/devices/device_kind.hpp"
 #include "abbe/devices/device_options.hpp"
 #include "abbe/devices/device_set.hpp"
@@ -350,7 +351,7 @@ struct Abbed::State {
                             });
 
     journal.emplace(config.machine.name, open_journal(), [this] { return observe(); });
-    if (config.counter_card) {
+    if (counted_axes(config)) {
       counting_state.emplace(
           counting_state_file(config.daemon.data_dir),
           [this, set_up = counting_set_up(config)] { return look_at_counting(set_up); },

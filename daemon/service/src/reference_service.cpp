@@ -19,15 +19,21 @@ constexpr double kStillCounts = 2.0;  // an axis at rest may change by this many
 
 ReferenceService::ReferenceService(const Config& config, RecorderThread* recorder,
                                    std::optional<Counting> left)
-    : config_(config), recorder_(recorder), datum_(config), left_(std::move(left)) {}
+    : config_(config),
+      counted_(counted_axes(config)),
+      marks_(reference_marks(config)),
+      recorder_(recorder),
+      datum_(config),
+      left_(std::move(left)) {}
 
 Result<void> ReferenceService::start() {
   if (!configured())
-    return fail(ErrorCode::Refused, "reference: there is no [reference] in the configuration");
+    return fail(ErrorCode::Refused, fmt::format("reference: there is no {} in the configuration",
+                                                tables_with(Capability::Marks)));
   if (running_)
     return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
-  session_.emplace(reference_options(*config_.reference, *config_.counter_card));
-  taken_up_.assign(config_.reference->axes.size(), false);
+  session_.emplace(reference_options(*marks_, *counted_));
+  taken_up_.assign(marks_->axes.size(), false);
   running_ = true;
   from_ = newest_;
   if (recorder_ != nullptr) recorder_->attach(reference_request(newest_), newest_);
@@ -66,7 +72,7 @@ void ReferenceService::take_up_left(const protocol::AxisSample& first) {
   for (FoundDatum datum : left.datum) {
     datum.from = nothing_known.at;
     take_up(datum);
-    carried_on_.push_back(config_.counter_card->wiring.axes[datum.axis].name);
+    carried_on_.push_back(counted_->axes()[datum.axis].name);
   }
 }
 
@@ -111,16 +117,16 @@ void ReferenceService::take_up(const FoundDatum& datum) {
 
 std::vector<std::string> ReferenceService::without_marks() const {
   std::vector<std::string> names;
-  if (!config_.counter_card) return names;
-  for (const auto& axis : config_.counter_card->wiring.axes)
+  if (!counted_) return names;
+  for (const auto& axis : counted_->axes())
     if (!has_marks(config_, axis.name)) names.push_back(axis.name);
   return names;
 }
 
 std::vector<std::string> ReferenceService::unknown() const {
   std::vector<std::string> names;
-  if (!config_.counter_card) return names;
-  const auto& axes = config_.counter_card->wiring.axes;
+  if (!counted_) return names;
+  const auto& axes = counted_->axes();
   for (std::size_t i = 0; i < axes.size(); ++i)
     if (!datum_.known(i)) names.push_back(axes[i].name);
   return names;
@@ -133,8 +139,8 @@ std::vector<std::string> ReferenceService::without_zero() const {
 }
 
 void ReferenceService::watch_standing(const protocol::AxisSample& sample) {
-  if (!config_.counter_card) return;
-  const auto& live = config_.counter_card->wiring.axes;
+  if (!counted_) return;
+  const auto& live = counted_->axes();
   const bool restarted =
       standing_.empty() || has(sample.head.flags, protocol::SampleFlag::Restarted);
   standing_.resize(live.size());
@@ -146,7 +152,7 @@ void ReferenceService::watch_standing(const protocol::AxisSample& sample) {
 }
 
 Result<void> ReferenceService::check_standing(std::size_t axis) const {
-  const auto& name = config_.counter_card->wiring.axes[axis].name;
+  const auto& name = counted_->axes()[axis].name;
   if ((latest_->missing_mask >> axis & 1u) != 0)
     return fail(ErrorCode::Refused,
                 fmt::format("reference: the counter card does not count axis {} now", name));
@@ -180,7 +186,7 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
     return fail(ErrorCode::Refused,
                 fmt::format("reference: the counter card has been silent for {:.1f} s",
                             std::chrono::duration<double>(here.now - newest_).count()));
-  const auto& live = config_.counter_card->wiring.axes;
+  const auto& live = counted_->axes();
   std::vector<std::size_t> places;
 
   for (const auto& name : here.axes.empty() ? possible : here.axes) {
@@ -202,13 +208,13 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
 }
 
 double ReferenceService::reading_at_zero(std::size_t axis) const {
-  return daemon::reading_at_zero(config_.reference->axes[axis], session_->axis(axis));
+  return daemon::reading_at_zero(marks_->axes[axis], session_->axis(axis));
 }
 
 std::vector<ReferenceService::AxisStatus> ReferenceService::status() const {
   std::vector<AxisStatus> all;
   if (!configured()) return all;
-  const auto options = reference_options(*config_.reference, *config_.counter_card);
+  const auto options = reference_options(*marks_, *counted_);
   for (std::size_t i = 0; i < options.axes.size(); ++i) {
     AxisStatus& axis = all.emplace_back();
     axis.name = options.axes[i].name;

@@ -14,7 +14,7 @@ Result<std::array<double, 3>> TouchService::where() const {
   if (!configured_)
     return fail(ErrorCode::Refused,
                 fmt::format("touch: there is no measuring machine, {}, in the configuration",
-                            moving_tables()));
+                            tables_with(Capability::Motion)));
   return devices_.machine_position();
 }
 

@@ -24,16 +24,18 @@ void read_cmm(Section& root, Config& out, StreamNames& names) {
   cmm.get("command_timeout_s", config.command_timeout, kPlain, kPositive);
   cmm.get("motion_timeout_s", config.motion_timeout, kPlain, kPositive);
 
-  if (out.probe) cmm.fault("", "touches come from [probe] already: remove [probe] or [cmm]");
+  if (const auto other = touch_source(out))
+    cmm.fault("",
+              fmt::format("touches come from [{0}] already: remove [{0}] or [cmm]", other->key));
   cmm.close();
   names.take(config.name, cmm);
   out.of<CmmConfig>() = std::move(config);
 }
 
-std::vector<SummaryLine> cmm_summary(const Config& config) {
+std::vector<std::string> cmm_summary(const Config& config) {
   const auto& cmm = config.of<CmmConfig>();
   if (!cmm) return {};
-  return {{"cmm", fmt::format("{}:{}", cmm->host, cmm->port)}};
+  return {fmt::format("{}:{}", cmm->host, cmm->port)};
 }
 
 std::string cmm_reading_text(const Config& config) {
@@ -44,13 +46,14 @@ std::string cmm_reading_text(const Config& config) {
 std::optional<AxisReadings> cmm_axes(const Config& config) {
   const auto& cmm = config.of<CmmConfig>();
   if (!cmm) return std::nullopt;
-  return AxisReadings{.axes = {}, .compensated = cmm->axes_compensated};
+  return AxisReadings{
+      .key = CmmConfig::kKind.key, .axes = {}, .compensated = cmm->axes_compensated};
 }
 
 std::optional<TouchSource> cmm_touches(const Config& config) {
   const auto& cmm = config.of<CmmConfig>();
   if (!cmm) return std::nullopt;
-  return TouchSource{.table = CmmConfig::kKind.table,
+  return TouchSource{.key = CmmConfig::kKind.key,
                      .device = cmm->name,
                      .reports_positions = true,
                      .compensated = cmm->axes_compensated};
@@ -58,7 +61,7 @@ std::optional<TouchSource> cmm_touches(const Config& config) {
 
 }  // namespace
 
-const ConfigKind CmmConfig::kKind{.table = "[cmm]",
+const ConfigKind CmmConfig::kKind{.key = "cmm",
                                   .read = &read_cmm,
                                   .summary = &cmm_summary,
                                   .reading_text = &cmm_reading_text,

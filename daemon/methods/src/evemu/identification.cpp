@@ -51,16 +51,17 @@ evemu::TouchPlan touch_plan(const EvemuConfig& config) {
 EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
   if (const auto machine = otf_machine(config.machine)) options.travel = machine->nodes;
-  if (config.probe) options.device = config.probe->name;
-  if (const auto touches = touch_source(config)) options.device = touches->device;
+  const auto touches = touch_source(config);
+  if (touches) options.device = touches->device;
   options.artefact = config.evemu.artefact;
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
 
   // Marks give the same zero again; a zero stated by the operator is only approximate.
+  const auto counted = counted_axes(config);
   options.zero_is_lost_by_restart =
-      config.probe && config.counter_card &&
-      std::ranges::any_of(config.counter_card->wiring.axes,
+      touches && !touches->reports_positions && counted &&
+      std::ranges::any_of(counted->axes(),
                           [&config](const auto& axis) { return !has_marks(config, axis.name); });
 
   return options;
@@ -88,20 +89,21 @@ Result<void> check_size(const EvemuRequest& request) {
 Result<void> check_evemu(const EvemuRequest& request, const Config& config) {
   if (auto fits = check_size(request); !fits) return fits;
   const auto touches = touch_source(config);
-  if (!config.probe && !touches) {
+  if (!touches) {
     return fail(ErrorCode::Refused,
-                fmt::format("calibrate evemu: neither [probe] nor {} is in the configuration: "
+                fmt::format("calibrate evemu: neither {} is in the configuration: "
                             "there is no source of touches",
-                            touch_tables("nor")));
+                            tables_with(Capability::Touches, "nor")));
   }
 
-  if (touches && touches->compensated) {
+  if (touches->compensated) {
     return fail(
         ErrorCode::Refused,
-        fmt::format("calibrate evemu: the measuring machine corrects the positions it reports ({} "
-                    "axes_compensated = true): switch the correction off in the machine and set "
-                    "axes_compensated = false",
-                    touches->table));
+        fmt::format(
+            "calibrate evemu: the measuring machine corrects the positions it reports ([{}] "
+            "axes_compensated = true): switch the correction off in the machine and set "
+            "axes_compensated = false",
+            touches->key));
   }
 
   if (const auto given = require_target(config.machine); !given) return given;

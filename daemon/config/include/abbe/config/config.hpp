@@ -20,12 +20,7 @@
 #include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/config/device_configs.hpp"
 #include "abbe/drivers/axis_kind.hpp"
-#include "abbe/drivers/counter_card/wiring.hpp"
-#include "abbe/drivers/environment/modbus_line.hpp"
-#include "abbe/drivers/environment/register_map.hpp"
 #include "abbe/drivers/real_time_mode.hpp"
-#include "abbe/drivers/sampling/distance_code.hpp"
-#include "abbe/drivers/sampling/probe_options.hpp"
 
 namespace abbe::daemon {
 
@@ -153,64 +148,6 @@ struct EncoderConfig {
   std::vector<EncoderNodeConfig> nodes;
 };
 
-enum class CardTransport { Usb, Usbip };
-
-/// [counter_card]: a USB-QUAD08 whose counters read the axes, instead of [encoder]. Count 0 is the
-/// position of the axis when the card was configured:
-///
-///   reading = offset + count * step
-///
-/// `step_nm` is the step of one count; a signal period has four counts.
-struct CounterCardConfig {
-  std::string name = "counter_card";
-  CardTransport transport = CardTransport::Usb;
-  std::string host = "127.0.0.1";  ///< USB/IP only
-  std::uint16_t port = 3240;       ///< USB/IP only
-  std::string bus_id = "1-1";      ///< USB/IP only
-  std::string serial_number;       ///< empty: the only connected card
-  drivers::CounterCardWiring wiring;
-  std::uint32_t sample_every = 1;  ///< one axis sample per this number of scans
-  /// Upper bound of the constant, unobservable part of the delay.
-  std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{1}};
-  bool axes_compensated = false;  ///< true: the control already corrects these readings
-  /// True: an axis without reference marks is referenced where it is when the card is configured
-  /// for the first time; it then reads its offset. If false, and always after the card restarted
-  /// during operation, the axis is not referenced until `abbe reference --here`.
-  bool zero_is_here = false;
-};
-
-/// One element of [reference] axes: the distance-coded reference marks of the scale.
-///
-///   reading at a mark = zero_mark + position of the mark on the scale
-///   reversed:           zero_mark - position of the mark on the scale
-struct ReferenceAxisConfig {
-  std::string axis;
-  drivers::DistanceCode code;
-  double signal_period = 20e-6;  ///< of the scale, m or rad
-  double zero_mark = 0.0;        ///< reading at the zero mark of the scale, m or rad
-  bool reversed = false;         ///< position on the scale ascends while the reading descends
-};
-
-/// [reference]: a second card that latches the counts of [counter_card]'s axes at their reference
-/// marks. These axes are not referenced until `abbe reference` has found the positions at which
-/// their counters started.
-struct ReferenceConfig {
-  CounterCardConfig card;                 ///< its axes are in the order of `axes`
-  std::vector<ReferenceAxisConfig> axes;  ///< each is an axis of [counter_card]
-  /// Standard uncertainty of the time offset between the scans of the two cards.
-  std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{1}};
-  double tolerance_m = 1e-6;  ///< limit of the difference of the two cards' counts, m or rad
-};
-
-/// One [[environment]]: a Modbus device that measures air, or temperatures of scales and parts.
-struct EnvironmentConfig {
-  std::string name;
-  drivers::ModbusAddress address;
-  drivers::RegisterMap map;
-  std::chrono::nanoseconds period{std::chrono::seconds{1}};
-  std::chrono::nanoseconds answer_timeout{std::chrono::milliseconds{500}};
-};
-
 /// One [[thermal]]: the readings of an axis are corrected for the thermal expansion of its scale.
 struct ThermalConfig {
   std::string axis;
@@ -235,17 +172,6 @@ struct AirConfig {
   /// The refractive index with which the tracker computed its distances. If given, abbe corrects
   /// the distances for the measured air.
   std::optional<double> assumed_index;
-};
-
-/// [probe]: the touch probe on the latch and edge channels of [counter_card]. `abbe calibrate
-/// probe` determines delay and jitter of this probe; the wiring comes from the card.
-struct ProbeConfig {
-  std::string name = "probe";
-  drivers::ProbeDelay delay;
-  drivers::ProbeApproach approach;
-  drivers::ProbeSwitching switching;
-  std::chrono::nanoseconds window_before{std::chrono::milliseconds{10}};
-  std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
 };
 
 using drivers::RealTimeMode;
@@ -353,21 +279,17 @@ struct ControlConfig {
   std::string move_group = "abbe-move";  ///< may move a machine; empty: as change_group
 };
 
-/// The whole file. `[tracker]` without host, a missing `[encoder]`, a missing `[counter_card]` mean
-/// "not connected". The axes come from one device: [encoder] or [counter_card].
+/// The whole file. A device whose table is missing is not connected; so is a tracker without host.
+/// One device reads the axes.
 struct Config {
   MachineConfig machine;
   DeviceConfigs devices;
   std::optional<TrackerConfig> tracker;
   std::optional<EncoderConfig> encoder;
-  std::optional<CounterCardConfig> counter_card;
-  std::vector<EnvironmentConfig> environment;
   /// Names of the elements of EnvironmentSample::temperature_K, in order of configuration.
   std::vector<std::string> temperatures;
   std::vector<ThermalConfig> thermal;
   AirConfig air;
-  std::optional<ReferenceConfig> reference;
-  std::optional<ProbeConfig> probe;
   DaemonConfig daemon;
   RecordingConfig recording;
   DdsConfig dds;
@@ -375,7 +297,7 @@ struct Config {
   EvemuConfig evemu;
   ControlConfig control;
 
-  /// The devices of a kind, as in DeviceConfigs: `config.of<CmmConfig>()->host`.
+  /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
   template <class Kind>
   [[nodiscard]] auto& of() noexcept {
     return devices_of<Kind>(devices);
@@ -385,7 +307,8 @@ struct Config {
     return devices_of<Kind>(devices);
   }
 
-  /// The axes in a sample of [encoder] or [counter_card], in order; empty: neither is configured.
+  /// The axes in a sample of the device that reads them, in order; empty: there is none, or it
+  /// reads the first axes of the machine.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
   /// True if the control already corrects the axis readings, for any device that reads them.

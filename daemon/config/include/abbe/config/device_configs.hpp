@@ -7,13 +7,19 @@
 #include <type_traits>
 #include <vector>
 
+#include "abbe/config/kinds/counter_card.hpp"
+#include "abbe/config/kinds/environment.hpp"
 #include "abbe/config/kinds/measuring_machine.hpp"
+#include "abbe/config/kinds/reference_card.hpp"
+#include "abbe/config/kinds/touch_probe.hpp"
 
 namespace abbe::daemon {
 
 /// Of each kind at most one device (optional), or any number of them in the order of the file
 /// (vector).
-using DeviceConfigs = std::tuple<std::optional<CmmConfig>>;
+using DeviceConfigs = std::tuple<std::optional<CounterCardConfig>, std::optional<ReferenceConfig>,
+                                 std::optional<ProbeConfig>, std::optional<CmmConfig>,
+                                 std::vector<EnvironmentConfig>>;
 
 template <class Element, class... Elements>
 [[nodiscard]] constexpr bool has_element(std::type_identity<std::tuple<Elements...>>) noexcept {

@@ -101,7 +101,7 @@ class RawDecoders {
 struct DeviceNames {
   std::vector<std::string> all;  ///< RawFromDevice::device is an index into it
   std::string tracker = "tracker", axes = "encoder", touches = "probe";
-  std::vector<std::string> environment;  ///< in the order of Config::environment
+  std::vector<std::string> environment;  ///< in the order of the configuration
 };
 [[nodiscard]] DeviceNames device_names(const Config& config);
 

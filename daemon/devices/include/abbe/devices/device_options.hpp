@@ -19,6 +19,7 @@ namespace abbe::daemon {
 [[nodiscard]] std::chrono::nanoseconds longest_tracker_order(const Config& config);
 [[nodiscard]] drivers::EncoderDeviceOptions device_options(const EncoderConfig& config,
                                                            double speed);
+[[nodiscard]] drivers::CounterCardOptions device_options(const UsbCardConfig& config, double speed);
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config,
                                                          double speed);
 [[nodiscard]] drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config,

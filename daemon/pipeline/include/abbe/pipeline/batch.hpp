@@ -12,7 +12,7 @@
 namespace abbe::daemon {
 
 struct FromEnvironment {
-  std::size_t device = 0;  ///< index in Config::environment
+  std::size_t device = 0;  ///< index in DeviceNames::environment
   protocol::EnvironmentSample sample;
 };
 struct RawFromDevice {

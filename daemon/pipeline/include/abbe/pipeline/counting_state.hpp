@@ -1,9 +1,9 @@
 #pragma once
 /// State of the counter card that survives a restart of the daemon: DATA_DIR/counting-state.json
-/// contains the counts of the card of [counter_card] and the datum of each axis. The datum refers
-/// to the counters, which continue without the daemon. It stays valid if it is the same card with
-/// the same set-up, the computer was not rebooted, and the clock count of the card shows that the
-/// counters have continued (drivers::CounterCardReceiverOptions::resume_from). The file may be
+/// contains the counts of the card that counts the axes, and the datum of each axis. The datum
+/// refers to the counters, which continue without the daemon. It stays valid if it is the same card
+/// with the same set-up, the computer was not rebooted, and the clock count of the card shows that
+/// the counters have continued (drivers::CounterCardReceiverOptions::resume_from). The file may be
 /// seconds old, because the datum changes only when an axis is referenced. Not for the RT path.
 
 #include <filesystem>
@@ -34,7 +34,7 @@ struct CountingState {
 
 /// All settings that determine what a count means: axes (name, channel, scale, offset, debounce),
 /// clock, probe channels, width, reference marks, speed of time. JSON in one line. Requires
-/// `config.counter_card`.
+/// counted_axes().
 [[nodiscard]] std::string counting_set_up(const Config& config);
 /// Boot id of this computer: from the kernel, else from the environment variable ABBE_BOOT_ID
 /// (abbed.service sets it, because it hides /proc/sys). Empty: unknown.
@@ -54,7 +54,7 @@ struct LeftCounting {
   std::string warning;  ///< why there is no state; empty if there is no file
 };
 /// Reads DATA_DIR/counting-state.json for `config`. A file that cannot be used is renamed to
-/// counting-state.json.damaged; half-written files are removed. Without [counter_card] the result
+/// counting-state.json.damaged; half-written files are removed. If no axes are counted, the result
 /// is empty and no file is read.
 [[nodiscard]] LeftCounting left_counting(const Config& config, const std::string& boot_id);
 

@@ -1,14 +1,14 @@
 #pragma once
 /// Datum of each axis of a counter card: it converts counts to readings. When the card is set up,
 /// its counters start at 0 at the current positions, and the axes are not referenced. An axis gets
-/// its datum from reference marks ([reference]), or when the operator states that the axis is at
-/// its offset (`abbe reference --here`); it loses the datum when the counters restart. Without a
-/// datum the axis is missing in every sample. With [counter_card] zero = "here", axes without
-/// marks are taken to be at their offset at the first set-up, but not after a restart of the
-/// counters. Each axis is treated separately. The uncertainty of a datum is a systematic error
-/// common to all readings of the axis and is not added to theirs. Deterministic: depends on the
-/// times in the samples only, so that a replay from raw bytes gives the readings of the live run.
-/// Not for the RT path; not thread-safe.
+/// its datum from reference marks, or when the operator states that the axis is at its offset
+/// (`abbe reference --here`); it loses the datum when the counters restart. Without a datum the
+/// axis is missing in every sample. With zero = "here" in the table of the card, axes without marks
+/// are taken to be at their offset at the first set-up, but not after a restart of the counters.
+/// Each axis is treated separately. The uncertainty of a datum is a systematic error common to all
+/// readings of the axis and is not added to theirs. Deterministic: depends on the times in the
+/// samples only, so that a replay from raw bytes gives the readings of the live run. Not for the RT
+/// path; not thread-safe.
 
 #include <cstdint>
 #include <deque>
@@ -31,7 +31,7 @@ struct FoundDatum {
   bool stated = false;  ///< true: stated by the operator; false: found from marks
 };
 
-/// Whether [reference] finds the zero of this axis.
+/// Whether the zero of this axis is found from reference marks.
 [[nodiscard]] bool has_marks(const Config& config, const std::string& axis);
 
 /// State of the axes at the start of a further file of a recording.
@@ -45,7 +45,7 @@ class Datum {
   /// How axes without marks are treated. NeedAZero: they need a stated datum. Untouched: their
   /// readings are not changed, for recordings that lack kDatumRule.
   enum class WithoutMarks { NeedAZero, Untouched };
-  /// Without [counter_card] no sample is changed.
+  /// If no axes are counted, no sample is changed.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
   /// Starts from the end of the previous file instead of from the first set-up of the card. Axes in

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "abbe/config/config.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/drivers/sampling/counter_alignment.hpp"
 #include "abbe/drivers/sampling/mark_traverse.hpp"
 #include "abbe/drivers/sampling/mark_watcher.hpp"
@@ -84,11 +84,11 @@ class ReferenceSession {
 };
 
 /// Options of a session, from the wiring of the two cards.
-[[nodiscard]] ReferenceOptions reference_options(const ReferenceConfig& config,
-                                                 const CounterCardConfig& live);
+[[nodiscard]] ReferenceOptions reference_options(const ReferenceMarks& found,
+                                                 const CountedAxes& live);
 
 /// Reading at count 0 of an axis in state Found, m or rad.
-[[nodiscard]] double reading_at_zero(const ReferenceAxisConfig& marks, const AxisReference& found);
+[[nodiscard]] double reading_at_zero(const AxisMarks& marks, const AxisReference& found);
 
 /// Request to set the datum of axes without marks: their current position is the one at which they
 /// read their offset.

@@ -47,8 +47,8 @@ class SampleSource {
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }
   /// Clears the errors and starts a new session. Refused if no release is awaited.
   [[nodiscard]] virtual Result<void> release_machine() {
-    return fail(ErrorCode::Refused, "machine: there is no measuring machine, " + moving_tables() +
-                                        ", in the configuration");
+    return fail(ErrorCode::Refused, "machine: there is no measuring machine, " +
+                                        tables_with(Capability::Motion) + ", in the configuration");
   }
   /// Available also while the machine is not ready; nullopt: no position was reported yet.
   [[nodiscard]] virtual std::optional<TipPlace> tip_place() const { return std::nullopt; }

@@ -23,7 +23,7 @@ struct RecorderThreadOptions {
   std::string tracker = "tracker";  ///< device names in the recording
   std::string encoder = "encoder";
   std::string probe = "probe";           ///< the touch probe, or the measuring machine
-  std::vector<std::string> environment;  ///< in the order of Config::environment
+  std::vector<std::string> environment;  ///< in the order of the configuration
   std::vector<std::string> devices;      ///< Batch::raw refers to them by index
   bool raw = true;                       ///< record the device bytes, too
   /// Enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. Limited,

@@ -32,7 +32,7 @@ class ReferenceService : public PipelineObserver {
   ReferenceService(const Config& config, RecorderThread* recorder,
                    std::optional<Counting> left = {});
 
-  /// Starts a search for the marks. Refused without [reference] and while a search runs. A
+  /// Starts a search for the marks. Refused without a card for marks and while a search runs. A
   /// referenced axis keeps its datum until the new one is found.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
@@ -53,7 +53,7 @@ class ReferenceService : public PipelineObserver {
   [[nodiscard]] std::optional<Counting> counting() const;
   /// Axes whose datum was taken over from an earlier run.
   [[nodiscard]] const std::vector<std::string>& carried_on() const noexcept { return carried_on_; }
-  [[nodiscard]] bool configured() const noexcept { return config_.reference.has_value(); }
+  [[nodiscard]] bool configured() const noexcept { return marks_ != nullptr; }
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] std::vector<AxisStatus> status() const;
   /// Axes of the counter card that are not referenced now.
@@ -72,6 +72,8 @@ class ReferenceService : public PipelineObserver {
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
   const Config& config_;
+  std::optional<CountedAxes> counted_;
+  const ReferenceMarks* marks_;
   RecorderThread* recorder_;
   Datum datum_;
   std::optional<ReferenceSession> session_;  ///< the latest search
@@ -81,7 +83,7 @@ class ReferenceService : public PipelineObserver {
     std::int64_t count = 0;
     protocol::HostTime since{};
   };
-  std::vector<Standing> standing_;  ///< in the order of the axes of [counter_card]
+  std::vector<Standing> standing_;  ///< in the order of the counted axes
   protocol::HostTime newest_{};     ///< time of the newest live sample
   std::optional<protocol::AxisSample> latest_;
   protocol::HostTime from_{};  ///< start of the search: only later marks are used

@@ -1,14 +1,15 @@
+#include "abbe/config/kinds/environment.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
 #include "abbe/base/units.hpp"
 #include "abbe/drivers/environment/known_maps.hpp"
 #include "abbe/drivers/environment/link.hpp"
+#include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
-#include "readers.hpp"
 
 namespace abbe::daemon {
 
@@ -40,7 +41,7 @@ std::uint8_t channel_of(const std::string& name, Section& section, std::string_v
   return static_cast<std::uint8_t>((names.size() - 1) % protocol::kMaxTemperatures);
 }
 
-void read_address(Section& device, drivers::ModbusAddress& out) {
+void read_modbus_address(Section& device, drivers::ModbusAddress& out) {
   const bool serial = device.has("serial");
   if (serial == device.has("host")) {
     device.fault(serial ? "serial" : "", "needs one of host (Modbus TCP) and serial (Modbus RTU)");
@@ -225,7 +226,7 @@ EnvironmentConfig read_device(Section& device, Config& out) {
   EnvironmentConfig config;
   get_bounded(device, "name", config.name, bound_of<v1::EnvironmentSample>("device"),
               Need::Required);
-  read_address(device, config.address);
+  read_modbus_address(device, config.address);
   read_map(device, out.temperatures, config.map);
   device.get("period_s", config.period, kPlain, {0.05, 3600.0});
   device.get("answer_timeout_ms", config.answer_timeout, kMilli, {10.0, 60'000.0});
@@ -235,7 +236,7 @@ EnvironmentConfig read_device(Section& device, Config& out) {
 
 /// All devices on one serial line share its baud rate, parity and stop bits.
 void check_line(const EnvironmentConfig& config, const Config& out, Section& section) {
-  for (const auto& other : out.environment) {
+  for (const auto& other : out.of<EnvironmentConfig>()) {
     if (!drivers::same_line(config.address, other.address) ||
         drivers::same_settings(config.address, other.address))
       continue;
@@ -250,8 +251,6 @@ void check_line(const EnvironmentConfig& config, const Config& out, Section& sec
   }
 }
 
-}  // namespace
-
 void read_environment(Section& root, Config& out, StreamNames& names) {
   protocol::EnvironmentMask seen = 0;
 
@@ -265,84 +264,31 @@ void read_environment(Section& root, Config& out, StreamNames& names) {
         section.fault("map", fmt::format("{} is measured by two devices", measured.name));
       seen = static_cast<protocol::EnvironmentMask>(seen | bit);
     }
-    out.environment.push_back(std::move(config));
+    out.of<EnvironmentConfig>().push_back(std::move(config));
   }
 }
 
-void read_thermal(Section& root, Config& out) {
-  std::set<std::string> axes;
-  const auto connected = out.connected_axes();
-  for (auto& section : root.children("thermal")) {
-    ThermalConfig config;
-    std::string temperature;
-    if (section.get("axis", config.axis, Need::Required)) {
-      const AxisConfig* axis = out.machine.find_axis(config.axis);
-      if (axis == nullptr || axis->kind != AxisKind::Linear)
-        section.fault("axis", "no such linear axis in [axes]");
-      if (!axes.insert(config.axis).second) section.fault("axis", "has two [[thermal]] tables");
-      if (!connected.empty() &&
-          std::find(connected.begin(), connected.end(), config.axis) == connected.end())
-        section.fault("axis", "is read by neither [encoder] nor [counter_card]");
-    }
-
-    if (section.get("temperature", temperature, Need::Required)) {
-      const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
-      if (found == out.temperatures.end())
-        section.fault("temperature", "no [[environment]] measures it: check the name");
-      config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
-    }
-
-    section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
-    section.get("u_alpha_um_per_m_K", config.u_alpha_per_K, kMicro, {0.0, 50.0}, Need::Required);
-    section.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 50.0}, Need::Required);
-    section.get("fixed_mm", config.fixed_m, kMilli, kAny, Need::Required);
-
-    if (out.axes_compensated())
-      section.fault("", "the control corrects these readings already (axes_compensated)");
-    section.close();
-    out.thermal.push_back(std::move(config));
-  }
+std::vector<std::string> environment_summary(const Config& config) {
+  std::vector<std::string> texts;
+  for (const auto& device : config.of<EnvironmentConfig>())
+    texts.push_back(
+        fmt::format("\"{}\" ({}) at {}", device.name, device.map.name, text_of(device.address)));
+  return texts;
 }
 
-namespace {
-
-bool air_is_fully_measured(const Config& config) {
-  protocol::EnvironmentMask seen = 0;
-  for (const auto& device : config.environment)
-    for (const auto& measured : device.map.measured) seen |= drivers::mask_of(measured);
-  return (seen & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;
+protocol::EnvironmentMask measured_by_devices(const Config& config) {
+  protocol::EnvironmentMask all = 0;
+  for (const auto& device : config.of<EnvironmentConfig>())
+    for (const auto& measured : device.map.measured) all |= drivers::mask_of(measured);
+  return all;
 }
 
 }  // namespace
 
-void read_air(Section& root, Config& out) {
-  Section air = root.child("air");
-  AirConfig& config = out.air;
-  air.get_word<calib::IndexEquation>("equation", config.equation,
-                                     {{"ciddor", calib::IndexEquation::Ciddor},
-                                      {"edlen", calib::IndexEquation::Edlen},
-                                      {"shop_floor", calib::IndexEquation::ShopFloor}});
-  air.get("wavelength_nm", config.wavelength_m, kNano, {350.0, 1200.0});
-  air.get("co2_ppm", config.co2_ppm, kPlain, {0.0, 2000.0});
-  air.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 10.0});
-  air.get("u_pressure_Pa", config.u_pressure_Pa, kPlain, {0.0, 1e4});
-  air.get("u_humidity_percent", config.u_relative_humidity, {100.0}, {0.0, 100.0});
-  air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
-  air.get("max_age_s", config.max_age, kPlain, kPositive);
-  double assumed = 1.0;
-
-  if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
-    config.assumed_index = assumed;
-    if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
-      air.fault("assumed_index",
-                "the controller computes the index already (tracker.weather = \"compute\")");
-    if (out.tracker && out.tracker->weather == WeatherConfig::None && !air_is_fully_measured(out))
-      air.fault("assumed_index",
-                "with tracker.weather = \"none\" an [[environment]] must measure temperature, "
-                "pressure and humidity of the air");
-  }
-
-  air.close();
-}
+const ConfigKind EnvironmentConfig::kKind{.key = "environment",
+                                          .several = true,
+                                          .read = &read_environment,
+                                          .summary = &environment_summary,
+                                          .environment = &measured_by_devices};
 
 }  // namespace abbe::daemon

@@ -1,0 +1,32 @@
+#pragma once
+/// [probe]: the touch probe on the latch and edge channels of the card that counts the axes. `abbe
+/// calibrate probe` determines delay and jitter of this probe; the wiring comes from the card.
+
+#include <chrono>
+#include <string>
+
+#include "abbe/drivers/counter_card/wiring.hpp"
+#include "abbe/drivers/sampling/probe_options.hpp"
+
+namespace abbe::daemon {
+
+struct ConfigKind;
+struct MachineConfig;
+
+struct ProbeConfig {
+  static const ConfigKind kKind;
+  std::string name = "probe";
+  drivers::ProbeDelay delay;
+  drivers::ProbeApproach approach;
+  drivers::ProbeSwitching switching;
+  std::chrono::nanoseconds window_before{std::chrono::milliseconds{10}};
+  std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
+};
+
+/// Options of the touch detector in drivers. `wiring`: of the card. `machine` gives the kind of
+/// each axis, linear or rotary.
+[[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe,
+                                                  const drivers::CounterCardWiring& wiring,
+                                                  const MachineConfig& machine);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,31 @@
+#pragma once
+/// The distance-coded reference marks of the scales. Pure data.
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/sampling/distance_code.hpp"
+
+namespace abbe::daemon {
+
+/// The marks of the scale of one axis.
+///
+///   reading at a mark = zero_mark + position of the mark on the scale
+///   reversed:           zero_mark - position of the mark on the scale
+struct AxisMarks {
+  std::string axis;
+  drivers::DistanceCode code;
+  double signal_period = 20e-6;  ///< of the scale, m or rad
+  double zero_mark = 0.0;        ///< reading at the zero mark of the scale, m or rad
+  bool reversed = false;         ///< position on the scale ascends while the reading descends
+};
+
+struct ReferenceMarks {
+  std::vector<AxisMarks> axes;  ///< each is one of counted_axes(); order of the latching card
+  /// Standard uncertainty of the time offset between the scans of the two cards.
+  std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{1}};
+  double tolerance_m = 1e-6;  ///< limit of the difference of the two cards' counts, m or rad
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,81 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "abbe/config/capabilities.hpp"
+#include "readers.hpp"
+
+namespace abbe::daemon {
+
+void read_thermal(Section& root, Config& out) {
+  std::set<std::string> axes;
+  const auto connected = out.connected_axes();
+  for (auto& section : root.children("thermal")) {
+    ThermalConfig config;
+    std::string temperature;
+    if (section.get("axis", config.axis, Need::Required)) {
+      const AxisConfig* axis = out.machine.find_axis(config.axis);
+      if (axis == nullptr || axis->kind != AxisKind::Linear)
+        section.fault("axis", "no such linear axis in [axes]");
+      if (!axes.insert(config.axis).second) section.fault("axis", "has two [[thermal]] tables");
+      if (!connected.empty() &&
+          std::find(connected.begin(), connected.end(), config.axis) == connected.end())
+        section.fault("axis", fmt::format("is read by neither [encoder] nor {}",
+                                          tables_with(Capability::NamedAxes, "nor")));
+    }
+
+    if (section.get("temperature", temperature, Need::Required)) {
+      const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
+      if (found == out.temperatures.end())
+        section.fault("temperature", fmt::format("no {} measures it: check the name",
+                                                 tables_with(Capability::Environment)));
+      config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
+    }
+
+    section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
+    section.get("u_alpha_um_per_m_K", config.u_alpha_per_K, kMicro, {0.0, 50.0}, Need::Required);
+    section.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 50.0}, Need::Required);
+    section.get("fixed_mm", config.fixed_m, kMilli, kAny, Need::Required);
+
+    if (out.axes_compensated())
+      section.fault("", "the control corrects these readings already (axes_compensated)");
+    section.close();
+    out.thermal.push_back(std::move(config));
+  }
+}
+
+void read_air(Section& root, Config& out) {
+  Section air = root.child("air");
+  AirConfig& config = out.air;
+  air.get_word<calib::IndexEquation>("equation", config.equation,
+                                     {{"ciddor", calib::IndexEquation::Ciddor},
+                                      {"edlen", calib::IndexEquation::Edlen},
+                                      {"shop_floor", calib::IndexEquation::ShopFloor}});
+  air.get("wavelength_nm", config.wavelength_m, kNano, {350.0, 1200.0});
+  air.get("co2_ppm", config.co2_ppm, kPlain, {0.0, 2000.0});
+  air.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 10.0});
+  air.get("u_pressure_Pa", config.u_pressure_Pa, kPlain, {0.0, 1e4});
+  air.get("u_humidity_percent", config.u_relative_humidity, {100.0}, {0.0, 100.0});
+  air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
+  air.get("max_age_s", config.max_age, kPlain, kPositive);
+  double assumed = 1.0;
+
+  if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
+    config.assumed_index = assumed;
+    const bool air_is_fully_measured =
+        (measured_environment(out) & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;
+    if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
+      air.fault("assumed_index",
+                "the controller computes the index already (tracker.weather = \"compute\")");
+    if (out.tracker && out.tracker->weather == WeatherConfig::None && !air_is_fully_measured)
+      air.fault("assumed_index",
+                fmt::format("with tracker.weather = \"none\" an {} must measure temperature, "
+                            "pressure and humidity of the air",
+                            tables_with(Capability::Environment)));
+  }
+
+  air.close();
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,24 @@
+#pragma once
+/// Readers that the tables of all USB-QUAD08 cards share.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "abbe/config/config.hpp"
+#include "abbe/config/section.hpp"
+#include "abbe/config/usb_card.hpp"
+
+namespace abbe::daemon {
+
+inline constexpr auto kLastChannel = static_cast<std::int64_t>(drivers::quad08::kChannels) - 1;
+
+/// Transport and address.
+void read_card_address(Section& table, UsbCardConfig& out);
+void read_card_clock(Section& table, drivers::CounterCardWiring& out);
+void read_debounce(Section& table, std::string_view key, drivers::quad08::Debounce& out);
+
+/// Address and axes, for `abbed --check-config`.
+[[nodiscard]] std::string card_text(const UsbCardConfig& card, const MachineConfig& machine);
+
+}  // namespace abbe::daemon

@@ -202,7 +202,7 @@ TEST(CalibrationSession, TheRunContainsTheTemperaturesOfScalesAndAir) {
 
 TEST(CalibrationSession, TheRunContainsTheUncertaintyLeftByTheControllersAirCorrection) {
   Config config;
-  config.tracker.emplace();
+  config.of<TrackerConfig>().emplace();
   AcquisitionOptions options;
   options.environment = environment_use(config);
   CalibrationSession session{{options, {}}};
@@ -220,7 +220,7 @@ TEST(CalibrationSession, TheRunContainsTheUncertaintyLeftByTheControllersAirCorr
 
 TEST(CalibrationSession, TheRunNamesAirThatIsNotMeasured) {
   Config config;
-  config.tracker.emplace().weather = WeatherConfig::None;
+  config.of<TrackerConfig>().emplace().weather = WeatherConfig::None;
   AcquisitionOptions options;
   options.environment = environment_use(config);
   CalibrationSession session{{options, {}}};
@@ -239,18 +239,18 @@ TEST(CalibrationSession, TheRunNamesAirThatIsNotMeasured) {
 
 TEST(CalibrationSession, TheStandstillOfASlowTrackerLastsTwentyPoints) {
   Config config;
-  config.tracker.emplace().point_rate_hz = 10.0;
+  config.of<TrackerConfig>().emplace().point_rate_hz = 10.0;
   const auto options = acquisition_options(config);
   EXPECT_GE(options.stand_before / 100ms, 20);
   EXPECT_GE(options.keep_before, options.stand_before);
   EXPECT_GE(options.stand_after, options.keep_after);
-  config.tracker->point_rate_hz = 500.0;
+  config.of<TrackerConfig>()->point_rate_hz = 500.0;
   EXPECT_EQ(acquisition_options(config).stand_before, AcquisitionOptions{}.stand_before);
 }
 
 TEST(CalibrationSession, ATooShortStandstillAtTheStartIsTheReasonGiven) {
   Config config;
-  config.tracker.emplace().point_rate_hz = 5.0;
+  config.of<TrackerConfig>().emplace().point_rate_hz = 5.0;
   CalibrationSession session{{acquisition_options(config), {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};

@@ -28,7 +28,8 @@ max_mm = 100
                                    "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   std::string order;
-  for (const auto& node : config->encoder->nodes) order += node.axis + std::to_string(node.node);
+  for (const auto& node : config->of<EncoderConfig>()->nodes)
+    order += node.axis + std::to_string(node.node);
   EXPECT_EQ(order, "X1Y2Z3W4B9");
 }
 
@@ -65,7 +66,7 @@ TEST(ConfigEncoder, LetsTheKernelSendTheSyncOnSocketCanOnly) {
   const std::string by_kernel = "sync = \"kernel\"\n" + kNodes;
   const auto config = parse_config(kMachine + kCanBus + by_kernel, "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  EXPECT_EQ(config->encoder->sync, SyncConfig::Kernel);
+  EXPECT_EQ(config->of<EncoderConfig>()->sync, SyncConfig::Kernel);
   const std::string udp =
       "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
   EXPECT_THAT(faults_of(kMachine + udp + by_kernel), ElementsAre(HasSubstr("encoder.sync")));
@@ -86,9 +87,9 @@ TEST(ConfigEncoder, TakesTheMachinesOwnSyncOnEitherTransport) {
 )",
       "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  EXPECT_EQ(config->encoder->sync, SyncConfig::External);
-  EXPECT_EQ(config->encoder->nodes[0].tpdo, 2);
-  EXPECT_EQ(config->encoder->nodes[0].position_byte, 2);
+  EXPECT_EQ(config->of<EncoderConfig>()->sync, SyncConfig::External);
+  EXPECT_EQ(config->of<EncoderConfig>()->nodes[0].tpdo, 2);
+  EXPECT_EQ(config->of<EncoderConfig>()->nodes[0].position_byte, 2);
   const std::string udp =
       "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 20000\n";
   EXPECT_THAT(faults_of(kMachine + udp + external + kNodes),

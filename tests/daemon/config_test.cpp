@@ -81,8 +81,8 @@ TEST(Config, OfAMachineAloneHasNoDevices) {
   const auto config = parse_config(kMachine + "[tracker]\nsigma_range_um = 1.5\n", "machine.toml");
   ASSERT_TRUE(config);
   EXPECT_DOUBLE_EQ(config->machine.sigma_range_m, 1.5e-6);
-  EXPECT_FALSE(config->tracker);
-  EXPECT_FALSE(config->encoder);
+  EXPECT_FALSE(config->of<TrackerConfig>());
+  EXPECT_FALSE(config->of<EncoderConfig>());
 }
 
 TEST(Config, ReadsWhereTheTrackerStandsAndItsVertical) {
@@ -117,20 +117,21 @@ nodes = [{axis = "X", node = 1, step_nm = 10, invert = true}, {axis = "Y", node 
 )",
                                    "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  EXPECT_EQ(config->tracker->max_constant_delay, microseconds{1500});
-  EXPECT_EQ(config->tracker->weather, WeatherConfig::Read);
-  EXPECT_EQ(config->encoder->sync_period, microseconds{500});
-  EXPECT_DOUBLE_EQ(config->encoder->nodes[0].step, -1e-8);
-  EXPECT_DOUBLE_EQ(config->encoder->nodes[1].step, 1e-9);
+  EXPECT_EQ(config->of<TrackerConfig>()->max_constant_delay, microseconds{1500});
+  EXPECT_EQ(config->of<TrackerConfig>()->weather, WeatherConfig::Read);
+  EXPECT_EQ(config->of<EncoderConfig>()->sync_period, microseconds{500});
+  EXPECT_DOUBLE_EQ(config->of<EncoderConfig>()->nodes[0].step, -1e-8);
+  EXPECT_DOUBLE_EQ(config->of<EncoderConfig>()->nodes[1].step, 1e-9);
 }
 
 TEST(Config, ReadsWhichReflectorTheTrackerHoldsAndHowItGetsThere) {
   const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
   const auto plain = parse_config(tracker + "reflector = \"\"\n", "abbed.toml");
   ASSERT_TRUE(plain) << plain.error().details.front();
-  EXPECT_EQ(plain->tracker->reflector, "");
-  EXPECT_FALSE(plain->tracker->home_after_initialize || plain->tracker->search);
-  EXPECT_FALSE(device_options(*plain->tracker, 1.0).session.search);
+  EXPECT_EQ(plain->of<TrackerConfig>()->reflector, "");
+  EXPECT_FALSE(plain->of<TrackerConfig>()->home_after_initialize ||
+               plain->of<TrackerConfig>()->search);
+  EXPECT_FALSE(device_options(*plain->of<TrackerConfig>(), 1.0).session.search);
   const auto config = parse_config(tracker + R"(reflector = "SMR 1.5\""
 home_after_initialize = true
 search_radius_mm = 30
@@ -138,7 +139,7 @@ search_timeout_s = 7.5
 )",
                                    "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
-  const auto session = device_options(*config->tracker, 1.0).session;
+  const auto session = device_options(*config->of<TrackerConfig>(), 1.0).session;
   EXPECT_EQ(session.reflector, "SMR 1.5\"");
   EXPECT_TRUE(session.home_after_initialize);
   ASSERT_TRUE(session.search);
@@ -166,7 +167,8 @@ TEST(Config, RefusesASearchWithoutBothBoundsAndUnknownReflectorNames) {
 TEST(Config, TheControllersAirIsUncertainIfItCorrectsForIt) {
   const auto u_scale = [](const std::string& more) {
     return parse_config(kMachine + "[tracker]\nhost = \"t\"\n" + more, "abbed.toml")
-        ->tracker->u_scale;
+        ->of<TrackerConfig>()
+        ->u_scale;
   };
   EXPECT_DOUBLE_EQ(u_scale(""), 0.2e-6);
   EXPECT_EQ(u_scale("weather = \"read\"\n[air]\nassumed_index = 1.00027\n"), 0.0);
@@ -181,8 +183,8 @@ TEST(Config, UncorrectedAirHasTheUncertaintyOfShopFloorAir) {
     const auto config = parse_config(
         kMachine + "[tracker]\nhost = \"t\"\nweather = \"" + weather + "\"\n", "abbed.toml");
     ASSERT_TRUE(config);
-    EXPECT_NEAR(config->tracker->u_scale, 1.044e-5, 2e-7);
-    EXPECT_THAT(unmeasured_air_text(*config, config->tracker->u_scale).value_or(""),
+    EXPECT_NEAR(config->of<TrackerConfig>()->u_scale, 1.044e-5, 2e-7);
+    EXPECT_THAT(unmeasured_air_text(*config, config->of<TrackerConfig>()->u_scale).value_or(""),
                 HasSubstr(weather));
   }
 }
@@ -191,7 +193,7 @@ TEST(Config, TheControllerIsSetToTheStatedAir) {
   const auto config =
       parse_config(kMachine + "[tracker]\nhost = \"t\"\nweather = \"none\"\n", "abbed.toml");
   ASSERT_TRUE(config);
-  const auto set = device_options(*config->tracker, 1.0).session.environment;
+  const auto set = device_options(*config->of<TrackerConfig>(), 1.0).session.environment;
   EXPECT_NEAR(set.temperature, 20.0, 1e-9);
   EXPECT_NEAR(set.pressure, 1013.25, 1e-9);
   EXPECT_NEAR(set.humidity, 50.0, 1e-9);
@@ -329,7 +331,7 @@ TEST(Config, RefusesAKinematicChainThatIsNotAChain) {
 TEST(Config, TheSamplingInstantOfARealNodeIsNeverPerfectlyKnown) {
   const auto silent = parse_config(kMachine + kCanBus + kNodes, "abbed.toml");
   ASSERT_TRUE(silent);
-  EXPECT_GT(silent->encoder->u_sampling_delay.count(), 0);
+  EXPECT_GT(silent->of<EncoderConfig>()->u_sampling_delay.count(), 0);
   const std::string zero = kMachine + kCanBus + "u_sampling_delay_us = 0\n" + kNodes;
   EXPECT_THAT(faults_of(zero),
               ElementsAre(HasSubstr("encoder.u_sampling_delay_us: must be positive")));
@@ -364,7 +366,7 @@ TEST(Config, TakesThePointRatesATrackerHas) {
   const auto rate = [](const std::string& hz) {
     const auto config = parse_config(
         kMachine + "[tracker]\nhost = \"h\"\npoint_rate_hz = " + hz + "\n", "abbed.toml");
-    return config ? config->tracker->point_rate_hz : 0.0;
+    return config ? config->of<TrackerConfig>()->point_rate_hz : 0.0;
   };
   EXPECT_EQ(rate("1000"), 1000.0);
   EXPECT_EQ(rate("500"), 500.0);
@@ -375,12 +377,13 @@ TEST(Config, TakesThePointRatesATrackerHas) {
 
 TEST(Config, ReadsBothModesOfATracker) {
   const std::string tracker = kMachine + "[tracker]\nhost = \"h\"\n";
-  EXPECT_EQ(parse_config(tracker, "abbed.toml")->tracker->mode, TrackerModeConfig::Continuous);
+  EXPECT_EQ(parse_config(tracker, "abbed.toml")->of<TrackerConfig>()->mode,
+            TrackerModeConfig::Continuous);
   const auto config =
       parse_config(tracker + "mode = \"stationary\"\nstationary_time_ms = 800\n", "abbed.toml");
   ASSERT_TRUE(config);
-  EXPECT_EQ(config->tracker->mode, TrackerModeConfig::Stationary);
-  EXPECT_EQ(config->tracker->stationary_time, std::chrono::milliseconds{800});
+  EXPECT_EQ(config->of<TrackerConfig>()->mode, TrackerModeConfig::Stationary);
+  EXPECT_EQ(config->of<TrackerConfig>()->stationary_time, std::chrono::milliseconds{800});
   EXPECT_THAT(faults_of(tracker + "mode = \"stationary\"\npoint_rate_hz = 500\n"),
               ElementsAre(HasSubstr("tracker.point_rate_hz")));
   EXPECT_THAT(faults_of(tracker + "stationary_time_ms = 500\n"),

@@ -129,12 +129,14 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
 
   EXPECT_EQ(machine_hash(full), machine_hash(plain));
   EXPECT_EQ(full.machine, plain.machine);
-  EXPECT_EQ(full.tracker->silence_timeout, plain.tracker->silence_timeout);
-  EXPECT_EQ(full.tracker->weather, plain.tracker->weather);
-  EXPECT_EQ(full.tracker->u_scale, plain.tracker->u_scale);
-  EXPECT_EQ(full.tracker->reflector, plain.tracker->reflector);
-  EXPECT_EQ(full.tracker->home_after_initialize, plain.tracker->home_after_initialize);
-  EXPECT_EQ(full.encoder->u_sampling_delay, plain.encoder->u_sampling_delay);
+  EXPECT_EQ(full.of<TrackerConfig>()->silence_timeout, plain.of<TrackerConfig>()->silence_timeout);
+  EXPECT_EQ(full.of<TrackerConfig>()->weather, plain.of<TrackerConfig>()->weather);
+  EXPECT_EQ(full.of<TrackerConfig>()->u_scale, plain.of<TrackerConfig>()->u_scale);
+  EXPECT_EQ(full.of<TrackerConfig>()->reflector, plain.of<TrackerConfig>()->reflector);
+  EXPECT_EQ(full.of<TrackerConfig>()->home_after_initialize,
+            plain.of<TrackerConfig>()->home_after_initialize);
+  EXPECT_EQ(full.of<EncoderConfig>()->u_sampling_delay,
+            plain.of<EncoderConfig>()->u_sampling_delay);
   EXPECT_EQ(full.air.wavelength_m, plain.air.wavelength_m);
   EXPECT_EQ(full.air.co2_ppm, plain.air.co2_ppm);
   EXPECT_EQ(full.air.u_relative_humidity, plain.air.u_relative_humidity);

@@ -52,7 +52,7 @@ class HubLocks : public test::HubBench<BusyDevices> {
   HubLocks() {
     prepare_background_tasks();
     devices_.clock = &time_;
-    config_.tracker.emplace().host = "127.0.0.1";
+    config_.of<TrackerConfig>().emplace().host = "127.0.0.1";
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
     options.devices = {"tracker", "encoder"};

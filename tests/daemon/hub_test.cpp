@@ -120,7 +120,7 @@ TEST_F(HubTest, PublishesTheHealthOfTheStreamsOnceASecond) {
 }
 
 TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
-  config_.encoder.emplace().axes_compensated = true;
+  config_.of<EncoderConfig>().emplace().axes_compensated = true;
   const auto started =
       calibration_->start(OtfRequest{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}}, "anna", time_.now());
   ASSERT_FALSE(started);
@@ -129,7 +129,7 @@ TEST_F(HubTest, RefusesToCalibrateAxesTheControlCorrectsAlready) {
 }
 
 TEST_F(HubTest, RefusesToCalibrateOnTheFlyWithAStationaryTracker) {
-  config_.tracker.emplace().mode = TrackerModeConfig::Stationary;
+  config_.of<TrackerConfig>().emplace().mode = TrackerModeConfig::Stationary;
   const auto started =
       calibration_->start(OtfRequest{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}}, "anna", time_.now());
   ASSERT_FALSE(started);
@@ -245,7 +245,7 @@ TEST_F(HubTest, TrackerMotionOrdersAreRefusedToTheLookRole) {
 }
 
 TEST_F(HubTest, CollectsStandstillsRequestedOverTheSocket) {
-  config_.tracker.emplace().host = "127.0.0.1";
+  config_.of<TrackerConfig>().emplace().host = "127.0.0.1";
   VerificationService verification{config_};
   Hub hub{HubParts{.config = config_,
                    .time = time_,

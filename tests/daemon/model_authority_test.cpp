@@ -154,7 +154,7 @@ TEST_F(ModelAuthorityTest, IsComparedOnlyWithAModelOfThisMachineConfiguration) {
 }
 
 TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
-  config_.encoder.emplace().axes_compensated = true;
+  config_.of<EncoderConfig>().emplace().axes_compensated = true;
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("by hand"), kNow));
   const auto standing = fresh_standing(authority);

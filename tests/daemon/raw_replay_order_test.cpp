@@ -34,7 +34,7 @@ class LiveEncoders {
   explicit LiveEncoders(const std::filesystem::path& folder)
       : config_(*parse_config(encoders_alone(), "abbed.toml")),
         recorder_(*Recorder::open(example_options(folder), example_info(), {})),
-        receiver_(device_options(*config_.encoder, config_.daemon.speed).receiver) {}
+        receiver_(device_options(*config_.of<EncoderConfig>(), config_.daemon.speed).receiver) {}
 
   void sync(HostTime t) { take(can::encode_sync(), t, RawBlock::Direction::ToDevice); }
   void answer(can::NodeId node, std::int64_t count, HostTime t) {
@@ -42,7 +42,7 @@ class LiveEncoders {
          RawBlock::Direction::FromDevice);
   }
   void all_answer(std::int64_t count, HostTime t) {
-    for (const auto& axis : config_.encoder->nodes) answer(axis.node, count, t);
+    for (const auto& axis : config_.of<EncoderConfig>()->nodes) answer(axis.node, count, t);
   }
   /// The hub takes the bytes from now on at `bytes`, the samples made of them at `samples`.
   void cycle(HostTime bytes, HostTime samples) {
@@ -65,9 +65,11 @@ class LiveEncoders {
     can::DatagramWriter writer{block.bytes, sequence_++};
     ASSERT_TRUE(writer.add(frame));
     block.length = static_cast<std::uint16_t>(writer.finish().size());
-    recorder_.record(protocol::to_raw_bytes(block, config_.encoder->name), bytes_taken_);
+    recorder_.record(protocol::to_raw_bytes(block, config_.of<EncoderConfig>()->name),
+                     bytes_taken_);
     receiver_.on_raw(block, [this](const AxisSample& sample) {
-      if (!samples_are_lost_) recorder_.record(sample, config_.encoder->name, samples_taken_);
+      if (!samples_are_lost_)
+        recorder_.record(sample, config_.of<EncoderConfig>()->name, samples_taken_);
       samples_.push_back(sample);
       turns_.push_back(samples_taken_.value_or(sample.head.time));
     });

@@ -28,7 +28,7 @@ TEST(RecordedConfig, IsReadWithValuesThatNoMachineHas) {
   const auto config = parse_recorded_config(implausible(), "recorded");
   ASSERT_TRUE(config) << ::testing::PrintToString(config.error().details);
   EXPECT_NEAR(config->machine.axes[0].max, -0.2997, 1e-12);
-  EXPECT_EQ(config->encoder->nodes[0].step, 0.01);
+  EXPECT_EQ(config->of<EncoderConfig>()->nodes[0].step, 0.01);
 }
 
 TEST(RecordedConfig, WithAnUnknownKeyIsRefused) {

@@ -55,9 +55,9 @@ class LiveHub {
 
   void cycle(const Batch& batch) {
     for (const auto& sample : batch.axes)
-      recorder_.record(sample, config_.encoder->name, batch.taken);
+      recorder_.record(sample, config_.of<EncoderConfig>()->name, batch.taken);
     for (const auto& point : batch.points)
-      recorder_.record(point, config_.tracker->name, batch.taken);
+      recorder_.record(point, config_.of<TrackerConfig>()->name, batch.taken);
     assembler_.take(batch);
     assembler_.emit(snapshots_);
   }

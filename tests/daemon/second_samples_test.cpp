@@ -33,7 +33,7 @@ AxisSample axes(std::uint32_t i, std::uint8_t missing_mask = 0) {
 /// Samples 0 to 4, number 2 twice; each in a hub cycle of its own.
 RecordingReader recorded(const std::filesystem::path& folder, const RecordingInfo& info) {
   auto recorder = *Recorder::open(example_options(folder), info, {});
-  const std::string name = encoders().encoder->name;
+  const std::string name = encoders().of<EncoderConfig>()->name;
   const std::vector samples{axes(0), axes(1), axes(2), axes(2, 0b010), axes(3), axes(4)};
   for (std::size_t i = 0; i < samples.size(); ++i)
     recorder.record(samples[i], name, samples[i].head.time + 100us * (i + 1));

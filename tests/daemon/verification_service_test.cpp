@@ -10,7 +10,7 @@ using protocol::Snapshot;
 
 Config watched() {
   Config config;
-  config.tracker.emplace().host = "127.0.0.1";
+  config.of<TrackerConfig>().emplace().host = "127.0.0.1";
   return config;
 }
 
@@ -80,15 +80,15 @@ TEST(VerificationService, RefusesReadingsWithoutInformation) {
   const Config without;
   EXPECT_EQ(VerificationService(without).begin().error().code, ErrorCode::Refused);
   Config compensated = watched();
-  compensated.encoder.emplace().axes_compensated = true;
+  compensated.of<EncoderConfig>().emplace().axes_compensated = true;
   EXPECT_THAT(VerificationService(compensated).begin().error().text,
               testing::HasSubstr("axes_compensated"));
 }
 
 TEST(VerificationService, WaitsForTheMeansOfASlowTracker) {
   Config config = watched();
-  config.tracker->mode = TrackerModeConfig::Stationary;
-  config.tracker->stationary_time = 2s;
+  config.of<TrackerConfig>()->mode = TrackerModeConfig::Stationary;
+  config.of<TrackerConfig>()->stationary_time = 2s;
   EXPECT_EQ(standstill_options(config).settle, 2s);
 }
 

@@ -12,6 +12,7 @@
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/identification.hpp"
@@ -40,7 +41,7 @@ struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, out;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;      // 0: blocks by travel
-  std::optional<double> u_scale_ppm;  // without a value: that of [tracker]
+  std::optional<double> u_scale_ppm;  // without a value: that of the configured tracker
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
 };
@@ -121,7 +122,8 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
 
 double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
-  return config.tracker ? config.tracker->u_scale : 0.0;
+  const auto tracker = tracker_source(config);
+  return tracker ? tracker->u_scale : 0.0;
 }
 
 /// The same checks that a session of the daemon makes before the machine drives. The message for a
@@ -326,7 +328,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       command
           ->add_option("--u-scale-ppm", arguments->u_scale_ppm,
                        "relative standard uncertainty common to all ranges (refractive index of "
-                       "air), ppm: 0.2 for 0.2 K and 30 Pa; default: that of [tracker], or 0")
+                       "air), ppm: 0.2 for 0.2 K and 30 Pa; default: that of " +
+                           tables_with(Capability::TrackerPoints) + ", or 0")
           ->check(CLI::NonNegativeNumber);
   auto* corrected = add_scales_corrected(*command, arguments->scales_corrected);
   auto* orientation =

@@ -10,7 +10,6 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/bounded_toml.hpp"
-#include "axis_steps.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
 
@@ -137,12 +136,11 @@ void doubt_paths(Section& root, const Config& config) {
 }
 
 void doubt_devices(Section& root, const Config& config) {
-  if (!config.encoder && axis_readings(config).empty())
-    root.fault("", fmt::format("no [encoder], {}: no device reads the axes",
-                               tables_with(Capability::Axes)));
-  if (!config.tracker && !touch_source(config))
-    root.fault("", fmt::format("no [tracker] host, {}: no device measures the errors",
-                               tables_with(Capability::Touches)));
+  if (axis_readings(config).empty())
+    root.fault("", fmt::format("no {}: no device reads the axes", needed_for(Capability::Axes)));
+  if (!tracker_source(config) && !touch_source(config))
+    root.fault("",
+               fmt::format("no {}: no device measures the errors", needed_for(Capability::Errors)));
   if (config.daemon.simulated)
     root.child("daemon").fault("simulated", "the devices are those of abbe-sim, not of a machine");
 }
@@ -153,7 +151,6 @@ std::vector<std::string> warnings_of(const toml::table& table, const Config& con
   Faults warnings(file, kMostConfigFaults);
   Section root(&table, "", {1, 1}, warnings);
   doubt_machine(root, config.machine);
-  doubt_steps(root, "encoder", "nodes", config.machine);
   for (const ConfigKind& kind : config_kinds())
     if (kind.doubt != nullptr) kind.doubt(root, config);
   doubt_devices(root, config);

@@ -47,6 +47,7 @@ struct ConfigKind {
   bool axes_if_no_other = false;
   std::optional<std::chrono::nanoseconds> (*time_of_axis_samples)(const Config& config,
                                                                   double periods) = nullptr;
+  std::optional<TrackerSource> (*points)(const Config& config) = nullptr;
   std::optional<TouchSource> (*touches)(const Config& config) = nullptr;
   std::optional<CountedAxes> (*counted)(const Config& config) = nullptr;
   const ReferenceMarks* (*marks)(const Config& config) = nullptr;
@@ -54,6 +55,9 @@ struct ConfigKind {
 };
 
 [[nodiscard]] std::span<const ConfigKind> config_kinds();
+
+/// As tables_with(), with the keys that the tables need: "[a] key or [b]".
+[[nodiscard]] std::string needed_for(Capability capability);
 
 /// Of all devices that read the axes.
 [[nodiscard]] std::vector<AxisReadings> axis_readings(const Config& config);

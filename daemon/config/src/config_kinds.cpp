@@ -32,6 +32,8 @@ std::string joined(const std::vector<std::string>& tables, std::string_view conj
 
 bool has(const ConfigKind& kind, Capability capability) {
   switch (capability) {
+    case Capability::TrackerPoints:
+      return kind.points != nullptr;
     case Capability::Axes:
       return kind.axes != nullptr;
     case Capability::NamedAxes:
@@ -42,6 +44,8 @@ bool has(const ConfigKind& kind, Capability capability) {
       return kind.marks != nullptr;
     case Capability::Touches:
       return kind.touches != nullptr;
+    case Capability::Errors:
+      return kind.points != nullptr || kind.touches != nullptr;
     case Capability::Motion:
       return kind.moves;
     case Capability::Environment:
@@ -71,13 +75,6 @@ std::span<const ConfigKind> config_kinds() {
 std::vector<AxisReadings> axis_readings(const Config& config) {
   const bool own = axes_have_own_device(config);
   std::vector<AxisReadings> all;
-  if (config.encoder) {
-    auto& readings = all.emplace_back();
-    readings.key = "encoder";
-    readings.compensated = config.encoder->axes_compensated;
-    for (const auto& node : config.encoder->nodes) readings.axes.push_back(node.axis);
-  }
-
   for (const ConfigKind& kind : config_kinds()) {
     if (kind.axes == nullptr || (own && kind.axes_if_no_other)) continue;
     if (auto readings = kind.axes(config)) all.push_back(std::move(*readings));
@@ -87,10 +84,13 @@ std::vector<AxisReadings> axis_readings(const Config& config) {
 }
 
 bool axes_have_own_device(const Config& config) {
-  if (config.encoder) return true;
   return std::ranges::any_of(config_kinds(), [&config](const ConfigKind& kind) {
     return kind.axes != nullptr && !kind.axes_if_no_other && kind.axes(config);
   });
+}
+
+std::optional<TrackerSource> tracker_source(const Config& config) {
+  return first_with(&ConfigKind::points, config);
 }
 
 std::optional<TouchSource> touch_source(const Config& config) {
@@ -126,6 +126,17 @@ std::string tables_with(Capability capability, std::string_view conjunction) {
   for (const ConfigKind& kind : config_kinds())
     if (has(kind, capability)) tables.push_back(table_of(kind));
   return joined(tables, conjunction);
+}
+
+std::string needed_for(Capability capability) {
+  std::vector<std::string> entries;
+  for (const ConfigKind& kind : config_kinds()) {
+    if (!has(kind, capability)) continue;
+    entries.push_back(kind.needs.empty() ? table_of(kind)
+                                         : fmt::format("{} {}", table_of(kind), kind.needs));
+  }
+
+  return joined(entries, "or");
 }
 
 }  // namespace abbe::daemon

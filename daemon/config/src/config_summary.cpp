@@ -5,7 +5,6 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/config/check_config.hpp"
-#include "axis_steps.hpp"
 #include "config_kind.hpp"
 
 namespace abbe::daemon {
@@ -46,27 +45,7 @@ void add_machine(const MachineConfig& machine, Lines& out) {
                          : "not given"));
 }
 
-std::string tracker_text(const TrackerConfig& tracker) {
-  const auto mode = tracker.mode == TrackerModeConfig::Stationary
-                        ? std::string{"stationary"}
-                        : fmt::format("{:g} points per second", tracker.point_rate_hz);
-  return fmt::format("{}:{}, {}", tracker.host, tracker.port, mode);
-}
-
-std::string encoder_text(const EncoderConfig& encoder) {
-  Lines nodes;
-  for (const auto& node : encoder.nodes)
-    nodes.push_back(fmt::format("{} node {} step {}", node.axis, node.node,
-                                step_text(node.step, node.kind == AxisKind::Linear)));
-  const auto address = encoder.transport == EncoderTransport::SocketCan
-                           ? encoder.interface
-                           : fmt::format("{}:{} (UDP)", encoder.peer_host, encoder.peer_port);
-  return fmt::format("{}, {}", address, fmt::join(nodes, "; "));
-}
-
 void add_devices(const Config& config, Lines& out) {
-  if (config.tracker) out.push_back(line("tracker", tracker_text(*config.tracker)));
-  if (config.encoder) out.push_back(line("encoder", encoder_text(*config.encoder)));
   for (const ConfigKind& kind : config_kinds())
     for (const auto& text : kind.summary(config)) out.push_back(line(kind.key, text));
 }

@@ -18,8 +18,6 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   StreamNames names;
   read_machine(root, config.machine);
   read_daemon(root, base, config);  // before the devices: they depend on [daemon] simulated
-  read_tracker(root, config, names);
-  read_encoder(root, config, names);
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
@@ -41,17 +39,6 @@ Result<std::string> read_configuration_text(const std::filesystem::path& file) {
     return fail(ErrorCode::Io, fmt::format("read {}: {}", file.string(), std::strerror(errno)));
   return text.str();
 }
-
-namespace {
-
-std::string reading_text(const EncoderConfig& encoder) {
-  std::string text = encoder.axes_compensated ? "|compensated" : "|raw";
-  for (const auto& node : encoder.nodes)
-    text += fmt::format("|{} {} {:.17g} {:.17g}", node.axis, node.node, node.step, node.offset);
-  return text;
-}
-
-}  // namespace
 
 namespace {
 
@@ -105,7 +92,6 @@ std::string machine_hash(const Config& config) {
     for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
   }
 
-  if (config.encoder) text += reading_text(*config.encoder);
   for (const ConfigKind& kind : config_kinds())
     if (kind.reading_text != nullptr) text += kind.reading_text(config);
   for (const auto& thermal : config.thermal)

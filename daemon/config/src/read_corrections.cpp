@@ -21,7 +21,7 @@ void read_thermal(Section& root, Config& out) {
       if (!axes.insert(config.axis).second) section.fault("axis", "has two [[thermal]] tables");
       if (!connected.empty() &&
           std::find(connected.begin(), connected.end(), config.axis) == connected.end())
-        section.fault("axis", fmt::format("is read by neither [encoder] nor {}",
+        section.fault("axis", fmt::format("is read by neither {}",
                                           tables_with(Capability::NamedAxes, "nor")));
     }
 
@@ -65,14 +65,15 @@ void read_air(Section& root, Config& out) {
     config.assumed_index = assumed;
     const bool air_is_fully_measured =
         (measured_environment(out) & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;
-    if (out.tracker && out.tracker->weather == WeatherConfig::Compute)
+    const auto tracker = tracker_source(out);
+    if (tracker && tracker->air == TrackerSource::Air::Measured)
+      air.fault("assumed_index", fmt::format("the controller computes the index already ({})",
+                                             tracker->air_setting));
+    if (tracker && tracker->air == TrackerSource::Air::Assumed && !air_is_fully_measured)
       air.fault("assumed_index",
-                "the controller computes the index already (tracker.weather = \"compute\")");
-    if (out.tracker && out.tracker->weather == WeatherConfig::None && !air_is_fully_measured)
-      air.fault("assumed_index",
-                fmt::format("with tracker.weather = \"none\" an {} must measure temperature, "
+                fmt::format("with {} an {} must measure temperature, "
                             "pressure and humidity of the air",
-                            tables_with(Capability::Environment)));
+                            tracker->air_setting, tables_with(Capability::Environment)));
   }
 
   air.close();

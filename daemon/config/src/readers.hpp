@@ -1,10 +1,9 @@
 #pragma once
 /// One reader per group of tables. Each reader sets the valid values, adds a fault for each invalid
-/// one, and closes its sections. A reader of devices also takes their names.
+/// one, and closes its sections.
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"
-#include "stream_names.hpp"
 
 namespace abbe::daemon {
 
@@ -17,8 +16,6 @@ inline constexpr std::size_t kMostConfigFaults = 1000;
 [[nodiscard]] Config read_all(Section& root, const std::filesystem::path& base);
 
 void read_machine(Section& root, MachineConfig& out);
-void read_tracker(Section& root, Config& out, StreamNames& names);
-void read_encoder(Section& root, Config& out, StreamNames& names);
 void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "abbe/base/units.hpp"
+#include "abbe/config/capabilities.hpp"
 
 namespace abbe::daemon {
 
@@ -17,28 +18,25 @@ double u_of_unmeasured_air() noexcept {
   return u;
 }
 
-bool air_is_unmeasured(const Config& config) noexcept {
-  return config.tracker && config.tracker->weather != WeatherConfig::Compute &&
-         !config.air.assumed_index;
-}
-
 std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale) {
-  if (!air_is_unmeasured(config)) return std::nullopt;
-  const bool none = config.tracker->weather == WeatherConfig::None;
+  const auto tracker = tracker_source(config);
+  const bool measured = !tracker || tracker->air == TrackerSource::Air::Measured;
+  if (measured || config.air.assumed_index) return std::nullopt;
   const calib::Air air = assumed_air();
   const std::string corrected_for =
-      none ? fmt::format("air not measured: the ranges are corrected for {:g} C, {:g} hPa, {:g} %",
-                         air.temperature_K - kZeroCelsius_K, air.pressure_Pa * 1e-2,
-                         air.relative_humidity * 1e2)
-           : std::string{
-                 "air measured, but the ranges are corrected with the index that was last set in "
-                 "the controller"};
+      tracker->air == TrackerSource::Air::Assumed
+          ? fmt::format("air not measured: the ranges are corrected for {:g} C, {:g} hPa, {:g} %",
+                        air.temperature_K - kZeroCelsius_K, air.pressure_Pa * 1e-2,
+                        air.relative_humidity * 1e2)
+          : std::string{
+                "air measured, but the ranges are corrected with the index that was last set in "
+                "the controller"};
 
   return fmt::format(
-      "{} (tracker.weather = \"{}\"); the standard uncertainty of their common scale is set to "
+      "{} ({}); the standard uncertainty of their common scale is set to "
       "{:.3g} um/m, for a shop floor {:.3g} um/m is realistic; set weather = \"compute\" to "
       "correct for measured air",
-      corrected_for, none ? "none" : "read", u_scale * 1e6, u_of_unmeasured_air() * 1e6);
+      corrected_for, tracker->air_setting, u_scale * 1e6, u_of_unmeasured_air() * 1e6);
 }
 
 }  // namespace abbe::daemon

@@ -61,10 +61,11 @@ class RunningEncoder final : public RunningDevices {
 
 Result<std::unique_ptr<RunningDevices>> start_encoder(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.encoder) return nullptr;
+  const auto& encoder = config.of<EncoderConfig>();
+  if (!encoder) return nullptr;
   auto running = run(drivers::EncoderDevice::create(
-                         device_options(*config.encoder, config.daemon.speed),
-                         make_bus(*config.encoder, config.daemon.speed, start.time), start.time),
+                         device_options(*encoder, config.daemon.speed),
+                         make_bus(*encoder, config.daemon.speed, start.time), start.time),
                      thread_options(config.daemon, "abbe-encoder", config.daemon.encoder_priority,
                                     config.daemon.encoder_cpu));
   if (!running) return tl::unexpected(running.error());
@@ -74,8 +75,8 @@ Result<std::unique_ptr<RunningDevices>> start_encoder(const DeviceStart& start) 
 class EncoderDecoder final : public RawDecoders {
  public:
   explicit EncoderDecoder(const Config& config)
-      : name_(config.encoder->name),
-        receiver_(device_options(*config.encoder, config.daemon.speed).receiver) {}
+      : name_(config.of<EncoderConfig>()->name),
+        receiver_(device_options(*config.of<EncoderConfig>(), config.daemon.speed).receiver) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_) return;
@@ -91,14 +92,15 @@ class EncoderDecoder final : public RawDecoders {
 };
 
 void name_encoder(const Config& config, DeviceNames& names) {
-  if (!config.encoder) return;
-  names.axes = config.encoder->name;
-  names.all.push_back(config.encoder->name);
+  const auto& encoder = config.of<EncoderConfig>();
+  if (!encoder) return;
+  names.axes = encoder->name;
+  names.all.push_back(encoder->name);
 }
 
 std::unique_ptr<RawDecoders> decoders_of_encoder(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
-  return config.encoder ? std::make_unique<EncoderDecoder>(config) : nullptr;
+  return config.of<EncoderConfig>() ? std::make_unique<EncoderDecoder>(config) : nullptr;
 }
 
 }  // namespace

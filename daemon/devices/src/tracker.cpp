@@ -67,11 +67,12 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
 
 Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) {
   const Config& config = start.config;
-  if (!config.tracker) return nullptr;
-  auto running = run(drivers::TrackerDevice::create(
-                         device_options(*config.tracker, config.daemon.speed), start.time),
-                     thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
-                                    config.daemon.tracker_cpu));
+  const auto& tracker = config.of<TrackerConfig>();
+  if (!tracker) return nullptr;
+  auto running =
+      run(drivers::TrackerDevice::create(device_options(*tracker, config.daemon.speed), start.time),
+          thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
+                         config.daemon.tracker_cpu));
   if (!running) return tl::unexpected(running.error());
   return std::make_unique<RunningTracker>(std::move(*running), start.first);
 }
@@ -79,9 +80,9 @@ Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) 
 class TrackerDecoder final : public RawDecoders {
  public:
   explicit TrackerDecoder(const Config& config)
-      : name_(config.tracker->name),
-        receiver_(drivers::receiver_options(device_options(*config.tracker, config.daemon.speed))) {
-  }
+      : name_(config.of<TrackerConfig>()->name),
+        receiver_(drivers::receiver_options(
+            device_options(*config.of<TrackerConfig>(), config.daemon.speed))) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_ || block.direction != protocol::RawBlock::Direction::FromDevice) return;
@@ -103,14 +104,15 @@ class TrackerDecoder final : public RawDecoders {
 };
 
 void name_tracker(const Config& config, DeviceNames& names) {
-  if (!config.tracker) return;
-  names.tracker = config.tracker->name;
-  names.all.push_back(config.tracker->name);
+  const auto& tracker = config.of<TrackerConfig>();
+  if (!tracker) return;
+  names.tracker = tracker->name;
+  names.all.push_back(tracker->name);
 }
 
 std::unique_ptr<RawDecoders> decoders_of_tracker(
     const Config& config, const std::optional<drivers::CounterCardProgress>&) {
-  return config.tracker ? std::make_unique<TrackerDecoder>(config) : nullptr;
+  return config.of<TrackerConfig>() ? std::make_unique<TrackerDecoder>(config) : nullptr;
 }
 
 }  // namespace
@@ -148,8 +150,9 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
 }
 
 std::chrono::nanoseconds longest_tracker_order(const Config& config) {
-  if (!config.tracker) return {};
-  return drivers::longest_order(device_options(*config.tracker, config.daemon.speed).session);
+  const auto& tracker = config.of<TrackerConfig>();
+  if (!tracker) return {};
+  return drivers::longest_order(device_options(*tracker, config.daemon.speed).session);
 }
 
 const DeviceKind kTracker{.moves = true,

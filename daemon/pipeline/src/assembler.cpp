@@ -46,12 +46,6 @@ AssemblerOptions assembler_options(const Config& config) {
   options.environment = environment_use(config);
   options.axes_compensated = config.axes_compensated();
 
-  if (config.encoder) {
-    const std::chrono::duration<double, std::nano> span =
-        kMostLostCycles * config.encoder->sync_period;
-    options.interpolation.max_span = std::chrono::duration_cast<std::chrono::nanoseconds>(span);
-  }
-
   if (const auto span = time_of_axis_samples(config, kMostLostCycles))
     options.interpolation.max_span = *span;
 

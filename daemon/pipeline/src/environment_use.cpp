@@ -65,9 +65,9 @@ EnvironmentUseOptions environment_use(const Config& config) {
   use.max_age = config.air.max_age;
   use.measured = measured_environment(config);
   use.air = config.air;
-  if (config.tracker) {
-    use.tracker_u_scale = config.tracker->u_scale;
-    use.unmeasured_air = unmeasured_air_text(config, config.tracker->u_scale);
+  if (const auto tracker = tracker_source(config)) {
+    use.tracker_u_scale = tracker->u_scale;
+    use.unmeasured_air = unmeasured_air_text(config, tracker->u_scale);
   }
 
   const auto axes = config.connected_axes();

@@ -1,8 +1,11 @@
 #include "abbe/pipeline/standstill_points.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/linear_axes.hpp"
 
 namespace abbe::daemon {
@@ -80,8 +83,10 @@ void StandstillPoints::finish() {
 }
 
 Result<void> check_verification(const Config& config) {
-  if (!config.tracker)
-    return fail(ErrorCode::Refused, "verify: there is no [tracker] with a host to measure with");
+  if (!tracker_source(config))
+    return fail(ErrorCode::Refused,
+                fmt::format("verify: there is no {} with a host to measure with",
+                            tables_with(Capability::TrackerPoints)));
   if (config.axes_compensated())
     return fail(ErrorCode::Refused,
                 "verify: the control already corrects these axes (axes_compensated = true): a "
@@ -91,8 +96,9 @@ Result<void> check_verification(const Config& config) {
 
 StandstillOptions standstill_options(const Config& config) {
   StandstillOptions options;
-  if (config.tracker && config.tracker->mode == TrackerModeConfig::Stationary)
-    options.settle = std::max(options.settle, config.tracker->stationary_time);
+  const auto tracker = tracker_source(config);
+  if (tracker && tracker->stationary_time)
+    options.settle = std::max(options.settle, *tracker->stationary_time);
   return options;
 }
 

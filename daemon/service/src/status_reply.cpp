@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/base/units.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "model_status_name.hpp"
 #include "tracker_requests.hpp"
@@ -273,8 +274,8 @@ json status_json(const SeenStatus& seen, const Config& config) {
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
   out["axes"] = axes_json(config, seen.live.axis_count);
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
-  if (const auto air =
-          config.tracker ? unmeasured_air_text(config, config.tracker->u_scale) : std::nullopt)
+  const auto tracker = tracker_source(config);
+  if (const auto air = tracker ? unmeasured_air_text(config, tracker->u_scale) : std::nullopt)
     out["unmeasured_air"] = *air;
   if (seen.reference) out["reference"] = reference_json(*seen.reference, config.machine);
   if (seen.without_zero) out["axes_without_zero"] = *seen.without_zero;

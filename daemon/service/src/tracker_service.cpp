@@ -6,6 +6,8 @@
 #include <chrono>
 #include <utility>
 
+#include "abbe/config/capabilities.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -41,7 +43,9 @@ Result<void> TrackerService::check(const TrackerOrder& order, bool takes_reading
     return not_now(ErrorCode::Usage, fault);
   const auto status = devices_.tracker_status();
   if (!status)
-    return not_now(ErrorCode::Refused, "there is no tracker, [tracker] host, in the configuration");
+    return not_now(ErrorCode::Refused,
+                   fmt::format("there is no tracker, {} host, in the configuration",
+                               tables_with(Capability::TrackerPoints)));
   if (takes_readings)
     return not_now(ErrorCode::Refused,
                    "a calibration takes readings: wait until it has ended, or cancel it (`abbe "

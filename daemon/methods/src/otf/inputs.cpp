@@ -11,6 +11,7 @@
 #include "abbe/calib/otf/orientation.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "abbe/config/stretched.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 
@@ -93,8 +94,9 @@ AcquisitionOptions acquisition_options(const Config& config) {
   options.arrival_time_out = stretched(options.arrival_time_out, config.daemon.speed);
   options.environment = environment_use(config);
   options.reading_tolerance_m = config.gate.path_tolerance_m;
-  if (!config.tracker) return options;
-  const std::chrono::duration<double> period{1.0 / config.tracker->point_rate_hz};
+  const auto tracker = tracker_source(config);
+  if (!tracker) return options;
+  const std::chrono::duration<double> period{1.0 / tracker->point_rate_hz};
 
   const auto holding = [&period](double points) {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(points * period);

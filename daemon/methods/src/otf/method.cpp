@@ -1,8 +1,11 @@
 #include "abbe/methods/otf/method.hpp"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 
@@ -21,9 +24,11 @@ OtfMethod::Request OtfMethod::request_from(const nlohmann::json& object, const C
 }
 
 Result<void> OtfMethod::check(const Request& request, const Config& config) {
-  if (config.tracker && config.tracker->mode == TrackerModeConfig::Stationary)
-    return fail(ErrorCode::Refused,
-                "calibrate otf: [tracker] mode = \"stationary\" gives no points during motion");
+  if (const auto tracker = tracker_source(config); tracker && tracker->stationary_time)
+    return fail(
+        ErrorCode::Refused,
+        fmt::format("calibrate otf: [{}] mode = \"stationary\" gives no points during motion",
+                    tracker->key));
   return check_otf_path(request.path_m, config.machine);
 }
 

@@ -15,6 +15,25 @@ namespace abbe::daemon {
 
 struct Config;
 
+/// The device that delivers tracker points.
+struct TrackerSource {
+  /// The air for which the controller corrects its distances.
+  enum class Air {
+    Measured,  ///< it measures the air
+    Assumed,   ///< assumed_air()
+    LastSet,   ///< the refractive index that was last set in it
+  };
+
+  std::string_view key;  ///< of its table
+  double point_rate_hz = 0.0;
+  /// Time of each mean value. nullopt: it delivers points during motion; else at standstills only.
+  std::optional<std::chrono::nanoseconds> stationary_time = std::nullopt;
+  double u_scale = 0.0;  ///< relative standard uncertainty common to all distances
+  Air air = Air::Measured;
+  std::string air_setting = {};  ///< that selects `air`, as in messages
+};
+[[nodiscard]] std::optional<TrackerSource> tracker_source(const Config& config);
+
 /// The device that delivers touches.
 struct TouchSource {
   std::string_view key;  ///< of its table
@@ -47,11 +66,13 @@ struct CountedAxes {
 [[nodiscard]] protocol::EnvironmentMask measured_environment(const Config& config);
 
 enum class Capability {
+  TrackerPoints,
   Axes,         ///< reads the axes
   NamedAxes,    ///< reads the axes, and its table names them
   CountedAxes,  ///< counts increments of the axes
   Marks,        ///< latches the counts at reference marks
   Touches,      ///< delivers touches
+  Errors,       ///< measures the errors of a machine: tracker points or touches
   Motion,       ///< moves and touches points under its own control
   Environment,  ///< measures air or temperatures
 };

@@ -2,7 +2,7 @@
 /// The configuration file, read once into plain structs. In the file lengths are in mm, small
 /// errors in um and urad, times in ms or us, and the key contains the unit; in the structs all
 /// values are SI or std::chrono. A relative path is relative to the folder of the file.
-/// `machine.toml` (only [machine], [axes], [target], [model] and the noise of [tracker]) and
+/// `machine.toml` (only [machine], [axes], [target], [model] and the noise of the tracker) and
 /// `abbed.toml` (everything) have the same format: a reader uses the tables that it needs from
 /// either file. Pure data; safe to copy between threads.
 
@@ -40,7 +40,7 @@ struct AxisConfig {
 /// Direction of a machine axis along which the vertical axis of a levelled tracker points.
 enum class TrackerVertical { PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ };
 
-/// [machine], [axes.*], [target], [model], and the noise of [tracker]: the input of an
+/// [machine], [axes.*], [target], [model], and the noise of the tracker: the input of an
 /// identification.
 struct MachineConfig {
   std::string name;
@@ -62,90 +62,6 @@ struct MachineConfig {
   std::optional<std::array<double, 3>> tracker_position_m;  ///< machine axes, to 0.5 m
   [[nodiscard]] const AxisConfig* find_axis(std::string_view name) const noexcept;
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
-};
-
-/// None: the controller's environment is not read. Read: it is read. Compute: the controller
-/// computes the refractive index and corrects the distances.
-enum class WeatherConfig { None, Read, Compute };
-
-/// Continuous: for on-the-fly runs. Stationary: one mean value after another, for verification at
-/// standstills; on-the-fly runs are then not possible.
-enum class TrackerModeConfig { Continuous, Stationary };
-
-/// Search of the tracker for its reflector. emScon sets both values with one command.
-struct TrackerSearchConfig {
-  double radius_m = 0.0;
-  std::chrono::nanoseconds timeout{};  ///< whole ms
-};
-
-/// [tracker]: the connected laser tracker.
-struct TrackerConfig {
-  std::string name = "tracker";
-  std::string host;
-  std::uint16_t port = 700;
-  TrackerModeConfig mode = TrackerModeConfig::Continuous;
-  double point_rate_hz = 500.0;                                              ///< mode Continuous
-  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< per mean; whole ms
-  WeatherConfig weather = WeatherConfig::Compute;
-  /// Relative standard uncertainty common to all distances. Default:
-  /// - weather = "compute": from the controller's own sensors, 0.2 K and 30 Pa: 2e-7;
-  /// - with [air] assumed_index: 0; the uncertainty from [air] is added later;
-  /// - else no correction for measured air is made: u_of_unmeasured_air().
-  double u_scale = kControllersAir;
-  static constexpr double kControllersAir = 0.2 / 1e6;
-  /// Upper bound of the constant, unobservable part of the delay.
-  std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{2}};
-  std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
-  std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
-  std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
-  /// A longer time without data during a measurement is a fault.
-  std::chrono::nanoseconds silence_timeout{std::chrono::milliseconds{1500}};
-  std::string reflector;  ///< name or id in the controller's list; empty: the current one
-  /// The tracker moves its beam to the home position (bird bath) after Initialize.
-  bool home_after_initialize = false;
-  /// Search around the direction of the beam. nullopt: the controller's settings are not changed.
-  std::optional<TrackerSearchConfig> search;
-};
-
-enum class EncoderTransport { Udp, SocketCan };
-/// The SYNC producer. Daemon: the device thread. Kernel: CAN_BCM with its timer. External: the
-/// machine; abbed then sends nothing on the bus.
-enum class SyncConfig { Daemon, Kernel, External };
-
-/// One element of [encoder] nodes. The step is negative with `invert = true`:
-///
-///   reading = offset + count * step
-struct EncoderNodeConfig {
-  std::string axis;
-  std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
-  double step = 1e-9;     ///< m or rad per count, signed
-  double offset = 0.0;    ///< reading at count 0, m or rad
-  AxisKind kind = AxisKind::Linear;
-  int tpdo = 1;           ///< 1 or 2: the TPDO with the position
-  int position_byte = 0;  ///< in the TPDO; External only, else read from the node
-  /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
-  std::int64_t wrap_counts = 0;
-};
-
-/// [encoder]: CANopen encoders on one bus.
-struct EncoderConfig {
-  std::string name = "encoder";
-  EncoderTransport transport = EncoderTransport::SocketCan;
-  std::string interface;         ///< SocketCAN only, "can0"
-  std::uint16_t local_port = 0;  ///< UDP only; 0: the kernel chooses
-  std::string peer_host;         ///< UDP only
-  std::uint16_t peer_port = 0;   ///< UDP only
-  SyncConfig sync = SyncConfig::Daemon;
-  std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  /// From the SYNC (its echo; with UDP: its sending) to the latching of the position in the node.
-  std::chrono::nanoseconds sampling_delay{};
-  /// Standard uncertainty of sampling_delay; 0 only with simulated devices.
-  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
-  /// True: the control already corrects these readings. Then no model becomes ACTIVE and none can
-  /// be identified, because it would add to the correction of the control.
-  bool axes_compensated = false;
-  /// In the order of MachineConfig::axes; contains X, Y and Z.
-  std::vector<EncoderNodeConfig> nodes;
 };
 
 /// One [[thermal]]: the readings of an axis are corrected for the thermal expansion of its scale.
@@ -279,13 +195,10 @@ struct ControlConfig {
   std::string move_group = "abbe-move";  ///< may move a machine; empty: as change_group
 };
 
-/// The whole file. A device whose table is missing is not connected; so is a tracker without host.
-/// One device reads the axes.
+/// The whole file. A device whose table is missing is not connected; one device reads the axes.
 struct Config {
   MachineConfig machine;
   DeviceConfigs devices;
-  std::optional<TrackerConfig> tracker;
-  std::optional<EncoderConfig> encoder;
   /// Names of the elements of EnvironmentSample::temperature_K, in order of configuration.
   std::vector<std::string> temperatures;
   std::vector<ThermalConfig> thermal;

@@ -8,16 +8,19 @@
 #include <vector>
 
 #include "abbe/config/kinds/counter_card.hpp"
+#include "abbe/config/kinds/encoder.hpp"
 #include "abbe/config/kinds/environment.hpp"
 #include "abbe/config/kinds/measuring_machine.hpp"
 #include "abbe/config/kinds/reference_card.hpp"
 #include "abbe/config/kinds/touch_probe.hpp"
+#include "abbe/config/kinds/tracker.hpp"
 
 namespace abbe::daemon {
 
 /// Of each kind at most one device (optional), or any number of them in the order of the file
 /// (vector).
-using DeviceConfigs = std::tuple<std::optional<CounterCardConfig>, std::optional<ReferenceConfig>,
+using DeviceConfigs = std::tuple<std::optional<TrackerConfig>, std::optional<EncoderConfig>,
+                                 std::optional<CounterCardConfig>, std::optional<ReferenceConfig>,
                                  std::optional<ProbeConfig>, std::optional<CmmConfig>,
                                  std::vector<EnvironmentConfig>>;
 

@@ -21,8 +21,6 @@ namespace abbe::daemon {
 /// floors: 1.05e-5.
 [[nodiscard]] double u_of_unmeasured_air() noexcept;
 
-[[nodiscard]] bool air_is_unmeasured(const Config& config) noexcept;
-
 /// Text for verdict and status: the assumed air, and `u_scale` of the model. nullopt if the air is
 /// measured.
 [[nodiscard]] std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale);

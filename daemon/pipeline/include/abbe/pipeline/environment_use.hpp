@@ -31,7 +31,7 @@ struct EnvironmentUseOptions {
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
   AirConfig air;
-  double tracker_u_scale = 0.0;               ///< TrackerConfig::u_scale
+  double tracker_u_scale = 0.0;               ///< TrackerSource::u_scale
   std::optional<std::string> unmeasured_air;  ///< unmeasured_air_text()
 };
 
@@ -44,7 +44,7 @@ struct EnvironmentEffect {
   /// relative standard uncertainty of expansion_factor; 0 without [[thermal]]
   std::array<double, 3> u_expansion_factor{};
   /// Relative standard uncertainty common to all distances: of the refractive index used for the
-  /// correction, and TrackerConfig::u_scale.
+  /// correction, and TrackerSource::u_scale.
   double u_scale = 0.0;
 };
 /// nullopt: a configured quantity was not available at that instant.

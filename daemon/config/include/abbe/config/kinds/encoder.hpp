@@ -1,0 +1,56 @@
+#pragma once
+/// [encoder]: CANopen encoders on one bus. Pure data.
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "abbe/drivers/axis_kind.hpp"
+
+namespace abbe::daemon {
+
+struct ConfigKind;
+
+enum class EncoderTransport { Udp, SocketCan };
+/// The SYNC producer. Daemon: the device thread. Kernel: CAN_BCM with its timer. External: the
+/// machine; abbed then sends nothing on the bus.
+enum class SyncConfig { Daemon, Kernel, External };
+
+/// One element of [encoder] nodes. The step is negative with `invert = true`:
+///
+///   reading = offset + count * step
+struct EncoderNodeConfig {
+  std::string axis;
+  std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
+  double step = 1e-9;     ///< m or rad per count, signed
+  double offset = 0.0;    ///< reading at count 0, m or rad
+  drivers::AxisKind kind = drivers::AxisKind::Linear;
+  int tpdo = 1;           ///< 1 or 2: the TPDO with the position
+  int position_byte = 0;  ///< in the TPDO; External only, else read from the node
+  /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
+  std::int64_t wrap_counts = 0;
+};
+
+struct EncoderConfig {
+  static const ConfigKind kKind;
+  std::string name = "encoder";
+  EncoderTransport transport = EncoderTransport::SocketCan;
+  std::string interface;         ///< SocketCAN only, "can0"
+  std::uint16_t local_port = 0;  ///< UDP only; 0: the kernel chooses
+  std::string peer_host;         ///< UDP only
+  std::uint16_t peer_port = 0;   ///< UDP only
+  SyncConfig sync = SyncConfig::Daemon;
+  std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
+  /// From the SYNC (its echo; with UDP: its sending) to the latching of the position in the node.
+  std::chrono::nanoseconds sampling_delay{};
+  /// Standard uncertainty of sampling_delay; 0 only with simulated devices.
+  std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
+  /// True: the control already corrects these readings. Then no model becomes ACTIVE and none can
+  /// be identified, because it would add to the correction of the control.
+  bool axes_compensated = false;
+  /// In the order of MachineConfig::axes; contains X, Y and Z.
+  std::vector<EncoderNodeConfig> nodes;
+};
+
+}  // namespace abbe::daemon

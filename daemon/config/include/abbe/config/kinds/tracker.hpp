@@ -1,0 +1,57 @@
+#pragma once
+/// [tracker]: the connected laser tracker. Pure data. The noise in the same table is part of
+/// MachineConfig.
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace abbe::daemon {
+
+struct ConfigKind;
+
+/// None: the controller's environment is not read. Read: it is read. Compute: the controller
+/// computes the refractive index and corrects the distances.
+enum class WeatherConfig { None, Read, Compute };
+
+/// Continuous: for on-the-fly runs. Stationary: one mean value after another, for verification at
+/// standstills; on-the-fly runs are then not possible.
+enum class TrackerModeConfig { Continuous, Stationary };
+
+/// Search of the tracker for its reflector. emScon sets both values with one command.
+struct TrackerSearchConfig {
+  double radius_m = 0.0;
+  std::chrono::nanoseconds timeout{};  ///< whole ms
+};
+
+struct TrackerConfig {
+  static const ConfigKind kKind;
+  std::string name = "tracker";
+  std::string host;
+  std::uint16_t port = 700;
+  TrackerModeConfig mode = TrackerModeConfig::Continuous;
+  double point_rate_hz = 500.0;                                              ///< mode Continuous
+  std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< per mean; whole ms
+  WeatherConfig weather = WeatherConfig::Compute;
+  /// Relative standard uncertainty common to all distances. Default:
+  /// - weather = "compute": from the controller's own sensors, 0.2 K and 30 Pa: 2e-7;
+  /// - with [air] assumed_index: 0; the uncertainty from [air] is added later;
+  /// - else no correction for measured air is made: u_of_unmeasured_air().
+  double u_scale = kControllersAir;
+  static constexpr double kControllersAir = 0.2 / 1e6;
+  /// Upper bound of the constant, unobservable part of the delay.
+  std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{2}};
+  std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
+  std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
+  std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
+  /// A longer time without data during a measurement is a fault.
+  std::chrono::nanoseconds silence_timeout{std::chrono::milliseconds{1500}};
+  std::string reflector;  ///< name or id in the controller's list; empty: the current one
+  /// The tracker moves its beam to the home position (bird bath) after Initialize.
+  bool home_after_initialize = false;
+  /// Search around the direction of the beam. nullopt: the controller's settings are not changed.
+  std::optional<TrackerSearchConfig> search;
+};
+
+}  // namespace abbe::daemon

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "abbe/devices/device_options.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "abbe/config/unmeasured_air.hpp"
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/tracker_options.hpp"
 #include "config_fixture.hpp"
 
 namespace abbe::daemon {

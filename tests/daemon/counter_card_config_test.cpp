@@ -3,7 +3,7 @@
 #include <string>
 
 #include "abbe/config/config.hpp"
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/counter_card_options.hpp"
 #include "config_tables.hpp"
 
 namespace abbe::daemon {

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "abbe/config/config.hpp"
-#include "abbe/devices/device_options.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 #include "config_tables.hpp"
 

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "abbe/devices/device_options.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/methods/evemu/artefact_thermometer.hpp"
 #include "abbe/methods/otf/inputs.hpp"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/encoder_options.hpp"
 #include "abbe/drivers/can/encoder_receiver.hpp"
 #include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "abbe/devices/device_options.hpp"
 #include "abbe/pipeline/assembler.hpp"
 #include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "abbe/config/stretched.hpp"
-#include "abbe/devices/device_options.hpp"
 #include "abbe/drivers/usb/libusb_link.hpp"
 #include "abbe/drivers/usb/usbip_link.hpp"
 
@@ -20,7 +19,7 @@ std::unique_ptr<drivers::UsbLink> make_link(const UsbCardConfig& config,
       time);
 }
 
-drivers::CounterCardOptions device_options(const UsbCardConfig& config, double speed) {
+drivers::CounterCardOptions card_options(const UsbCardConfig& config, double speed) {
   drivers::CounterCardOptions options;
   options.name = config.name;
   options.serial = config.serial_number;

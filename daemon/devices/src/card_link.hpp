@@ -1,6 +1,6 @@
 #pragma once
-/// Creates the USB link of a counter card: of the card that counts the axes, or of the card that
-/// latches them on their reference marks.
+/// Driver options and USB link of a counter card: of the card that counts the axes, or of the card
+/// that latches them on their reference marks.
 
 #include <memory>
 #include <string>
@@ -12,6 +12,9 @@
 #include "abbe/drivers/usb/usb_link.hpp"
 
 namespace abbe::daemon {
+
+/// Time-outs are multiplied by `speed`; see stretched().
+[[nodiscard]] drivers::CounterCardOptions card_options(const UsbCardConfig& config, double speed);
 
 [[nodiscard]] std::unique_ptr<drivers::UsbLink> make_link(const UsbCardConfig& config,
                                                           const drivers::UsbIdentity& identity,

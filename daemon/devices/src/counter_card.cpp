@@ -1,4 +1,4 @@
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/counter_card_options.hpp"
 
 #include <string>
 
@@ -30,8 +30,7 @@ class RunningCard final : public RunningDevices {
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->samples(), axes_, batch.axes);
-    for (drivers::CounterCardProgress p; running_.device->progress().pop({&p, 1}) != 0;)
-      progress_ = p;
+    for (CountingProgress p; running_.device->progress().pop({&p, 1}) != 0;) progress_ = p;
 
     if (touch_detector_) {
       drain_ring(touch_detector_->touches(), touches_, batch.touches);
@@ -46,7 +45,7 @@ class RunningCard final : public RunningDevices {
   [[nodiscard]] std::vector<std::string> warnings() const override {
     return with_assumption(RunningDevices::warnings(), *running_.device);
   }
-  [[nodiscard]] std::optional<drivers::CounterCardProgress> take_progress() override {
+  [[nodiscard]] std::optional<CountingProgress> take_progress() override {
     return std::exchange(progress_, std::nullopt);
   }
 
@@ -54,7 +53,7 @@ class RunningCard final : public RunningDevices {
   TouchDetectorPointer touch_detector_;  // the card feeds it: destroyed after the card
   Running<drivers::CounterCardDevice> running_;
   std::size_t place_;
-  std::optional<drivers::CounterCardProgress> progress_;
+  std::optional<CountingProgress> progress_;
   std::array<protocol::AxisSample, kMostSamples> axes_;
   std::array<protocol::ProbeTrigger, 16> touches_;
   std::array<protocol::TouchScan, 256> touch_scans_;
@@ -84,7 +83,7 @@ Result<std::unique_ptr<RunningDevices>> start_counter_card(const DeviceStart& st
 
 class CardDecoder final : public RawDecoders {
  public:
-  CardDecoder(const Config& config, const std::optional<drivers::CounterCardProgress>& left)
+  CardDecoder(const Config& config, const std::optional<CountingProgress>& left)
       : name_(config.of<CounterCardConfig>()->card.name),
         decimation_(config.of<CounterCardConfig>()->sample_every),
         touch_detector_(touch_detector_of(config)) {
@@ -122,15 +121,15 @@ void name_counter_card(const Config& config, DeviceNames& names) {
   if (const auto& probe = config.of<ProbeConfig>()) names.touches = probe->name;
 }
 
-std::unique_ptr<RawDecoders> decoders_of_counter_card(
-    const Config& config, const std::optional<drivers::CounterCardProgress>& left) {
+std::unique_ptr<RawDecoders> decoders_of_counter_card(const Config& config,
+                                                      const std::optional<CountingProgress>& left) {
   return config.of<CounterCardConfig>() ? std::make_unique<CardDecoder>(config, left) : nullptr;
 }
 
 }  // namespace
 
 drivers::CounterCardOptions device_options(const CounterCardConfig& config, double speed) {
-  auto options = device_options(config.card, speed);
+  auto options = card_options(config.card, speed);
   options.sample_every = config.sample_every;
   return options;
 }

@@ -1,4 +1,3 @@
-#include <array>
 #include <vector>
 
 #include "kinds.hpp"
@@ -6,8 +5,7 @@
 namespace abbe::daemon {
 
 std::span<const DeviceKind> device_kinds() {
-  static const std::array kinds{kTracker,       kEncoder,     kCounterCard,
-                                kReferenceCard, kEnvironment, kMeasuringMachine};
+  static const auto kinds = all_kinds();
   return kinds;
 }
 

@@ -46,7 +46,7 @@ struct DeviceSet::State {
 };
 
 Result<DeviceSet> DeviceSet::start(const Config& config, const drivers::TimeSource& time,
-                                   const std::optional<drivers::CounterCardProgress>& left) {
+                                   const std::optional<CountingProgress>& left) {
   auto state = std::make_unique<State>();
   DeviceNames names;
   std::vector<std::size_t> first;
@@ -103,7 +103,7 @@ std::vector<std::string> DeviceSet::warnings() const {
   return out;
 }
 
-std::optional<drivers::CounterCardProgress> DeviceSet::card_progress() {
+std::optional<CountingProgress> DeviceSet::card_progress() {
   for (auto* const running : state_->devices) {
     if (auto progress = running->take_progress()) return progress;
   }
@@ -154,6 +154,10 @@ std::optional<drivers::DeviceStatus> DeviceSet::tracker_status() const {
 
 void DeviceSet::order_tracker(drivers::TrackerOrder order) {
   if (state_->tracker != nullptr) state_->tracker->order(std::move(order));
+}
+
+std::chrono::nanoseconds DeviceSet::longest_tracker_order() const {
+  return state_->tracker != nullptr ? state_->tracker->longest_order() : std::chrono::nanoseconds{};
 }
 
 std::vector<drivers::TrackerOrderReport> DeviceSet::tracker_reports() {

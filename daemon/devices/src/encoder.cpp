@@ -1,4 +1,4 @@
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/encoder_options.hpp"
 
 #include <string>
 
@@ -98,8 +98,8 @@ void name_encoder(const Config& config, DeviceNames& names) {
   names.all.push_back(encoder->name);
 }
 
-std::unique_ptr<RawDecoders> decoders_of_encoder(
-    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+std::unique_ptr<RawDecoders> decoders_of_encoder(const Config& config,
+                                                 const std::optional<CountingProgress>&) {
   return config.of<EncoderConfig>() ? std::make_unique<EncoderDecoder>(config) : nullptr;
 }
 

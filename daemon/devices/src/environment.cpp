@@ -1,9 +1,8 @@
-#include "abbe/devices/device_options.hpp"
-
 #include <algorithm>
 #include <string>
 
 #include "abbe/config/stretched.hpp"
+#include "abbe/drivers/environment/device.hpp"
 #include "abbe/drivers/environment/line.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "kinds.hpp"
@@ -11,6 +10,19 @@
 
 namespace abbe::daemon {
 namespace {
+
+drivers::EnvironmentDeviceOptions environment_options(const EnvironmentConfig& config,
+                                                      double speed) {
+  drivers::EnvironmentDeviceOptions options;
+  options.name = config.name;
+  options.address = config.address;
+  options.map = config.map;
+  options.period = config.period;
+  options.answer_timeout = stretched(config.answer_timeout, speed);
+  options.retry = stretched(options.retry, speed);
+  options.refused_retry = stretched(options.refused_retry, speed);
+  return options;
+}
 
 /// One device of a line.
 struct OnLine {
@@ -76,7 +88,7 @@ class RunningEnvironment final : public RunningDevices {
     std::vector<drivers::EnvironmentDeviceOptions> options;
     const auto& configured = start.config.of<EnvironmentConfig>();
     for (const std::size_t i : devices)
-      options.push_back(device_options(configured[i], start.config.daemon.speed));
+      options.push_back(environment_options(configured[i], start.config.daemon.speed));
     // The line is read once a second: a thread without real-time priority is sufficient.
     auto running = run(drivers::EnvironmentLine::create(options, start.time),
                        thread_options(start.config.daemon, "abbe-environ", 0, std::nullopt));
@@ -127,25 +139,13 @@ void name_environment(const Config& config, DeviceNames& names) {
   }
 }
 
-std::unique_ptr<RawDecoders> decoders_of_environment(
-    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+std::unique_ptr<RawDecoders> decoders_of_environment(const Config& config,
+                                                     const std::optional<CountingProgress>&) {
   return config.of<EnvironmentConfig>().empty() ? nullptr
                                                 : std::make_unique<EnvironmentDecoders>(config);
 }
 
 }  // namespace
-
-drivers::EnvironmentDeviceOptions device_options(const EnvironmentConfig& config, double speed) {
-  drivers::EnvironmentDeviceOptions options;
-  options.name = config.name;
-  options.address = config.address;
-  options.map = config.map;
-  options.period = config.period;
-  options.answer_timeout = stretched(config.answer_timeout, speed);
-  options.retry = stretched(options.retry, speed);
-  options.refused_retry = stretched(options.refused_retry, speed);
-  return options;
-}
 
 const DeviceKind kEnvironment{
     .name = &name_environment, .start = &start_environment, .decoders = &decoders_of_environment};

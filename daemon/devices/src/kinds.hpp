@@ -1,5 +1,7 @@
 #pragma once
-/// The kinds of devices, each with the source file that defines it.
+/// The kinds of devices that abbed runs, each defined in one source file.
+
+#include <array>
 
 #include "abbe/devices/device_kind.hpp"
 
@@ -11,5 +13,11 @@ extern const DeviceKind kCounterCard;       // counter_card.cpp
 extern const DeviceKind kReferenceCard;     // reference_card.cpp
 extern const DeviceKind kEnvironment;       // environment.cpp
 extern const DeviceKind kMeasuringMachine;  // measuring_machine.cpp
+
+/// In the order of the health report.
+[[nodiscard]] inline auto all_kinds() {
+  return std::array{kTracker,       kEncoder,     kCounterCard,
+                    kReferenceCard, kEnvironment, kMeasuringMachine};
+}
 
 }  // namespace abbe::daemon

@@ -1,5 +1,3 @@
-#include "abbe/devices/device_options.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <variant>
 
 #include "abbe/config/stretched.hpp"
+#include "abbe/drivers/ippdme/device.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "kinds.hpp"
 #include "machine_hold.hpp"
@@ -16,6 +15,23 @@
 
 namespace abbe::daemon {
 namespace {
+
+drivers::IppDeviceOptions machine_options(const CmmConfig& config, double speed) {
+  drivers::IppDeviceOptions options;
+  options.name = config.name;
+  options.host = config.host;
+  options.port = config.port;
+  options.session.tool = config.tool;
+  options.session.home = config.home;
+  options.session.poll_period = stretched(options.session.poll_period, speed);
+  options.session.connect_timeout = stretched(options.session.connect_timeout, speed);
+  options.session.command_timeout = stretched(config.command_timeout, speed);
+  options.session.motion_timeout = stretched(config.motion_timeout, speed);
+  options.receiver.probe = config.probe;
+  options.receiver.u_position_m = config.u_position_m;
+
+  return options;
+}
 
 // Wall time. A position older than this is not used; a machine that is ready reports ten positions
 // in this time.
@@ -120,7 +136,7 @@ Result<std::unique_ptr<RunningDevices>> start_measuring_machine(const DeviceStar
   const Config& config = start.config;
   const auto& cmm = config.of<CmmConfig>();
   if (!cmm) return nullptr;
-  auto options = device_options(*cmm, config.daemon.speed);
+  auto options = machine_options(*cmm, config.daemon.speed);
   keep_hold(config.daemon.data_dir, options);
   auto thread = thread_options(config.daemon, "abbe-cmm", 0, std::nullopt);
   thread.wait_at_most = kMostStopDelay;
@@ -135,7 +151,7 @@ class MachineDecoder final : public RawDecoders {
       : name_(config.of<CmmConfig>()->name),
         is_the_axes_(cmm_reads_axes(config)),
         receiver_(std::make_unique<drivers::IppReceiver>(
-            device_options(*config.of<CmmConfig>(), config.daemon.speed).receiver)) {}
+            machine_options(*config.of<CmmConfig>(), config.daemon.speed).receiver)) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_) return;
@@ -170,29 +186,12 @@ void name_measuring_machine(const Config& config, DeviceNames& names) {
   names.all.push_back(cmm->name);
 }
 
-std::unique_ptr<RawDecoders> decoders_of_measuring_machine(
-    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+std::unique_ptr<RawDecoders> decoders_of_measuring_machine(const Config& config,
+                                                           const std::optional<CountingProgress>&) {
   return config.of<CmmConfig>() ? std::make_unique<MachineDecoder>(config) : nullptr;
 }
 
 }  // namespace
-
-drivers::IppDeviceOptions device_options(const CmmConfig& config, double speed) {
-  drivers::IppDeviceOptions options;
-  options.name = config.name;
-  options.host = config.host;
-  options.port = config.port;
-  options.session.tool = config.tool;
-  options.session.home = config.home;
-  options.session.poll_period = stretched(options.session.poll_period, speed);
-  options.session.connect_timeout = stretched(options.session.connect_timeout, speed);
-  options.session.command_timeout = stretched(config.command_timeout, speed);
-  options.session.motion_timeout = stretched(config.motion_timeout, speed);
-  options.receiver.probe = config.probe;
-  options.receiver.u_position_m = config.u_position_m;
-
-  return options;
-}
 
 const DeviceKind kMeasuringMachine{.moves = true,
                                    .name = &name_measuring_machine,

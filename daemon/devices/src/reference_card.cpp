@@ -1,5 +1,3 @@
-#include "abbe/devices/device_options.hpp"
-
 #include <string>
 
 #include "abbe/drivers/counter_card/receiver.hpp"
@@ -52,7 +50,7 @@ Result<std::unique_ptr<RunningDevices>> start_reference_card(const DeviceStart& 
   const auto& reference = config.of<ReferenceConfig>();
   if (!reference) return nullptr;
   const UsbCardConfig& card = reference->card;
-  const auto options = device_options(card, config.daemon.speed);
+  const auto options = card_options(card, config.daemon.speed);
 
   return RunningReferenceCard::of(start.first, [&](drivers::MarkWatcher& watcher) {
     return run(drivers::CounterCardDevice::create(
@@ -68,7 +66,7 @@ class ReferenceCardDecoder final : public RawDecoders {
   explicit ReferenceCardDecoder(const Config& config)
       : name_(config.of<ReferenceConfig>()->card.name),
         receiver_(std::make_unique<drivers::CounterCardReceiver>(
-            device_options(config.of<ReferenceConfig>()->card, config.daemon.speed).receiver)) {}
+            card_options(config.of<ReferenceConfig>()->card, config.daemon.speed).receiver)) {}
 
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) override {
     if (device != name_) return;
@@ -92,8 +90,8 @@ void name_reference_card(const Config& config, DeviceNames& names) {
     names.all.push_back(reference->card.name);
 }
 
-std::unique_ptr<RawDecoders> decoders_of_reference_card(
-    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+std::unique_ptr<RawDecoders> decoders_of_reference_card(const Config& config,
+                                                        const std::optional<CountingProgress>&) {
   return config.of<ReferenceConfig>() ? std::make_unique<ReferenceCardDecoder>(config) : nullptr;
 }
 

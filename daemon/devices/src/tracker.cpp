@@ -1,4 +1,4 @@
-#include "abbe/devices/device_options.hpp"
+#include "abbe/devices/tracker_options.hpp"
 
 #include <chrono>
 #include <cmath>
@@ -38,8 +38,9 @@ protocol::emscon::Environment controller_units(const calib::Air& air) {
 
 class RunningTracker final : public RunningDevices, private TrackerOrders {
  public:
-  RunningTracker(Running<drivers::TrackerDevice> running, std::size_t place)
-      : running_(std::move(running)), place_(place) {}
+  RunningTracker(Running<drivers::TrackerDevice> running, std::size_t place,
+                 std::chrono::nanoseconds longest_order)
+      : running_(std::move(running)), place_(place), longest_order_(longest_order) {}
 
   void drain(Batch& batch) override {
     drain_ring(running_.device->points(), points_, batch.points);
@@ -53,6 +54,7 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
 
  private:
   [[nodiscard]] drivers::DeviceStatus status() const override { return running_.thread->status(); }
+  [[nodiscard]] std::chrono::nanoseconds longest_order() const override { return longest_order_; }
   void order(drivers::TrackerOrder order) override { running_.device->order(std::move(order)); }
   [[nodiscard]] std::vector<drivers::TrackerOrderReport> reports() override {
     return running_.device->reports();
@@ -60,6 +62,7 @@ class RunningTracker final : public RunningDevices, private TrackerOrders {
 
   Running<drivers::TrackerDevice> running_;
   std::size_t place_;
+  std::chrono::nanoseconds longest_order_;
   std::array<protocol::TrackerPoint, kMostSamples> points_;
   std::array<protocol::EnvironmentSample, 16> weather_;
   BlockBuffer blocks_;
@@ -69,12 +72,13 @@ Result<std::unique_ptr<RunningDevices>> start_tracker(const DeviceStart& start) 
   const Config& config = start.config;
   const auto& tracker = config.of<TrackerConfig>();
   if (!tracker) return nullptr;
-  auto running =
-      run(drivers::TrackerDevice::create(device_options(*tracker, config.daemon.speed), start.time),
-          thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
-                         config.daemon.tracker_cpu));
+  const auto options = device_options(*tracker, config.daemon.speed);
+  auto running = run(drivers::TrackerDevice::create(options, start.time),
+                     thread_options(config.daemon, "abbe-tracker", config.daemon.tracker_priority,
+                                    config.daemon.tracker_cpu));
   if (!running) return tl::unexpected(running.error());
-  return std::make_unique<RunningTracker>(std::move(*running), start.first);
+  return std::make_unique<RunningTracker>(std::move(*running), start.first,
+                                          drivers::longest_order(options.session));
 }
 
 class TrackerDecoder final : public RawDecoders {
@@ -110,8 +114,8 @@ void name_tracker(const Config& config, DeviceNames& names) {
   names.all.push_back(tracker->name);
 }
 
-std::unique_ptr<RawDecoders> decoders_of_tracker(
-    const Config& config, const std::optional<drivers::CounterCardProgress>&) {
+std::unique_ptr<RawDecoders> decoders_of_tracker(const Config& config,
+                                                 const std::optional<CountingProgress>&) {
   return config.of<TrackerConfig>() ? std::make_unique<TrackerDecoder>(config) : nullptr;
 }
 
@@ -147,12 +151,6 @@ drivers::TrackerDeviceOptions device_options(const TrackerConfig& config, double
 
   options.clock.max_constant_delay = config.max_constant_delay;
   return options;
-}
-
-std::chrono::nanoseconds longest_tracker_order(const Config& config) {
-  const auto& tracker = config.of<TrackerConfig>();
-  if (!tracker) return {};
-  return drivers::longest_order(device_options(*tracker, config.daemon.speed).session);
 }
 
 const DeviceKind kTracker{.moves = true,

@@ -4,8 +4,7 @@
 
 namespace abbe::daemon {
 
-RawDecoder::RawDecoder(const Config& config,
-                       const std::optional<drivers::CounterCardProgress>& left) {
+RawDecoder::RawDecoder(const Config& config, const std::optional<CountingProgress>& left) {
   for (const DeviceKind& kind : device_kinds()) {
     if (auto decoders = kind.decoders(config, left)) decoders_.push_back(std::move(decoders));
   }

@@ -16,7 +16,7 @@ class RawDecoder {
  public:
   /// `left`: as in the live run (DeviceStart).
   explicit RawDecoder(const Config& config,
-                      const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
+                      const std::optional<CountingProgress>& left = std::nullopt);
 
   /// Appends to `batch` the samples that the block completes; nothing for a device that `config`
   /// does not have.

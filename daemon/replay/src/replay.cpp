@@ -223,7 +223,7 @@ Result<Attached> attached_to(const RecordingReader& recording, const Config& con
 
 /// State of the counters at the end of an earlier run, if the live run had it. One that cannot be
 /// read is ignored: the counters then differ only by whole counter periods.
-std::optional<drivers::CounterCardProgress> left_progress(const RecordingReader& recording) {
+std::optional<CountingProgress> left_progress(const RecordingReader& recording) {
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kCountingStateName) continue;
     if (const auto state = counting_state_from_text(attachment.content, attachment.name))

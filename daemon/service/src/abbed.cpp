@@ -28,7 +28,6 @@
 #include "abbe/base/unix_socket.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/devices/device_kind.hpp"
-#include "abbe/devices/device_options.hpp"
 #include "abbe/devices/device_set.hpp"
 #include "abbe/drivers/cpu_latency.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
@@ -288,7 +287,7 @@ struct Abbed::State {
   Result<void> start_devices() {
     left_counting = daemon::left_counting(config, boot);
     if (!left_counting.warning.empty()) warnings.push_back(left_counting.warning);
-    std::optional<drivers::CounterCardProgress> left;
+    std::optional<CountingProgress> left;
     if (left_counting.state) left = left_counting.state->counting.progress;
     auto started = DeviceSet::start(config, time, left);
     if (!started) return tl::unexpected(started.error());
@@ -325,7 +324,7 @@ struct Abbed::State {
     reference.emplace(config, recorder.get(), std::move(left));
     verification.emplace(config);
     touching.emplace(*devices, devices->moves());
-    tracker.emplace(*devices, longest_tracker_order(config));
+    tracker.emplace(*devices, devices->longest_tracker_order());
     hub.emplace(HubParts{.config = config,
                          .time = time,
                          .devices = *devices,

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <utility>
 
-#include "abbe/devices/device_options.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"

@@ -78,7 +78,7 @@ void ReferenceService::take_up_left(const protocol::AxisSample& first) {
 
 /// Progress newer than the newest sample waits: a sample that shows that the counters restarted
 /// must be taken before the progress after it.
-void ReferenceService::take(const std::optional<drivers::CounterCardProgress>& progress) {
+void ReferenceService::take(const std::optional<CountingProgress>& progress) {
   if (progress) coming_ = progress;
   if (!coming_ || coming_->head.time > newest_) return;
   if (coming_->head.time >= restarted_at_) progress_ = coming_;

@@ -4,6 +4,7 @@
 /// a replay iterate over this list; drivers/docs/adding_a_device.md describes how to add a kind.
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,10 +14,10 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/drivers/counter_card/progress.hpp"
 #include "abbe/drivers/device_thread.hpp"
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/counting_progress.hpp"
 #include "abbe/pipeline/sample_source.hpp"
 
 namespace abbe::daemon {
@@ -51,6 +52,8 @@ class TrackerOrders {
 
   [[nodiscard]] virtual drivers::DeviceStatus status() const = 0;
   virtual void order(drivers::TrackerOrder order) = 0;
+  /// Longest host time until the outcome of an order is reported.
+  [[nodiscard]] virtual std::chrono::nanoseconds longest_order() const = 0;
   [[nodiscard]] virtual std::vector<drivers::TrackerOrderReport> reports() = 0;
 };
 
@@ -77,9 +80,7 @@ class RunningDevices {
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }
   /// The latest progress that drain() read; its samples are already in the batch. Each progress is
   /// returned at most once.
-  [[nodiscard]] virtual std::optional<drivers::CounterCardProgress> take_progress() {
-    return std::nullopt;
-  }
+  [[nodiscard]] virtual std::optional<CountingProgress> take_progress() { return std::nullopt; }
 };
 
 /// Decodes the recorded raw bytes of the devices of one kind, with the receivers that the live
@@ -107,12 +108,12 @@ struct DeviceNames {
 
 /// Arguments of DeviceKind::start. `first`: index in DeviceNames::all of the first device of the
 /// kind. `left`: state of the counters at the end of an earlier run; counting continues from it if
-/// the counter card kept counting.
+/// the card kept counting.
 struct DeviceStart {
   const Config& config;
   const drivers::TimeSource& time;
   std::size_t first;
-  const std::optional<drivers::CounterCardProgress>& left;
+  const std::optional<CountingProgress>& left;
 };
 
 struct DeviceKind {
@@ -125,7 +126,7 @@ struct DeviceKind {
   Result<std::unique_ptr<RunningDevices>> (*start)(const DeviceStart& start);
   /// Null if the configuration has no device of this kind.
   std::unique_ptr<RawDecoders> (*decoders)(const Config& config,
-                                           const std::optional<drivers::CounterCardProgress>& left);
+                                           const std::optional<CountingProgress>& left);
 };
 
 /// In the order of the health report.

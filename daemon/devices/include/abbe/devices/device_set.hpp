@@ -24,11 +24,11 @@ class DeviceSet final : public SampleSource {
  public:
   /// Creates the devices and starts their threads. Io if the operating system refuses a setting
   /// that real-time mode `enforce` requires, BadInput for a device that cannot be opened as
-  /// configured. `time` must outlive the set. `left`: state of the counters of [counter_card] at
-  /// the end of an earlier run; counting continues from it if the card kept counting.
+  /// configured. `time` must outlive the set. `left`: state of the counters at the end of an
+  /// earlier run; counting continues from it if the card kept counting.
   [[nodiscard]] static Result<DeviceSet> start(
       const Config& config, const drivers::TimeSource& time,
-      const std::optional<drivers::CounterCardProgress>& left = std::nullopt);
+      const std::optional<CountingProgress>& left = std::nullopt);
   ~DeviceSet() override;  ///< stops all threads
   DeviceSet(DeviceSet&&) noexcept;
   DeviceSet& operator=(DeviceSet&&) noexcept;
@@ -38,7 +38,7 @@ class DeviceSet final : public SampleSource {
   /// Real-time settings that the operating system refused in real-time mode `ignore`, and
   /// assumptions of the drivers; one sentence each.
   [[nodiscard]] std::vector<std::string> warnings() const;
-  [[nodiscard]] std::optional<drivers::CounterCardProgress> card_progress() override;
+  [[nodiscard]] std::optional<CountingProgress> card_progress() override;
   /// True if a device moves and probes under its own control (a measuring machine).
   [[nodiscard]] bool moves() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
@@ -53,6 +53,9 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] Result<std::array<double, 3>> machine_position() const override;
   [[nodiscard]] std::optional<drivers::DeviceStatus> tracker_status() const override;
   void order_tracker(drivers::TrackerOrder order) override;
+  /// Longest host time until the outcome of an order to the tracker is reported; 0 without a
+  /// tracker.
+  [[nodiscard]] std::chrono::nanoseconds longest_tracker_order() const;
   [[nodiscard]] std::vector<drivers::TrackerOrderReport> tracker_reports() override;
 
  private:

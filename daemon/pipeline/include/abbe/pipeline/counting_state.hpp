@@ -14,15 +14,15 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/config/config.hpp"
-#include "abbe/drivers/counter_card/progress.hpp"
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/pipeline/counting_progress.hpp"
 #include "abbe/pipeline/datum.hpp"
 
 namespace abbe::daemon {
 
 /// `datum` applies to the counts of `progress`. An axis without an element in it is not referenced.
 struct Counting {
-  drivers::CounterCardProgress progress;
+  CountingProgress progress;
   std::vector<FoundDatum> datum;
 };
 

@@ -12,11 +12,11 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/config/capabilities.hpp"
-#include "abbe/drivers/counter_card/progress.hpp"
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/tracker/order.hpp"
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/counting_progress.hpp"
 #include "abbe/pipeline/stream_health.hpp"
 
 namespace abbe::daemon {
@@ -63,9 +63,7 @@ class SampleSource {
 
   /// Latest state of the counter card's counters that drain() read; its samples are already in the
   /// batch. Each state is returned at most once.
-  [[nodiscard]] virtual std::optional<drivers::CounterCardProgress> card_progress() {
-    return std::nullopt;
-  }
+  [[nodiscard]] virtual std::optional<CountingProgress> card_progress() { return std::nullopt; }
 
   /// Current status; nullopt: no tracker is configured.
   [[nodiscard]] virtual std::optional<drivers::DeviceStatus> tracker_status() const {

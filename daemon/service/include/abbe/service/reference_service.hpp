@@ -46,7 +46,7 @@ class ReferenceService : public PipelineObserver {
   /// The datum of every axis, for the pipeline.
   [[nodiscard]] Datum& datum() noexcept { return datum_; }
   /// Takes the progress of the card as the devices report it. Call after on_delivered().
-  void take(const std::optional<drivers::CounterCardProgress>& progress);
+  void take(const std::optional<CountingProgress>& progress);
 
   /// State of the counters and datums for a later run; nullopt until the first progress after a
   /// restart of the counters.
@@ -89,9 +89,9 @@ class ReferenceService : public PipelineObserver {
   protocol::HostTime from_{};  ///< start of the search: only later marks are used
   std::optional<Counting> left_;
   std::vector<std::string> carried_on_;
-  protocol::HostTime restarted_at_{};  ///< time of the sample that showed a counter restart
-  std::optional<drivers::CounterCardProgress> coming_;  ///< newer than the newest sample
-  std::optional<drivers::CounterCardProgress> progress_;
+  protocol::HostTime restarted_at_{};       ///< time of the sample that showed a counter restart
+  std::optional<CountingProgress> coming_;  ///< newer than the newest sample
+  std::optional<CountingProgress> progress_;
 };
 
 }  // namespace abbe::daemon

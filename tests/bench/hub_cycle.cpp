@@ -271,7 +271,7 @@ class Bench {
     daemon::RecorderThreadOptions options;
     options.recorder.directory = folder_;
     options.recorder.name = "run";
-    options.devices = {"encoder"};
+    options.devices.all = {"encoder"};
     recorder_ =
         daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
     authority_.emplace(open_models());

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "abbe/devices/device_kind.hpp"
 #include "abbe/devices/device_set.hpp"
 #include "abbe/drivers/environment/receiver.hpp"
 #include "abbe/recording/recorder_thread.hpp"
@@ -72,7 +73,7 @@ TEST_F(EnvironmentDevices, AreReadRecordedAndDecodedAgainFromTheirBytes) {
 
   {
     auto recorder = RecorderThread::start(
-        {.recorder = example_options(folder_.path()), .environment = {"air"}, .devices = {"air"}},
+        {.recorder = example_options(folder_.path()), .devices = device_names(config)},
         example_info());
     ASSERT_TRUE(recorder) << recorder.error().text;
     (*recorder)->hand_over(batch_);

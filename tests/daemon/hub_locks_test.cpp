@@ -55,7 +55,7 @@ class HubLocks : public test::HubBench<BusyDevices> {
     config_.of<TrackerConfig>().emplace().host = "127.0.0.1";
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
-    options.devices = {"tracker", "encoder"};
+    options.devices.all = {"tracker", "encoder"};
     recorder_ = RecorderThread::start(std::move(options), example_info()).value();
     verification_.emplace(config_);
     make_hub();

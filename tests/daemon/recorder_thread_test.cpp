@@ -21,8 +21,8 @@ class RecorderThreadTest : public ::testing::Test {
   void start(std::size_t most_waiting_bytes) {
     RecorderThreadOptions options;
     options.recorder = example_options(folder_.path());
-    options.environment = {"air", "scales"};
-    options.devices = {"tracker", "encoder", "probe", "reference_card", "air", "scales"};
+    options.devices.environment = {"air", "scales"};
+    options.devices.all = {"tracker", "encoder", "probe", "reference_card", "air", "scales"};
     options.most_waiting_bytes = most_waiting_bytes;
     auto started = RecorderThread::start(std::move(options), example_info());
     if (!started) throw std::runtime_error(started.error().text);

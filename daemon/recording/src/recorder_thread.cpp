@@ -269,10 +269,11 @@ struct RecorderThread::State {
     // Environment first: a further file begins with the repeated environment samples, which must
     // not come after the new ones.
     for (const auto& [taken, e] : data.environment) recorder.record(e.sample, e.device, taken);
-    for (const auto& [taken, s] : data.axes) recorder.record(s, options.encoder, taken);
-    for (const auto& [taken, s] : data.points) recorder.record(s, options.tracker, taken);
-    for (const auto& [taken, t] : data.touches) recorder.record(t, options.probe, taken);
-    for (const auto& [taken, s] : data.touch_scans) recorder.record(s, options.probe, taken);
+    for (const auto& [taken, s] : data.axes) recorder.record(s, options.devices.axes, taken);
+    for (const auto& [taken, s] : data.points) recorder.record(s, options.devices.tracker, taken);
+    for (const auto& [taken, t] : data.touches) recorder.record(t, options.devices.touches, taken);
+    for (const auto& [taken, s] : data.touch_scans)
+      recorder.record(s, options.devices.touches, taken);
 
     data.raw.for_each([this](const protocol::RawBytes& bytes, protocol::HostTime taken) {
       recorder.record(bytes, taken);
@@ -337,7 +338,7 @@ void RecorderThread::hand_over(const Batch& batch) {
   if (adding->full) return state_->drop(batch);
   State::make_room(adding);
   Waiting& waiting = *adding.to;
-  const auto& names = state_->options;
+  const DeviceNames& names = state_->options.devices;
   const auto taken = batch.taken;
 
   append(waiting.points, taken, batch.points, unreported.points);
@@ -349,12 +350,12 @@ void RecorderThread::hand_over(const Batch& batch) {
            entry_of(unreported.measured, device));
   append(waiting.touches, taken, batch.touches, unreported.touches);
   append(waiting.touch_scans, taken, batch.touch_scans, unreported.touch_scans);
-  if (!names.raw) return;
+  if (!state_->options.raw) return;
   for (const auto& [device, block] : batch.raw) {
-    if (device >= names.devices.size()) {  // no name: no stream to record it in
+    if (device >= names.all.size()) {  // no name: no stream to record it in
       state_->dropped.fetch_add(1, std::memory_order_relaxed);
     } else {
-      waiting.raw.append(taken, names.devices[device], block, entry_of(unreported.raw, device));
+      waiting.raw.append(taken, names.all[device], block, entry_of(unreported.raw, device));
     }
   }
 }

@@ -82,12 +82,7 @@ RecorderThreadOptions recorder_options(const Config& config, const std::string& 
   options.recorder.max_file_bytes = config.recording.max_file_bytes;
   options.raw = config.recording.raw;
 
-  DeviceNames names = device_names(config);
-  options.tracker = std::move(names.tracker);
-  options.encoder = std::move(names.axes);
-  options.probe = std::move(names.touches);
-  options.environment = std::move(names.environment);
-  options.devices = std::move(names.all);
+  options.devices = device_names(config);
   return options;
 }
 

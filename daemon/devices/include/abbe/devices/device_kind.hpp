@@ -18,6 +18,7 @@
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/counting_progress.hpp"
+#include "abbe/pipeline/device_names.hpp"
 #include "abbe/pipeline/sample_source.hpp"
 
 namespace abbe::daemon {
@@ -98,12 +99,6 @@ class RawDecoders {
   virtual void finish(Batch& /*batch*/) {}
 };
 
-/// Names of the configured devices, and which device delivers which data.
-struct DeviceNames {
-  std::vector<std::string> all;  ///< RawFromDevice::device is an index into it
-  std::string tracker = "tracker", axes = "encoder", touches = "probe";
-  std::vector<std::string> environment;  ///< in the order of the configuration
-};
 [[nodiscard]] DeviceNames device_names(const Config& config);
 
 /// Arguments of DeviceKind::start. `first`: index in DeviceNames::all of the first device of the

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/device_names.hpp"
 #include "abbe/pipeline/pipeline.hpp"
 #include "abbe/recording/recorder.hpp"
 
@@ -20,12 +21,8 @@ namespace abbe::daemon {
 
 struct RecorderThreadOptions {
   RecorderOptions recorder;
-  std::string tracker = "tracker";  ///< device names in the recording
-  std::string encoder = "encoder";
-  std::string probe = "probe";           ///< the touch probe, or the measuring machine
-  std::vector<std::string> environment;  ///< in the order of the configuration
-  std::vector<std::string> devices;      ///< Batch::raw refers to them by index
-  bool raw = true;                       ///< record the device bytes, too
+  DeviceNames devices;  ///< as in the recording
+  bool raw = true;      ///< record the device bytes, too
   /// Enough for two minutes of a stalled disk with axes at 1 kHz and a tracker at 500 Hz. Limited,
   /// because the memory may be locked.
   std::size_t most_waiting_bytes = 64 << 20;

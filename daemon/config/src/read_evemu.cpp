@@ -7,6 +7,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/evemu/scaled_design.hpp"
 #include "abbe/calib/evemu/solve.hpp"
+#include "abbe/config/capabilities.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
@@ -43,8 +44,8 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
   if (section.get("artefact_sensor", sensor)) {
     const auto found = std::ranges::find(temperatures, sensor);
     if (found == temperatures.end())
-      section.fault("artefact_sensor",
-                    fmt::format("no [[environment]] measures a temperature \"{}\"", sensor));
+      section.fault("artefact_sensor", fmt::format("no {} measures a temperature \"{}\"",
+                                                   tables_with(Capability::Environment), sensor));
     artefact.sensor = static_cast<std::uint8_t>(found - temperatures.begin());
   }
 

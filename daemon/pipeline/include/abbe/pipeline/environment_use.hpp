@@ -26,7 +26,7 @@ struct ThermalAxis {
 };
 
 struct EnvironmentUseOptions {
-  /// quantities measured by the devices of [[environment]]; the tracker's values are not used then
+  /// quantities measured by the environment devices; the tracker's values are not used then
   protocol::EnvironmentMask measured = 0;
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
@@ -68,13 +68,14 @@ class MeanEffect {
   std::size_t count_ = 0;
 };
 
-/// Takes every quantity from the device that measures it: at most one of [[environment]], else the
+/// Takes every quantity from the device that measures it: at most one environment device, else the
 /// tracker. If a device has sent nothing for longer than max_age, its values are NaN. Air values
 /// that a tracker assumes without measuring are not merged.
 class EnvironmentMerge {
  public:
-  /// A sample of [[environment]] applies from `lag` after its instant. By then it has arrived, so
-  /// that the order of arrival does not matter; the delay of half a second is negligible.
+  /// A sample of an environment device applies from `lag` after its instant. By then it has
+  /// arrived, so that the order of arrival does not matter; the delay of half a second is
+  /// negligible.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);

@@ -45,7 +45,7 @@ struct EvemuRun {
 struct EvemuAcquisitionOptions {
   std::string device = "probe";  ///< name of the probing device, for messages
   /// True: a restart of the device during the run fails the run, because the counters of a counter
-  /// card restart at 0 at the current position. With [reference] the same zero is found again.
+  /// card restart at 0 at the current position. With reference marks the same zero is found again.
   bool zero_is_lost_by_restart = true;
   /// Longest host time between two touches; the run fails after it. The operator turns and clamps
   /// the artefact by hand between positions.

@@ -1,7 +1,7 @@
 #pragma once
-/// Mean temperature of the ball array over a run, from a sensor of [[environment]] or from a fixed
-/// value in the configuration. Depends on snapshots only, so that a replay gives bit-identical
-/// results. Not for the RT path; not thread-safe.
+/// Mean temperature of the ball array over a run, from a sensor of an environment device or from a
+/// fixed value in the configuration. Depends on snapshots only, so that a replay gives
+/// bit-identical results. Not for the RT path; not thread-safe.
 
 #include <cstddef>
 #include <optional>

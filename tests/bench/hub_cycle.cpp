@@ -336,7 +336,7 @@ class Bench {
 
   void stream() const { std::this_thread::sleep_for(seconds_ * 1s); }
   /// The same as `abbe model activate` in another process; the daemon follows the store.
-  void put_models_in_force() {
+  void activate_models() {
     for (unsigned seed = 1; seed <= 3; ++seed) {
       auto document = daemon::test::synthetic_document(seed);
       document.model = largest_model(seed);
@@ -347,10 +347,10 @@ class Bench {
       const daemon::StoreActor actor{"bench", "", protocol::UtcTime{seed * 1s}};
       auto kept = authority_keeper_->keep(document, {.accepted = true}, actor, time_.now());
       if (!kept) throw std::runtime_error(kept.error().text);
-      if (is_in_force(kept->id)) ++in_force_;
+      if (is_active(kept->id)) ++active_;
     }
   }
-  [[nodiscard]] bool is_in_force(const std::string& id) {
+  [[nodiscard]] bool is_active(const std::string& id) {
     json model;
     for (const auto end = Clock::now() + 20s; Clock::now() < end;
          std::this_thread::sleep_for(100ms)) {
@@ -395,14 +395,14 @@ class Bench {
         "{:.2f} "
         "MB, "
         "{} points matched\n",
-        in_force_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_),
+        active_, parameters_, nodes_, path_.size(), 1e-6 * static_cast<double>(request_bytes_),
         points_);
     tests::print_figure(
         "hub cycle, longest", "2 ms",
         "{:.3f} ms; {:.3f} ms in wall time, the processor was taken away for up to {:.3f} ms",
         ms(worst_ns_), ms(worst_wall_ns_), ms(worst_interruption_ns_));
 
-    return within && in_force_ == 3;
+    return within && active_ == 3;
   }
 
  private:
@@ -435,7 +435,7 @@ class Bench {
   Interruptions interruptions_;
   std::thread dds_, hub_thread_, interruptions_thread_;
   std::int64_t worst_ns_ = 0, worst_wall_ns_ = 0, worst_interruption_ns_ = 0;
-  std::size_t parameters_ = 0, nodes_ = 0, in_force_ = 0, request_bytes_ = 0, points_ = 0;
+  std::size_t parameters_ = 0, nodes_ = 0, active_ = 0, request_bytes_ = 0, points_ = 0;
 };
 
 }  // namespace
@@ -452,7 +452,7 @@ int main(int argc, char** argv) {
     }}.join();
     Bench bench{brief};
     bench.measure("streaming", [&] { bench.stream(); });
-    bench.measure("models into force", [&] { bench.put_models_in_force(); });
+    bench.measure("models into force", [&] { bench.activate_models(); });
     bench.measure("request for 1e5 vertices", [&] { bench.ask_for_the_path(); });
     bench.measure("the whole path driven", [&] { bench.drive(); });
     bench.measure("status again and again", [&] { bench.ask_for_status(); });

@@ -204,7 +204,7 @@ TEST(EvemuArtefact, AddsToBayesWhatDrawnCalibratorsScatter) {
       (prior.asDiagonal() * Z.transpose() * C.ldlt().solve(rows)).topRows(X.cols());
   Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, X.cols());
 
-  for (const SeenArtefact& seen : o.seen) {
+  for (const TouchedArtefact& seen : o.seen) {
     mean += block_rotation(seen, design) / static_cast<double>(o.seen.size());
   }
 

@@ -29,7 +29,7 @@ TEST_P(EvemuChain, AgreesWithTheReferenceAtEveryStep) {
 
   for (std::size_t p = 0; p < 8; ++p) {
     const auto& position = reference["positions"][p];
-    const SeenArtefact& seen = o->seen[p];
+    const TouchedArtefact& seen = o->seen[p];
     for (std::size_t b = 0; b < 9; ++b) {
       EXPECT_LT((1000 * seen.balls[b].centre - vector3(position["centres"][b])).norm(),
                 kNanometre_mm);
@@ -154,7 +154,7 @@ TEST(BlockRotation, IsWhatRefittingTheMovedBlocksGives) {
   }
 
   const ScaledDesign design = *ScaledDesign::of(o->machine.chain, 3, bounding_box(readings));
-  const SeenArtefact& seen = o->seen[4];
+  const TouchedArtefact& seen = o->seen[4];
   const Eigen::Matrix3Xd theta = block_rotation(seen, design);
   constexpr double kSmall_m = 1e-8;
 
@@ -187,7 +187,7 @@ TEST(BallDisplacement, IsWhatRefittingTheMovedPointsGives) {
   ASSERT_TRUE(o);
   const ScaledDesign design =
       *ScaledDesign::of(o->machine.chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});
-  const SeenArtefact& seen = o->seen[2];
+  const TouchedArtefact& seen = o->seen[2];
   const Eigen::Matrix3Xd D = ball_displacement(seen, 5, design);
   constexpr double kSmall_m = 1e-8;
 

@@ -15,7 +15,7 @@ constexpr std::array<double, 3> kTool_m{0.02, -0.015,
                                         -0.12};  // the one tool of the synthetic model
 constexpr std::array<double, 3> kNoVector{};
 
-const ModelInForce kModel{.id = "m", .model = test::synthetic_model(1)};
+const PublishedModel kModel{.id = "m", .model = test::synthetic_model(1)};
 
 protocol::Snapshot view_inside() {
   protocol::Snapshot view;

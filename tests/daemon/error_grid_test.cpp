@@ -10,7 +10,7 @@ namespace {
 
 using calib::Vector3;
 
-ModelInForce in_force(calib::VolumetricModel model) {
+PublishedModel published(calib::VolumetricModel model) {
   return {.id = "m",
           .method = "otf",
           .estimator = "two-step",
@@ -44,7 +44,7 @@ calib::VolumetricModel of_half_the_volume() {
 }
 
 TEST(ErrorGrid, MarksEveryNodeAsCoveredByTheDataOrNot) {
-  const auto nodes = nodes_of(grid_messages(in_force(of_half_the_volume()), {}));
+  const auto nodes = nodes_of(grid_messages(published(of_half_the_volume()), {}));
   std::size_t inside = 0;
   for (const auto& node : nodes) {
     EXPECT_EQ(node.inside(), position(node).x() < 1e-6) << position(node).transpose();
@@ -55,14 +55,14 @@ TEST(ErrorGrid, MarksEveryNodeAsCoveredByTheDataOrNot) {
 }
 
 TEST(ErrorGrid, HoldsEveryNodeWhileTheyFit) {
-  const auto model = in_force(test::synthetic_model(1, 3.0));  // 13 x 13 x 10
+  const auto model = published(test::synthetic_model(1, 3.0));  // 13 x 13 x 10
   const auto slices = grid_messages(model, {});
   EXPECT_EQ(nodes_of(slices).size(), 13u * 13u * 10u);
   for (const auto& slice : slices) EXPECT_TRUE(slice.every_node());
 }
 
 TEST(ErrorGrid, ReducesTheNodesOfTheLongestAxesAndReportsIt) {
-  const auto model = in_force(test::synthetic_model(1, 6.0));  // 25 x 25 x 19
+  const auto model = published(test::synthetic_model(1, 6.0));  // 25 x 25 x 19
   const auto slices = grid_messages(model, {});
   const auto nodes = nodes_of(slices);
   EXPECT_LE(nodes.size(), 4096u);
@@ -73,7 +73,7 @@ TEST(ErrorGrid, ReducesTheNodesOfTheLongestAxesAndReportsIt) {
 }
 
 TEST(ErrorModel, CarriesTheHullOfWhatTheDataCovered) {
-  const auto model = in_force(of_half_the_volume());
+  const auto model = published(of_half_the_volume());
   const auto message = model_message(model, {});
   std::vector<Vector3> vertices;
   for (const auto& v : message.validity_hull()) {

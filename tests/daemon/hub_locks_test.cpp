@@ -118,7 +118,7 @@ TEST_F(HubLocks, NoneIsTakenForAModelActivatedByAnotherProcess) {
   if (!tests::kLocksAreCounted) GTEST_SKIP() << "the sanitizer has mutexes of its own";
   const auto kept = keep_a_model();
   ASSERT_TRUE(kept) << kept.error().text;
-  while (hub_->standing().model == nullptr) cycle();
+  while (hub_->model_state().model == nullptr) cycle();
   cycle();
   EXPECT_EQ(locks_, 0u);
 }

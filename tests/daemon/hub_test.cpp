@@ -42,7 +42,7 @@ class HubTest : public test::HubBench<FakeDevices> {
   void activate_a_model() {
     auto kept = keep_a_model();
     ASSERT_TRUE(kept) << kept.error().text;
-    authority_->take_up(std::move(kept->active).value());
+    authority_->set_active(std::move(kept->active).value());
   }
   void cycle_with_axes(std::chrono::nanoseconds later = 1ms) {
     protocol::AxisSample sample;
@@ -102,7 +102,7 @@ TEST_F(HubTest, ATrackerAloneDoesNotKeepTheModelActive) {
     devices_.next.points.push_back(point);
     cycle(10ms);
   }
-  EXPECT_EQ(hub_->standing().status, ModelStatus::MODEL_STALE);
+  EXPECT_EQ(hub_->model_state().status, ModelStatus::MODEL_STALE);
 }
 
 TEST_F(HubTest, PublishesTheHealthOfTheStreamsOnceASecond) {

@@ -60,7 +60,7 @@ class ModelAuthorityTest : public ::testing::Test {
                                  HostTime now) {
     auto kept = authority.keeper().keep(d, verdict, who, now);
     if (!kept) return tl::unexpected(kept.error());
-    if (kept->active) authority.take_up(std::move(*kept->active));
+    if (kept->active) authority.set_active(std::move(*kept->active));
     return kept->id;
   }
   /// Until it is known whether there is something new; true if there was.
@@ -68,10 +68,10 @@ class ModelAuthorityTest : public ::testing::Test {
     using Following = ModelAuthority::Following;
     auto following = Following::Reading;
     while (following == Following::Reading) following = authority.follow_store(kNow);
-    return following == Following::TakenUp;
+    return following == Following::Replaced;
   }
-  static ModelStanding fresh_standing(const ModelAuthority& a) {
-    return a.standing(kNow, kNow, kPatience);
+  static ActiveModelState fresh_state(const ModelAuthority& a) {
+    return a.model_state(kNow, kNow, kPatience);
   }
 
   Config config_;
@@ -94,39 +94,39 @@ TEST_F(ModelAuthorityTest, AModelThatIsKeptAgainIsEnteredOnce) {
 }
 
 TEST_F(ModelAuthorityTest, WithoutAModelTheStateIsNone) {
-  const auto standing = fresh_standing(open());
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_NONE);
-  EXPECT_EQ(standing.model, nullptr);
+  const auto state = fresh_state(open());
+  EXPECT_EQ(state.status, ModelStatus::MODEL_NONE);
+  EXPECT_EQ(state.model, nullptr);
 }
 
 TEST_F(ModelAuthorityTest, AnAcceptedModelIsActiveAtOnce) {
   auto authority = open();
   const auto id = add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow);
   ASSERT_TRUE(id) << id.error().text;
-  const auto standing = fresh_standing(authority);
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_ACTIVE);
-  EXPECT_EQ(standing.reason, "accepted by the gate");
-  EXPECT_EQ(standing.model->id, *id);
+  const auto state = fresh_state(authority);
+  EXPECT_EQ(state.status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(state.reason, "accepted by the gate");
+  EXPECT_EQ(state.model->id, *id);
 }
 
 TEST_F(ModelAuthorityTest, ARefusedModelIsKeptAndChangesNothing) {
   auto authority = open();
   const auto first =
       add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
-  const auto revision = fresh_standing(authority).revision;
+  const auto revision = fresh_state(authority).revision;
   const auto second =
       add(authority, document(2), {.reasons = {"worse"}}, actor("calibrate otf"), kNow).value();
   EXPECT_TRUE(store().load(second));
-  EXPECT_EQ(fresh_standing(authority).model->id, first);
-  EXPECT_EQ(fresh_standing(authority).revision, revision);
+  EXPECT_EQ(fresh_state(authority).model->id, first);
+  EXPECT_EQ(fresh_state(authority).revision, revision);
 }
 
 TEST_F(ModelAuthorityTest, WithoutAxesOrWithOldOnesItIsStale) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
-  EXPECT_EQ(authority.standing(kNow, std::nullopt, kPatience).status, ModelStatus::MODEL_STALE);
-  EXPECT_EQ(authority.standing(kNow + 500ms, kNow, kPatience).status, ModelStatus::MODEL_ACTIVE);
-  EXPECT_EQ(authority.standing(kNow + 501ms, kNow, kPatience).status, ModelStatus::MODEL_STALE);
+  EXPECT_EQ(authority.model_state(kNow, std::nullopt, kPatience).status, ModelStatus::MODEL_STALE);
+  EXPECT_EQ(authority.model_state(kNow + 500ms, kNow, kPatience).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(authority.model_state(kNow + 501ms, kNow, kPatience).status, ModelStatus::MODEL_STALE);
 }
 
 TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
@@ -134,32 +134,32 @@ TEST_F(ModelAuthorityTest, OfAnotherMachineConfigurationItIsStale) {
   other.machine_hash = "of another machine";
   auto authority = open();
   ASSERT_TRUE(add(authority, other, {.accepted = true}, actor("calibrate otf"), kNow));
-  const auto standing = fresh_standing(authority);
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_STALE);
-  EXPECT_THAT(standing.reason, HasSubstr("another machine configuration"));
+  const auto state = fresh_state(authority);
+  EXPECT_EQ(state.status, ModelStatus::MODEL_STALE);
+  EXPECT_THAT(state.reason, HasSubstr("another machine configuration"));
 }
 
 TEST_F(ModelAuthorityTest, IsComparedOnlyWithAModelOfThisMachineConfiguration) {
   auto other = document(1);
   other.machine_hash = "of another machine";
   auto authority = open();
-  EXPECT_EQ(authority.to_beat(), nullptr);
+  EXPECT_EQ(authority.comparison_model(), nullptr);
   ASSERT_TRUE(add(authority, other, {.accepted = true}, actor("calibrate otf"), kNow));
-  EXPECT_NE(authority.in_force(), nullptr);
-  EXPECT_EQ(authority.to_beat(), nullptr);
+  EXPECT_NE(authority.active_model(), nullptr);
+  EXPECT_EQ(authority.comparison_model(), nullptr);
   // The same model, found again under the configuration the daemon has.
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
-  EXPECT_NE(authority.to_beat(), nullptr);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_NE(authority.comparison_model(), nullptr);
 }
 
 TEST_F(ModelAuthorityTest, WhereTheControlCorrectsAlreadyNoModelIsActive) {
   config_.of<EncoderConfig>().emplace().axes_compensated = true;
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("by hand"), kNow));
-  const auto standing = fresh_standing(authority);
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
-  EXPECT_THAT(standing.reason, HasSubstr("axes_compensated"));
+  const auto state = fresh_state(authority);
+  EXPECT_EQ(state.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(state.reason, HasSubstr("axes_compensated"));
 }
 
 TEST_F(ModelAuthorityTest, AForcedModelNamesUserAndReasonAlsoAfterARestart) {
@@ -168,8 +168,8 @@ TEST_F(ModelAuthorityTest, AForcedModelNamesUserAndReasonAlsoAfterARestart) {
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(id, actor("crane test"), true));
   ASSERT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).reason, "forced by anna: crane test");
-  EXPECT_EQ(fresh_standing(open()).reason, "forced by anna: crane test");
+  EXPECT_EQ(fresh_state(authority).reason, "forced by anna: crane test");
+  EXPECT_EQ(fresh_state(open()).reason, "forced by anna: crane test");
 }
 
 TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {
@@ -182,11 +182,11 @@ TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {
   ASSERT_TRUE(add(authority, document(3), {.accepted = true}, actor("calibrate otf"), kNow));
   ASSERT_TRUE(store().rollback(actor("drifts")));
   ASSERT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
+  EXPECT_EQ(fresh_state(authority).reason, "rolled back by anna: drifts");
   ASSERT_TRUE(store().rollback(actor("drifts too", kNow + 1s)));
   ASSERT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).model->id, forced);
-  EXPECT_THAT(fresh_standing(authority).reason,
+  EXPECT_EQ(fresh_state(authority).model->id, forced);
+  EXPECT_THAT(fresh_state(authority).reason,
               HasSubstr("a model the gate did not accept, by anna: drifts too"));
 }
 
@@ -195,11 +195,11 @@ TEST_F(ModelAuthorityTest, FollowsTheStoreOnceForEachChange) {
   const auto a = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
   ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("second"), kNow));
   EXPECT_FALSE(follow(authority));
-  const auto revision = fresh_standing(authority).revision;
+  const auto revision = fresh_state(authority).revision;
   ASSERT_TRUE(store().activate(a, actor("by hand")));
   EXPECT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).model->id, a);
-  EXPECT_GT(fresh_standing(authority).revision, revision);
+  EXPECT_EQ(fresh_state(authority).model->id, a);
+  EXPECT_GT(fresh_state(authority).revision, revision);
   EXPECT_FALSE(follow(authority));
 }
 
@@ -209,7 +209,7 @@ TEST_F(ModelAuthorityTest, AStoreThatBecomesDamagedChangesNothing) {
       add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(folder_ / "state.json", 10);
   EXPECT_FALSE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).model->id, id);
+  EXPECT_EQ(fresh_state(authority).model->id, id);
 }
 
 // As when its owner and mode are put right: nothing of it that could be watched changes by that.
@@ -227,14 +227,14 @@ TEST_F(ModelAuthorityTest, AnUnreadableStoreIsReportedAndReadAgain) {
   fs::last_write_time(state, time);
   EXPECT_FALSE(follow(authority));
   EXPECT_THAT(authority.fault(), HasSubstr("state.json"));
-  EXPECT_THAT(fresh_standing(authority).reason, HasSubstr("state.json"));
+  EXPECT_THAT(fresh_state(authority).reason, HasSubstr("state.json"));
   text.front() = '{';
   std::ofstream{state} << text;
   fs::last_write_time(state, time);
   EXPECT_TRUE(follow(authority));
   EXPECT_EQ(authority.fault(), "");
-  EXPECT_EQ(fresh_standing(authority).model->id, first);
-  EXPECT_EQ(fresh_standing(authority).reason, "rolled back by anna: drifts");
+  EXPECT_EQ(fresh_state(authority).model->id, first);
+  EXPECT_EQ(fresh_state(authority).reason, "rolled back by anna: drifts");
 }
 
 TEST_F(ModelAuthorityTest, ARepairedModelFileBecomesActive) {
@@ -243,10 +243,10 @@ TEST_F(ModelAuthorityTest, ARepairedModelFileBecomesActive) {
   const fs::path file = store().model_path(id);
   fs::rename(file, folder_ / "elsewhere");
   auto authority = open();
-  ASSERT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
+  ASSERT_EQ(fresh_state(authority).status, ModelStatus::MODEL_INVALID);
   fs::rename(folder_ / "elsewhere", file);
   EXPECT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_ACTIVE);
 }
 
 TEST_F(ModelAuthorityTest, AReadResultOlderThanTheActiveModelIsDiscarded) {
@@ -262,12 +262,12 @@ TEST_F(ModelAuthorityTest, AReadResultOlderThanTheActiveModelIsDiscarded) {
   const std::string after = text_of(folder_ / "state.json");
   std::ofstream{folder_ / "state.json"} << before;
   (void)authority.follow_store(kNow);  // reads what was before, and is asked for it only below
-  authority.take_up(std::move(*kept->active));
+  authority.set_active(std::move(*kept->active));
   EXPECT_FALSE(follow(authority));
   std::ofstream{folder_ / "state.json"} << after;
-  EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
+  EXPECT_EQ(fresh_state(authority).model->id, kept->id);
   EXPECT_FALSE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).model->id, kept->id);
+  EXPECT_EQ(fresh_state(authority).model->id, kept->id);
 }
 
 TEST_F(ModelAuthorityTest, AModelStoredBeforeARollbackIsNotActivatedAfterIt) {
@@ -278,22 +278,22 @@ TEST_F(ModelAuthorityTest, AModelStoredBeforeARollbackIsNotActivatedAfterIt) {
   ASSERT_TRUE(kept);
   ASSERT_TRUE(store().rollback(actor("drifts", kNow + 1s)));
   ASSERT_TRUE(follow(authority));
-  authority.take_up(std::move(*kept->active), since);
-  EXPECT_EQ(fresh_standing(authority).model->id, first);
+  authority.set_active(std::move(*kept->active), since);
+  EXPECT_EQ(fresh_state(authority).model->id, first);
   EXPECT_FALSE(follow(authority));
-  EXPECT_EQ(fresh_standing(authority).model->id, first);
+  EXPECT_EQ(fresh_state(authority).model->id, first);
 }
 
 TEST_F(ModelAuthorityTest, AModelIsEncodedInTheThreadThatReadsIt) {
   auto authority = open();
   ASSERT_TRUE(add(authority, document(1), {.accepted = true}, actor("calibrate otf"), kNow));
-  const auto standing = fresh_standing(authority);
-  ASSERT_NE(standing.publication, nullptr);
-  const auto model = decode<v1::ErrorModel>(standing.publication->model);
+  const auto state = fresh_state(authority);
+  ASSERT_NE(state.publication, nullptr);
+  const auto model = decode<v1::ErrorModel>(state.publication->model);
   ASSERT_TRUE(model);
-  EXPECT_EQ(*model, model_message(*standing.model, {.machine = "mill"}));
-  EXPECT_EQ(standing.publication->slices.size(),
-            grid_messages(*standing.model, {.machine = "mill"}).size());
+  EXPECT_EQ(*model, model_message(*state.model, {.machine = "mill"}));
+  EXPECT_EQ(state.publication->slices.size(),
+            grid_messages(*state.model, {.machine = "mill"}).size());
 }
 
 TEST_F(ModelAuthorityTest, TheKeptModelEqualsTheModelOfTheStoreBitForBit) {
@@ -324,16 +324,16 @@ TEST_F(ModelAuthorityTest, ThePreviousModelIsDestroyedOnAnotherThread) {
   auto authority = open();
   const auto destroyed = std::make_shared<std::promise<std::thread::id>>();
   ActiveModel first;
-  first.model = std::shared_ptr<const ModelInForce>{
-      new ModelInForce{.id = "first", .model = document(1).model},
-      [destroyed](const ModelInForce* m) {
+  first.model = std::shared_ptr<const PublishedModel>{
+      new PublishedModel{.id = "first", .model = document(1).model},
+      [destroyed](const PublishedModel* m) {
         delete m;
         destroyed->set_value(std::this_thread::get_id());
       }};
-  authority.take_up(std::move(first));
+  authority.set_active(std::move(first));
 
-  ASSERT_EQ(authority.in_force()->id, "first");
-  authority.take_up(ActiveModel{});
+  ASSERT_EQ(authority.active_model()->id, "first");
+  authority.set_active(ActiveModel{});
   EXPECT_NE(destroyed->get_future().get(), std::this_thread::get_id());
 }
 
@@ -371,10 +371,10 @@ TEST_F(ModelAuthorityTest, ADamagedActiveModelIsInvalidAndNotUsed) {
       add(open(), document(1), {.accepted = true}, actor("calibrate otf"), kNow).value();
   fs::resize_file(store().model_path(id), 1000);
   auto authority = open();
-  const auto standing = fresh_standing(authority);
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
-  EXPECT_THAT(standing.reason, HasSubstr(id));
-  EXPECT_EQ(standing.model, nullptr);
+  const auto state = fresh_state(authority);
+  EXPECT_EQ(state.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(state.reason, HasSubstr(id));
+  EXPECT_EQ(state.model, nullptr);
   EXPECT_FALSE(follow(authority));
 }
 
@@ -386,14 +386,14 @@ TEST_F(ModelAuthorityTest, ADamagedStateIsRenamedAtTheStartAndReportedUntilAMode
   const std::string aside = "state.json.damaged-2023-11-14T22-30-00Z";
 
   EXPECT_TRUE(fs::exists(folder_ / aside));
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
-  EXPECT_THAT(fresh_standing(authority).reason, HasSubstr(aside));
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(fresh_state(authority).reason, HasSubstr(aside));
   EXPECT_THAT(authority.fault(), HasSubstr(aside));
   EXPECT_THAT(open().fault(), HasSubstr(aside)) << "also after another restart";
   ASSERT_TRUE(store().activate(id, actor("it was this one"), true));
   EXPECT_TRUE(follow(authority));
   EXPECT_EQ(authority.fault(), "");
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_ACTIVE);
 }
 
 // As where the disk is read-only at the start, or the store's lock is held: the name is taken.
@@ -427,14 +427,14 @@ TEST_F(ModelAuthorityTest, AStateThatIsDamagedLaterIsRenamedAndTheModelStaysActi
   EXPECT_TRUE(fs::exists(folder_ / "state.json")) << "somebody may be writing it";
   for (int look = 0; look < 3; ++look) EXPECT_FALSE(follow(authority));
   EXPECT_FALSE(fs::exists(folder_ / "state.json"));
-  EXPECT_EQ(fresh_standing(authority).model->id, id);
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(fresh_state(authority).model->id, id);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_ACTIVE);
   EXPECT_THAT(authority.fault(), HasSubstr("kept as state.json.damaged-"));
   const auto second = add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow);
   ASSERT_TRUE(second) << second.error().text;
   follow(authority);
   EXPECT_EQ(authority.fault(), "");
-  EXPECT_EQ(fresh_standing(authority).model->id, *second);
+  EXPECT_EQ(fresh_state(authority).model->id, *second);
 }
 
 // A read-only disk, a missing permission: root is refused nothing, so a file stands for them.
@@ -442,11 +442,11 @@ TEST_F(ModelAuthorityTest, AStoreThatCannotBeMadeIsReportedAndTriedAgain) {
   std::ofstream{folder_} << "in the way";
   auto authority = open();
   EXPECT_THAT(authority.fault(), HasSubstr(folder_.string()));
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_INVALID);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_INVALID);
   fs::remove(folder_);
   EXPECT_TRUE(follow(authority));
   EXPECT_EQ(authority.fault(), "");
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_NONE);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_NONE);
 }
 
 TEST_F(ModelAuthorityTest, TheStartRemovesWhatKilledProcessesLeftInTheStore) {
@@ -467,9 +467,9 @@ TEST_F(ModelAuthorityTest, AModelThatNoReplayCanCheckIsMarked) {
   unchecked.recording_gap = "12 messages of the run are missing";
   auto authority = open();
   ASSERT_TRUE(add(authority, unchecked, {.accepted = true}, actor("calibrate otf"), kNow));
-  EXPECT_EQ(fresh_standing(authority).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(fresh_state(authority).status, ModelStatus::MODEL_ACTIVE);
   EXPECT_EQ(
-      fresh_standing(authority).reason,
+      fresh_state(authority).reason,
       "accepted by the gate; no replay can check this model: 12 messages of the run are missing");
 }
 
@@ -478,22 +478,22 @@ TEST_F(ModelAuthorityTest, AModelThatCannotBePublishedIsNotActivated) {
   unpublishable.estimator = std::string(33, 'e');
   const auto id = store().add(unpublishable, true, {}, actor("by hand")).value();
   ASSERT_TRUE(store().activate(id, actor("by hand")));
-  const auto standing = fresh_standing(open());
-  EXPECT_EQ(standing.status, ModelStatus::MODEL_INVALID);
-  EXPECT_THAT(standing.reason,
+  const auto state = fresh_state(open());
+  EXPECT_EQ(state.status, ModelStatus::MODEL_INVALID);
+  EXPECT_THAT(state.reason,
               testing::AllOf(HasSubstr("cannot be published"), HasSubstr("estimator")));
 }
 
 TEST_F(ModelAuthorityTest, ARestartDoesNotMakeTheModelYounger) {
   ASSERT_TRUE(
       add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow - 24h), kNow));
-  EXPECT_EQ(fresh_standing(open()).model->active_since, kNow - 24h);
+  EXPECT_EQ(fresh_state(open()).model->active_since, kNow - 24h);
 }
 
 TEST_F(ModelAuthorityTest, AWallClockThatWasSetBackDoesNotMakeAnAgeNegative) {
   ASSERT_TRUE(
       add(open(), document(1), {.accepted = true}, actor("calibrate otf", kNow + 1h), kNow));
-  EXPECT_EQ(fresh_standing(open()).model->active_since, kNow);
+  EXPECT_EQ(fresh_state(open()).model->active_since, kNow);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 using calib::Vector3;
 
 struct PolynomialPublication : testing::Test {
-  static ModelInForce in_force() {
+  static PublishedModel active_model() {
     const auto observations = calib::evemu::observe_errors(tests::evemu::reference_errors(),
                                                            tests::evemu::reference_machine());
     return {.id = "m",
@@ -35,7 +35,7 @@ struct PolynomialPublication : testing::Test {
                                 std::chrono::seconds{1}, {});
   }
 
-  ModelInForce model = in_force();
+  PublishedModel model = active_model();
   Vector3 inside_m{0.3, 0.2, 0.04};
 };
 

@@ -22,7 +22,7 @@ using WallTime = Publisher::WallTime;
 constexpr HostTime kNow{100s};
 constexpr WallTime kWall{50s};
 
-const ModelInForce kModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
+const PublishedModel kModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
 const ModelPublication kPublication = encode_model(kModel, "mill").value();
 
 protocol::Snapshot view() {
@@ -33,7 +33,7 @@ protocol::Snapshot view() {
   return v;
 }
 
-ModelStanding active(std::uint64_t revision = 1) {
+ActiveModelState active(std::uint64_t revision = 1) {
   return {.status = ModelStatus::MODEL_ACTIVE,
           .reason = "accepted",
           .model = &kModel,
@@ -58,10 +58,10 @@ class PublisherTest : public ::testing::Test {
     far_.emplace(directory_ / "dds.sock");
     publisher_->beat(kWall);
   }
-  void publish_live(const protocol::Snapshot& view, const ModelStanding& standing,
+  void publish_live(const protocol::Snapshot& view, const ActiveModelState& state,
                     protocol::HostTime now, Publisher::WallTime wall) {
     publisher_->snapshot(view, now, wall);
-    publisher_->compensation(view, standing, now, wall);
+    publisher_->compensation(view, state, now, wall);
   }
   template <class T>
   std::vector<T> taken(Topic topic) {
@@ -94,9 +94,9 @@ TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
 }
 
 TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
-  auto standing = active();
-  standing.status = ModelStatus::MODEL_STALE;
-  publish_live(view(), standing, kNow + 2ms, kWall);
+  auto state = active();
+  state.status = ModelStatus::MODEL_STALE;
+  publish_live(view(), state, kNow + 2ms, kWall);
   const auto sent = taken<v1::Compensation>(Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
@@ -172,9 +172,9 @@ TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
   }
 
   EXPECT_EQ(sent, 3u);
-  auto standing = active();
-  standing.reason = "forced by anna: crane test";
-  publisher_->model(standing, kNow + 2510ms, kWall + 2510ms);
+  auto state = active();
+  state.reason = "forced by anna: crane test";
+  publisher_->model(state, kNow + 2510ms, kWall + 2510ms);
   const auto changed = taken<v1::ModelState>(Topic::ModelState);
   ASSERT_THAT(changed, SizeIs(1));
   EXPECT_EQ(changed[0].state(), ModelStatus::MODEL_ACTIVE);
@@ -184,9 +184,9 @@ TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
 TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
   auto model = kModel;
   model.active_since = kNow - 1h;
-  auto standing = active();
-  standing.model = &model;
-  publisher_->model(standing, kNow, kWall);
+  auto state = active();
+  state.model = &model;
+  publisher_->model(state, kNow, kWall);
   const auto sent = taken<v1::ModelState>(Topic::ModelState);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].age_ns(), std::chrono::nanoseconds{1h}.count());

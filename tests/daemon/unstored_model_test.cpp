@@ -120,7 +120,7 @@ TEST_F(UnstoredModel, AModelTheStoreDoesNotTakeIsKeptTriedAgainAndReported) {
   cycle_until_over();
   EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
   EXPECT_THAT(service_->not_stored(), IsEmpty());
-  EXPECT_EQ(authority_->in_force()->id, model_id(stored()));
+  EXPECT_EQ(authority_->active_model()->id, model_id(stored()));
 }
 
 TEST_F(UnstoredModel, OneBackgroundTaskIdentifiesStoresAndActivatesTheModel) {
@@ -132,7 +132,7 @@ TEST_F(UnstoredModel, OneBackgroundTaskIdentifiesStoresAndActivatesTheModel) {
   EXPECT_EQ(activation->actor.who, "anna");
   (void)service_->cycle({}, now_);
   EXPECT_EQ(state(), SessionState::Active) << service_->status().reason;
-  EXPECT_EQ(authority_->in_force()->id, activation->id);
+  EXPECT_EQ(authority_->active_model()->id, activation->id);
 }
 
 TEST_F(UnstoredModel, CancelDiscardsAModelTheStoreDoesNotTake) {

@@ -15,7 +15,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 /// What the kernel keeps to now: the smallest of all bounds asked for.
-std::optional<std::int32_t> bound_in_force() {
+std::optional<std::int32_t> bound_now() {
   std::ifstream file(kCpuLatencyFile, std::ios::binary);
   std::int32_t us = 0;
   if (!file.read(reinterpret_cast<char*>(&us), sizeof us)) return std::nullopt;
@@ -23,16 +23,16 @@ std::optional<std::int32_t> bound_in_force() {
 }
 
 TEST(CpuLatencyBound, IsActiveUntilItsDestruction) {
-  const auto before = bound_in_force();
+  const auto before = bound_now();
   if (!before || ::access(kCpuLatencyFile, W_OK) != 0)
     GTEST_SKIP() << kCpuLatencyFile << " cannot be used here";
   if (*before <= 77) GTEST_SKIP() << "somebody else asks for " << *before << " us";
   {
     const auto bound = CpuLatencyBound::request(77us);
     ASSERT_TRUE(bound) << bound.error().text;
-    EXPECT_LE(bound_in_force(), 77);
+    EXPECT_LE(bound_now(), 77);
   }
-  EXPECT_NE(bound_in_force(), 77);
+  EXPECT_NE(bound_now(), 77);
 }
 
 TEST(CpuLatencyBound, ReportsWhatRefusedIt) {

@@ -80,7 +80,7 @@ inline calib::evemu::Observations with_array(calib::evemu::Observations o, const
   for (const auto& true_m : layout.true_m) {
     const Vector3 x = (true_m[5] - true_m[0]).normalized(),
                   y = (true_m[5] - true_m[8]).normalized();
-    calib::evemu::SeenArtefact seen;
+    calib::evemu::TouchedArtefact seen;
     seen.position = o.rows[row].position;
     seen.T_self_uni.R << x, y, x.cross(y);
     seen.T_self_uni.t_m = true_m[0];

@@ -16,18 +16,18 @@ namespace {
 using Rows3 = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
 /// Vector from Ball1 to ball b in machine directions.
-Vector3 from_ball1_m(const SeenArtefact& s, std::size_t b) {
+Vector3 from_ball1_m(const TouchedArtefact& s, std::size_t b) {
   return s.ideal_m[b] - s.ideal_m.front();
 }
 
 /// First and last index among the touched balls and blocks.
-std::pair<double, double> touched_between(std::span<const SeenArtefact> seen) {
+std::pair<double, double> touched_between(std::span<const TouchedArtefact> seen) {
   std::pair<double, double> between{seen.front().ball_index.front(),
                                     seen.front().ball_index.front()};
   const auto widen = [&](double index) {
     between = {std::min(between.first, index), std::max(between.second, index)};
   };
-  for (const SeenArtefact& s : seen) {
+  for (const TouchedArtefact& s : seen) {
     std::for_each(s.ball_index.begin(), s.ball_index.end(), widen);
     std::for_each(s.block_index.begin(), s.block_index.end(), widen);
   }
@@ -40,7 +40,7 @@ double share_of(const std::pair<double, double>& between, double index) {
 
 /// Four shapes of a bent array: the long leg bent upwards, the long leg bent sideways, the short
 /// leg bent upwards, a twist.
-Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
+Rows3 bow(const TouchedArtefact& s, std::size_t ball, double arm_m) {
   const Vector3 a = s.T_self_uni.R.transpose() * from_ball1_m(s, ball) / arm_m;
   Rows3 rows(3, 4);
   const Vector3 y = s.T_self_uni.R.col(1), z = s.T_self_uni.R.col(2);
@@ -50,7 +50,7 @@ Rows3 bow(const SeenArtefact& s, std::size_t ball, double arm_m) {
 
 /// Rotation of the block frame by the motion G (p - p1), of which the fraction share[b] is complete
 /// when block b is touched.
-Vector3 turn_of_blocks(const SeenArtefact& s, const Matrix3& G,
+Vector3 turn_of_blocks(const TouchedArtefact& s, const Matrix3& G,
                        const std::array<double, 2>& share) {
   const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
   const Vector3 z = s.T_self_uni.R.col(2), y = s.T_self_uni.R.col(1);
@@ -68,20 +68,21 @@ using DoneShare = std::function<double(double index)>;
 
 /// Displacement of a ball by the motion G (p - p1), relative to the block frame, which the motion
 /// rotates.
-Vector3 seen_of(const SeenArtefact& s, std::size_t ball, const Matrix3& G, const DoneShare& share) {
+Vector3 seen_of(const TouchedArtefact& s, std::size_t ball, const Matrix3& G,
+                const DoneShare& share) {
   const Vector3 a = from_ball1_m(s, ball);
   const Vector3 blocks = turn_of_blocks(s, G, {share(s.block_index[0]), share(s.block_index[1])});
   return share(s.ball_index[ball]) * (G * a) - blocks.cross(a);
 }
 
 /// Displacement of a ball by a translation, relative to Ball1.
-Matrix3 seen_shift(const SeenArtefact& s, std::size_t ball, const DoneShare& share) {
+Matrix3 seen_shift(const TouchedArtefact& s, std::size_t ball, const DoneShare& share) {
   return (share(s.ball_index[ball]) - share(s.ball_index.front())) * Matrix3::Identity();
 }
 
 /// Displacement of a ball by unit translations of the array, then by unit rotations about Ball1
 /// (displacement at the distance of one arm).
-Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m,
+Rows3 shifted_and_turned(const TouchedArtefact& s, std::size_t ball, double arm_m,
                          const DoneShare& share) {
   Rows3 rows(3, 6);
   rows.leftCols<3>() = seen_shift(s, ball, share);
@@ -94,7 +95,7 @@ Rows3 shifted_and_turned(const SeenArtefact& s, std::size_t ball, double arm_m,
 
 /// True if another feature is touched before this ball and another one after it. A step at the
 /// first or last feature cannot be distinguished from a single displaced ball.
-bool between_others(const SeenArtefact& s, std::size_t ball) {
+bool between_others(const TouchedArtefact& s, std::size_t ball) {
   const auto [first, last] = touched_between({&s, 1});
   return s.ball_index[ball] > first && s.ball_index[ball] < last;
 }
@@ -198,7 +199,7 @@ Eigen::MatrixXd AlternativeColumns::of_step(const Added& a) const {
 Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
   const Eigen::Index count = columns_by_position(cause);
   return filled(count * std::ssize(o_.seen), [&](auto rows, std::size_t p, std::size_t i) {
-    const SeenArtefact& s = o_.seen[p];
+    const TouchedArtefact& s = o_.seen[p];
     auto here = rows.middleCols(count * static_cast<Eigen::Index>(p), count);
     if (cause == Cause::Bent) {
       here = -bow(s, i, arm_m_);

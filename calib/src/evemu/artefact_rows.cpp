@@ -65,7 +65,7 @@ Eigen::MatrixXd artefact_rows(const Observations& o) {
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()), columns);
   Eigen::Index row = 0;
 
-  for (const SeenArtefact& seen : o.seen) {
+  for (const TouchedArtefact& seen : o.seen) {
     const Matrix3& R = seen.T_self_uni.R;
     for (std::size_t b = 0; b < seen.balls.size(); ++b, row += 3) {
       const Vector3 a_m = R.transpose() * (seen.ideal_m[b] - seen.ideal_m.front());

@@ -32,7 +32,7 @@ Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3>
 
 }  // namespace
 
-Eigen::Matrix3Xd block_rotation(const SeenArtefact& seen, const ScaledDesign& design) {
+Eigen::Matrix3Xd block_rotation(const TouchedArtefact& seen, const ScaledDesign& design) {
   const Vector3 z = seen.T_self_uni.R.col(2), y = seen.T_self_uni.R.col(1);
   const Vector3 &n1 = seen.blocks[0].normal, &n2 = seen.blocks[1].normal;
   const Eigen::Matrix3Xd dn1 = normal_change(seen.blocks[0], seen.block_points_m[0], design);
@@ -50,7 +50,7 @@ Eigen::Matrix3Xd block_rotation(const SeenArtefact& seen, const ScaledDesign& de
   return theta;
 }
 
-Eigen::Matrix3Xd ball_displacement(const SeenArtefact& seen, std::size_t ball,
+Eigen::Matrix3Xd ball_displacement(const TouchedArtefact& seen, std::size_t ball,
                                    const ScaledDesign& design) {
   const Vector3& centre = seen.balls[ball].centre;
   const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
@@ -80,7 +80,7 @@ Eigen::MatrixXd design_rows(const Observations& o, const ScaledDesign& design, R
   }
 
   Eigen::Index row = 0;
-  for (const SeenArtefact& seen : o.seen) {
+  for (const TouchedArtefact& seen : o.seen) {
     const Eigen::Matrix3Xd theta = block_rotation(seen, design);
     const Vector3& ball1_m = seen.balls.front().centre;
     for (std::size_t b = 0; b < seen.balls.size(); ++b, row += 3) {

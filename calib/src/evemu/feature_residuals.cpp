@@ -27,7 +27,7 @@ std::vector<Vector3> without_V(const std::vector<Vector3>& points_m, const Volum
   return out;
 }
 
-std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
+std::optional<FeatureResiduals> of_ball(const TouchedArtefact& s, std::size_t ball,
                                         const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.ball_points_m[ball], model);
   const auto sphere = fit::fit_sphere(points);
@@ -57,7 +57,7 @@ std::optional<FeatureResiduals> of_ball(const SeenArtefact& s, std::size_t ball,
 }
 
 /// Unknowns: offset of the face, and its slopes along two directions x and y in the face.
-std::optional<FeatureResiduals> of_block(const SeenArtefact& s, std::size_t block,
+std::optional<FeatureResiduals> of_block(const TouchedArtefact& s, std::size_t block,
                                          const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.block_points_m[block], model);
   const auto plane = fit::fit_plane(points, s.blocks[block].normal);
@@ -110,7 +110,7 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
   };
 
   for (std::size_t p = 0; p < o.seen.size(); ++p) {
-    const SeenArtefact& s = o.seen[p];
+    const TouchedArtefact& s = o.seen[p];
     for (std::size_t b = 0; b < s.balls.size(); ++b) {
       if (s.ball_points_m[b].size() > kUnknownsOfBall) {
         add(p, Feature::Ball, b, of_ball(s, b, model));
@@ -153,7 +153,7 @@ std::string place_of(const Observations& o, const FeatureResiduals& f) {
 Eigen::VectorXd effect_m(const Observations& o, const FeatureResiduals& f,
                          const Eigen::VectorXd& along_m) {
   Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * o.rows.size()));
-  const SeenArtefact& s = o.seen[f.seen];
+  const TouchedArtefact& s = o.seen[f.seen];
   const Vector3 change = (f.response * along_m).head<3>();  // of the ball centre or face normal
   const auto balls = s.balls.size();
   Vector3 turn = Vector3::Zero();

@@ -25,7 +25,7 @@ Observations part_of(const Observations& o, int position, bool others) {
   Observations part = o;
   std::erase_if(part.rows, [&](const BallError& r) { return (r.position == position) == others; });
   std::erase_if(part.seen,
-                [&](const SeenArtefact& s) { return (s.position == position) == others; });
+                [&](const TouchedArtefact& s) { return (s.position == position) == others; });
   return part;
 }
 

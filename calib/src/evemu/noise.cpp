@@ -28,7 +28,7 @@ Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, 
 }
 
 /// k_ij - k_i1 - k_1j + k_11 of the balls of a position.
-Eigen::MatrixXd slow_covariance(const SeenArtefact& seen) {
+Eigen::MatrixXd slow_covariance(const TouchedArtefact& seen) {
   constexpr double kPerPosition = 4.0;  // correlation times in one position
   const std::vector<double> t = times_in_position(seen);
   const auto k = [&](Eigen::Index i, Eigen::Index j) {
@@ -48,7 +48,7 @@ Eigen::MatrixXd slow_covariance(const SeenArtefact& seen) {
 
 }  // namespace
 
-std::vector<double> times_in_position(const SeenArtefact& s) {
+std::vector<double> times_in_position(const TouchedArtefact& s) {
   double first = std::min(s.block_index[0], s.block_index[1]);
   double last = std::max(s.block_index[0], s.block_index[1]);
   for (const double index : s.ball_index) {
@@ -90,8 +90,9 @@ Eigen::MatrixXd ball_covariance(const Observations& o, const PositionRows& p) {
   const auto n = static_cast<Eigen::Index>(p.count),
              first = static_cast<Eigen::Index>(p.ball1 - p.first);
   Eigen::MatrixXd C = Eigen::MatrixXd::Ones(n, n) + Eigen::MatrixXd::Identity(n, n);
-  const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
-                                 [&](const SeenArtefact& s) { return s.position == p.position; });
+  const auto seen = std::find_if(o.seen.begin(), o.seen.end(), [&](const TouchedArtefact& s) {
+    return s.position == p.position;
+  });
   if (o.slow_noise > 0.0 && seen != o.seen.end()) {
     C += o.slow_noise * o.slow_noise * slow_covariance(*seen);
   }

@@ -145,8 +145,8 @@ std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,
   return std::nullopt;
 }
 
-Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches,
-                                  const Calibrator& at_20_C, const ObserveOptions& options) {
+Result<TouchedArtefact> see_artefact(int position, std::span<const Touch> touches,
+                                     const Calibrator& at_20_C, const ObserveOptions& options) {
   if (Result<void> sound = check(at_20_C); !sound) {
     return tl::unexpected(sound.error());
   }
@@ -183,7 +183,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
   std::vector<Matrix3> turned;
 
   for (const auto& [position, touched] : *positions) {
-    Result<SeenArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
+    Result<TouchedArtefact> seen = see(position, touched, c, pre_to_uniform(c), options);
     if (!seen) {
       return tl::unexpected(seen.error());
     }

@@ -34,7 +34,7 @@ std::vector<Vector3> readings_m(const Observations& o) {
 /// Theta averaged over the positions, 3 x size().
 Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& design) {
   Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
-  for (const SeenArtefact& seen : o.seen) {
+  for (const TouchedArtefact& seen : o.seen) {
     mean += block_rotation(seen, design) / static_cast<double>(o.seen.size());
   }
   return mean;

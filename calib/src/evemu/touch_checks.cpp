@@ -101,7 +101,7 @@ std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m
   return one ? one : rough_surface(plane_through(points_m), options.max_off_surface_m);
 }
 
-bool touched_from_below(const SeenArtefact& seen) {
+bool touched_from_below(const TouchedArtefact& seen) {
   Vector3 mean = Vector3::Zero();
   for (std::size_t b = 0; b < seen.balls.size(); ++b) {
     for (const Vector3& p : seen.ball_points_m[b]) {

@@ -21,6 +21,6 @@ namespace abbe::calib::evemu {
 
 /// True if the balls were touched from below, where the plate is. The mirror image of a planar
 /// array has the same shape: only the touched side reveals a mirrored axis.
-[[nodiscard]] bool touched_from_below(const SeenArtefact&);
+[[nodiscard]] bool touched_from_below(const TouchedArtefact&);
 
 }  // namespace abbe::calib::evemu

@@ -285,7 +285,7 @@ Result<RigidTransform> rough_pose(int position, std::span<const fit::Sphere> bal
   return *T;
 }
 
-Result<void> fit_blocks(SeenArtefact& seen, const Touched& touched, const Calibrator& c,
+Result<void> fit_blocks(TouchedArtefact& seen, const Touched& touched, const Calibrator& c,
                         const RigidTransform& T_machine_pre, const ObserveOptions& options) {
   std::array<Vector3, 2> nominal;
   for (std::size_t b = 0; b < 2; ++b) {
@@ -351,13 +351,13 @@ Result<std::map<int, Touched>> by_position(std::span<const Touch> touches,
   return found;
 }
 
-Result<SeenArtefact> see(int position, const Touched& touched, const Calibrator& c,
-                         const RigidTransform& T_uni_pre, const ObserveOptions& options) {
+Result<TouchedArtefact> see(int position, const Touched& touched, const Calibrator& c,
+                            const RigidTransform& T_uni_pre, const ObserveOptions& options) {
   if (Result<void> complete = check_complete(position, touched, c, options); !complete) {
     return tl::unexpected(complete.error());
   }
 
-  SeenArtefact seen;
+  TouchedArtefact seen;
   seen.position = position;
   Result<std::vector<fit::Sphere>> balls = fit_balls(position, touched, c);
 

@@ -41,7 +41,8 @@ using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
 /// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
 /// `T_uni_pre`: from its coordinates into the uniform frame. The text of BadInput names the feature
 /// that does not fit, and the mistake that would explain it.
-[[nodiscard]] Result<SeenArtefact> see(int position, const Touched&, const Calibrator& at_machine,
-                                       const RigidTransform& T_uni_pre, const ObserveOptions&);
+[[nodiscard]] Result<TouchedArtefact> see(int position, const Touched&,
+                                          const Calibrator& at_machine,
+                                          const RigidTransform& T_uni_pre, const ObserveOptions&);
 
 }  // namespace abbe::calib::evemu

@@ -30,11 +30,11 @@ Result<std::optional<ModelDocument>> active_model(const std::string& store) {
   return active;
 }
 
-void ModelToBeat::add_note(calib::Verdict& verdict) const {
+void ComparisonModel::add_note(calib::Verdict& verdict) const {
   if (!left_out.empty()) verdict.notes.push_back(left_out);
 }
 
-ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config) {
+ComparisonModel comparison_model(const std::optional<ModelDocument>& active, const Config& config) {
   if (!active) return {};
   if (active->machine_hash != machine_hash(config))
     return {nullptr, std::string{kOfAnotherMachine}};

@@ -17,7 +17,7 @@ namespace abbe::daemon {
 [[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);
 
 /// The model with which the gate compares a candidate.
-struct ModelToBeat {
+struct ComparisonModel {
   const calib::VolumetricModel* model = nullptr;  ///< null: no comparison
   /// why the active model is not compared; empty: it is compared, or there is none
   std::string left_out;
@@ -27,7 +27,8 @@ struct ModelToBeat {
 
 /// The active model, if it was made for the machine of `config`. A model of another configuration
 /// is STALE there and must not prevent its replacement.
-[[nodiscard]] ModelToBeat to_beat(const std::optional<ModelDocument>& active, const Config& config);
+[[nodiscard]] ComparisonModel comparison_model(const std::optional<ModelDocument>& active,
+                                               const Config& config);
 
 /// Adds the model to the store and records the user and `command`. Does nothing if `store` is
 /// empty.

@@ -312,7 +312,7 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
         std::move(*solution), {input->reference->points, input->reference->sigma_m});
   if (!solution) return tl::make_unexpected(error_of(solution.error()));
 
-  const auto other = to_beat(*active, input->config);
+  const auto other = comparison_model(*active, input->config);
   auto verdict = evemu::judge(input->observations, *solution, other.model, *judging);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.add_note(*verdict);

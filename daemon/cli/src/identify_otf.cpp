@@ -175,7 +175,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                              noise, options);
   if (!found) return tl::make_unexpected(error_of(found.error()));
 
-  const auto other = to_beat(active, files->config);
+  const auto other = comparison_model(active, files->config);
   auto verdict = otf::judge(found->observations, found->solution, other.model,
                             gate_limits(files->config.gate), options);
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
@@ -210,7 +210,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   if (!recording) return tl::make_unexpected(recording.error());
   if (const auto given = require_target(recording->config.machine); !given)
     return tl::make_unexpected(given.error());
-  const auto other = to_beat(active, recording->config);
+  const auto other = comparison_model(active, recording->config);
   auto replayed = replay(
       recording->reader, recording->config,
       {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});

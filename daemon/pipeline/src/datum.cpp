@@ -41,7 +41,7 @@ Datum::Datum(const Config& config, WithoutMarks without_marks) {
     axis.step = live[i].scale;
     axis.offset = live[i].offset;
     axis.zero_is_here = !marks && counted->zero_is_here;
-    if (axis.zero_is_here) axis.in_force = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
+    if (axis.zero_is_here) axis.current = FoundDatum{.axis = i, .reading_at_zero = axis.offset};
   }
 }
 
@@ -49,7 +49,7 @@ void Datum::go_on(const DatumState& state) {
   begun_ = true;
   for (Axis& axis : axes_) {
     if ((state.unknown >> axis.place & 1u) == 0) continue;
-    axis.in_force.reset();
+    axis.current.reset();
     std::erase_if(axis.coming, [&state](const FoundDatum& found) { return found.from < state.at; });
   }
 }
@@ -61,24 +61,24 @@ void Datum::found(const FoundDatum& datum) {
 
 bool Datum::known(std::size_t place) const {
   const auto axis = std::ranges::find(axes_, place, &Axis::place);
-  return axis == axes_.end() || axis->in_force || !axis->coming.empty();
+  return axis == axes_.end() || axis->current || !axis->coming.empty();
 }
 
-std::vector<FoundDatum> Datum::in_force() const {
+std::vector<FoundDatum> Datum::current() const {
   std::vector<FoundDatum> all;
   for (const Axis& axis : axes_)
-    if (axis.in_force) all.push_back(*axis.in_force);
+    if (axis.current) all.push_back(*axis.current);
   return all;
 }
 
 void Datum::move_on(const protocol::SampleHead& head) {
   for (Axis& axis : axes_) {
     while (!axis.coming.empty() && axis.coming.front().from < head.time) {
-      axis.in_force = axis.coming.front();
+      axis.current = axis.coming.front();
       axis.coming.pop_front();
     }
     const bool first_set_up = !begun_ && axis.zero_is_here;
-    if (has(head.flags, SampleFlag::Restarted) && !first_set_up) axis.in_force.reset();
+    if (has(head.flags, SampleFlag::Restarted) && !first_set_up) axis.current.reset();
   }
   begun_ = true;
 }
@@ -86,9 +86,9 @@ void Datum::move_on(const protocol::SampleHead& head) {
 template <class Counted>
 void Datum::apply_to_counts(Counted& sample) const {
   for (const Axis& axis : axes_) {
-    if (axis.in_force) {
-      sample.position[axis.place] = axis.in_force->reading_at_zero +
-                                    axis.step * static_cast<double>(sample.count[axis.place]);
+    if (axis.current) {
+      sample.position[axis.place] =
+          axis.current->reading_at_zero + axis.step * static_cast<double>(sample.count[axis.place]);
     } else {
       set_missing(sample, axis.place);
     }
@@ -102,8 +102,8 @@ void Datum::apply(protocol::AxisSample& sample) {
 
 void Datum::apply(protocol::ProbeTrigger& touch) const {
   for (const Axis& axis : axes_) {
-    if (axis.in_force) {
-      touch.position[axis.place] += axis.in_force->reading_at_zero - axis.offset;
+    if (axis.current) {
+      touch.position[axis.place] += axis.current->reading_at_zero - axis.offset;
     } else {
       set_missing(touch, axis.place);
     }

@@ -49,7 +49,7 @@ std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   return hull;
 }
 
-v1::GridNode grid_node(const ModelInForce& m, const calib::InterpolationGrid& grid,
+v1::GridNode grid_node(const PublishedModel& m, const calib::InterpolationGrid& grid,
                        const std::array<std::size_t, 3>& at, const calib::Vector3& tool_m) {
   const calib::Vector3 q_m(grid.axes_m[0][at[0]], grid.axes_m[1][at[1]], grid.axes_m[2][at[2]]);
   const auto e = m.model.error_at(q_m, tool_m);
@@ -91,7 +91,7 @@ v1::Snapshot snapshot_message(const protocol::Snapshot& s, protocol::UtcOffset u
   return m;
 }
 
-v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
+v1::ErrorModel model_message(const PublishedModel& active, const Stamp& stamp) {
   v1::ErrorModel m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -129,7 +129,7 @@ v1::ErrorModel model_message(const ModelInForce& active, const Stamp& stamp) {
   return m;
 }
 
-std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& active, const Stamp& stamp) {
+std::vector<v1::ErrorGrid> grid_messages(const PublishedModel& active, const Stamp& stamp) {
   const auto grid = calib::interpolation_grid(active.model, kMostGridNodes);
   const calib::Vector3 tool_m = active.model.tool_offsets_m().front();
   std::vector<v1::GridNode> all;
@@ -163,7 +163,8 @@ std::vector<v1::ErrorGrid> grid_messages(const ModelInForce& active, const Stamp
 }
 
 v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
-                             const ModelInForce* active, nanoseconds validity, const Stamp& stamp) {
+                             const PublishedModel* active, nanoseconds validity,
+                             const Stamp& stamp) {
   v1::ModelState m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -178,7 +179,7 @@ v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
   return m;
 }
 
-v1::Compensation compensation_message(v1::ModelStatus status, const ModelInForce* active,
+v1::Compensation compensation_message(v1::ModelStatus status, const PublishedModel* active,
                                       const protocol::Snapshot& s,
                                       const std::array<double, 3>& tool_offset_m,
                                       nanoseconds validity, const Stamp& stamp) {

@@ -8,7 +8,7 @@ namespace abbe::daemon {
 namespace {
 
 template <class T>
-Result<std::vector<std::byte>> encoded(const T& message, const ModelInForce& model) {
+Result<std::vector<std::byte>> encoded(const T& message, const PublishedModel& model) {
   std::vector<std::byte> payload;
   if (const auto done = encode(message, payload); !done)
     return fail(ErrorCode::Refused,
@@ -18,7 +18,7 @@ Result<std::vector<std::byte>> encoded(const T& message, const ModelInForce& mod
 
 }  // namespace
 
-Result<ModelPublication> encode_model(const ModelInForce& model, std::string_view machine) {
+Result<ModelPublication> encode_model(const PublishedModel& model, std::string_view machine) {
   const Stamp stamp{.machine = machine};
   ModelPublication out;
   auto payload = encoded(model_message(model, stamp), model);

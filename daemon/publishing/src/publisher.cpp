@@ -54,29 +54,29 @@ void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now,
     send(Topic::Snapshot, snapshot_message(view, utc_, stamp(now)), wall);
 }
 
-void Publisher::compensation(const protocol::Snapshot& view, const ModelStanding& standing,
+void Publisher::compensation(const protocol::Snapshot& view, const ActiveModelState& active,
                              protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
   send(Topic::Compensation,
-       compensation_message(standing.status, standing.model, view, options_.tool_offset_m,
+       compensation_message(active.status, active.model, view, options_.tool_offset_m,
                             options_.validity, stamp(now)),
        wall);
 }
 
-void Publisher::model(const ModelStanding& standing, protocol::HostTime now, WallTime wall) {
-  if (standing.publication != nullptr && standing.revision != sent_revision_) {
-    send_encoded(Topic::ErrorModel, standing.publication->model);
-    for (const auto& slice : standing.publication->slices) send_encoded(Topic::ErrorGrid, slice);
-    sent_revision_ = standing.revision;
+void Publisher::model(const ActiveModelState& active, protocol::HostTime now, WallTime wall) {
+  if (active.publication != nullptr && active.revision != sent_revision_) {
+    send_encoded(Topic::ErrorModel, active.publication->model);
+    for (const auto& slice : active.publication->slices) send_encoded(Topic::ErrorGrid, slice);
+    sent_revision_ = active.revision;
     next_state_ = wall;
   }
 
-  const bool changed = standing.status != sent_status_ || standing.reason != sent_reason_;
+  const bool changed = active.status != sent_status_ || active.reason != sent_reason_;
   if (!changed && wall < next_state_) return;
-  send(Topic::ModelState, state_message(standing.status, standing.reason, standing.model,
-                                        options_.validity, stamp(now)));
-  sent_status_ = standing.status;
-  sent_reason_ = standing.reason;
+  send(Topic::ModelState,
+       state_message(active.status, active.reason, active.model, options_.validity, stamp(now)));
+  sent_status_ = active.status;
+  sent_reason_ = active.reason;
   next_state_ = wall + kStatePeriod;
 }
 

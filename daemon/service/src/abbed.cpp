@@ -380,12 +380,12 @@ struct Abbed::State {
   Observed observe() {
     auto seen = hub->call(
         [this] {
-          const ModelStanding standing = hub->standing();
+          const ActiveModelState active = hub->model_state();
           return Observed{.streams = hub->health(),
                           .session = calibration->status(),
-                          .model = {.state = std::string{status_name(standing.status)},
-                                    .id = standing.model != nullptr ? standing.model->id : "",
-                                    .reason = standing.reason}};
+                          .model = {.state = std::string{status_name(active.status)},
+                                    .id = active.model != nullptr ? active.model->id : "",
+                                    .reason = active.reason}};
         },
         kHubTimeout);
     Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};

@@ -190,8 +190,8 @@ void CalibrationService::begin_identification(Acquisition acquired) {
   state_ = std::make_shared<IdentificationState>();
   state_->now = latest_cycle_;
   revision_before_storing_ = authority_.revision();
-  auto active = authority_.to_beat();
-  const bool left_out = !active && authority_.in_force() != nullptr;
+  auto active = authority_.comparison_model();
+  const bool left_out = !active && authority_.active_model() != nullptr;
 
   task_ = run_abandonable(IdentificationTask{
       .state = state_,
@@ -252,7 +252,7 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
     return;
   }
 
-  if (kept->active) authority_.take_up(std::move(*kept->active), revision_before_storing_);
+  if (kept->active) authority_.set_active(std::move(*kept->active), revision_before_storing_);
   const calib::Verdict& verdict = to_keep_->verdict;
   session_.judged(kept->id, verdict.accepted, verdict_text(verdict), now);
   discard_unstored();

@@ -118,9 +118,9 @@ Hub::WallTime Hub::last_cycle() const noexcept {
   return WallTime{std::chrono::nanoseconds{last_cycle_ns_.load(std::memory_order_relaxed)}};
 }
 
-ModelStanding Hub::standing() const {
-  return parts_.authority.standing(parts_.time.now(), live_.axes_known_at(),
-                                   parts_.time.host(kAxesTimeout));
+ActiveModelState Hub::model_state() const {
+  return parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(),
+                                      parts_.time.host(kAxesTimeout));
 }
 
 void Hub::cycle(WallTime wall) {
@@ -171,7 +171,7 @@ void Hub::publish(bool fresh, HostTime now) {
   const WallTime wall = cycle_began_;
   if (fresh && publisher != nullptr) {
     publisher->snapshot(live_.view(), now, wall);
-    publisher->compensation(live_.view(), standing(), now, wall);
+    publisher->compensation(live_.view(), model_state(), now, wall);
   }
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
@@ -179,7 +179,7 @@ void Hub::publish(bool fresh, HostTime now) {
     collect_health(now);
     if (publisher != nullptr) publisher->health(health_, now);
   }
-  if (publisher != nullptr) publisher->model(standing(), now, wall);
+  if (publisher != nullptr) publisher->model(model_state(), now, wall);
 }
 
 void Hub::collect_health(HostTime now) {

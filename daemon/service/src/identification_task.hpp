@@ -64,7 +64,7 @@ struct IdentificationTask {
   std::shared_ptr<IdentificationState> state;
   std::shared_ptr<const Config> config;
   Acquisition acquired;
-  std::shared_ptr<const ModelInForce> active;  ///< the gate compares with it; may be null
+  std::shared_ptr<const PublishedModel> active;  ///< the gate compares with it; may be null
   bool active_left_out = false;         ///< the active model is for another machine configuration
   std::future<RecordingDigest> digest;  ///< invalid: nothing is recorded
   ModelKeeper keeper;

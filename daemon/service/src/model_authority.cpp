@@ -52,7 +52,7 @@ ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, c
   keeper.tidy_store(now);
   ModelAuthority authority{std::move(keeper), config.axes_compensated()};
   if (auto active = authority.keeper_.read_active(now)) {
-    authority.take_up(std::move(*active));
+    authority.set_active(std::move(*active));
   } else {
     authority.active_.fault = active.error().text;
     authority.read_again_ = true;
@@ -60,14 +60,14 @@ ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, c
   return authority;
 }
 
-void ModelAuthority::take_up(ActiveModel active) {
+void ModelAuthority::set_active(ActiveModel active) {
   destroy_in_background(std::exchange(active_, std::move(active)));
   ++revision_;
 }
 
-void ModelAuthority::take_up(ActiveModel active, std::uint64_t since) {
+void ModelAuthority::set_active(ActiveModel active, std::uint64_t since) {
   if (since == revision_) {
-    take_up(std::move(active));
+    set_active(std::move(active));
   } else {
     read_again_ = true;
     destroy_in_background(std::move(active));
@@ -104,8 +104,8 @@ void ModelAuthority::begin_to_look(HostTime now) {
   });
 }
 
-/// The active model stays active. The fault is reported in standing() and in health(), and the next
-/// call reads the store again.
+/// The active model stays active. The fault is reported in model_state() and in health(), and the
+/// next call reads the store again.
 ModelAuthority::Following ModelAuthority::report_look(std::string fault) {
   fault_ = std::move(fault);
   read_again_ = true;
@@ -133,21 +133,21 @@ ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostT
   }
 
   const auto before = revision_;
-  take_up(std::move(*look->active), looking_since_);
-  return revision_ == before ? Following::Unchanged : Following::TakenUp;
+  set_active(std::move(*look->active), looking_since_);
+  return revision_ == before ? Following::Unchanged : Following::Replaced;
 }
 
-ModelStanding ModelAuthority::standing(HostTime now, std::optional<HostTime> axes_known_at,
-                                       std::chrono::nanoseconds patience) const {
-  ModelStanding s = standing_by_store(now, axes_known_at, patience);
+ActiveModelState ModelAuthority::model_state(HostTime now, std::optional<HostTime> axes_known_at,
+                                             std::chrono::nanoseconds patience) const {
+  ActiveModelState s = state_by_store(now, axes_known_at, patience);
   if (!fault_.empty() && fault_ != s.reason)
     s.reason += fmt::format("; later activations are not known: {}", fault_);
   return s;
 }
 
-ModelStanding ModelAuthority::standing_by_store(HostTime now, std::optional<HostTime> axes_known_at,
+ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const {
-  ModelStanding s{.model = in_force(), .revision = revision_};
+  ActiveModelState s{.model = active_model(), .revision = revision_};
   if (s.model != nullptr) s.publication = &active_.publication;
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;

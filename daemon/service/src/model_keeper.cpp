@@ -105,14 +105,14 @@ ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument d
   ActiveModel active{.activation = activation};
   active.made_for_this_machine = document.machine_hash == machine_hash_;
   active.recording_gap = document.recording_gap;
-  auto model = std::make_shared<const ModelInForce>(
-      ModelInForce{.id = activation.id,
-                   .method = document.method,
-                   .estimator = document.estimator,
-                   .recording_sha256 = provenance(document),
-                   .created = document.created,
-                   .active_since = std::min(now, utc_.to_host(activation.actor.when)),
-                   .model = std::move(document.model)});
+  auto model = std::make_shared<const PublishedModel>(
+      PublishedModel{.id = activation.id,
+                     .method = document.method,
+                     .estimator = document.estimator,
+                     .recording_sha256 = provenance(document),
+                     .created = document.created,
+                     .active_since = std::min(now, utc_.to_host(activation.actor.when)),
+                     .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 
   if (!publication) {

@@ -33,7 +33,7 @@ Result<void> ReferenceService::start() {
   if (running_)
     return fail(ErrorCode::Refused, "reference: a search for the marks is running already");
   session_.emplace(reference_options(*marks_, *counted_));
-  taken_up_.assign(marks_->axes.size(), false);
+  datum_used_.assign(marks_->axes.size(), false);
   running_ = true;
   from_ = newest_;
   if (recorder_ != nullptr) recorder_->attach(reference_request(newest_), newest_);
@@ -47,7 +47,7 @@ Result<void> ReferenceService::cancel() {
 }
 
 void ReferenceService::on_delivered(const Batch& batch) {
-  if (left_ && !batch.axes.empty()) take_up_left(batch.axes.front());
+  if (left_ && !batch.axes.empty()) use_datum_left(batch.axes.front());
   for (const auto& sample : batch.axes) {
     if (has(sample.head.flags, protocol::SampleFlag::Restarted)) {
       restarted_at_ = sample.head.time;
@@ -62,7 +62,7 @@ void ReferenceService::on_delivered(const Batch& batch) {
 
 /// Takes over the datum of the earlier run if the counters continued. The datum is recorded in the
 /// same way as at the start of a further recording file.
-void ReferenceService::take_up_left(const protocol::AxisSample& first) {
+void ReferenceService::use_datum_left(const protocol::AxisSample& first) {
   const Counting left = *std::exchange(left_, std::nullopt);
   if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
   const DatumState nothing_known{.at = first.head.time - 1ns, .unknown = 0xff};
@@ -71,7 +71,7 @@ void ReferenceService::take_up_left(const protocol::AxisSample& first) {
   if (recorder_ != nullptr) recorder_->attach(to_attachment(nothing_known), newest_);
   for (FoundDatum datum : left.datum) {
     datum.from = nothing_known.at;
-    take_up(datum);
+    use_datum(datum);
     carried_on_.push_back(counted_->axes()[datum.axis].name);
   }
 }
@@ -87,30 +87,30 @@ void ReferenceService::take(const std::optional<CountingProgress>& progress) {
 
 std::optional<Counting> ReferenceService::counting() const {
   if (!progress_) return std::nullopt;
-  return Counting{.progress = *progress_, .datum = datum_.in_force()};
+  return Counting{.progress = *progress_, .datum = datum_.current()};
 }
 
 void ReferenceService::look_for_marks(const Batch& batch) {
   for (const auto& crossing : batch.marks)
     if (crossing.head.time > from_) session_->take(crossing);
   for (const auto& sample : batch.axes) session_->take(sample);
-  for (std::size_t i = 0; i < taken_up_.size(); ++i) {
+  for (std::size_t i = 0; i < datum_used_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
-    if (found && !taken_up_[i]) take_up(i);
-    taken_up_[i] = found;  // false again if the card restarted
+    if (found && !datum_used_[i]) use_datum(i);
+    datum_used_[i] = found;  // false again if the card restarted
   }
   if (session_->finished()) running_ = false;
 }
 
-void ReferenceService::take_up(std::size_t axis) {
+void ReferenceService::use_datum(std::size_t axis) {
   const FoundDatum datum{.axis = session_->options().axes[axis].live_axis,
                          .reading_at_zero = reading_at_zero(axis),
                          .u = session_->axis(axis).u_offset,
                          .from = newest_};
-  take_up(datum);
+  use_datum(datum);
 }
 
-void ReferenceService::take_up(const FoundDatum& datum) {
+void ReferenceService::use_datum(const FoundDatum& datum) {
   datum_.found(datum);
   if (recorder_ != nullptr) recorder_->attach(to_attachment(datum), newest_);
 }
@@ -197,11 +197,11 @@ Result<void> ReferenceService::set_datum_here(const SetDatumHere& here) {
 
   for (const std::size_t place : places) {
     const double counted = live[place].scale * static_cast<double>(latest_->count[place]);
-    take_up(FoundDatum{.axis = place,
-                       .reading_at_zero = live[place].offset - counted,
-                       .u = here.u,
-                       .from = newest_,
-                       .stated = true});
+    use_datum(FoundDatum{.axis = place,
+                         .reading_at_zero = live[place].offset - counted,
+                         .u = here.u,
+                         .from = newest_,
+                         .stated = true});
   }
 
   return {};

@@ -101,13 +101,14 @@ ObservedPart part_of(const SessionStatus& session) {
 
 ObservedPart part_of(const ObservedModel& model) {
   const bool bad = model.state == "INVALID" || model.state == "STALE" || model.state == "DRIFT";
-  return {.key = "model",
-          .state = fmt::format("{}\n{}\n{}", model.state, model.id, model.reason),
-          .message = fmt::format("model {}: {}: {}", model.id.empty() ? "in force" : model.id,
-                                 model.state, model.reason),
-          .message_id = kModelId,
-          .urgency = bad ? Urgency::Warning : Urgency::Notice,
-          .fields = {{"ABBE_MODEL", model.id}, {"ABBE_STATE", model.state}}};
+  return {
+      .key = "model",
+      .state = fmt::format("{}\n{}\n{}", model.state, model.id, model.reason),
+      .message = fmt::format("{}: {}: {}", model.id.empty() ? "active model" : "model " + model.id,
+                             model.state, model.reason),
+      .message_id = kModelId,
+      .urgency = bad ? Urgency::Warning : Urgency::Notice,
+      .fields = {{"ABBE_MODEL", model.id}, {"ABBE_STATE", model.state}}};
 }
 
 ObservedPart part_of(const ObservedParticipant& participant) {

@@ -75,12 +75,12 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
 
 /// A copy of the active model's state.
 struct SeenModel {
-  explicit SeenModel(const ModelStanding& standing)
-      : status(standing.status), reason(standing.reason), known(standing.model != nullptr) {
+  explicit SeenModel(const ActiveModelState& active)
+      : status(active.status), reason(active.reason), known(active.model != nullptr) {
     if (!known) return;
-    id = standing.model->id;
-    method = standing.model->method;
-    recording_sha256 = standing.model->recording_sha256;
+    id = active.model->id;
+    method = active.model->method;
+    recording_sha256 = active.model->recording_sha256;
   }
   v1::ModelStatus status;
   std::string reason;
@@ -236,7 +236,7 @@ SeenStatus look_at_status(const Hub& hub) {
   const auto axes_at = hub.live().axes_at();
   SeenStatus seen{
       .streams = hub.health(),
-      .model = SeenModel{hub.standing()},
+      .model = SeenModel{hub.model_state()},
       .session = parts.calibration.status(),
       .held_out = parts.calibration.held_out(),
       .ended = parts.calibration.ended(),

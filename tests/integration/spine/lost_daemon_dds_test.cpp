@@ -18,7 +18,7 @@ using nlohmann::json;
 
 struct LostDaemon : Spine {
   /// A model of this configuration, active before abbed starts.
-  void put_a_model_in_force() {
+  void activate_a_model() {
     const auto config = daemon::load_config(file("abbed.toml"));
     ASSERT_TRUE(config) << config.error().text;
     auto document = daemon::test::synthetic_document(1);
@@ -51,7 +51,7 @@ TEST_F(LostDaemon, IsReportedToItsSubscribersWhetherItHangsOrEnds) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   write_configuration("child");
-  ASSERT_NO_FATAL_FAILURE(put_a_model_in_force());
+  ASSERT_NO_FATAL_FAILURE(activate_a_model());
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   watch_ = start({ABBE_WATCH_PROGRAM, "--domain", domain_.text(), "--profile",
                   ABBE_LOOPBACK_PROFILE, "--json", "--timeout", "100"},

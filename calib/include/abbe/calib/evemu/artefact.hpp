@@ -86,7 +86,7 @@ struct Touch {
                                                    const Vector3& n2);
 
 /// The artefact as the machine measured it at one position.
-struct SeenArtefact {
+struct TouchedArtefact {
   int position = 0;
   std::vector<fit::Sphere> balls;
   std::vector<std::vector<Vector3>> ball_points_m;

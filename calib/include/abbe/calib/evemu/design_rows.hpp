@@ -9,9 +9,9 @@
 namespace abbe::calib::evemu {
 
 /// Theta_p (observe.hpp) of every function of the design, 3 x design.size(), to first order.
-[[nodiscard]] Eigen::Matrix3Xd block_rotation(const SeenArtefact&, const ScaledDesign&);
+[[nodiscard]] Eigen::Matrix3Xd block_rotation(const TouchedArtefact&, const ScaledDesign&);
 /// D (observe.hpp) of every function at a ball (index from 0), 3 x design.size(), to first order.
-[[nodiscard]] Eigen::Matrix3Xd ball_displacement(const SeenArtefact&, std::size_t ball,
+[[nodiscard]] Eigen::Matrix3Xd ball_displacement(const TouchedArtefact&, std::size_t ball,
                                                  const ScaledDesign&);
 
 /// Source of the design rows. Centres: B at the ball centre, as in [Li OMM]. Touches: D and Theta

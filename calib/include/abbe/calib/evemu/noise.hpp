@@ -28,7 +28,7 @@ struct PositionRows {
 
 /// Relative time of each ball by the order of the touches: 0 for the first ball or block of its
 /// position, 1 for the last.
-[[nodiscard]] std::vector<double> times_in_position(const SeenArtefact&);
+[[nodiscard]] std::vector<double> times_in_position(const TouchedArtefact&);
 
 /// Covariance C0 of one position, count x count, in units of s^2. Slow noise requires
 /// Observations::seen.

@@ -81,7 +81,7 @@ struct Observations {
   int order = 3;
   RotationOrigin rotation = RotationOrigin::Blocks;
   std::vector<BallError> rows;        ///< by position, then ball; every position has Ball1
-  std::vector<SeenArtefact> seen;     ///< by position; empty when only errors were given
+  std::vector<TouchedArtefact> seen;  ///< by position; empty when only errors were given
   Vector3 ball1_m = Vector3::Zero();  ///< mean reading of Ball1
   std::optional<ArtefactUncertainty> artefact{};  ///< nullopt when only errors were given
   /// Standard deviation of slow noise divided by that of a ball centre (noise.hpp); 0: no slow
@@ -102,8 +102,9 @@ struct Observations {
                                            const Machine&, const ObserveOptions& = {});
 /// One position alone, by the same rules. Without a temperature the array is taken as at 20 C, even
 /// if the calibrator states an expansivity.
-[[nodiscard]] Result<SeenArtefact> see_artefact(int position, std::span<const Touch> touches_of_it,
-                                                const Calibrator&, const ObserveOptions& = {});
+[[nodiscard]] Result<TouchedArtefact> see_artefact(int position,
+                                                   std::span<const Touch> touches_of_it,
+                                                   const Calibrator&, const ObserveOptions& = {});
 /// Index in `before` of the first orientation from which `R_self_uni` differs by less than
 /// `least_turn_rad`; nullopt if there is none.
 [[nodiscard]] std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,

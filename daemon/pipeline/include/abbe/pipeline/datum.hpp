@@ -58,7 +58,7 @@ class Datum {
 
   [[nodiscard]] bool known(std::size_t axis) const;
   /// The datum of each referenced axis after the newest sample.
-  [[nodiscard]] std::vector<FoundDatum> in_force() const;
+  [[nodiscard]] std::vector<FoundDatum> current() const;
 
  private:
   struct Axis {
@@ -67,7 +67,7 @@ class Datum {
     double offset = 0.0;        // used by the driver
     bool zero_is_here = false;  // the datum is known at the first set-up
     std::deque<FoundDatum> coming;
-    std::optional<FoundDatum> in_force;
+    std::optional<FoundDatum> current;
   };
   void move_on(const protocol::SampleHead& head);
   void apply(protocol::AxisSample& sample);

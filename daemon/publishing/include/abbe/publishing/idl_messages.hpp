@@ -16,7 +16,7 @@
 namespace abbe::daemon {
 
 /// The active model, with the data that subscribers need.
-struct ModelInForce {
+struct PublishedModel {
   std::string id;
   std::string method;
   std::string estimator;
@@ -36,17 +36,17 @@ struct Stamp {
 
 [[nodiscard]] v1::Snapshot snapshot_message(const protocol::Snapshot&, protocol::UtcOffset,
                                             const Stamp&);
-[[nodiscard]] v1::ErrorModel model_message(const ModelInForce&, const Stamp&);
+[[nodiscard]] v1::ErrorModel model_message(const PublishedModel&, const Stamp&);
 /// V on calib::interpolation_grid() of at most 4096 nodes, in slices with the IDL's bound. If
 /// every_node is false, cov_m2 includes the error of the linear interpolation.
-[[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const ModelInForce&, const Stamp&);
+[[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const PublishedModel&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
-                                           const ModelInForce*, std::chrono::nanoseconds validity,
+                                           const PublishedModel*, std::chrono::nanoseconds validity,
                                            const Stamp&);
 /// V at the axis position of the live view, for the given tool. The vector is zero and `inside`
 /// false if there is no model, if the model is not valid for this tool, or if the axis positions
 /// are not known. If they are not known, this message also has STALE instead of ACTIVE.
-[[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const ModelInForce*,
+[[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const PublishedModel*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,
                                                     std::chrono::nanoseconds validity,

@@ -19,7 +19,7 @@ struct ModelPublication {
 };
 
 /// Error Refused if the model exceeds the bounds of the IDL.
-[[nodiscard]] Result<ModelPublication> encode_model(const ModelInForce& model,
+[[nodiscard]] Result<ModelPublication> encode_model(const PublishedModel& model,
                                                     std::string_view machine);
 
 }  // namespace abbe::daemon

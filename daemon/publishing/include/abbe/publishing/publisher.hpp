@@ -35,10 +35,10 @@ struct PublisherOptions {
 };
 
 /// The present state of the active model.
-struct ModelStanding {
+struct ActiveModelState {
   v1::ModelStatus status = v1::ModelStatus::MODEL_NONE;
   std::string reason;
-  const ModelInForce* model = nullptr;
+  const PublishedModel* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< of `model`
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
 };
@@ -54,10 +54,10 @@ class Publisher {
   void beat(WallTime wall);
   /// Call snapshot(), then compensation(), in every cycle that has new data.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
-  void compensation(const protocol::Snapshot& view, const ModelStanding& standing,
+  void compensation(const protocol::Snapshot& view, const ActiveModelState& active,
                     protocol::HostTime now, WallTime wall);
   /// Call every cycle. Sends the model if it is another one, and the state if it changed or is due.
-  void model(const ModelStanding& standing, protocol::HostTime now, WallTime wall);
+  void model(const ActiveModelState& active, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);
 

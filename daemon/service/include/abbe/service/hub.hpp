@@ -84,7 +84,7 @@ class Hub : private PipelineObserver {
   // The following may be called only by tasks on the hub's thread.
   [[nodiscard]] const LiveView& live() const noexcept { return live_; }
   [[nodiscard]] const std::vector<StreamHealth>& health() const noexcept { return health_; }
-  [[nodiscard]] ModelStanding standing() const;
+  [[nodiscard]] ActiveModelState model_state() const;
   [[nodiscard]] const HubParts& parts() const noexcept { return parts_; }
 
  private:

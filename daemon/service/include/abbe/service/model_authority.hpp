@@ -26,7 +26,7 @@ namespace abbe::daemon {
 class ModelAuthority {
  public:
   /// Loads the active model of the store, if there is one. A damaged model is reported in
-  /// standing() and not used. A store that can be neither read nor created (read-only disk,
+  /// model_state() and not used. A store that can be neither read nor created (read-only disk,
   /// permission, damage) is reported in fault(), and follow_store() reads it again: acquisition
   /// does not wait for it.
   [[nodiscard]] static ModelAuthority open(const std::filesystem::path& store_folder,
@@ -34,25 +34,24 @@ class ModelAuthority {
                                            protocol::HostTime now);
 
   /// A copy with which another thread stores a model. The caller then passes the active model that
-  /// the keeper returns to take_up().
+  /// the keeper returns to set_active().
   [[nodiscard]] ModelKeeper keeper() const { return keeper_; }
   /// Makes `active` the active model. The previous one is destroyed on an ordinary thread.
-  void take_up(ActiveModel active);
+  void set_active(ActiveModel active);
   /// The same for a model whose reading or storing began when revision() was `since`. If another
   /// model became active meanwhile, `active` may be the older one: it is not used, and the next
   /// follow_store() reads the store again.
-  void take_up(ActiveModel active, std::uint64_t since);
+  void set_active(ActiveModel active, std::uint64_t since);
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
-  enum class Following : std::uint8_t { Unchanged, Reading, TakenUp };
+  enum class Following : std::uint8_t { Unchanged, Reading, Replaced };
   /// Follows activations and rollbacks that another process made in the store (`abbe model ...`).
   /// Never waits and never accesses the disk: one call starts a background task, which reads the
   /// store if its file changed, and a later call takes the result.
   /// - A damaged state file that is unchanged at the second reading is renamed. The active model
   ///   stays active until another one is activated.
   /// - A store that cannot be read, or has not answered for kStoreTimeout, is reported in
-  /// standing()
-  ///   and fault(), and read again.
+  ///   model_state() and fault(), and read again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStoreTimeout{5};
   /// Why the last reading of the store, or of the model that is active in it, failed; empty: it
@@ -63,19 +62,19 @@ class ModelAuthority {
 
   /// `axes_known_at`: the last time at which all axis positions were known; `patience`: its largest
   /// age before the model is STALE.
-  [[nodiscard]] ModelStanding standing(protocol::HostTime now,
-                                       std::optional<protocol::HostTime> axes_known_at,
-                                       std::chrono::nanoseconds patience) const;
-  [[nodiscard]] const ModelInForce* in_force() const noexcept { return active_.model.get(); }
+  [[nodiscard]] ActiveModelState model_state(protocol::HostTime now,
+                                             std::optional<protocol::HostTime> axes_known_at,
+                                             std::chrono::nanoseconds patience) const;
+  [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
   /// The model with which the gate compares a new one: the active model, or null if that was made
   /// for another machine configuration.
-  [[nodiscard]] std::shared_ptr<const ModelInForce> to_beat() const noexcept {
+  [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const noexcept {
     return active_.made_for_this_machine ? active_.model : nullptr;
   }
 
  private:
   ModelAuthority(ModelKeeper keeper, bool axes_compensated);
-  [[nodiscard]] ModelStanding standing_by_store(protocol::HostTime now,
+  [[nodiscard]] ActiveModelState state_by_store(protocol::HostTime now,
                                                 std::optional<protocol::HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const;
 

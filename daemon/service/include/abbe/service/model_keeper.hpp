@@ -24,7 +24,7 @@ namespace abbe::daemon {
 /// with the model shares it.
 struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
-  std::shared_ptr<const ModelInForce> model;
+  std::shared_ptr<const PublishedModel> model;
   ModelPublication publication;  ///< of `model`
   bool made_for_this_machine = false;
   std::string recording_gap;  ///< ModelDocument::recording_gap

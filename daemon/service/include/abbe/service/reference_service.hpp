@@ -63,11 +63,11 @@ class ReferenceService : public PipelineObserver {
 
  private:
   void look_for_marks(const Batch& batch);
-  void take_up(std::size_t axis);
-  void take_up(const FoundDatum& datum);
+  void use_datum(std::size_t axis);
+  void use_datum(const FoundDatum& datum);
   [[nodiscard]] std::vector<std::string> without_marks() const;
   void watch_standing(const protocol::AxisSample& sample);
-  void take_up_left(const protocol::AxisSample& first);
+  void use_datum_left(const protocol::AxisSample& first);
   [[nodiscard]] Result<void> check_standing(std::size_t axis) const;
   [[nodiscard]] double reading_at_zero(std::size_t axis) const;
 
@@ -77,7 +77,7 @@ class ReferenceService : public PipelineObserver {
   RecorderThread* recorder_;
   Datum datum_;
   std::optional<ReferenceSession> session_;  ///< the latest search
-  std::vector<bool> taken_up_;
+  std::vector<bool> datum_used_;
   bool running_ = false;
   struct Standing {
     std::int64_t count = 0;

@@ -23,7 +23,7 @@ const BallArrayProblem& problem() {
 }
 
 /// Largest difference of coefficients, in standardised units.
-double difference(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& theirs) {
+double scaled_difference(const Eigen::MatrixXd& ours, const Eigen::MatrixXd& theirs) {
   const Eigen::MatrixXd slopes =
       problem().scale.asDiagonal() * (ours - theirs).bottomRows(ours.rows() - 1);
   return std::max(slopes.cwiseAbs().maxCoeff(), (ours - theirs).row(0).cwiseAbs().maxCoeff());
@@ -40,7 +40,7 @@ TEST(SparseReference, PathsOfAllPenaltiesAreThoseOfNcvreg) {
     ASSERT_TRUE(path) << path.error().text;
     EXPECT_EQ(path->sweeps, reference.sweeps);
     ASSERT_EQ(path->reached(), reference.coefficients.cols());
-    EXPECT_LE(difference(path->coefficients, reference.coefficients), kAsked);
+    EXPECT_LE(scaled_difference(path->coefficients, reference.coefficients), kAsked);
   }
 }
 
@@ -86,7 +86,7 @@ TEST_P(SparseReferenceGrid, PathAtTheBestGammaIsThatOfNcvreg) {
       numbers(read_table(folder(), std::string(GetParam()) + "_path.csv"));
   ASSERT_EQ(cv->path.reached(), expected.rows());
   EXPECT_EQ(cv->path.sweeps, std::vector<long>(expected.col(1).begin(), expected.col(1).end()));
-  EXPECT_LE(difference(cv->path.coefficients, expected.rightCols(46).transpose()), kAsked);
+  EXPECT_LE(scaled_difference(cv->path.coefficients, expected.rightCols(46).transpose()), kAsked);
   EXPECT_LE((cv->path.residual_sum_squares - expected.col(2)).cwiseAbs().maxCoeff(), kAsked);
 }
 

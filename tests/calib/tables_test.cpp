@@ -64,7 +64,7 @@ TEST(ParameterLayout, KeepsThe14TablesOneTargetShows) {
   const auto layout = ParameterLayout::observable_with_one_target({}, three_axes());
   ASSERT_TRUE(layout);
   std::vector<std::string> names;
-  for (const Table& t : layout->tables()) {
+  for (const auto& t : layout->tables()) {
     names.push_back(name(t.motion));
   }
   EXPECT_THAT(names, ElementsAre("EXX", "EYX", "EZX", "EAX", "EBX", "ECX", "EXY", "EYY", "EZY",

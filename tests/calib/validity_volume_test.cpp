@@ -259,9 +259,9 @@ TEST(ValidityVolume, OfNothingContainsNothing) {
 
 TEST(SpreadSubset, LosesNoSide) {
   std::vector<Vector3> sphere;
-  constexpr int kPoints = 2000;
-  for (int i = 0; i < kPoints; ++i) {  // a spiral: nearly uniform points on a sphere
-    const double z = 1.0 - (2.0 * i + 1.0) / kPoints, turn = 2.399963 * i,
+  constexpr int kSpiralPoints = 2000;
+  for (int i = 0; i < kSpiralPoints; ++i) {  // a spiral: nearly uniform points on a sphere
+    const double z = 1.0 - (2.0 * i + 1.0) / kSpiralPoints, turn = 2.399963 * i,
                  r = std::sqrt(1.0 - z * z);
     sphere.emplace_back(z, r * std::cos(turn), r * std::sin(turn));
   }

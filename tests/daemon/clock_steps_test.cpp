@@ -7,26 +7,26 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr ClockReading kStart{.utc = 24h * 365 * 56, .since_boot = 20s};
+constexpr ClockReading kFirstReading{.utc = 24h * 365 * 56, .since_boot = 20s};
 
 ClockReading later(std::chrono::nanoseconds by, std::chrono::nanoseconds step) {
-  return {.utc = kStart.utc + by + step, .since_boot = kStart.since_boot + by};
+  return {.utc = kFirstReading.utc + by + step, .since_boot = kFirstReading.since_boot + by};
 }
 
 TEST(ClockSteps, AClockThatRunsOnWasNotSet) {
-  ClockSteps steps{kStart};
-  EXPECT_FALSE(steps.look(kStart));
+  ClockSteps steps{kFirstReading};
+  EXPECT_FALSE(steps.look(kFirstReading));
   EXPECT_FALSE(steps.look(later(24h * 365, 0s)));
   EXPECT_FALSE(steps.look(later(24h, -1s)));
 }
 
 TEST(ClockSteps, AreSeenBothWays) {
-  EXPECT_TRUE(ClockSteps{kStart}.look(later(1h, 24h * 365)));
-  EXPECT_TRUE(ClockSteps{kStart}.look(later(1h, -10min)));
+  EXPECT_TRUE(ClockSteps{kFirstReading}.look(later(1h, 24h * 365)));
+  EXPECT_TRUE(ClockSteps{kFirstReading}.look(later(1h, -10min)));
 }
 
 TEST(ClockSteps, AreNotForgottenWhenTheClockIsRightAgain) {
-  ClockSteps steps{kStart};
+  ClockSteps steps{kFirstReading};
   EXPECT_TRUE(steps.look(later(1h, 24h)));
   EXPECT_TRUE(steps.look(later(2h, 0s)));
 }

@@ -15,7 +15,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-const std::string kMachine = to_toml(config_tables::mill()) + std::string(R"([encoder]
+const std::string kMillWithEncoder = to_toml(config_tables::mill()) + std::string(R"([encoder]
 transport = "udp"
 peer_host = "10.0.0.8"
 peer_port = 20000
@@ -39,12 +39,12 @@ inputs = ["scale_x", "", "part"]
 )";
 
 Config config_of(const std::string& text) {
-  auto config = parse_config(kMachine + text, "abbed.toml");
+  auto config = parse_config(kMillWithEncoder + text, "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
   return config ? *config : Config{};
 }
-std::string faults_of(const std::string& text) {
-  const auto config = parse_config(kMachine + text, "abbed.toml");
+std::string fault_text_of(const std::string& text) {
+  const auto config = parse_config(kMillWithEncoder + text, "abbed.toml");
   std::string all;
   if (!config)
     for (const auto& fault : config.error().details) all += fault + "\n";
@@ -79,7 +79,7 @@ u_alpha_um_per_m_K = 1
 u_temperature_K = 0.1
 fixed_mm = 0
 )");
-  const auto faults = faults_of(many);
+  const auto faults = fault_text_of(many);
   EXPECT_THAT(faults, HasSubstr("temperature \"i\" is number 9, but"));
   EXPECT_EQ(std::ranges::count(faults, '\n'), 1) << faults;
 }
@@ -120,39 +120,39 @@ expected = 4711
 
 TEST(EnvironmentConfiguration, RefusesInconsistentMaps) {
   const std::string custom = "[[environment]]\nname = \"a\"\nmap = \"custom\"\nhost = \"h\"\n";
-  EXPECT_THAT(faults_of(custom), HasSubstr("no register is measured"));
+  EXPECT_THAT(fault_text_of(custom), HasSubstr("no register is measured"));
   EXPECT_THAT(
-      faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
-                         "type = \"int16\"\nquantity_unit = \"C\"\n"),
+      fault_text_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                             "type = \"int16\"\nquantity_unit = \"C\"\n"),
       HasSubstr("is not a unit of the quantity"));
   EXPECT_THAT(
-      faults_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
-                         "type = \"int16\"\nquantity_unit = \"Pa\"\nscale = 0\n"),
+      fault_text_of(custom + "[[environment.measured]]\nquantity = \"air_pressure\"\naddress = 1\n"
+                             "type = \"int16\"\nquantity_unit = \"Pa\"\nscale = 0\n"),
       HasSubstr("must not be 0"));
 }
 
 TEST(EnvironmentConfiguration, RefusesAnUnknownMap) {
-  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"comet-t751\"\nhost = \"h\"\n"),
+  EXPECT_THAT(fault_text_of("[[environment]]\nname = \"a\"\nmap = \"comet-t751\"\nhost = \"h\"\n"),
               HasSubstr("did you mean \"comet-t7510\"?"));
 }
 
 TEST(EnvironmentConfiguration, NeedsTheSerialNumberOfAComet) {
-  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"comet-t7510\"\nhost = \"h\"\n"),
+  EXPECT_THAT(fault_text_of("[[environment]]\nname = \"a\"\nmap = \"comet-t7510\"\nhost = \"h\"\n"),
               HasSubstr("needs the serial number"));
 }
 
 TEST(EnvironmentConfiguration, RefusesTwoDevicesThatMeasureTheSame) {
   EXPECT_THAT(
-      faults_of(kAir +
-                "[[environment]]\nname = \"b\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\n"),
+      fault_text_of(
+          kAir + "[[environment]]\nname = \"b\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\n"),
       HasSubstr("air temperature is measured by two devices"));
 }
 
 TEST(EnvironmentConfiguration, RefusesADeviceWithoutAnAddressOrWithTwo) {
-  EXPECT_THAT(faults_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\n"),
+  EXPECT_THAT(fault_text_of("[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\n"),
               HasSubstr("needs one of host"));
   EXPECT_THAT(
-      faults_of(
+      fault_text_of(
           "[[environment]]\nname = \"a\"\nmap = \"vaisala-indigo520-hmp\"\nhost = \"h\"\nserial = "
           "\"/dev/ttyS0\"\n"),
       HasSubstr("needs one of host"));
@@ -165,12 +165,12 @@ TEST(EnvironmentConfiguration, DevicesOnOneSerialLineHaveTheSameSettings) {
            settings + "unit = 4\ninputs = [\"table\"]\n";
   };
 
-  EXPECT_THAT(faults_of(kScales + second("baud = 9600\nparity = \"none\"\nstop_bits = 2\n")),
+  EXPECT_THAT(fault_text_of(kScales + second("baud = 9600\nparity = \"none\"\nstop_bits = 2\n")),
               IsEmpty());
   for (const std::string settings :
        {"baud = 19200\nparity = \"none\"\nstop_bits = 2\n", "baud = 9600\n"})
     EXPECT_THAT(
-        faults_of(kScales + second(settings)),
+        fault_text_of(kScales + second(settings)),
         AllOf(HasSubstr("\"table\""), HasSubstr("\"rtd\""), HasSubstr("9600 8N2"),
               HasSubstr("/dev/serial/by-id/rs485"), HasSubstr("same baud, parity and stop_bits")));
 }
@@ -209,29 +209,29 @@ TEST(ThermalConfiguration, IsPartOfTheMachineHash) {
 
 TEST(ThermalConfiguration, RefusesATemperatureThatIsNotMeasured) {
   EXPECT_THAT(
-      faults_of(kScales +
-                "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
-                "u_alpha_um_per_m_K = 1\nu_temperature_K = 1\nfixed_mm = 0\n"),
+      fault_text_of(kScales +
+                    "[[thermal]]\naxis = \"X\"\ntemperature = \"scale_y\"\nalpha_um_per_m_K = 8\n"
+                    "u_alpha_um_per_m_K = 1\nu_temperature_K = 1\nfixed_mm = 0\n"),
       HasSubstr("no [[environment]] measures it"));
 }
 
 TEST(AirConfiguration, TakesTheUncertaintyOfCo2) {
   EXPECT_DOUBLE_EQ(config_of("[air]\nu_co2_ppm = 50\n").air.u_co2_ppm, 50.0);
-  EXPECT_THAT(faults_of("[air]\nu_co2_ppm = -1\n"), HasSubstr("air.u_co2_ppm"));
+  EXPECT_THAT(fault_text_of("[air]\nu_co2_ppm = -1\n"), HasSubstr("air.u_co2_ppm"));
 }
 
 TEST(AirConfiguration, RefusesToCorrectForAirThatIsNotMeasured) {
-  EXPECT_THAT(
-      faults_of("[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
-      HasSubstr("an [[environment]] must measure"));
+  EXPECT_THAT(fault_text_of(
+                  "[tracker]\nhost = \"t\"\nweather = \"none\"\n[air]\nassumed_index = 1.00027\n"),
+              HasSubstr("an [[environment]] must measure"));
 }
 
 TEST(AirConfiguration, RefusesToCorrectDistancesTwice) {
-  EXPECT_THAT(faults_of("[tracker]\nhost = \"t\"\n[air]\nassumed_index = 1.00027\n"),
+  EXPECT_THAT(fault_text_of("[tracker]\nhost = \"t\"\n[air]\nassumed_index = 1.00027\n"),
               HasSubstr("the controller computes the index already"));
-  EXPECT_THAT(
-      faults_of("[tracker]\nhost = \"t\"\nweather = \"read\"\n[air]\nassumed_index = 1.00027\n"),
-      IsEmpty());
+  EXPECT_THAT(fault_text_of(
+                  "[tracker]\nhost = \"t\"\nweather = \"read\"\n[air]\nassumed_index = 1.00027\n"),
+              IsEmpty());
 }
 
 }  // namespace

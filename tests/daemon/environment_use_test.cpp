@@ -15,7 +15,7 @@ using protocol::EnvironmentSample;
 using protocol::HostTime;
 using protocol::SampleFlag;
 
-constexpr HostTime kStart{100s};
+constexpr HostTime kUseStart{100s};
 constexpr auto kLag = 600ms;
 
 EnvironmentSample weather(HostTime t, double air_K) {
@@ -68,12 +68,12 @@ protocol::Snapshot at_one_metre(std::optional<double> scale_K) {
 TEST(EnvironmentMerge, TakesAQuantityFromTheDeviceThatMeasuresIt) {
   EnvironmentMerge merge{{.measured = protocol::kAirTemperature}, kLag};
   Batch b;
-  b.environment = {weather(kStart, 290.0)};
-  auto air = weather(kStart, 295.0);
+  b.environment = {weather(kUseStart, 290.0)};
+  auto air = weather(kUseStart, 295.0);
   air.measured = protocol::kAirTemperature;
   b.measured_environment = {{0, air}};
   merge.take(b);
-  const auto e = merge.at(kStart + 1s);
+  const auto e = merge.at(kUseStart + 1s);
   ASSERT_TRUE(e);
   EXPECT_EQ(e->air_temperature_K, 295.0);
   EXPECT_EQ(e->air_pressure_Pa, 101'325.0);
@@ -82,9 +82,9 @@ TEST(EnvironmentMerge, TakesAQuantityFromTheDeviceThatMeasuresIt) {
 TEST(EnvironmentMerge, NeverFallsBackToTheTrackerForWhatADeviceIsToMeasure) {
   EnvironmentMerge merge{{.measured = protocol::kAirTemperature}, kLag};
   Batch b;
-  b.environment = {weather(kStart, 290.0)};
+  b.environment = {weather(kUseStart, 290.0)};
   merge.take(b);
-  const auto e = merge.at(kStart + 1s);
+  const auto e = merge.at(kUseStart + 1s);
   ASSERT_TRUE(e);
   EXPECT_TRUE(std::isnan(e->air_temperature_K));
 }
@@ -92,22 +92,22 @@ TEST(EnvironmentMerge, NeverFallsBackToTheTrackerForWhatADeviceIsToMeasure) {
 TEST(EnvironmentMerge, LeavesOutAirThatATrackerAssumes) {
   EnvironmentMerge merge{{}, kLag};
   Batch b;
-  b.environment = {weather(kStart, 293.15)};
+  b.environment = {weather(kUseStart, 293.15)};
   b.environment[0].measured = 0;
   merge.take(b);
-  EXPECT_FALSE(merge.at(kStart + 1s));
-  merge.take(measured({scale_at(kStart, 293.0)}));
-  EXPECT_TRUE(std::isnan(merge.at(kStart + 1s)->air_temperature_K));
+  EXPECT_FALSE(merge.at(kUseStart + 1s));
+  merge.take(measured({scale_at(kUseStart, 293.0)}));
+  EXPECT_TRUE(std::isnan(merge.at(kUseStart + 1s)->air_temperature_K));
 }
 
 TEST(EnvironmentMerge, MergesTheTemperaturesOfSeveralDevices) {
   EnvironmentMerge merge{{}, kLag};
-  auto other = weather(kStart, 0.0);
+  auto other = weather(kUseStart, 0.0);
   other.measured = protocol::temperature_bit(0);
   other.temperature_K[0] = 300.0;
-  merge.take(measured({scale_at(kStart, 293.0)}, 0));
+  merge.take(measured({scale_at(kUseStart, 293.0)}, 0));
   merge.take(measured({other}, 1));
-  const auto e = merge.at(kStart + 1s);
+  const auto e = merge.at(kUseStart + 1s);
   ASSERT_TRUE(e);
   EXPECT_EQ(e->temperature_K[0], 300.0);
   EXPECT_EQ(e->temperature_K[2], 293.0);
@@ -116,28 +116,29 @@ TEST(EnvironmentMerge, MergesTheTemperaturesOfSeveralDevices) {
 TEST(EnvironmentMerge, GivesTheSameWhateverTheOrderOfArrival) {
   EnvironmentMerge early{{}, kLag};
   EnvironmentMerge late{{}, kLag};
-  const auto first = measured({scale_at(kStart, 293.0)});
-  const auto second = measured({scale_at(kStart + 500ms, 294.0)});
+  const auto first = measured({scale_at(kUseStart, 293.0)});
+  const auto second = measured({scale_at(kUseStart + 500ms, 294.0)});
   early.take(first);
   early.take(second);
   late.take(first);
   // This instant is before the second sample: its value must not be used yet.
-  EXPECT_EQ(early.at(kStart + 900ms)->temperature_K[2], late.at(kStart + 900ms)->temperature_K[2]);
+  EXPECT_EQ(early.at(kUseStart + 900ms)->temperature_K[2],
+            late.at(kUseStart + 900ms)->temperature_K[2]);
 }
 
 TEST(EnvironmentMerge, TakesSamplesInTheOrderOfTheirInstants) {
   EnvironmentMerge merge{{}, kLag};
-  merge.take(measured({scale_at(kStart + 500ms, 294.0)}));
-  merge.take(measured({scale_at(kStart, 293.0)}));
-  EXPECT_EQ(merge.at(kStart + 600ms)->temperature_K[2], 293.0);
-  EXPECT_EQ(merge.at(kStart + 1100ms)->temperature_K[2], 294.0);
+  merge.take(measured({scale_at(kUseStart + 500ms, 294.0)}));
+  merge.take(measured({scale_at(kUseStart, 293.0)}));
+  EXPECT_EQ(merge.at(kUseStart + 600ms)->temperature_K[2], 293.0);
+  EXPECT_EQ(merge.at(kUseStart + 1100ms)->temperature_K[2], 294.0);
 }
 
 TEST(EnvironmentMerge, DropsTheValueOfASilentDevice) {
   EnvironmentMerge merge{{.max_age = 60s}, kLag};
-  merge.take(measured({scale_at(kStart, 293.0)}));
-  EXPECT_EQ(merge.at(kStart + 60s)->temperature_K[2], 293.0);
-  EXPECT_TRUE(std::isnan(merge.at(kStart + 61s)->temperature_K[2]));
+  merge.take(measured({scale_at(kUseStart, 293.0)}));
+  EXPECT_EQ(merge.at(kUseStart + 60s)->temperature_K[2], 293.0);
+  EXPECT_TRUE(std::isnan(merge.at(kUseStart + 61s)->temperature_K[2]));
 }
 
 TEST(ThermalCorrection, CorrectsAnAxisToItsTruePosition) {
@@ -171,7 +172,7 @@ protocol::Snapshot with_point(double air_K) {
   s.has_tracker_point = true;
   s.tracker_point.p_tracker_m = {10.0, 0.0, 0.0};
   s.has_environment = true;
-  s.environment = weather(kStart, air_K);
+  s.environment = weather(kUseStart, air_K);
   return s;
 }
 
@@ -214,9 +215,9 @@ TEST(RawDistances, AreLeftAloneUnlessConfigured) {
 TEST(LiveView, ShowsCorrectedPositionsAndTheNewestTemperatures) {
   const drivers::MonotonicTime time;
   LiveView view{AssemblerOptions{.environment = with_scale()}, time};
-  auto batch = measured({scale_at(kStart, 296.15)});
+  auto batch = measured({scale_at(kUseStart, 296.15)});
   protocol::AxisSample axes;
-  axes.head.time = kStart;
+  axes.head.time = kUseStart;
   axes.axis_count = 3;
   axes.position = {1.1, 0.0, 0.0};
   batch.axes = {axes};
@@ -230,7 +231,7 @@ TEST(LiveView, ShowsNoAxesWithoutTheTemperatureOfTheirScale) {
   LiveView view{AssemblerOptions{.environment = with_scale()}, time};
   Batch batch;
   protocol::AxisSample axes;
-  axes.head.time = kStart;
+  axes.head.time = kUseStart;
   axes.axis_count = 3;
   batch.axes = {axes};
   view.take(batch);

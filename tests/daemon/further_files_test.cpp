@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 using protocol::HostTime;
 using ::testing::ElementsAre;
 
-const std::string kWatched = to_toml(config_tables::half_metre_mill()) + R"([tracker]
+const std::string kTrackerMill = to_toml(config_tables::half_metre_mill()) + R"([tracker]
 host = "127.0.0.1"
 [counter_card]
 transport = "usbip"
@@ -58,7 +58,7 @@ class FurtherFiles : public ::testing::Test {
   }
   /// Instants of the tracker's weather that a replay gives.
   static std::vector<HostTime> weather_of(const RecordingReader& reader, ReplaySource source) {
-    const auto config = parse_config(kWatched, "abbed.toml");
+    const auto config = parse_config(kTrackerMill, "abbed.toml");
     if (!config) throw std::runtime_error(config.error().details.front());
     std::vector<HostTime> times;
     ReplayOptions options{.source = source};
@@ -285,7 +285,7 @@ TEST_F(CutRecording, RawBytesOfEveryFileGiveTheAxesOfTheLiveRun) {
 /// Whether the axes are missing in a sample at `t` after the file began.
 std::uint8_t missing_after(const DatumState& state, const std::vector<FoundDatum>& found,
                            bool restarted) {
-  const auto config = parse_config(kWatched, "abbed.toml");
+  const auto config = parse_config(kTrackerMill, "abbed.toml");
   EXPECT_TRUE(config);
   Datum datum{*config};
   datum.go_on(state);

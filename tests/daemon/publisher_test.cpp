@@ -19,15 +19,15 @@ using ::testing::SizeIs;
 using v1::ModelStatus;
 using WallTime = Publisher::WallTime;
 
-constexpr HostTime kNow{100s};
+constexpr HostTime kPublishTime{100s};
 constexpr WallTime kWall{50s};
 
-const PublishedModel kModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
-const ModelPublication kPublication = encode_model(kModel, "mill").value();
+const PublishedModel kPublishedModel{.id = "m", .method = "otf", .model = test::synthetic_model(1)};
+const ModelPublication kPublication = encode_model(kPublishedModel, "mill").value();
 
 protocol::Snapshot view() {
   protocol::Snapshot v;
-  v.head.time = kNow;
+  v.head.time = kPublishTime;
   v.axis_count = 3;
   v.position = {0.01, -0.02, -0.25};
   return v;
@@ -36,7 +36,7 @@ protocol::Snapshot view() {
 ActiveModelState active(std::uint64_t revision = 1) {
   return {.status = ModelStatus::MODEL_ACTIVE,
           .reason = "accepted",
-          .model = &kModel,
+          .model = &kPublishedModel,
           .publication = &kPublication,
           .revision = revision};
 }
@@ -76,7 +76,7 @@ class PublisherTest : public ::testing::Test {
 TEST_F(PublisherTest, LiveVectorsKeepToTheirRates) {
   std::size_t snapshots = 0, compensations = 0;
   for (auto t = 0ms; t < 1s; t += 1ms) {
-    publish_live(view(), active(), kNow + t, kWall + t);
+    publish_live(view(), active(), kPublishTime + t, kWall + t);
     const auto seen = far_->take();
     snapshots += messages<v1::Snapshot>(seen, Topic::Snapshot).size();
     compensations += messages<v1::Compensation>(seen, Topic::Compensation).size();
@@ -87,7 +87,7 @@ TEST_F(PublisherTest, LiveVectorsKeepToTheirRates) {
 
 TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
   open({.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0});
-  for (int i = 0; i < 5; ++i) publish_live(view(), active(), kNow, kWall);
+  for (int i = 0; i < 5; ++i) publish_live(view(), active(), kPublishTime, kWall);
   const auto seen = far_->take();
   EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(5));
   EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(5));
@@ -96,7 +96,7 @@ TEST_F(PublisherTest, ARateOfZeroIsEveryTime) {
 TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
   auto state = active();
   state.status = ModelStatus::MODEL_STALE;
-  publish_live(view(), state, kNow + 2ms, kWall);
+  publish_live(view(), state, kPublishTime + 2ms, kWall);
   const auto sent = taken<v1::Compensation>(Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
@@ -104,11 +104,11 @@ TEST_F(PublisherTest, ACompensationCarriesTheStateOfTheModel) {
 }
 
 TEST_F(PublisherTest, AnAxisThatBecomesMissingIsPublishedAtOnce) {
-  publish_live(view(), active(), kNow, kWall);
+  publish_live(view(), active(), kPublishTime, kWall);
   auto broken = view();
   broken.head.time += 1ms;
   broken.missing_mask = 0b010;
-  publish_live(broken, active(), kNow + 1ms, kWall + 1ms);
+  publish_live(broken, active(), kPublishTime + 1ms, kWall + 1ms);
   const auto seen = far_->take();
   EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(2));
   const auto sent = messages<v1::Compensation>(seen, Topic::Compensation);
@@ -120,46 +120,47 @@ TEST_F(PublisherTest, AnAxisThatStaysMissingKeepsToTheRate) {
   auto broken = view();
   broken.missing_mask = 0b010;
   for (auto t = 0ms; t < 10ms; t += 1ms)
-    publish_live(t < 1ms ? view() : broken, active(), kNow + t, kWall + t);
+    publish_live(t < 1ms ? view() : broken, active(), kPublishTime + t, kWall + t);
   EXPECT_THAT(taken<v1::Compensation>(Topic::Compensation), SizeIs(2));
 }
 
 TEST_F(PublisherTest, WithAnAxisMissingNoCompensationIsActive) {
   auto broken = view();
   broken.missing_mask = 0b010;
-  publish_live(broken, active(), kNow, kWall);
+  publish_live(broken, active(), kPublishTime, kWall);
   const auto sent = taken<v1::Compensation>(Topic::Compensation);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].state(), ModelStatus::MODEL_STALE);
 }
 
 TEST_F(PublisherTest, WithoutAxesThereIsASnapshotAndNoCompensation) {
-  publish_live({}, active(), kNow, kWall);
+  publish_live({}, active(), kPublishTime, kWall);
   const auto seen = far_->take();
   EXPECT_THAT(messages<v1::Snapshot>(seen, Topic::Snapshot), SizeIs(1));
   EXPECT_THAT(messages<v1::Compensation>(seen, Topic::Compensation), SizeIs(0));
 }
 
 TEST_F(PublisherTest, ModelAndGridGoOutOncePerRevision) {
-  for (int turn = 0; turn < 3; ++turn) publisher_->model(active(1), kNow, kWall);
+  for (int turn = 0; turn < 3; ++turn) publisher_->model(active(1), kPublishTime, kWall);
   auto seen = far_->take();
   EXPECT_THAT(messages<v1::ErrorModel>(seen, Topic::ErrorModel), SizeIs(1));
   EXPECT_FALSE(messages<v1::ErrorGrid>(seen, Topic::ErrorGrid).empty());
-  publisher_->model(active(2), kNow, kWall);
+  publisher_->model(active(2), kPublishTime, kWall);
   seen = far_->take();
   EXPECT_THAT(messages<v1::ErrorModel>(seen, Topic::ErrorModel), SizeIs(1));
   EXPECT_THAT(messages<v1::ModelState>(seen, Topic::ModelState), SizeIs(1));
 }
 
 TEST_F(PublisherTest, MessagesEncodedElsewhereGetSequenceNumbersOfThisPublisher) {
-  publish_live(view(), active(), kNow, kWall);  // has numbers already
+  publish_live(view(), active(), kPublishTime, kWall);  // has numbers already
   const auto before = taken<v1::Compensation>(Topic::Compensation).at(0).sequence_number();
-  publisher_->model(active(), kNow, kWall);
+  publisher_->model(active(), kPublishTime, kWall);
   const auto seen = far_->take();
   const auto models = messages<v1::ErrorModel>(seen, Topic::ErrorModel);
   ASSERT_THAT(models, SizeIs(1));
-  EXPECT_EQ(models[0], model_message(kModel, {.machine = "mill", .sequence_number = before + 1}));
-  auto expected = grid_messages(kModel, {.machine = "mill"});
+  EXPECT_EQ(models[0],
+            model_message(kPublishedModel, {.machine = "mill", .sequence_number = before + 1}));
+  auto expected = grid_messages(kPublishedModel, {.machine = "mill"});
   for (std::size_t i = 0; i < expected.size(); ++i) expected[i].sequence_number(before + 2 + i);
   EXPECT_EQ(messages<v1::ErrorGrid>(seen, Topic::ErrorGrid), expected);
 }
@@ -167,14 +168,14 @@ TEST_F(PublisherTest, MessagesEncodedElsewhereGetSequenceNumbersOfThisPublisher)
 TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
   std::size_t sent = 0;
   for (auto t = 0ms; t <= 2500ms; t += 10ms) {
-    publisher_->model({}, kNow + t, kWall + t);
+    publisher_->model({}, kPublishTime + t, kWall + t);
     sent += taken<v1::ModelState>(Topic::ModelState).size();
   }
 
   EXPECT_EQ(sent, 3u);
   auto state = active();
   state.reason = "forced by anna: crane test";
-  publisher_->model(state, kNow + 2510ms, kWall + 2510ms);
+  publisher_->model(state, kPublishTime + 2510ms, kWall + 2510ms);
   const auto changed = taken<v1::ModelState>(Topic::ModelState);
   ASSERT_THAT(changed, SizeIs(1));
   EXPECT_EQ(changed[0].state(), ModelStatus::MODEL_ACTIVE);
@@ -182,11 +183,11 @@ TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
 }
 
 TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
-  auto model = kModel;
-  model.active_since = kNow - 1h;
+  auto model = kPublishedModel;
+  model.active_since = kPublishTime - 1h;
   auto state = active();
   state.model = &model;
-  publisher_->model(state, kNow, kWall);
+  publisher_->model(state, kPublishTime, kWall);
   const auto sent = taken<v1::ModelState>(Topic::ModelState);
   ASSERT_THAT(sent, SizeIs(1));
   EXPECT_EQ(sent[0].age_ns(), std::chrono::nanoseconds{1h}.count());
@@ -194,7 +195,7 @@ TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
 
 TEST_F(PublisherTest, AMessageOutsideItsBoundsIsCountedAndNamed) {
   open({.machine = std::string(65, 'm')});
-  publish_live(view(), active(), kNow, kWall);
+  publish_live(view(), active(), kPublishTime, kWall);
   EXPECT_EQ(publisher_->link().counters().refused, 2u);
   EXPECT_THAT(publisher_->refusal(), testing::HasSubstr("machine"));
 }
@@ -204,7 +205,7 @@ TEST_F(PublisherTest, EveryStreamHasItsHealth) {
   streams[0].status.name = "tracker";
   streams[1].status.name = "encoder";
   streams[1].status.last_fault = "no answer";
-  publisher_->health(streams, kNow);
+  publisher_->health(streams, kPublishTime);
   const auto sent = taken<v1::Health>(Topic::Health);
   ASSERT_THAT(sent, SizeIs(2));
   EXPECT_EQ(sent[1].stream(), "encoder");

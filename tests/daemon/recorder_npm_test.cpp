@@ -138,9 +138,9 @@ TEST_F(RecordingInPublicLibraries, MetadataAndAttachmentsAreRead) {
 }
 
 TEST_F(RecordingInPublicLibraries, AFileCutAtAnyByteStillGivesEveryFinishedChunk) {
-  constexpr std::uint32_t kChunks = 3;
-  constexpr std::uint32_t kPerChunk = 10;
-  const auto file = example_recording(folder_.path(), kChunks, kPerChunk);
+  constexpr std::uint32_t kFileChunks = 3;
+  constexpr std::uint32_t kMessagesPerChunk = 10;
+  const auto file = example_recording(folder_.path(), kFileChunks, kMessagesPerChunk);
   const auto bytes = bytes_of_file(file);
   std::vector<std::size_t> starts;
   std::vector<std::size_t> ends;
@@ -152,7 +152,7 @@ TEST_F(RecordingInPublicLibraries, AFileCutAtAnyByteStillGivesEveryFinishedChunk
     ends.push_back(item->record.end());
   }
 
-  ASSERT_EQ(ends.size(), kChunks);
+  ASSERT_EQ(ends.size(), kFileChunks);
   write_file(folder_.path() / "data.mcap", bytes, scan.whole_until());
   const auto data = (folder_.path() / "data.mcap").string();
   const json seen =
@@ -162,7 +162,7 @@ TEST_F(RecordingInPublicLibraries, AFileCutAtAnyByteStillGivesEveryFinishedChunk
   for (const json& at : seen) {
     const auto finished =
         std::ranges::count_if(ends, [&](std::size_t end) { return end <= at[0]; });
-    ASSERT_EQ(at[1], finished * kPerChunk) << "cut at " << at[0];
+    ASSERT_EQ(at[1], finished * kMessagesPerChunk) << "cut at " << at[0];
   }
 }
 

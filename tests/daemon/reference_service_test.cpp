@@ -19,7 +19,7 @@ using protocol::SampleFlag;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-const std::string kMachine = to_toml(config_tables::half_metre_mill());
+const std::string kHalfMetreMill = to_toml(config_tables::half_metre_mill());
 const std::string kCard = R"([counter_card]
 transport = "usbip"
 port = 3240
@@ -33,18 +33,18 @@ std::string reference(const std::string& more,
          "axes = [{" + axis + ", signal_period_um = 20, length_mm = 500, zero_mark_mm = 10}]\n";
 }
 
-Config config_of(const std::string& text) {
-  auto config = parse_config(kMachine + text, "abbed.toml");
+Config reference_config_of(const std::string& text) {
+  auto config = parse_config(kHalfMetreMill + text, "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
   return config ? *config : Config{};
 }
-std::vector<std::string> faults_of(const std::string& text) {
-  const auto config = parse_config(kMachine + text, "abbed.toml");
+std::vector<std::string> reference_faults_of(const std::string& text) {
+  const auto config = parse_config(kHalfMetreMill + text, "abbed.toml");
   return config ? std::vector<std::string>{} : config.error().details;
 }
 
 TEST(ReferenceConfig, TakesTheStepFromTheCardThatCountsLive) {
-  const auto config = config_of(kCard + reference(""));
+  const auto config = reference_config_of(kCard + reference(""));
   ASSERT_TRUE(config.of<ReferenceConfig>());
   const auto options = reference_options(*reference_marks(config), *counted_axes(config));
   ASSERT_EQ(options.axes.size(), 1u);
@@ -56,24 +56,26 @@ TEST(ReferenceConfig, TakesTheStepFromTheCardThatCountsLive) {
 }
 
 TEST(ReferenceConfig, NeedsTheAxesCountedLiveByAnotherCard) {
-  EXPECT_THAT(faults_of(reference("")), Contains(HasSubstr("needs [counter_card]")));
-  EXPECT_THAT(faults_of(kCard + reference("", R"(axis = "A", channel = 2)")),
+  EXPECT_THAT(reference_faults_of(reference("")), Contains(HasSubstr("needs [counter_card]")));
+  EXPECT_THAT(reference_faults_of(kCard + reference("", R"(axis = "A", channel = 2)")),
               Contains(HasSubstr("is not counted by [counter_card]")));
-  EXPECT_THAT(faults_of(kCard + "[reference]\ntransport = \"usbip\"\nport = 3240\naxes = []\n"),
-              Contains(HasSubstr("is the card of [counter_card]")));
+  EXPECT_THAT(
+      reference_faults_of(kCard + "[reference]\ntransport = \"usbip\"\nport = 3240\naxes = []\n"),
+      Contains(HasSubstr("is the card of [counter_card]")));
 }
 
 TEST(ReferenceConfig, RefusesAPeriodThatHoldsNoWholeNumberOfCounts) {
   const std::string odd =
       "[reference]\ntransport = \"usbip\"\nport = 3241\naxes = [{axis = \"X\", channel = 0, "
       "signal_period_um = 20.1, length_mm = 500}]\n";
-  EXPECT_THAT(faults_of(kCard + odd), Contains(HasSubstr("must be a whole number")));
+  EXPECT_THAT(reference_faults_of(kCard + odd), Contains(HasSubstr("must be a whole number")));
 }
 
 TEST(ReferenceConfig, IsPartOfTheMachineHash) {
-  EXPECT_NE(machine_hash(config_of(kCard)), machine_hash(config_of(kCard + reference(""))));
-  EXPECT_EQ(machine_hash(config_of(kCard + reference("tolerance_um = 2\n"))),
-            machine_hash(config_of(kCard + reference(""))));
+  EXPECT_NE(machine_hash(reference_config_of(kCard)),
+            machine_hash(reference_config_of(kCard + reference(""))));
+  EXPECT_EQ(machine_hash(reference_config_of(kCard + reference("tolerance_um = 2\n"))),
+            machine_hash(reference_config_of(kCard + reference(""))));
 }
 
 /// Z of the machine, read by both cards at 1 kHz; counts fall as it rises. The scale's zero mark is
@@ -127,7 +129,7 @@ Batch drive(ReferenceService& service, Traverse& traverse) {
 }
 
 TEST(ReferenceService, AnAxisIsMissingUntilItsMarksWereFound) {
-  const auto config = config_of(kCard + reference("tolerance_um = 5\n"));
+  const auto config = reference_config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   Traverse traverse;
   Batch batch = traverse.step(0.1);
@@ -138,7 +140,7 @@ TEST(ReferenceService, AnAxisIsMissingUntilItsMarksWereFound) {
 }
 
 TEST(ReferenceService, AReferencedAxisReadsTheMachinesPosition) {
-  const auto config = config_of(kCard + reference("tolerance_um = 5\n"));
+  const auto config = reference_config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   ASSERT_TRUE(service.start());
   Traverse traverse;
@@ -150,7 +152,7 @@ TEST(ReferenceService, AReferencedAxisReadsTheMachinesPosition) {
 }
 
 TEST(ReferenceService, ACardThatRestartedHasNoDatum) {
-  const auto config = config_of(kCard + reference("tolerance_um = 5\n"));
+  const auto config = reference_config_of(kCard + reference("tolerance_um = 5\n"));
   ReferenceService service{config, nullptr};
   ASSERT_TRUE(service.start());
   Traverse traverse;
@@ -163,10 +165,10 @@ TEST(ReferenceService, ACardThatRestartedHasNoDatum) {
 }
 
 TEST(ReferenceService, RefusesWithoutMarksAndASecondTime) {
-  const auto without = config_of(kCard);
+  const auto without = reference_config_of(kCard);
   ReferenceService none{without, nullptr};
   EXPECT_EQ(none.start().error().code, ErrorCode::Refused);
-  const auto config = config_of(kCard + reference(""));
+  const auto config = reference_config_of(kCard + reference(""));
   ReferenceService service{config, nullptr};
   EXPECT_EQ(service.cancel().error().code, ErrorCode::Refused);
   ASSERT_TRUE(service.start());
@@ -201,7 +203,7 @@ SetDatumHere z_at(HostTime now) {
 }
 
 TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilADatumIsSet) {
-  const auto config = config_of(kCard);
+  const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
 
   EXPECT_EQ(service.set_datum_here({}).error().code, ErrorCode::Refused);
@@ -220,7 +222,7 @@ TEST(ReferenceService, AxesWithoutMarksAreUnreferencedUntilADatumIsSet) {
 }
 
 TEST(ReferenceService, RefusesToSetTheDatumOfAMovingAxis) {
-  const auto config = config_of(kCard);
+  const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   Batch batch = counts(HostTime{2s}, 440);
@@ -238,7 +240,7 @@ TEST(ReferenceService, RefusesToSetTheDatumOfAMovingAxis) {
 }
 
 TEST(ReferenceService, RefusesToSetTheDatumWhileTheCardIsSilent) {
-  const auto config = config_of(kCard);
+  const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   const auto silent = service.set_datum_here(z_at(HostTime{2600ms}));
@@ -248,7 +250,7 @@ TEST(ReferenceService, RefusesToSetTheDatumWhileTheCardIsSilent) {
 }
 
 TEST(ReferenceService, NoDatumChangesDuringACalibration) {
-  const auto config = config_of(kCard);
+  const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   auto here = z_at(HostTime{2s});
@@ -259,7 +261,7 @@ TEST(ReferenceService, NoDatumChangesDuringACalibration) {
 }
 
 TEST(ReferenceService, RefusesADatumWithoutUncertainty) {
-  const auto config = config_of(kCard);
+  const auto config = reference_config_of(kCard);
   ReferenceService service{config, nullptr};
   stand(service, 400);
   auto here = z_at(HostTime{2s});
@@ -269,8 +271,8 @@ TEST(ReferenceService, RefusesADatumWithoutUncertainty) {
 }
 
 TEST(ReferenceService, AConfiguredDatumIsValidForTheFirstSetUpOnly) {
-  const auto config =
-      config_of(kCard.substr(0, kCard.find("axes")) + kHere + kCard.substr(kCard.find("axes")));
+  const auto config = reference_config_of(kCard.substr(0, kCard.find("axes")) + kHere +
+                                          kCard.substr(kCard.find("axes")));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 400, true);
   give(service, batch);
@@ -287,8 +289,8 @@ TEST(ReferenceService, AConfiguredDatumIsValidForTheFirstSetUpOnly) {
 }
 
 TEST(ReferenceService, ItIsDecidedForEachAxis) {
-  const auto config = config_of(kCard.substr(0, kCard.find("axes")) + kHere +
-                                kCard.substr(kCard.find("axes")) + reference(""));
+  const auto config = reference_config_of(kCard.substr(0, kCard.find("axes")) + kHere +
+                                          kCard.substr(kCard.find("axes")) + reference(""));
   ReferenceService service{config, nullptr};
   Batch batch = counts(HostTime{1s}, 0, true);
   give(service, batch);
@@ -312,7 +314,7 @@ TEST(Datum, IsTheSameFromTheRecording) {
 }
 
 TEST(Datum, AppliesToSamplesLaterThanItWasFound) {
-  Datum datum{config_of(kCard + reference(""))};
+  Datum datum{reference_config_of(kCard + reference(""))};
   datum.found({.axis = 2, .reading_at_zero = 0.3, .from = HostTime{10s}});
   Batch batch;
 

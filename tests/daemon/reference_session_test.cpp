@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 using drivers::MarkCrossing;
 using protocol::AxisSample;
 using protocol::HostTime;
-using State = AxisReference::State;
+using ReferenceState = AxisReference::State;
 
 constexpr double kPeriod_m = 20e-6;
 constexpr double kCountsPerPeriod = 80.0;  // 0.25 um a count
@@ -74,7 +74,7 @@ TEST(ReferenceSession, FindsThePositionAtWhichTheLiveCounterStarted) {
   TwoCards cards;
   cards.drive(
       session, [](double t) { return 0.1 + 1e-3 * t; }, 45.0);
-  ASSERT_EQ(session.axis(0).state, State::Found) << session.axis(0).reason;
+  ASSERT_EQ(session.axis(0).state, ReferenceState::Found) << session.axis(0).reason;
   const double truth = kPeriod_m / kCountsPerPeriod * static_cast<double>(cards.live_zero);
   EXPECT_NEAR(session.axis(0).offset, truth, 2.5e-6);
   EXPECT_NEAR(session.axis(0).offset, truth, 3.0 * session.axis(0).u_offset);
@@ -89,7 +89,7 @@ TEST(ReferenceSession, DrivenSlowlyAlignsTheCardsToACount) {
   TwoCards cards;
   cards.drive(
       session, [](double t) { return 0.1095 + 0.12e-3 * t; }, 260.0);
-  ASSERT_EQ(session.axis(0).state, State::Found) << session.axis(0).reason;
+  ASSERT_EQ(session.axis(0).state, ReferenceState::Found) << session.axis(0).reason;
   EXPECT_NEAR(session.axis(0).offset,
               kPeriod_m / kCountsPerPeriod * static_cast<double>(cards.live_zero), 0.25e-6);
 }
@@ -101,7 +101,7 @@ TEST(ReferenceSession, ReportsThatTheCardsMustBeAlignedBetter) {
   TwoCards cards;
   cards.drive(
       session, [](double t) { return 0.1 + 5e-3 * t; }, 10.0);
-  EXPECT_EQ(session.axis(0).state, State::Searching);
+  EXPECT_EQ(session.axis(0).state, ReferenceState::Searching);
   EXPECT_NE(session.axis(0).reason.find("slowly"), std::string::npos) << session.axis(0).reason;
 }
 
@@ -111,7 +111,7 @@ TEST(ReferenceSession, AReversalBetweenMarksDiscardsTheMarksBefore) {
   // Two marks up, back over them, two up again: never four of one direction.
   cards.drive(
       session, [](double t) { return 0.1355 + 0.012 * std::sin(2.0 * t); }, 10.0);
-  EXPECT_EQ(session.axis(0).state, State::Searching);
+  EXPECT_EQ(session.axis(0).state, ReferenceState::Searching);
   EXPECT_GT(session.axis(0).marks, 8u);
 }
 
@@ -133,7 +133,7 @@ TEST(ReferenceSession, NamesACardThatMiscounts) {
     if (i == 5) session.take(MarkCrossing{{.time = now}, now - kScan, 0, count - cards.latch_zero});
   }
 
-  EXPECT_EQ(session.axis(0).state, State::Failed);
+  EXPECT_EQ(session.axis(0).state, ReferenceState::Failed);
   EXPECT_NE(session.axis(0).reason.find("miscounts"), std::string::npos);
 }
 

@@ -30,7 +30,7 @@ Config tracker_and_encoders() {
   return std::move(*parsed);
 }
 
-protocol::AxisSample axes_at(HostTime t) {
+protocol::AxisSample replayed_axes_at(HostTime t) {
   auto sample = example_axes(0);
   sample.head.time = t;
   sample.missing_mask = 0;
@@ -38,7 +38,7 @@ protocol::AxisSample axes_at(HostTime t) {
   return sample;
 }
 
-protocol::TrackerPoint point_at(HostTime t) {
+protocol::TrackerPoint replayed_point_at(HostTime t) {
   auto point = example_point(0);
   point.head = {.time = t};
   return point;
@@ -83,9 +83,9 @@ TEST(ReplayTurns, ASampleThatWasLateLiveIsLateInTheReplay) {
   for (HostTime t = start; t < start + 4s; t += 10ms) {
     Batch batch;
     batch.taken = t + 1ms;
-    batch.points = {point_at(t + 500us)};
+    batch.points = {replayed_point_at(t + 500us)};
     const bool keeps_up = t < start + 1s || t > start + 3s;
-    (keeps_up ? batch : late).axes.push_back(axes_at(t));
+    (keeps_up ? batch : late).axes.push_back(replayed_axes_at(t));
     if (keeps_up && !late.axes.empty()) {
       batch.axes.insert(batch.axes.begin(), late.axes.begin(), late.axes.end());
       late.clear();
@@ -126,7 +126,7 @@ TEST(ReplayTurns, APointDatedSecondsAheadKeepsItsPlace) {
     Batch batch;
     batch.taken = start + 20s + i * 2ms;
     // The clock of the tracker was learnt from a packet that was read ten seconds late.
-    batch.points = {point_at(start + i * 2ms + (i < 100 ? 10s : 0s))};
+    batch.points = {replayed_point_at(start + i * 2ms + (i < 100 ? 10s : 0s))};
     live.push_back(batch.points[0].head.time);
     hub.cycle(batch);
   }

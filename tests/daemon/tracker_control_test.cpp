@@ -26,7 +26,7 @@ using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr auto kPatience = 60s;
+constexpr auto kReplyPatience = 60s;
 
 sim::VirtualMachine machine_at_rest() {
   sim::PathPlan plan;
@@ -115,7 +115,7 @@ class TrackerControl : public ::testing::Test {
   }
 
   [[nodiscard]] Result<json> ask(const json& request) const {
-    return ask_daemon(socket_, request, kPatience);
+    return ask_daemon(socket_, request, kReplyPatience);
   }
   [[nodiscard]] std::string refusal_of(const json& request) const {
     const auto answer = ask(request);
@@ -126,7 +126,7 @@ class TrackerControl : public ::testing::Test {
     return status ? status->value("tracker", json::object()) : json::object();
   }
   [[nodiscard]] bool reaches(const std::string& state) const {
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kReplyPatience;
     while (tracker().value("state", "") != state && std::chrono::steady_clock::now() < end)
       std::this_thread::sleep_for(5ms);
     return tracker().value("state", "") == state;
@@ -135,7 +135,7 @@ class TrackerControl : public ::testing::Test {
   [[nodiscard]] json carried_out(const json& request) const {
     const auto given = ask(request);
     if (!given) return {};
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kReplyPatience;
     while (std::chrono::steady_clock::now() < end) {
       for (const json& order : tracker().value("orders", json::array()))
         if (order["number"] == (*given)["order"] && order["outcome"] != "running") return order;

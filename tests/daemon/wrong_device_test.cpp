@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-const std::string kMachine = to_toml(config_tables::half_metre_mill());
+const std::string kConfiguredMill = to_toml(config_tables::half_metre_mill());
 
 struct Expecting {
   std::string device;  ///< its table, without the port
@@ -30,7 +30,7 @@ TEST_P(WrongDevice, IsReportedByNameAndGivesNoSamples) {
   auto thermometer = sim::ModbusServer::open({}, time.now()).value();
   const std::string port = std::to_string(thermometer.port());
   const auto config =
-      parse_config(kMachine + GetParam().device + "port = " + port + "\n", "abbed.toml");
+      parse_config(kConfiguredMill + GetParam().device + "port = " + port + "\n", "abbed.toml");
   ASSERT_TRUE(config) << config.error().details.front();
   auto devices = DeviceSet::start(*config, time);
   ASSERT_TRUE(devices) << devices.error().text;

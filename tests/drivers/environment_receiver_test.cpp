@@ -19,7 +19,7 @@ using protocol::HostTime;
 using testing::HasSubstr;
 using Progress = EnvironmentReceiver::Progress;
 
-constexpr HostTime kStart{1h};
+constexpr HostTime kLineStart{1h};
 
 class Receiver : public testing::TestWithParam<Transport> {
  protected:
@@ -37,7 +37,7 @@ class Receiver : public testing::TestWithParam<Transport> {
   }
   EnvironmentReceiver receiver_{small_map(), GetParam()};
   std::map<std::uint16_t, std::uint16_t> registers_ = small_registers();
-  HostTime now_ = kStart;
+  HostTime now_ = kLineStart;
   Progress last_ = Progress::Waiting;
 };
 
@@ -55,7 +55,7 @@ TEST_P(Receiver, ChecksTheDeviceThenMeasures) {
 
 TEST_P(Receiver, DatesASampleInTheMiddleOfItsRound) {
   to_first_sample();
-  EXPECT_EQ(receiver_.sample().head.time, kStart + 40ms);  // round from 20 ms to 60 ms
+  EXPECT_EQ(receiver_.sample().head.time, kLineStart + 40ms);  // round from 20 ms to 60 ms
   EXPECT_NEAR(static_cast<double>(receiver_.sample().head.u_time.count()), 40e6 / std::sqrt(12.0),
               1.0);
 }

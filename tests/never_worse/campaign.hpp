@@ -31,6 +31,12 @@ struct Outcome {
   std::size_t covered = 0, intervals = 0;  ///< components of V inside their 95 % interval
 };
 
+inline Outcome refused(std::string reason) {
+  Outcome o;
+  o.first_reason = std::move(reason);
+  return o;
+}
+
 /// The expected diagnosis of a fault: the cause of the first reason of a verdict, or words in the
 /// text of an error before any verdict. Empty: no diagnosis is required.
 struct Names {

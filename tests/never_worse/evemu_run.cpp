@@ -294,12 +294,6 @@ void scale_errors(EvemuRun& run, double mean_error_m) {
   draw_errors(run, kUnit_m * mean_error_m / mean_length(rigid_free));
 }
 
-Outcome refused(std::string reason) {
-  Outcome o;
-  o.first_reason = std::move(reason);
-  return o;
-}
-
 /// About 250 points inside the validity volume of the model.
 std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   const evemu::ReadingBox box = evemu::bounding_box(volume.vertices_m());

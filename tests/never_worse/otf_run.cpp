@@ -37,8 +37,9 @@ std::vector<Vector3> stretched_path(const sim::TruthMachine& truth) {
   return path;
 }
 
-const std::array<const char*, 6> kChains{"[w X' b Y Z (C1) t]", "[w Y' b X Z t]", "[w X' Y' b Z t]",
-                                         "[w b Z Y X t]",       "[w Z' b X Y t]", "[w Y' b Z X t]"};
+const std::array<const char*, 6> kPathChains{"[w X' b Y Z (C1) t]", "[w Y' b X Z t]",
+                                             "[w X' Y' b Z t]",     "[w b Z Y X t]",
+                                             "[w Z' b X Y t]",      "[w Y' b Z X t]"};
 
 void make_machine(OtfRun& run, double spacing_m) {
   for (const sim::Axis a : sim::kAxes) {
@@ -97,12 +98,6 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
   }
 
   return samples;
-}
-
-Outcome refused(std::string reason) {
-  Outcome o;
-  o.first_reason = std::move(reason);
-  return o;
 }
 
 void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
@@ -192,7 +187,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   OtfRun run;
   run.random.seed(seed);
   std::mt19937_64& random = run.random;
-  const std::string chain = kChains[random() % kChains.size()];
+  const std::string chain = kPathChains[random() % kPathChains.size()];
   run.truth.order = *sim::parse_chain(chain);
   run.machine.chain = *calib::KinematicChain::parse(chain);
 
@@ -254,7 +249,7 @@ std::vector<Fault<OtfRun>> otf_faults() {
        [](OtfRun& r) {
          std::string other;
          do {
-           other = kChains[r.random() % kChains.size()];
+           other = kPathChains[r.random() % kPathChains.size()];
          } while (calib::KinematicChain::parse(other)->order_w_to_t() ==
                   r.machine.chain.order_w_to_t());
          r.machine.chain = *calib::KinematicChain::parse(other);

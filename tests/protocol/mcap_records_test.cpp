@@ -7,7 +7,7 @@
 namespace abbe::protocol::mcap {
 namespace {
 
-Bytes bytes_of(std::string_view text) {
+Bytes record_bytes_of(std::string_view text) {
   return std::as_bytes(std::span{text});
 }
 
@@ -36,7 +36,7 @@ TEST(McapRecords, AHeaderIsLaidOutAsInTheSpecification) {
   Buffer buffer;
   append(buffer, Header{"ros2", "me"});
   const std::string_view expected{"\x01\x0E\0\0\0\0\0\0\0\x04\0\0\0ros2\x02\0\0\0me", 9 + 14};
-  EXPECT_TRUE(std::ranges::equal(buffer, bytes_of(expected)));
+  EXPECT_TRUE(std::ranges::equal(buffer, record_bytes_of(expected)));
 }
 
 TEST(McapRecords, AFooterIsTwentyBytesOfContent) {
@@ -44,7 +44,7 @@ TEST(McapRecords, AFooterIsTwentyBytesOfContent) {
   append(buffer, Footer{0x0102, 0x0304, 0x0A0B0C0D});
   const std::string_view expected{
       "\x02\x14\0\0\0\0\0\0\0\x02\x01\0\0\0\0\0\0\x04\x03\0\0\0\0\0\0\x0D\x0C\x0B\x0A", 29};
-  EXPECT_TRUE(std::ranges::equal(buffer, bytes_of(expected)));
+  EXPECT_TRUE(std::ranges::equal(buffer, record_bytes_of(expected)));
   EXPECT_EQ(buffer.size(), kFooterRecordSize);
 }
 
@@ -55,16 +55,17 @@ TEST(McapRecords, EveryKindSurvivesARoundTrip) {
   const Buffer pairs(30, std::byte{7});
   const Buffer entries(32, std::byte{9});
   expect_round_trip(Header{"", "library"}, Opcode::Header);
-  expect_round_trip(Schema{3, "a::B", "omgidl", bytes_of("struct")}, Opcode::Schema);
+  expect_round_trip(Schema{3, "a::B", "omgidl", record_bytes_of("struct")}, Opcode::Schema);
   expect_round_trip(Channel{1, 3, "topic", "cdr", StringMap{map}}, Opcode::Channel);
-  expect_round_trip(Message{1, 2, 3, 4, bytes_of("data")}, Opcode::Message);
-  expect_round_trip(Chunk{{1, 2, 4, 5, "", 4}, bytes_of("recs")}, Opcode::Chunk);
+  expect_round_trip(Message{1, 2, 3, 4, record_bytes_of("data")}, Opcode::Message);
+  expect_round_trip(Chunk{{1, 2, 4, 5, "", 4}, record_bytes_of("recs")}, Opcode::Chunk);
   expect_round_trip(MessageIndex{1, decltype(MessageIndex::entries){entries}},
                     Opcode::MessageIndex);
   expect_round_trip(
       ChunkIndex{1, 2, 3, 4, decltype(ChunkIndex::index_offsets){pairs}, 5, "lz4", 6, 7},
       Opcode::ChunkIndex);
-  expect_round_trip(Attachment{1, 2, "path.csv", "text/csv", bytes_of("x_mm")}, Opcode::Attachment);
+  expect_round_trip(Attachment{1, 2, "path.csv", "text/csv", record_bytes_of("x_mm")},
+                    Opcode::Attachment);
   expect_round_trip(AttachmentIndex{1, 2, 3, 4, 5, "path.csv", "text/csv"},
                     Opcode::AttachmentIndex);
   expect_round_trip(
@@ -102,7 +103,7 @@ TEST(McapRecords, EveryShortenedContentIsRefused) {
 
 TEST(McapRecords, FieldsANewerWriterAddsAreSkipped) {
   Buffer buffer;
-  append(buffer, Schema{3, "a::B", "omgidl", bytes_of("struct")});
+  append(buffer, Schema{3, "a::B", "omgidl", record_bytes_of("struct")});
   buffer.push_back(std::byte{42});
   const auto schema = decode<Schema>(Bytes{buffer}.subspan(kRecordHeadSize));
   ASSERT_TRUE(schema);
@@ -122,7 +123,7 @@ TEST(McapRecords, AMapWhoseLastEntryIsTornIsRefused) {
 
 TEST(McapRecords, AnAttachmentWithAFlippedBitIsRefused) {
   Buffer buffer;
-  append(buffer, Attachment{1, 2, "path.csv", "text/csv", bytes_of("x_mm,y_mm,z_mm")});
+  append(buffer, Attachment{1, 2, "path.csv", "text/csv", record_bytes_of("x_mm,y_mm,z_mm")});
   buffer[buffer.size() - 8] ^= std::byte{1};
   const auto attachment = decode<Attachment>(Bytes{buffer}.subspan(kRecordHeadSize));
   ASSERT_FALSE(attachment);

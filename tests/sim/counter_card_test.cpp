@@ -15,12 +15,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr double kClock_hz = 1e6;
-const HostTime kStart{1h};
+const HostTime kCardStart{1h};
 
 CounterCardOptions options() {
   CounterCardOptions card;
   card.channels[0].phases =
-      ScaleSignal{.reading = [](HostTime t) { return 0.5 * ns_to_seconds(t - kStart); },
+      ScaleSignal{.reading = [](HostTime t) { return 0.5 * ns_to_seconds(t - kCardStart); },
                   .step = 1e-6,
                   .noise = 0.0,
                   .marks = {}};
@@ -48,15 +48,15 @@ class CounterCardTest : public testing::Test {
     for (const auto& write : quad08::channel_writes(channel, setup, {}, {}))
       (void)card_.control(write, at);
   }
-  /// 1000 scans per second of scale, clock, latch and edges, set up and started at kStart.
+  /// 1000 scans per second of scale, clock, latch and edges, set up and started at kCardStart.
   void start() {
-    set_up(0, {.mode = quad08::CounterMode::Encoder}, kStart);
-    set_up(5, {}, kStart);
-    set_up(6, {.latch_on_index = true}, kStart);
-    set_up(7, {}, kStart);
-    run(quad08::load_sequence(layout(), *quad08::pacer_divisor(1000.0)), kStart);
-    run(quad08::arm_sequence(), kStart);
-    (void)card_.control(quad08::start_pacer(), kStart);
+    set_up(0, {.mode = quad08::CounterMode::Encoder}, kCardStart);
+    set_up(5, {}, kCardStart);
+    set_up(6, {.latch_on_index = true}, kCardStart);
+    set_up(7, {}, kCardStart);
+    run(quad08::load_sequence(layout(), *quad08::pacer_divisor(1000.0)), kCardStart);
+    run(quad08::arm_sequence(), kCardStart);
+    (void)card_.control(quad08::start_pacer(), kCardStart);
   }
   std::vector<quad08::RawScan> scans() {
     quad08::ScanDecoder decoder{layout()};
@@ -67,7 +67,7 @@ class CounterCardTest : public testing::Test {
     return all;
   }
   [[nodiscard]] quad08::Status status() {
-    const auto answer = card_.control(quad08::read(quad08::Register::Acquisition), kStart);
+    const auto answer = card_.control(quad08::read(quad08::Register::Acquisition), kCardStart);
     return {*quad08::decode_word(*answer)};
   }
   CounterCard card_{options()};
@@ -75,7 +75,7 @@ class CounterCardTest : public testing::Test {
 
 TEST_F(CounterCardTest, CountsFromThePositionAtSetUp) {
   start();
-  card_.advance(kStart + 10ms, 0);
+  card_.advance(kCardStart + 10ms, 0);
   const auto all = scans();
   ASSERT_EQ(all.size(), 10u);
   EXPECT_EQ(all[0][0], 500u);  // 0.5 m/s, 1 um, after 1 ms
@@ -85,8 +85,8 @@ TEST_F(CounterCardTest, CountsFromThePositionAtSetUp) {
 
 TEST_F(CounterCardTest, LatchesTheClockAtTheEdgeOfTheProbe) {
   start();
-  card_.add_probe_edge(kStart + 4321us);
-  card_.advance(kStart + 6ms, 0);
+  card_.add_probe_edge(kCardStart + 4321us);
+  card_.advance(kCardStart + 6ms, 0);
   const auto all = scans();
   EXPECT_EQ(all[3][2], 0u);
   EXPECT_EQ(all[4][2], 4321u);
@@ -96,37 +96,37 @@ TEST_F(CounterCardTest, LatchesTheClockAtTheEdgeOfTheProbe) {
 
 TEST_F(CounterCardTest, OverrunsWhenTheHostDoesNotRead) {
   start();
-  card_.advance(kStart + 200ms, 0);
+  card_.advance(kCardStart + 200ms, 0);
   EXPECT_FALSE(status().overrun());
-  card_.advance(kStart + 300ms, 0);  // 4096 bytes are 256 scans
+  card_.advance(kCardStart + 300ms, 0);  // 4096 bytes are 256 scans
   EXPECT_TRUE(status().overrun());
   EXPECT_EQ(scans().size(), 256u);
-  run(quad08::stop_sequence(), kStart + 300ms);
+  run(quad08::stop_sequence(), kCardStart + 300ms);
   EXPECT_FALSE(status().overrun());
 }
 
 TEST_F(CounterCardTest, KeepsItsCountsOverARestartOfTheScan) {
   start();
-  card_.advance(kStart + 5ms, 0);
+  card_.advance(kCardStart + 5ms, 0);
   (void)scans();
-  run(quad08::load_sequence(layout(), *quad08::pacer_divisor(1000.0)), kStart + 50ms);
-  run(quad08::arm_sequence(), kStart + 50ms);
-  (void)card_.control(quad08::start_pacer(), kStart + 50ms);
-  card_.advance(kStart + 52ms, 0);
+  run(quad08::load_sequence(layout(), *quad08::pacer_divisor(1000.0)), kCardStart + 50ms);
+  run(quad08::arm_sequence(), kCardStart + 50ms);
+  (void)card_.control(quad08::start_pacer(), kCardStart + 50ms);
+  card_.advance(kCardStart + 52ms, 0);
   EXPECT_EQ(scans().front()[1], 51'000u);
 }
 
 TEST_F(CounterCardTest, CountersCanBeReadByRegister) {
-  set_up(0, {.mode = quad08::CounterMode::Encoder, .register_reading = true}, kStart);
-  (void)card_.control(quad08::write(quad08::Register::CounterBank, 0), kStart);
-  const auto low = card_.control(quad08::read(quad08::Register::CounterWord0), kStart + 10ms);
+  set_up(0, {.mode = quad08::CounterMode::Encoder, .register_reading = true}, kCardStart);
+  (void)card_.control(quad08::write(quad08::Register::CounterBank, 0), kCardStart);
+  const auto low = card_.control(quad08::read(quad08::Register::CounterWord0), kCardStart + 10ms);
   EXPECT_EQ(quad08::decode_word(*low), 5000);
 }
 
 TEST_F(CounterCardTest, StallsUnknownRequests) {
-  EXPECT_FALSE(card_.control({0xC0, 0x77, 0, 0, 2}, kStart).has_value());
-  EXPECT_FALSE(
-      card_.control(usb::get_descriptor(usb::DescriptorType::String, 9, 255), kStart).has_value());
+  EXPECT_FALSE(card_.control({0xC0, 0x77, 0, 0, 2}, kCardStart).has_value());
+  EXPECT_FALSE(card_.control(usb::get_descriptor(usb::DescriptorType::String, 9, 255), kCardStart)
+                   .has_value());
 }
 
 TEST(DistanceCodedMarks, HaveTheDistancesOfTheFormula) {
@@ -146,7 +146,7 @@ TEST(UsbipServer, ListsTheCardForUsbipAttach) {
 
   ASSERT_EQ(usbip::encode_device_list_request(request), request.size());
   test::send_bytes(client, request);
-  for (int i = 0; i < 50; ++i) server->poll(kStart);
+  for (int i = 0; i < 50; ++i) server->poll(kCardStart);
   const auto answer = test::receive_bytes(client);
   auto list = usbip::DeviceListView::parse(answer);
   ASSERT_TRUE(list) << usbip::to_text(list.error());
@@ -164,7 +164,7 @@ TEST(UsbipServer, RefusesABusIdItDoesNotHave) {
   std::array<std::byte, usbip::kImportRequestSize> request{};
   (void)usbip::encode_import_request(usbip::BusId{"3-7"}, request);
   test::send_bytes(client, request);
-  for (int i = 0; i < 50; ++i) server->poll(kStart);
+  for (int i = 0; i < 50; ++i) server->poll(kCardStart);
   const auto reply = usbip::decode_import_reply(test::receive_bytes(client));
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status, usbip::OpStatus::NoDevice);

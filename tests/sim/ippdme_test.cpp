@@ -9,7 +9,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr HostTime kStart{100s};
+constexpr HostTime kMachineStart{100s};
 
 IppDmeOptions with_a_sphere() {
   IppDmeOptions o;
@@ -18,8 +18,8 @@ IppDmeOptions with_a_sphere() {
 }
 
 /// Sends one line at `at` and returns the answer until `until`; each line ends with "|".
-std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kStart,
-                HostTime until = kStart) {
+std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kMachineStart,
+                HostTime until = kMachineStart) {
   const std::string bytes = line + "\r\n";
   machine.receive(std::as_bytes(std::span{bytes}), at);
   machine.advance(std::max(at, until));
@@ -31,8 +31,8 @@ std::string ask(IppDmeDevice& machine, const std::string& line, HostTime at = kS
 }
 
 TEST(IppDmeDevice, RefusesCommandsOutsideASession) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
   EXPECT_EQ(ask(machine, "00001 IsHomed()"),
             "00001 &|00001 ! Error(3,0008,IsHomed,\"Protocol error\")|00001 %|");
   EXPECT_EQ(ask(machine, "00002 StartSession()"), "00002 &|00002 %|");
@@ -40,28 +40,29 @@ TEST(IppDmeDevice, RefusesCommandsOutsideASession) {
 }
 
 TEST(IppDmeDevice, RefusesASecondSession) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
   (void)ask(machine, "00001 StartSession()");
   EXPECT_NE(ask(machine, "00002 StartSession()").find("Error(3,0008"), std::string::npos);
 }
 
 TEST(IppDmeDevice, RefusesCommandsAfterAnAbortUntilErrorsAreCleared) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
   (void)ask(machine, "00001 StartSession()");
   EXPECT_EQ(ask(machine, "00002 GoTo(X(100))"), "00002 &|");
-  EXPECT_EQ(ask(machine, "E0001 AbortE()", kStart + 100ms, kStart + 100ms),
+  EXPECT_EQ(ask(machine, "E0001 AbortE()", kMachineStart + 100ms, kMachineStart + 100ms),
             "E0001 &|00002 ! Error(2,0006,GoTo,\"Transaction aborted\")|00002 %|E0001 %|");
-  EXPECT_NEAR(machine.reading_m(kStart + 1s)[0], 0.02, 1e-9);  // 0.1 s of 200 mm/s
+  EXPECT_NEAR(machine.reading_m(kMachineStart + 1s)[0], 0.02, 1e-9);  // 0.1 s of 200 mm/s
   EXPECT_NE(ask(machine, "00003 IsHomed()").find("Error(2,0514"), std::string::npos);
   EXPECT_EQ(ask(machine, "00004 ClearAllErrors()"), "00004 &|00004 %|");
   EXPECT_EQ(ask(machine, "00005 GoTo(X(20))"), "00005 &|00005 %|");
 }
 
 TEST(IppDmeDevice, ReportsAtMostTenTimesASecondWhileMoving) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
   (void)ask(machine, "00001 StartSession()");
   EXPECT_EQ(ask(machine, "E0001 OnMoveReportE(Time(0.01),Dis(1),X())"), "E0001 &|");
-  const std::string answer = ask(machine, "00002 GoTo(X(200))", kStart, kStart + 2s);  // 1 s
+  const std::string answer =
+      ask(machine, "00002 GoTo(X(200))", kMachineStart, kMachineStart + 2s);  // 1 s
   EXPECT_EQ(
       answer,
       "00002 &|E0001 # X(0)|E0001 # X(20)|E0001 # X(40)|E0001 # X(60)|E0001 # X(80)|E0001 # X(100)|"
@@ -69,14 +70,14 @@ TEST(IppDmeDevice, ReportsAtMostTenTimesASecondWhileMoving) {
 }
 
 TEST(IppDmeDevice, ReportsAMissingSurfaceAndAnIllegalTouch) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
   (void)ask(machine, "00001 StartSession()");
   const std::string missed =
-      ask(machine, "00002 PtMeas(X(0),Y(0),Z(0),IJK(0,0,1))", kStart, kStart + 60s);
+      ask(machine, "00002 PtMeas(X(0),Y(0),Z(0),IJK(0,0,1))", kMachineStart, kMachineStart + 60s);
   EXPECT_NE(missed.find("Error(2,1006"), std::string::npos) << missed;
   (void)ask(machine, "00003 ClearAllErrors()");
-  const std::string inside =
-      ask(machine, "00004 PtMeas(X(100),Y(200),Z(-100),IJK(0,0,1))", kStart, kStart + 60s);
+  const std::string inside = ask(machine, "00004 PtMeas(X(100),Y(200),Z(-100),IJK(0,0,1))",
+                                 kMachineStart, kMachineStart + 60s);
   EXPECT_NE(inside.find("Error(2,1001"), std::string::npos) << inside;
 }
 
@@ -100,52 +101,55 @@ TEST(IppDmeDevice, TouchesTheFaceOfABlockOnlyWithinItsSquare) {
 }
 
 TEST(IppDmeDevice, LosesItsSessionWhenItIsMute) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
   (void)ask(machine, "00001 StartSession()");
-  machine.inject({.kind = FaultKind::Mute, .duration_s = 1.0}, kStart);
-  EXPECT_EQ(ask(machine, "00002 IsHomed()", kStart + 500ms, kStart + 500ms), "");
-  EXPECT_NE(ask(machine, "00003 IsHomed()", kStart + 1s, kStart + 1s).find("Protocol error"),
+  machine.inject({.kind = FaultKind::Mute, .duration_s = 1.0}, kMachineStart);
+  EXPECT_EQ(ask(machine, "00002 IsHomed()", kMachineStart + 500ms, kMachineStart + 500ms), "");
+  EXPECT_NE(ask(machine, "00003 IsHomed()", kMachineStart + 1s, kMachineStart + 1s)
+                .find("Protocol error"),
             std::string::npos);
 }
 
 TEST(IppDmeDevice, KeepsMovingWhenTheConnectionClosesAndKeepsTheListOfCommands) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
   (void)ask(machine, "00001 StartSession()");
   (void)ask(machine, "00002 GoTo(X(200))");
   machine.disconnected();
 
   EXPECT_TRUE(machine.moving());
-  machine.connected(kStart);
-  EXPECT_EQ(ask(machine, "00001 StartSession()", kStart + 500ms, kStart + 500ms),
+  machine.connected(kMachineStart);
+  EXPECT_EQ(ask(machine, "00001 StartSession()", kMachineStart + 500ms, kMachineStart + 500ms),
             "00001 &|");  // waits for the end of the motion
-  EXPECT_NE(ask(machine, "E0002 AbortE()", kStart + 500ms, kStart + 2s).find("E0002 %"),
-            std::string::npos);
-  EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
+  EXPECT_NE(
+      ask(machine, "E0002 AbortE()", kMachineStart + 500ms, kMachineStart + 2s).find("E0002 %"),
+      std::string::npos);
+  EXPECT_NEAR(machine.reading_m(kMachineStart + 2s)[0], 0.1, 1e-9);
   EXPECT_EQ(machine.heard().back(), "AbortE()");
   EXPECT_EQ(machine.heard().size(), 4u);
 }
 
 TEST(IppDmeDevice, AnEmergencyStopIsNotClearedWhileItIsPressed) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
   (void)ask(machine, "00001 StartSession()");
   (void)ask(machine, "00002 GoTo(X(200))");
-  machine.inject({.kind = FaultKind::EmergencyStop, .duration_s = 1.0}, kStart + 500ms);
-  EXPECT_NEAR(machine.reading_m(kStart + 2s)[0], 0.1, 1e-9);
-  EXPECT_NE(
-      ask(machine, "00003 ClearAllErrors()", kStart + 600ms, kStart + 600ms).find("Error(3,0500"),
-      std::string::npos);
-  EXPECT_EQ(ask(machine, "00004 ClearAllErrors()", kStart + 2s, kStart + 2s), "00004 &|00004 %|");
+  machine.inject({.kind = FaultKind::EmergencyStop, .duration_s = 1.0}, kMachineStart + 500ms);
+  EXPECT_NEAR(machine.reading_m(kMachineStart + 2s)[0], 0.1, 1e-9);
+  EXPECT_NE(ask(machine, "00003 ClearAllErrors()", kMachineStart + 600ms, kMachineStart + 600ms)
+                .find("Error(3,0500"),
+            std::string::npos);
+  EXPECT_EQ(ask(machine, "00004 ClearAllErrors()", kMachineStart + 2s, kMachineStart + 2s),
+            "00004 &|00004 %|");
 }
 
 TEST(IppDmeDevice, SendsOddTagsErrorsAndOtherCharacters) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
-  machine.inject({.kind = FaultKind::OddTag}, kStart);
-  machine.inject({.kind = FaultKind::ErrorReport, .value = 9}, kStart);
-  machine.inject({.kind = FaultKind::NotAscii}, kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
+  machine.inject({.kind = FaultKind::OddTag}, kMachineStart);
+  machine.inject({.kind = FaultKind::ErrorReport, .value = 9}, kMachineStart);
+  machine.inject({.kind = FaultKind::NotAscii}, kMachineStart);
   const auto answer = machine.take_output();
   const std::string_view text{reinterpret_cast<const char*>(answer.data()), answer.size()};
   EXPECT_EQ(text.substr(0, 9), "98765 %\r\n");
@@ -154,12 +158,12 @@ TEST(IppDmeDevice, SendsOddTagsErrorsAndOtherCharacters) {
 }
 
 TEST(IppDmeDevice, RefusesTheNextTouchWithTheGivenError) {
-  IppDmeDevice machine{with_a_sphere(), kStart};
-  machine.connected(kStart);
+  IppDmeDevice machine{with_a_sphere(), kMachineStart};
+  machine.connected(kMachineStart);
   (void)ask(machine, "00001 StartSession()");
-  machine.inject({.kind = FaultKind::RefuseTouch, .value = 1009}, kStart);
-  const auto answer =
-      ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kStart, kStart + 60s);
+  machine.inject({.kind = FaultKind::RefuseTouch, .value = 1009}, kMachineStart);
+  const auto answer = ask(machine, "00002 PtMeas(X(100),Y(200),Z(-85.5),IJK(0,0,1))", kMachineStart,
+                          kMachineStart + 60s);
   EXPECT_NE(answer.find("00002 ! Error(2,1009,PtMeas"), std::string::npos) << answer;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr HostTime kStart{1h};
+constexpr HostTime kServerStart{1h};
 
 std::uint16_t value_at(const std::vector<SimulatedRegister>& registers, std::uint8_t unit,
                        std::uint16_t address) {
@@ -53,9 +53,10 @@ TEST(Course, DriftsAndSwings) {
 }
 
 TEST(ModbusServer, NamesThePortThatIsInUse) {
-  const auto first = ModbusServer::open({}, kStart);
+  const auto first = ModbusServer::open({}, kServerStart);
   ASSERT_TRUE(first);
-  const auto second = ModbusServer::open({.endpoint = ModbusTcpEndpoint{first->port()}}, kStart);
+  const auto second =
+      ModbusServer::open({.endpoint = ModbusTcpEndpoint{first->port()}}, kServerStart);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::Io);
   EXPECT_NE(second.error().text.find(std::to_string(first->port())), std::string::npos);
@@ -67,13 +68,13 @@ TEST(ModbusServer, RemovesItsTerminalAndCreatesItAgain) {
   const std::string link = folder + "/line";
 
   {
-    auto server = ModbusServer::open({.endpoint = ModbusPtyEndpoint{link}}, kStart);
+    auto server = ModbusServer::open({.endpoint = ModbusPtyEndpoint{link}}, kServerStart);
     ASSERT_TRUE(server);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
-    server->inject({.kind = FaultKind::Disconnect, .duration_s = 1.0}, kStart);
+    server->inject({.kind = FaultKind::Disconnect, .duration_s = 1.0}, kServerStart);
     EXPECT_FALSE(std::filesystem::is_symlink(link));
-    EXPECT_EQ(server->next_due(), kStart + 1s);
-    server->poll(kStart + 1s);
+    EXPECT_EQ(server->next_due(), kServerStart + 1s);
+    server->poll(kServerStart + 1s);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
   }
 

@@ -5,6 +5,7 @@
 #include "abbe/protocol/quad08/sequences.hpp"
 #include "abbe/protocol/usb/descriptors.hpp"
 #include "abbe/sim/recorded_card.hpp"
+#include "recording_instants.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -13,12 +14,10 @@ using namespace std::chrono_literals;
 using Outcome = ControlAnswer::Outcome;
 namespace usbip = protocol::usbip;
 
-constexpr HostTime kRecorded{5000s};
-constexpr HostTime kReplayed{90s};
 constexpr auto kVersion = quad08::read_firmware_version();
 constexpr auto kStatus = quad08::read(quad08::Register::Acquisition);
 constexpr auto kStop = quad08::write(quad08::Register::Acquisition, quad08::acquisition::kPacerOff);
-constexpr auto kStart = quad08::start_pacer();
+constexpr auto kStartPacer = quad08::start_pacer();
 
 using Data = std::vector<std::byte>;
 Data word(unsigned low) {
@@ -68,10 +67,10 @@ class Tape {
 /// A scan that overruns after 200 ms and is restarted.
 Tape overrun() {
   Tape t;
-  t.open().ask(kStart).answer();
+  t.open().ask(kStartPacer).answer();
   t.at(100ms).scans(word(1)).ask(kStatus).answer(word(0x10));
   t.at(200ms).scans(word(2)).ask(kStatus).answer(word(0x14));
-  t.at(201ms).ask(kStop).answer().ask(kStart).answer();
+  t.at(201ms).ask(kStop).answer().ask(kStartPacer).answer();
   return t.at(300ms).scans(word(3));
 }
 
@@ -103,7 +102,7 @@ TEST(RecordedCard, SendsScansWithTheirTimingFromTheStartOfThePacer) {
   Replayed r{overrun()};
   r.open();
   EXPECT_TRUE(r.at(kReplayed + 1s).empty());
-  EXPECT_EQ(r.card.answer(kStart, kReplayed).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.answer(kStartPacer, kReplayed).outcome, Outcome::Done);
   EXPECT_EQ(r.card.available_at(2), kReplayed + 100ms);
   EXPECT_TRUE(r.at(kReplayed + 99ms).empty());
   EXPECT_EQ(r.at(kReplayed + 100ms), word(1));
@@ -113,7 +112,7 @@ TEST(RecordedCard, SendsScansWithTheirTimingFromTheStartOfThePacer) {
 TEST(RecordedCard, ReportsTheRecordedStatusOfTheTime) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kReplayed);
+  (void)r.card.answer(kStartPacer, kReplayed);
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 50ms).data, word(0x10));
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 150ms).data, word(0x10));
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 210ms).data, word(0x14));
@@ -122,10 +121,10 @@ TEST(RecordedCard, ReportsTheRecordedStatusOfTheTime) {
 TEST(RecordedCard, ARecordedRestartContinuesWithTheScansRecordedAfterIt) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kReplayed);
+  (void)r.card.answer(kStartPacer, kReplayed);
   (void)r.at(kReplayed + 200ms);
   EXPECT_EQ(r.card.answer(kStop, kReplayed + 205ms).outcome, Outcome::Done);
-  EXPECT_EQ(r.card.answer(kStart, kReplayed + 206ms).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.answer(kStartPacer, kReplayed + 206ms).outcome, Outcome::Done);
   EXPECT_FALSE(r.card.finished());
   EXPECT_EQ(r.at(kReplayed + 305ms), word(3));
   EXPECT_TRUE(r.card.finished());
@@ -134,40 +133,40 @@ TEST(RecordedCard, ARecordedRestartContinuesWithTheScansRecordedAfterIt) {
 TEST(RecordedCard, AHostThatRestartsEarlierThanRecordedGetsTheRest) {
   Replayed r{overrun()};
   r.open();
-  (void)r.card.answer(kStart, kReplayed);
+  (void)r.card.answer(kStartPacer, kReplayed);
   EXPECT_EQ(r.at(kReplayed + 100ms), word(1));
   EXPECT_EQ(r.card.answer(kStop, kReplayed + 110ms).outcome, Outcome::Done);
   EXPECT_TRUE(r.at(kReplayed + 250ms).empty());
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 250ms).data, word(0x10));
-  EXPECT_EQ(r.card.answer(kStart, kReplayed + 260ms).outcome, Outcome::Done);
+  EXPECT_EQ(r.card.answer(kStartPacer, kReplayed + 260ms).outcome, Outcome::Done);
   EXPECT_EQ(r.at(kReplayed + 260ms), word(2));
 }
 
 TEST(RecordedCard, DoesNotAnswerWhereTheRecordedCardDidNot) {
   Tape t;
-  t.open().ask(kStart).answer().at(100ms).scans(word(1)).ask(kStatus).answer(word(0x10));
+  t.open().ask(kStartPacer).answer().at(100ms).scans(word(1)).ask(kStatus).answer(word(0x10));
   t.at(200ms).ask(kStatus);
-  t.at(900ms).open().ask(kStart).answer().at(1s).scans(word(2));
+  t.at(900ms).open().ask(kStartPacer).answer().at(1s).scans(word(2));
   Replayed r{t};
   r.open();
-  (void)r.card.answer(kStart, kReplayed);
+  (void)r.card.answer(kStartPacer, kReplayed);
 
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 150ms).outcome, Outcome::Done);
   EXPECT_EQ(r.card.answer(kStatus, kReplayed + 250ms).outcome, Outcome::Silent);
   r.card.host_disconnected();
   r.open();
-  (void)r.card.answer(kStart, kReplayed + 1s);
+  (void)r.card.answer(kStartPacer, kReplayed + 1s);
   EXPECT_EQ(r.at(kReplayed + 1100ms), word(2));
 }
 
 TEST(RecordedCard, ARecordedConnectionLossIsRepeated) {
   Tape t;
-  t.open().ask(kStart).answer().at(100ms).scans(word(1)).at(150ms).lose();
-  t.at(900ms).open().ask(kStart).answer().at(1s).scans(word(2));
+  t.open().ask(kStartPacer).answer().at(100ms).scans(word(1)).at(150ms).lose();
+  t.at(900ms).open().ask(kStartPacer).answer().at(1s).scans(word(2));
   Replayed r{t};
   r.open();
   EXPECT_EQ(r.card.breaks_at(), HostTime::max());
-  (void)r.card.answer(kStart, kReplayed);
+  (void)r.card.answer(kStartPacer, kReplayed);
   EXPECT_EQ(r.card.breaks_at(), kReplayed + 150ms);
   r.card.host_disconnected();
   EXPECT_EQ(r.card.breaks_at(), HostTime::max());

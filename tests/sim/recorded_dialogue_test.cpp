@@ -6,15 +6,13 @@
 
 #include "abbe/protocol/modbus/read.hpp"
 #include "abbe/sim/recorded_dialogue.hpp"
+#include "recording_instants.hpp"
 
 namespace abbe::sim {
 namespace {
 
 using namespace std::chrono_literals;
 namespace modbus = protocol::modbus;
-
-constexpr HostTime kRecorded{5000s};  // start of the recording
-constexpr HostTime kReplayed{90s};    // start of the replay
 
 std::vector<std::byte> bytes(std::string_view text) {
   const auto view = std::as_bytes(std::span{text});

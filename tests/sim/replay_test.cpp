@@ -11,6 +11,7 @@
 #include "abbe/sim/recorded_bus.hpp"
 #include "abbe/sim/recorded_tracker.hpp"
 #include "loopback_client.hpp"
+#include "recording_instants.hpp"
 #include "tracker_script.hpp"
 
 namespace abbe::sim {
@@ -18,9 +19,6 @@ namespace {
 
 using namespace std::chrono_literals;
 namespace mcap = protocol::mcap;
-
-constexpr HostTime kRecorded{5000s};  // start of the recording
-constexpr HostTime kReplayed{90s};    // start of the replay
 
 template <class Packet>
 std::vector<std::byte> packed(const Packet& packet) {

@@ -45,14 +45,15 @@ std::string listed(const std::vector<std::size_t>& numbers) {
 
 /// Rows of the reference: r = J x + B dc + noise. x: translation and rotation; dc: error of the
 /// model's shape.
-struct Rows {
+struct ReferenceRows {
   Eigen::MatrixXd J, B;
   Eigen::VectorXd r;
 };
 
-Rows rows_of(const EvemuModel& model, std::span<const BallError> points) {
+ReferenceRows rows_of(const EvemuModel& model, std::span<const BallError> points) {
   const auto n = static_cast<Eigen::Index>(3 * points.size());
-  Rows rows{Eigen::MatrixXd(n, 6), Eigen::MatrixXd(n, model.c_m().size()), Eigen::VectorXd(n)};
+  ReferenceRows rows{Eigen::MatrixXd(n, 6), Eigen::MatrixXd(n, model.c_m().size()),
+                     Eigen::VectorXd(n)};
   for (std::size_t i = 0; i < points.size(); ++i) {
     const BallError& p = points[i];
     const auto at = static_cast<Eigen::Index>(3 * i);
@@ -82,7 +83,7 @@ struct Turn {
 
 /// Generalised least squares with the covariance S = sigma^2 1 + B C B^T: where the model's shape
 /// is uncertain, or its errors are correlated, the reference has correspondingly less weight.
-Turn turn_onto(const Rows& rows, const Eigen::MatrixXd& C_shape, double sigma_m) {
+Turn turn_onto(const ReferenceRows& rows, const Eigen::MatrixXd& C_shape, double sigma_m) {
   Eigen::MatrixXd S = rows.B * C_shape * rows.B.transpose();
   S.diagonal().array() += sigma_m * sigma_m;
   const Eigen::LLT<Eigen::MatrixXd> llt(S);
@@ -152,7 +153,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
     return tl::unexpected(valid.error());
   }
 
-  const Rows rows = rows_of(evemu, used.points);
+  const ReferenceRows rows = rows_of(evemu, used.points);
   if (!rows.r.allFinite()) {
     return failure(ErrorCode::NotFinite, "rotation reference: a point is not a number");
   }

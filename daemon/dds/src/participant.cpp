@@ -21,7 +21,7 @@ namespace abbe::dds {
 namespace {
 
 namespace fast = eprosima::fastdds::dds;
-const auto kOk = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+const auto kSuccess = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 
 /// Directs the log of Fast DDS to stderr. By default its errors go to stdout, which is reserved for
 /// the output of the program.
@@ -42,11 +42,11 @@ Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& fil
   const auto loaded =
       file.empty() ? factory->load_XML_profiles_string(kBuiltinProfile, sizeof(kBuiltinProfile) - 1)
                    : factory->load_XML_profiles_file(name);
-  if (loaded != kOk)
+  if (loaded != kSuccess)
     return fail(ErrorCode::BadInput, name + ": is not a Fast DDS XML profile file");
   fast::DomainParticipantQos qos;
 
-  if (factory->get_participant_qos_from_profile(daemon::kDdsProfileName, qos) != kOk) {
+  if (factory->get_participant_qos_from_profile(daemon::kDdsProfileName, qos) != kSuccess) {
     return fail(ErrorCode::BadInput,
                 name + ": has no participant profile \"" + daemon::kDdsProfileName + "\"");
   }
@@ -133,7 +133,7 @@ Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
   type->auto_fill_type_object(false);
   const std::string name(traits.name);
   auto* created =
-      type.register_type(participant_.get()) == kOk
+      type.register_type(participant_.get()) == kSuccess
           ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)
           : nullptr;
   if (created == nullptr)

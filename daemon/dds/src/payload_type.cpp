@@ -14,7 +14,7 @@
 namespace abbe::dds {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 4;
+constexpr std::size_t kPayloadHeaderBytes = 4;
 
 std::size_t largest_body_bytes(daemon::Topic topic) {
   switch (topic) {
@@ -53,7 +53,7 @@ void append_big_endian(std::string& key, std::string_view text) {
 PayloadType::PayloadType(daemon::Topic topic) : topic_(topic) {
   setName(std::string(daemon::traits(topic).type_name).c_str());
   // A payload is padded to a multiple of 4 in its submessage.
-  m_typeSize = static_cast<uint32_t>(kHeaderBytes + (largest_body_bytes(topic) + 3) / 4 * 4);
+  m_typeSize = static_cast<uint32_t>(kPayloadHeaderBytes + (largest_body_bytes(topic) + 3) / 4 * 4);
   m_isGetKeyDefined = true;
 }
 

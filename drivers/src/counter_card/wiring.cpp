@@ -18,29 +18,29 @@ constexpr double kFewestCountsPerScan = 8.0;
 constexpr double kMostCountsPerScan = 1e9;
 constexpr double kFastestClock_hz = 24e6;  // half of the card's own 48 MHz
 
-Result<void> refuse(std::string text) {
+Result<void> refuse_wiring(std::string text) {
   return tl::unexpected(Error{ErrorCode::BadConfiguration, "counter card: " + std::move(text)});
 }
 
 Result<void> check_axis(const CounterAxis& axis) {
   const auto name = fmt::format("axis {} (channel {})", axis.name, axis.channel);
   if (axis.scale == 0.0 || !std::isfinite(axis.scale))
-    return refuse(fmt::format("{}: scale {} per count is not possible", name, axis.scale));
+    return refuse_wiring(fmt::format("{}: scale {} per count is not possible", name, axis.scale));
   if (!std::isfinite(axis.offset))
-    return refuse(fmt::format("{}: offset {} must be finite", name, axis.offset));
+    return refuse_wiring(fmt::format("{}: offset {} must be finite", name, axis.offset));
   return {};
 }
 
 Result<void> check_axes(const CounterCardWiring& wiring) {
   if (wiring.axes.empty() || wiring.axes.size() > protocol::kMaxAxes) {
-    return refuse(
+    return refuse_wiring(
         fmt::format("{} axes, 1 to {} are possible", wiring.axes.size(), protocol::kMaxAxes));
   }
   std::set<std::string> names;
   for (const auto& axis : wiring.axes) {
     if (auto ok = check_axis(axis); !ok) return ok;
     if (!names.insert(axis.name).second)
-      return refuse(fmt::format("two channels claim axis {}", axis.name));
+      return refuse_wiring(fmt::format("two channels claim axis {}", axis.name));
   }
   return {};
 }
@@ -49,9 +49,10 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
   std::array<std::string, quad08::kChannels> used;
   const auto claim = [&used](std::uint8_t channel, const std::string& what) -> Result<void> {
     if (channel >= used.size())
-      return refuse(fmt::format("{}: channel {}, 0 to {} exist", what, channel, used.size() - 1));
+      return refuse_wiring(
+          fmt::format("{}: channel {}, 0 to {} exist", what, channel, used.size() - 1));
     if (!used[channel].empty())
-      return refuse(
+      return refuse_wiring(
           fmt::format("channel {} is claimed by {} and {}", channel, used[channel], what));
     used[channel] = what;
     return {};
@@ -70,22 +71,23 @@ Result<void> check_channels(const CounterCardWiring& wiring) {
 
 Result<void> check_clock(const CounterCardWiring& wiring) {
   if (!quad08::pacer_divisor(wiring.scan_rate_hz))
-    return refuse(
+    return refuse_wiring(
         fmt::format("the card does not support a scan rate of {} Hz", wiring.scan_rate_hz));
   if (!(wiring.clock_hz > 0.0 && wiring.clock_hz <= kFastestClock_hz))
-    return refuse(fmt::format("clock {} Hz: above 0 to {} Hz are possible", wiring.clock_hz,
-                              kFastestClock_hz));
+    return refuse_wiring(fmt::format("clock {} Hz: above 0 to {} Hz are possible", wiring.clock_hz,
+                                     kFastestClock_hz));
   const double counts = clock_counts_per_scan(wiring);
 
   if (counts < kFewestCountsPerScan || counts > kMostCountsPerScan) {
-    return refuse(fmt::format("{} clock periods per scan: {} to {} are needed to detect lost scans",
-                              counts, kFewestCountsPerScan, kMostCountsPerScan));
+    return refuse_wiring(
+        fmt::format("{} clock periods per scan: {} to {} are needed to detect lost scans", counts,
+                    kFewestCountsPerScan, kMostCountsPerScan));
   }
 
   if (wiring.clock_source == ClockSource::External) return {};
   const double divisor = quad08::kPacerClock_hz / wiring.clock_hz;
   if (std::abs(divisor - std::round(divisor)) > 1e-9 * divisor || divisor < 2.0) {
-    return refuse(fmt::format(
+    return refuse_wiring(fmt::format(
         "the card's timer cannot make {} Hz: 48 MHz divided by an integer above 1 is possible",
         wiring.clock_hz));
   }

@@ -33,7 +33,7 @@ modbus_t* make_context(const ModbusAddress& address) {
                         kDataBits, serial.stop_bits);
 }
 
-bool wait_readable(int fd, nanoseconds wall) {
+bool becomes_readable(int fd, nanoseconds wall) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   const auto ns = std::max<std::int64_t>(wall.count(), 0);
   const timespec timeout{static_cast<time_t>(ns / kSecond), static_cast<long>(ns % kSecond)};
@@ -125,7 +125,7 @@ Result<void> ModbusLine::send(const modbus::ReadRequest& request) {
 
 Result<std::size_t> ModbusLine::read(std::span<std::byte> into, nanoseconds wall) {
   const int fd = modbus_get_socket(context_.get());
-  if (!wait_readable(fd, wall)) return std::size_t{0};
+  if (!becomes_readable(fd, wall)) return std::size_t{0};
   const auto n = ::read(fd, into.data(), into.size());
   if (n > 0) return static_cast<std::size_t>(n);
   if (n < 0 && (errno == EAGAIN || errno == EINTR)) return std::size_t{0};

@@ -21,7 +21,7 @@ constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
 constexpr int kMostCloseCycles = 20;
 constexpr timeval kCloseCycle{0, 50'000};
 
-std::string error_text(int error) {
+std::string usb_error_text(int error) {
   return libusb_strerror(static_cast<libusb_error>(error));
 }
 
@@ -106,7 +106,8 @@ struct LibusbLink::State {
                   "its cancelled transfers have not ended: the USB host controller hangs");
     }
 
-    if (init_error != 0) return lose(ErrorCode::SystemRefused, "libusb: " + error_text(init_error));
+    if (init_error != 0)
+      return lose(ErrorCode::SystemRefused, "libusb: " + usb_error_text(init_error));
     if (!find()) return;
     if (!take_over()) {
       libusb_close(std::exchange(handle, nullptr));
@@ -146,7 +147,7 @@ struct LibusbLink::State {
       if (const int error = libusb_open(ours, &handle); error != 0) {
         handle = nullptr;
         serials.clear();
-        refused = error_text(error);
+        refused = usb_error_text(error);
       }
     }
 
@@ -164,7 +165,7 @@ struct LibusbLink::State {
     if (known != cards.end()) return *known;
     libusb_device_handle* candidate = nullptr;
     if (const int error = libusb_open(device, &candidate); error != 0) {
-      refused = error_text(error);
+      refused = usb_error_text(error);
       return std::nullopt;
     }
 
@@ -196,13 +197,13 @@ struct LibusbLink::State {
     if (libusb_get_configuration(handle, &configuration) != 0 ||
         configuration != identity.configuration) {
       if (const int error = libusb_set_configuration(handle, identity.configuration); error != 0) {
-        lose(ErrorCode::SystemRefused, "configuration: " + error_text(error));
+        lose(ErrorCode::SystemRefused, "configuration: " + usb_error_text(error));
         return false;
       }
     }
 
     if (const int error = libusb_claim_interface(handle, kInterface); error != 0) {
-      lose(ErrorCode::SystemRefused, "interface: " + error_text(error));
+      lose(ErrorCode::SystemRefused, "interface: " + usb_error_text(error));
       return false;
     }
 
@@ -251,14 +252,14 @@ struct LibusbLink::State {
     libusb_fill_control_transfer(control_transfer, handle, control_buffer.data(),
                                  &State::on_control, this, 0);
     const int error = libusb_submit_transfer(control_transfer);
-    if (error != 0) return lose(ErrorCode::Unreachable, "request: " + error_text(error));
+    if (error != 0) return lose(ErrorCode::Unreachable, "request: " + usb_error_text(error));
     control_under_way = true;
   }
 
   /// Also resets the data toggle in the host; a plain control request does not.
   void clear_halt() {
     const int error = libusb_clear_halt(handle, identity.bulk_endpoint);
-    if (error == LIBUSB_ERROR_NO_DEVICE) return lose(ErrorCode::Unreachable, error_text(error));
+    if (error == LIBUSB_ERROR_NO_DEVICE) return lose(ErrorCode::Unreachable, usb_error_text(error));
     UsbControlDone done{.setup = control_setup};
     if (error != 0) done.outcome = UsbOutcome::Failed;
     events.emplace_back(done);
@@ -287,7 +288,7 @@ struct LibusbLink::State {
   void submit(Bulk& bulk) {
     bulk.resubmit = false;
     const int error = libusb_submit_transfer(bulk.transfer);
-    if (error != 0) return lose(ErrorCode::Unreachable, "scan endpoint: " + error_text(error));
+    if (error != 0) return lose(ErrorCode::Unreachable, "scan endpoint: " + usb_error_text(error));
     ++in_flight;
   }
 

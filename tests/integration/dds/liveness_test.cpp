@@ -18,10 +18,6 @@ using namespace std::chrono_literals;
 constexpr const char* kActive = "vmc-3: state 1";
 constexpr const char* kInvalid = "vmc-3: state 4 SOURCE_LOST";
 
-double milliseconds(Clock::duration d) {
-  return std::chrono::duration<double, std::milli>(d).count();
-}
-
 class DdsLiveness : public ShopFloor {
  protected:
   void SetUp() override {

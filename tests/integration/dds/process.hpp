@@ -17,6 +17,10 @@ namespace abbe::test {
 
 using Clock = std::chrono::steady_clock;
 
+inline double milliseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
 struct Line {
   std::string text;
   Clock::time_point came;

@@ -45,10 +45,6 @@ class Strangers : public ShopFloor {
   }
 };
 
-double milliseconds(Clock::duration duration) {
-  return std::chrono::duration<double, std::milli>(duration).count();
-}
-
 /// What a watcher printed of the vectors.
 struct Vectors {
   long seen = 0;

@@ -20,7 +20,7 @@ std::string machine_tables(const std::string& at_its_port = {}) {
          to_toml(config_tables::CounterCard{.scan_rate_hz = 500, .more = at_its_port});
 }
 
-constexpr const char* kSimulator = R"([sim]
+constexpr const char* kBallArraySimulator = R"([sim]
 machine = "machine.toml"
 seed = 3
 speed = {speed}
@@ -71,7 +71,7 @@ void TouchingRun::warm_the_array() {
 
 TouchingRun::TouchingRun() {
   write("machine.toml", machine_tables());
-  write("sim.toml", fmt::format(kSimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
+  write("sim.toml", fmt::format(kBallArraySimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
 }
 
 void TouchingRun::start_touching_simulator(const std::vector<std::string>& more) {

@@ -59,26 +59,12 @@ function(abbe_allow_local_types target)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endfunction()
 
-# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_UNITY_BUILD several files
-# of a module are compiled as one. Names that are local to a file are therefore unique in their module.
+# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_UNITY_BUILD up to 25 files
+# of a target are compiled as one. Names that are local to a file are therefore unique in their target, tests included.
 option(ABBE_UNITY_BUILD "Compile several source files of a module as one: faster when everything is built" OFF)
 function(abbe_unity_build target)
   if(ABBE_UNITY_BUILD)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-    abbe_allow_local_types(${target})
-  endif()
-endfunction()
-
-# The same for tests, by the first word of a file's name: tests of one subject share headers and names.
-function(abbe_unity_build_tests target)
-  if(ABBE_UNITY_BUILD AND NOT ABBE_FUZZ)
-    get_target_property(sources ${target} SOURCES)
-    foreach(source IN LISTS sources)
-      get_filename_component(name ${source} NAME_WE)
-      string(REGEX REPLACE "_.*" "" subject ${name})
-      set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${subject})
-    endforeach()
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 25)
     abbe_allow_local_types(${target})
   endif()
 endfunction()

@@ -121,7 +121,7 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
 }
 
 /// With at most this many touches, two or fewer residuals do not tell which touch is false.
-constexpr std::size_t kFewTouches = 6;
+constexpr std::size_t kTooFewToName = 6;
 
 /// The touch without which the others fit a sphere much better, and the radius of that sphere is at
 /// most half as far from `radius_m`. nullopt if there is none.
@@ -129,7 +129,7 @@ std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, d
   constexpr double kClear = 3.0;  // ratio of rms; machine errors of some mm deform the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
 
-  if (!all || points_m.size() <= kFewTouches) {
+  if (!all || points_m.size() <= kTooFewToName) {
     return std::nullopt;
   }
 
@@ -174,7 +174,7 @@ std::string why_another_radius(std::span<const fit::Sphere> balls,
 
   if (balls.size() > 1 && balls_of_another_radius(balls, c, options) == 1) {
     const std::string one_ball = "the other balls fit: ";
-    return points_m.size() > kFewTouches
+    return points_m.size() > kTooFewToName
                ? one_ball + "check the radius of this ball in the calibrator file, and clean it"
                : one_ball + message("one of its ", points_m.size(),
                                     " touches is a false trigger, or on dirt, too few to find "

@@ -9,8 +9,10 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <string_view>
 
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/model/model_document.hpp"
@@ -330,10 +332,25 @@ TEST_F(EvemuCli, NamesAPositionWithoutTouches) {
   expect_refused(identify(all), 1, "position 5: left out");
 }
 
-TEST_F(EvemuCli, NamesTheCalibratorOfAnotherArtefact) {
+/// The calibrator file with 15 mm for 12.7 mm as the radius of these balls.
+std::string calibrator_with_another_radius(std::initializer_list<int> balls) {
+  const std::string_view radius = "radius_mm = 12.7";
   std::string text = calibrator_toml();
-  const auto at = text.find("radius_mm = 12.7", text.find("number = 3"));
-  write("calibrator.toml", text.replace(at, 16, "radius_mm = 15.0"));
+  for (const int ball : balls) {
+    const auto at = text.find(radius, text.find(fmt::format("number = {}", ball)));
+    text.replace(at, radius.size(), "radius_mm = 15.0");
+  }
+  return text;
+}
+
+TEST_F(EvemuCli, NamesTheBallOfAnotherRadius) {
+  write("calibrator.toml", calibrator_with_another_radius({3}));
+  expect_refused(identify(touches()), 3,
+                 "the other balls fit: check the radius of this ball in the calibrator file");
+}
+
+TEST_F(EvemuCli, NamesTheCalibratorOfAnotherArtefact) {
+  write("calibrator.toml", calibrator_with_another_radius({3, 5}));
   expect_refused(identify(touches()), 3, "calibrator file of another artefact");
 }
 

@@ -14,14 +14,18 @@ namespace {
 using calib::Vector3;
 
 struct PolynomialPublication : testing::Test {
-  static PublishedModel active_model() {
-    const auto observations = calib::evemu::observe_errors(tests::evemu::reference_errors(),
-                                                           tests::evemu::reference_machine());
-    return {.id = "m",
-            .method = "evemu",
-            .estimator = "bayes-pose",
-            .recording_sha256 = {},
-            .model = calib::evemu::solve(*observations)->model};
+  /// Identified once: with sanitizers it takes seconds.
+  static const PublishedModel& active_model() {
+    static const PublishedModel active{
+        .id = "m",
+        .method = "evemu",
+        .estimator = "bayes-pose",
+        .recording_sha256 = {},
+        .model =
+            calib::evemu::solve(*calib::evemu::observe_errors(tests::evemu::reference_errors(),
+                                                              tests::evemu::reference_machine()))
+                ->model};
+    return active;
   }
   static protocol::Snapshot standing_at(const Vector3& q_m) {
     protocol::Snapshot s;
@@ -35,7 +39,7 @@ struct PolynomialPublication : testing::Test {
                                 std::chrono::seconds{1}, {});
   }
 
-  PublishedModel model = active_model();
+  const PublishedModel& model = active_model();
   Vector3 inside_m{0.3, 0.2, 0.04};
 };
 

@@ -11,7 +11,15 @@ target_compile_options(abbe_warnings INTERFACE
   # GCC 12 at -O3 gives false warnings of overlaps and bounds in inlined std::string (GCC bug 105651)
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-restrict$<SEMICOLON>-Wno-array-bounds$<SEMICOLON>-Wno-stringop-overflow>)
 
-if(ABBE_SANITIZE)
+# What a build adds to observe a program. abbe_compile_mathematics removes it where it observes nothing.
+set(abbe_observing_options "")
+if(ABBE_FUZZ)
+  list(APPEND abbe_observing_options -fsanitize=fuzzer-no-link)
+endif()
+if(ABBE_SANITIZE MATCHES "thread")
+  list(APPEND abbe_observing_options -fsanitize=thread -fno-omit-frame-pointer -O1 -g1 -UNDEBUG)
+  add_link_options(-fsanitize=thread)
+elseif(ABBE_SANITIZE)
   add_compile_options(-fsanitize=${ABBE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ABBE_SANITIZE})
   if(ABBE_SANITIZE MATCHES "undefined")
@@ -19,6 +27,7 @@ if(ABBE_SANITIZE)
     add_compile_options(-fno-sanitize-recover=undefined -fno-sanitize=object-size)
   endif()
 endif()
+add_compile_options(${abbe_observing_options})
 
 # Identification gives the same bits on every processor. Eigen without vectors sums in one order, independent of the width
 # of the registers, the place of the data in memory and the size of the caches; no fused multiply-add.
@@ -46,12 +55,18 @@ function(abbe_compile_brief target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# For Eigen's code: these two checks of every access are half of its compile time under UBSan, and what they find
-# ends the program anyway (ASan's report of a null access; SSE's trap on an unaligned one).
+# For Eigen's code.
+# - Two checks of UBSan, of every access, are half of its compile time, and what they find ends the program anyway (ASan's
+#   report of a null access; SSE's trap on an unaligned one).
+# - It starts no threads and decodes nothing. Without the options of ThreadSanitizer and libFuzzer it is compiled as in the
+#   release build or with ASan, and ccache has the result; with ThreadSanitizer an identification would take minutes.
 function(abbe_compile_mathematics target)
   if(ABBE_SANITIZE MATCHES "undefined")
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment)
   endif()
+  get_target_property(options ${target} COMPILE_OPTIONS)
+  list(REMOVE_ITEM options ${abbe_observing_options})
+  set_property(TARGET ${target} PROPERTY COMPILE_OPTIONS ${options})
 endfunction()
 
 # GCC warns about types in unnamed namespaces of source files that another file includes.

@@ -33,7 +33,8 @@ namespace {
 
 using nlohmann::json;
 
-// Bytes of answers that a client has not read; above this its next requests wait.
+// Most bytes of answers that may wait for a client to read them. While more wait, the next requests
+// of this client are not answered.
 constexpr std::size_t kMostUnread = 1u << 20;
 // Pause before the next accept() when no file descriptors are left.
 constexpr auto kAcceptPause = std::chrono::milliseconds{200};

@@ -41,7 +41,8 @@ std::string finish(EVP_MD_CTX* context) {
 }  // namespace
 
 Sha256::Sha256() : state_(std::make_unique<State>()) {
-  // Both fail only for lack of memory: SHA-256 is part of the default provider.
+  // EVP_MD_CTX_new() and EVP_DigestInit_ex() fail only for lack of memory, because SHA-256 is part
+  // of OpenSSL's default provider.
   if (state_->context == nullptr || EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr) != 1)
     throw std::bad_alloc();
 }

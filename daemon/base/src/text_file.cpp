@@ -92,7 +92,8 @@ void set_ownership(int fd, const Ownership& to) noexcept {
   struct stat status {};
   if (::fstat(fd, &status) != 0) return;
   if (status.st_uid != to.owner && ::fchown(fd, to.owner, to.group) == 0) status.st_gid = to.group;
-  // Without root rights the group may be set if this process is a member of it.
+  // Without root rights the call above fails, but a process may give its file to a group that the
+  // process is a member of.
   if (status.st_gid != to.group) (void)!::fchown(fd, static_cast<uid_t>(-1), to.group);
   (void)::fchmod(fd, to.mode);
 }
@@ -104,7 +105,7 @@ std::optional<Ownership> ownership_in_folder(const std::filesystem::path& folder
   return Ownership{status.st_uid, status.st_gid, status.st_mode & kFileModes};
 }
 
-/// Owner and mode of `file` if it is a regular file; else those that its folder gives.
+/// Owner and mode of `file` if it is a regular file, else those of a new file in its folder.
 std::optional<Ownership> ownership_of(const std::filesystem::path& file) noexcept {
   struct stat status {};
   if (::lstat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode))

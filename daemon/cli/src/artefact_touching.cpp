@@ -52,7 +52,8 @@ Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
   return out;
 }
 
-/// True if the touching is cancelled. Refused counts as well: no touching was running.
+/// True if the daemon touches no more: it cancelled the touching, or it refused the request because
+/// no touching was running.
 bool cancel(const std::filesystem::path& socket) {
   const auto answer = ask_daemon(socket, {{"do", "touch"}, {"cancel", true}});
   return answer || answer.error().code == ErrorCode::Refused;
@@ -107,7 +108,7 @@ Result<Touched> touch_artefact(const std::filesystem::path& socket,
   mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   const auto started = ask_daemon(socket, as_json(plan));
   if (!started) {
-    // Without an answer the daemon may have started the touching all the same.
+    // Io: no answer arrived, but the daemon may have started the touching.
     if (started.error().code == ErrorCode::Io) (void)cancel(socket);
     return tl::unexpected(started.error());
   }

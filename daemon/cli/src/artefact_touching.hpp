@@ -1,8 +1,8 @@
 #pragma once
 /// The part of `abbe calibrate artefact` that moves the machine: requests the touches of a plan
-/// from the running daemon and follows them. The machine must not move unsupervised: a signal, or a
-/// daemon that does not answer, ends the following and with it the touching, and the daemon itself
-/// ends the touching if no client asks for the touches for 2 s.
+/// from the running daemon and follows their progress. The machine must not move unsupervised.
+/// Therefore this program cancels the touching after a signal or when the daemon does not answer,
+/// and the daemon itself cancels it if no client requests its progress for 2 s.
 
 #include <filesystem>
 #include <string>

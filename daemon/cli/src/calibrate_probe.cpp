@@ -61,8 +61,10 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
   return touches;
 }
 
-/// Refuses a fit whose lack of fit is significant: with three feeds, random scatter exceeds the
-/// limit with a probability of 0.001. Residuals below the repeatability of any probe are accepted.
+/// Refuses a fit of position against feed whose lack of fit is significant. kMostLackOfFit is the
+/// 0.999 quantile of chi-square with one degree of freedom: with three feeds, random scatter
+/// exceeds it with a probability of 0.001. A fit with residuals of at most kRepeats_m, the
+/// repeatability of the best probes, is accepted in any case.
 std::optional<Error> not_on_a_line(const calib::probe::ProbeDelayFit& fit) {
   constexpr double kMostLackOfFit = 10.8;
   constexpr double kRepeats_m = 0.1e-6;
@@ -147,8 +149,8 @@ int fit(const CalibrateProbeArguments& arguments,
   return print_delay(*fit, arguments.json);
 }
 
-/// From a damaged recording the result is printed and refused: the lost touches could be the ones
-/// that do not fit.
+/// The result from a damaged recording is printed, but the command fails: the lost touches could be
+/// those that contradict the result.
 int calibrate(const CalibrateProbeArguments& arguments) {
   const auto touches = touches_of(arguments);
   if (!touches) return report(touches.error());

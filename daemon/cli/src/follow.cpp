@@ -30,7 +30,7 @@ int print_how_to_cancel(const Following& following) {
   return number(ExitCode::Interrupted);
 }
 
-/// Detects a restart of the daemon: compares the process of each status with that of the first.
+/// Detects a restart of the daemon: compares the process id in each status with that in the first.
 class SameDaemon {  // NOLINT(bugprone-exception-escape): an empty json throws nothing
  public:
   bool is(const json& status) {

@@ -34,8 +34,9 @@ std::vector<std::string> names_of(const CLI::App& app) {
   return names;
 }
 
-/// At most a third of the characters may differ, and two of a short word (two that are swapped
-/// count twice); with more, the guess is of no use.
+/// The name most similar to `word`. nullopt if none differs by at most a third of its characters,
+/// or by two characters for a short word (two exchanged characters count as two): a less similar
+/// name is probably not the one that was meant.
 std::optional<std::string> nearest(const std::string& word, const std::vector<std::string>& names) {
   const auto distance = [&](const std::string& name) { return edit_distance(word, name); };
   const auto best = std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
@@ -79,7 +80,7 @@ bool asks_for_help(const std::vector<std::string>& words) {
 std::optional<Error> unknown_command(const CLI::App& app, const std::vector<std::string>& words,
                                      const std::vector<std::string>& programs) {
   const CLI::App* at = &app;
-  std::string before;  // the commands up to here, each with a space
+  std::string before;  // the subcommands before `word`, each followed by a space
 
   for (const auto& word : words) {
     auto names = names_of(*at);

@@ -17,8 +17,8 @@ void add_store_options(CLI::App& command, StoreOption& where);
 /// An existing store; creates nothing. Io if the folder does not exist, BadInput if it is no store.
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
 
-/// The id that `name` stands for: "active" or the beginning of an id. Refused if no model is
-/// active; else as ModelStore::find().
+/// The id that `name` stands for: "active" or the beginning of an id. Refused if `name` is "active"
+/// and no model is; the other errors are those of ModelStore::find().
 [[nodiscard]] Result<std::string> id_named(const ModelStore& store, const std::string& name);
 /// True for a path, a name with an extension, and a file that exists.
 [[nodiscard]] bool names_a_file(const std::string& name);

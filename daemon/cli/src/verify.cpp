@@ -96,7 +96,8 @@ Result<LivePoints> points_of(const VerifyArguments& arguments) {
   return points_of_daemon(*socket, arguments.count, keep_them);
 }
 
-/// If points are missing, sets `cut_short`, also on an error: the missing points may be its cause.
+/// Sets `cut_short` if points are missing, even if the comparison fails: the missing points may be
+/// the cause of its failure.
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());

@@ -8,16 +8,16 @@
 
 namespace abbe::daemon {
 
-/// Readings with steps this large cannot show errors of some um.
+/// Largest plausible step per count. Readings with larger steps cannot show errors of some um.
 inline constexpr double kLargestStep_m = 1e-3;
 inline constexpr double kLargestStep_rad = 0.1;
 
-/// Adds a fault at step_nm or step_nrad if one count is larger than any scale has; none in a
-/// recorded file.
+/// Adds a fault at step_nm or step_nrad if `step` per count is larger than that of any real scale;
+/// no fault in a recorded configuration.
 void check_step(Section& section, double step, bool linear);
 
-/// Adds a fault for every step that is possible but improbable. `table`.`list`: the axes of a
-/// device, each with a step per count.
+/// Adds a fault for every axis whose step is possible but improbable. `table`.`list` is the array
+/// in the file that has one element with a step per axis.
 void doubt_steps(Section& root, const char* table, const char* list, const MachineConfig& machine);
 
 /// "10 nm".

@@ -30,7 +30,7 @@ fs::path existing_part(const fs::path& folder) {
   return error ? fs::path{} : part;
 }
 
-/// A folder that exists, or that abbed can create.
+/// Adds a fault unless `folder` exists or can be created by abbed.
 void check_folder(Section section, std::string_view key, const fs::path& folder) {
   std::error_code error;
   const auto part = existing_part(folder);
@@ -39,7 +39,8 @@ void check_folder(Section section, std::string_view key, const fs::path& folder)
                                  folder.string(), part.string()));
 }
 
-/// A folder above that may not be searched hides the file: then nothing is reported.
+/// False also if the path cannot be examined, for example because a folder above it may not be
+/// searched by this user: then the file may exist for abbed.
 bool is_missing(const fs::path& path, bool folder) {
   std::error_code error;
   const auto status = fs::status(path, error);
@@ -70,7 +71,7 @@ void check_paths(Section& root, const Config& config) {
 // ---- The improbable ----
 
 constexpr double kLongTravel_m = 50.0;
-constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;  // 62.8: a range of 90 is in degrees
+constexpr double kManyTurns_rad = 10 * 2.0 * std::numbers::pi;  // 62.8: more is in degrees
 constexpr double kLongTarget_m = 2.0;
 
 void doubt_axis(Section axis, const AxisConfig& config) {
@@ -121,7 +122,8 @@ void doubt_cpus(Section daemon, const DaemonConfig& config, int cpus) {
       daemon.fault(key, fmt::format("CPU {}: this computer has the CPUs 0 to {}", *cpu, cpus - 1));
 }
 
-/// No shell expands "~" or "$HOME" in the file: a folder with this name would be created.
+/// Warns about paths with "~" or "$HOME": no shell expands them, and a folder of that name would be
+/// created.
 void doubt_paths(Section& root, const Config& config) {
   const auto doubt = [&](const char* table, const char* key, const fs::path& path) {
     const bool shell = std::ranges::any_of(path, [](const fs::path& part) {

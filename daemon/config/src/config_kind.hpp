@@ -23,27 +23,30 @@ struct AxisReadings {
   bool compensated = false;       ///< the control already corrects them
 };
 
-/// A function that takes a Config returns an empty result if it has no device of the kind. A null
-/// pointer means that no device of the kind has this part.
+/// One kind of device in the configuration. Each function that takes a Config returns an empty
+/// result if no device of the kind is configured. A null pointer means that the kind does not have
+/// the capability of this member.
 struct ConfigKind {
   std::string_view key;         ///< of the table
   bool several = false;         ///< an array of tables: [[KEY]]
   std::string_view needs = {};  ///< the key without which a table configures no device
 
-  /// Reads and checks the table, adds the device to `out`, and takes its name. The kinds before it
-  /// in DeviceConfigs are read already.
+  /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
+  /// kinds that precede this one in DeviceConfigs have been read already.
   void (*read)(Section& root, Config& out, StreamNames& names);
-  /// Adds a fault for what is possible but improbable.
+  /// Adds a warning, as a fault, for each value that is possible but improbable.
   void (*doubt)(Section& root, const Config& config) = nullptr;
-  /// For `abbed --check-config`, one text for each device.
+  /// The lines about the devices of this kind in `abbed --check-config`, one for each device.
   std::vector<std::string> (*summary)(const Config& config);
-  /// Part of machine_hash(): what the meaning of a scale reading depends on.
+  /// The text of this kind that enters machine_hash(): all that the meaning of a scale reading
+  /// depends on.
   std::string (*reading_text)(const Config& config) = nullptr;
 
   // Capabilities; see capabilities.hpp.
   bool moves = false;  ///< it moves and touches points under its own control
   std::optional<AxisReadings> (*axes)(const Config& config) = nullptr;
-  /// Its positions are the axis readings only if no device of another kind reads the axes.
+  /// True: the positions of the device are the axis readings only if no other kind of device reads
+  /// the axes.
   bool axes_if_no_other = false;
   std::optional<std::chrono::nanoseconds> (*time_of_axis_samples)(const Config& config,
                                                                   double periods) = nullptr;
@@ -56,7 +59,7 @@ struct ConfigKind {
 
 [[nodiscard]] std::span<const ConfigKind> config_kinds();
 
-/// As tables_with(), with the keys that the tables need: "[a] key or [b]".
+/// As tables_with(), each table followed by the key that it requires: "[a] key or [b]".
 [[nodiscard]] std::string needed_for(Capability capability);
 
 /// Of all devices that read the axes.

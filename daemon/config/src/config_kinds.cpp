@@ -54,7 +54,7 @@ bool has(const ConfigKind& kind, Capability capability) {
   return false;
 }
 
-/// The result of the first kind that has the capability in this configuration.
+/// Calls the function `capability` of each kind and returns the first result that is not empty.
 template <class Result>
 Result first_with(Result (*ConfigKind::*capability)(const Config&), const Config& config) {
   for (const ConfigKind& kind : config_kinds()) {

@@ -17,7 +17,7 @@ std::string line(std::string_view what, std::string_view text) {
   return fmt::format("{:<13} {}", what, text);
 }
 
-/// The folder that a relative path means, whatever the current folder is later.
+/// The absolute path: it stays valid when the current folder changes.
 std::string full(const std::filesystem::path& path) {
   std::error_code error;
   const auto absolute = std::filesystem::absolute(path, error);

@@ -1,6 +1,7 @@
 #pragma once
-/// Order of the axes in samples. The users of a sample select an axis by its index, so the index
-/// must not depend on the order in the configuration file.
+/// Brings the axes of a device into the order of the machine's axes. The users of a sample select
+/// an axis by its index, so the index must not depend on the order of axes in the configuration
+/// file.
 
 #include <fmt/format.h>
 
@@ -24,7 +25,7 @@ void put_in_order_of_the_machine(const MachineConfig& machine, std::string Reads
     if (std::ranges::find(all, needed, name) == all.end())
       device.fault(key, fmt::format("axis {} has no {}", needed, what));
   const auto known = [&](const Reads& one) { return machine.find_axis(one.*name) != nullptr; };
-  if (!std::ranges::all_of(all, known)) return;  // reported already
+  if (!std::ranges::all_of(all, known)) return;  // an unknown axis is reported already
   const auto place = [&](const Reads& one) {
     return machine.find_axis(one.*name) - machine.axes.data();
   };

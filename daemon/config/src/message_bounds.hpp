@@ -12,8 +12,8 @@
 
 namespace abbe::daemon {
 
-/// The IDL's bound of a member of T. 0 if T has no such member: then the name in the call is
-/// misspelt.
+/// The largest size that the IDL allows for `member` of T (a string or sequence). 0 if T has no
+/// such member, which means that the caller misspelt the name.
 template <class T>
 [[nodiscard]] std::size_t bound_of(std::string_view member) {
   for (const auto& known : member_bounds<T>())

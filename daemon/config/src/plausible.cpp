@@ -25,8 +25,8 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// Numbers with dots, one of them larger than 255: 192.168.0.300. A name never consists of digits
-/// and dots only.
+/// True for a text of digits and dots with a number above 255, for example 192.168.0.300. Such a
+/// text is a mistyped address, because a host name never consists of digits and dots only.
 bool has_number_over_255(std::string_view host) {
   constexpr int kMost = 255;
   int number = 0;
@@ -37,8 +37,8 @@ bool has_number_over_255(std::string_view host) {
   return false;
 }
 
-/// What no resolver accepts; empty: an address or a name. The resolver judges the rest: zeros in
-/// front of a number, names in /etc/hosts, mDNS.
+/// Why no resolver can accept `host`; empty if it may be an address or a name. What only a resolver
+/// can decide is not checked: leading zeros in a number, names in /etc/hosts, mDNS.
 std::string fault_of_host(const std::string& host) {
   const auto digit_or_dot = [](char c) { return is_digit(c) || c == '.'; };
   const auto not_printable = [](char c) { return c == ' ' || c == '\x7f' || (c >= 0 && c < ' '); };
@@ -52,7 +52,7 @@ std::string fault_of_host(const std::string& host) {
   return "";
 }
 
-/// A terminal would execute control characters.
+/// Replaces control characters, which a terminal would execute, by '?'.
 std::string printable(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; }, '?');

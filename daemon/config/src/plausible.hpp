@@ -1,7 +1,7 @@
 #pragma once
-/// Limits of what a real machine has. A value beyond them is a mistake in the unit or a typing
-/// error, and is a fault of a configuration that a person wrote. A recorded configuration is not
-/// judged by them (Section::implausible()).
+/// Checks that values are those of a real machine. A value beyond these limits is a mistake in the
+/// unit or a typing error, and is a fault in a configuration that a person wrote. A recorded
+/// configuration is not checked (Section::implausible()).
 
 #include <string_view>
 
@@ -10,14 +10,15 @@
 
 namespace abbe::daemon {
 
-/// Shorter than any axis of a machine tool or measuring machine. 0.3 mm is 300 mm given in m.
+/// Shorter than any axis of a machine tool or measuring machine. A travel of 0.3 mm, for example,
+/// is probably 300 mm that was entered in m.
 inline constexpr double kShortestTravel_m = 1e-3;
 
 /// Adds a fault at `key` (max_mm) if a linear axis with min < max is shorter than
 /// kShortestTravel_m.
 void check_travel_length(Section& axis, std::string_view key, const AxisConfig& config);
 
-/// Reads the name or address of a device in the network. Adds a fault if it can be neither.
+/// Reads the host name or network address of a device. Adds a fault if the text can be neither.
 bool get_host(Section& section, std::string_view key, std::string& out, Need need = Need::Optional);
 
 }  // namespace abbe::daemon

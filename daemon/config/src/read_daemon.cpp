@@ -44,8 +44,8 @@ void read_daemon(Section& root, const std::filesystem::path& base, Config& out) 
   section.get("data_dir", daemon.data_dir, base);
   section.get("runtime_dir", daemon.runtime_dir, base);
 
-  // The hub sends a beat to abbe-dds every 100 ms, and counts as hung after a second without a
-  // cycle.
+  // The longest hub_period is half of the 100 ms between the alive messages that the hub sends to
+  // abbe-dds, and far below the second without a cycle after which the hub counts as hung.
   section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
   // Maximum: half of the time for which the assembler retains samples.
   section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});
@@ -84,7 +84,7 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   Section section = root.child("dds");
   auto& dds = out.dds;
   dds.socket = out.daemon.runtime_dir / "dds.sock";
-  // RTPS 2.2, 9.6.1.1: domain 232 is the last one with valid port numbers.
+  // The domain ids 0 to 232 give valid UDP port numbers [DDSI-RTPS 2.2, 9.6.1.1].
   section.get_integer("domain", dds.domain, 0, 232);
 
   // 0: with every hub cycle that has new data; the rate is then limited by the hub period and the

@@ -62,7 +62,8 @@ void read_axes(Section axes, MachineConfig& out) {
   sort_axes(out.axes);
 }
 
-/// [model] node_spacing_mm: one number, or a table with one per axis.
+/// Reads [model] node_spacing_mm for one axis. The key is one number for all axes, or a table with
+/// one number per axis.
 double read_spacing(Section& model, Section* per_axis, const std::string& axis) {
   double spacing_m = kDefaultNodeSpacing_m;
   if (per_axis != nullptr)
@@ -93,8 +94,8 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
     return;
   }
 
-  // A larger table cannot be identified; the limit also prevents that a typing error allocates
-  // gigabytes.
+  // More nodes than this cannot be identified. The limit also prevents that a typing error
+  // allocates gigabytes.
   constexpr double kMaxNodes = 2000.0;
   if ((axis.max - axis.min) / spacing_m > kMaxNodes)
     model.fault("node_spacing_mm",
@@ -117,7 +118,8 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
   model.close();
 }
 
-/// Checks the number of parameters. A machine with other faults is skipped.
+/// Adds a fault if the model has too many parameters. A configuration that otf_machine() does not
+/// accept is skipped, because its faults are reported elsewhere.
 void check_model_size(Section& model, const MachineConfig& config) {
   const auto machine = otf_machine(config);
   if (!machine) return;

@@ -7,7 +7,8 @@
 
 namespace abbe::daemon {
 
-/// All faults of a file that a person wrote; the limit is for a file that is no configuration.
+/// A file that a person wrote has fewer faults than this; the limit shortens the list for a file
+/// that is not a configuration at all.
 inline constexpr std::size_t kMostConfigFaults = 1000;
 
 /// Io if the file cannot be read.

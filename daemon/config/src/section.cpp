@@ -138,7 +138,7 @@ bool Section::get(std::string_view key, double& out, Unit unit, Bounds bounds, N
 bool Section::get(std::string_view key, std::chrono::nanoseconds& out, Unit unit, Bounds bounds,
                   Need need) {
   double seconds = 0.0;
-  // The limit of a century prevents overflow in the conversion to int64 nanoseconds.
+  // At most a century, because the conversion to int64 nanoseconds must not overflow.
   bounds.max = std::min(bounds.max, 3.15e9 * unit.per_si);
   if (!get(key, seconds, unit, bounds, need)) return false;
   out = std::chrono::nanoseconds{std::llround(seconds * kNano.per_si)};

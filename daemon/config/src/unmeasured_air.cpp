@@ -12,7 +12,7 @@ calib::Air assumed_air() noexcept {
 }
 
 double u_of_unmeasured_air() noexcept {
-  // The air is constant and within the range of the equation, so there is always a value.
+  // The result always has a value: assumed_air() is within the range of the equation.
   static const double u =
       *calib::u_of_assumed_air(assumed_air(), calib::kHeliumNeon_m, calib::IndexEquation::Ciddor);
   return u;

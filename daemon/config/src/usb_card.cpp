@@ -16,7 +16,8 @@ constexpr Unit kMega{1e-6};
 
 }  // namespace
 
-/// Keys that apply only to the other transport are refused instead of being ignored silently.
+/// Reads how the card is connected. Keys that apply only to the other transport are refused,
+/// because ignoring them silently would hide a mistake.
 void read_card_address(Section& table, UsbCardConfig& out) {
   table.get_word<CardTransport>("transport", out.transport,
                                 {{"usb", CardTransport::Usb}, {"usbip", CardTransport::Usbip}},

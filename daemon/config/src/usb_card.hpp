@@ -18,7 +18,7 @@ void read_card_address(Section& table, UsbCardConfig& out);
 void read_card_clock(Section& table, drivers::CounterCardWiring& out);
 void read_debounce(Section& table, std::string_view key, drivers::quad08::Debounce& out);
 
-/// Address and axes, for `abbed --check-config`.
+/// Address of the card and the axes that it counts, as text for `abbed --check-config`.
 [[nodiscard]] std::string card_text(const UsbCardConfig& card, const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -102,8 +102,9 @@ abbe::daemon::Result<void> take_from_config(Options& options) {
   return {};
 }
 
-/// Notifies systemd when abbe-dds runs as a service: systemd kills it if its loop hangs. A child of
-/// abbed sends nothing, because the notification socket that it inherits is that of abbed.
+/// Notifies systemd that the loop is alive when abbe-dds runs as a service; systemd kills it if its
+/// loop hangs. When abbe-dds is a child of abbed nothing is sent, because the notification socket
+/// that the child inherits is that of abbed.
 class ServiceManager {
  public:
   using Instant = std::chrono::steady_clock::time_point;
@@ -135,7 +136,7 @@ std::optional<int> publish(const Options& options) {
   if (!writers) return refuse(writers.error());
   stop_on_signals();
 
-  // Readiness is reported only after participant and writers exist.
+  // The service reports readiness to systemd only after participant and writers exist.
   ServiceManager manager(options);
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);

@@ -53,14 +53,14 @@ std::string footer() {
               {ExitCode::Internal}});
 }
 
-/// In the order in which they are read. ModelState first: Readers::take() goes topic by topic, so
-/// every other sample is judged by the latest state.
+/// In the order in which the readers are read. ModelState is first, because Readers::take() reads
+/// topic by topic: every other sample is then judged by the latest ModelState.
 constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
                              Topic::Snapshot,        Topic::Health,     Topic::Compensation,
                              Topic::CalibrationEvent};
 
-/// Without any sample for so long, the user learns what is waited for. ModelState is repeated every
-/// second.
+/// If no sample has arrived for this time, a message tells the user what may be wrong. The time
+/// exceeds the second after which ModelState is repeated.
 constexpr std::chrono::seconds kReportedSilence{5};
 
 volatile sig_atomic_t stop_requested = 0;
@@ -152,15 +152,17 @@ void report_silence(const Options& options) {
              kReportedSilence.count(), options.participant.domain, topics);
 }
 
-/// The keys of the daemon allow publishing, and only abbed may read them: those of subscriber-1 in
-/// the folder above are used. `abbe dds keys` makes both.
+/// The folder that contains the folder `daemon_keys`; a subscriber uses the keys in subscriber-1 of
+/// the former, because the keys in `daemon_keys` allow publishing and only abbed may read them.
+/// `abbe dds keys` makes both.
 std::filesystem::path subscriber_keys(const std::filesystem::path& daemon_keys) {
   if (daemon_keys.empty()) return {};
   const auto folder = daemon_keys.lexically_normal();
   return folder.has_filename() ? folder.parent_path() : folder.parent_path().parent_path();
 }
 
-/// --security on the command line takes precedence.
+/// Takes the options that the configuration file defines. --security on the command line takes
+/// precedence over the file.
 Result<void> take_from_config(Options& options) {
   auto config = daemon::load_config(options.config);
   if (!config) return tl::make_unexpected(config.error());

@@ -15,15 +15,16 @@ namespace {
 
 using daemon::Topic;
 
-/// A publisher is not alive if its last ModelState is older. ModelState is repeated every second,
-/// even if nothing changes.
+/// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher
+/// repeats ModelState once a second, even if nothing changes.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
 std::string micrometres(const std::array<double, 3>& v_m) {
   return fmt::format("{:+.2f} {:+.2f} {:+.2f} um", v_m[0] * 1e6, v_m[1] * 1e6, v_m[2] * 1e6);
 }
 
-/// A missing axis is shown as "-": its last position is out of date.
+/// The position as text. An axis that is missing in the sample is shown as "-", because its last
+/// position is out of date.
 std::string millimetres(const std::vector<double>& position_m, unsigned missing_mask) {
   std::string text;
   for (std::size_t axis = 0; axis < position_m.size(); ++axis) {

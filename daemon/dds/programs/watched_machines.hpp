@@ -32,8 +32,8 @@ class WatchedMachines {
   /// True once a sample of a machine that is watched has arrived.
   [[nodiscard]] bool received() const { return received_; }
   void take(const Arrival& arrival);
-  /// Discards the ModelState of publishers that are not alive, and shows the change. If such a
-  /// publisher becomes alive again, it repeats its state within a second.
+  /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
+  /// that becomes alive again repeats its ModelState within a second.
   void notice_losses();
   /// The first model that may be applied and is complete; nullptr if there is none.
   [[nodiscard]] const ReceivedModel* applicable() const;
@@ -75,7 +75,8 @@ class WatchedMachines {
   };
 
   [[nodiscard]] bool alive(const Publisher& publisher) const;
-  /// Called also for publishers that are not pinned, because one of them may be pinned next.
+  /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
+  /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
   /// Shows a sample of the pinned publisher, after keep().
   void show(const Arrival& arrival, const std::string& name, Machine& machine,

@@ -28,8 +28,8 @@ constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter =
 /// Parameters that announce a type: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
-/// Vendor-specific and without the bit "must understand": a receiver that does not know it skips
-/// it.
+/// Replaces the ids of type parameters. This id is vendor-specific and has no bit "must
+/// understand", so a receiver skips a parameter with it.
 constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
 class Reader {
@@ -76,7 +76,7 @@ std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, U
   return std::nullopt;
 }
 
-/// `body`: a DATA or DATA_FRAG submessage without its header.
+/// Whether `body`, a DATA or DATA_FRAG submessage without its header, announces an endpoint.
 bool is_announcement(Bytes body) {
   constexpr std::size_t kWriterAt = 8;  // after extra flags, octetsToInlineQos and reader id
   if (body.size() < kWriterAt + 4) return false;
@@ -167,7 +167,7 @@ std::size_t filter_message(std::span<std::uint8_t> message) noexcept {
 
     const Bytes body = message.subspan(at, length);
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
-    if (kind == kDataFrag && is_announcement(body)) return 0;  // a fragment cannot be checked
+    if (kind == kDataFrag && is_announcement(body)) return 0;  // a fragment cannot be checked alone
     if (kind == kData && is_announcement(body) && !blank_types(body, flags)) return 0;
     at += length;
   }

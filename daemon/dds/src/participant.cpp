@@ -33,7 +33,8 @@ void log_to_stderr() {
 }
 
 Result<fast::DomainParticipantQos> read_profile(const std::filesystem::path& file) {
-  // Without this a DEFAULT_FASTRTPS_PROFILES.xml in the working directory would change the profile.
+  // Without this variable Fast DDS would also load a DEFAULT_FASTRTPS_PROFILES.xml in the working
+  // directory, which would change the profile.
   ::setenv("SKIP_DEFAULT_XML", "1", 1);
   auto* factory = fast::DomainParticipantFactory::get_instance();
   const std::string name = file.empty() ? std::string("built-in profile") : file.string();
@@ -59,8 +60,8 @@ bool has_property(const fast::DomainParticipantQos& qos, const char* name) {
          nullptr;
 }
 
-/// Without an authentication plugin Fast DDS switches security off, even if an access control
-/// plugin is set.
+/// Whether the profile switches DDS Security on. Without an authentication plugin Fast DDS switches
+/// it off, even if an access control plugin is set.
 bool has_security(const fast::DomainParticipantQos& qos) {
   return has_property(qos, "dds.sec.auth.plugin") && has_property(qos, "dds.sec.access.plugin");
 }

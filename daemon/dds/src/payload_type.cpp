@@ -52,7 +52,7 @@ void append_big_endian(std::string& key, std::string_view text) {
 
 PayloadType::PayloadType(daemon::Topic topic) : topic_(topic) {
   setName(std::string(daemon::traits(topic).type_name).c_str());
-  // A payload is padded to a multiple of 4 in its submessage.
+  // In an RTPS submessage a payload is padded to a multiple of 4 bytes.
   m_typeSize = static_cast<uint32_t>(kPayloadHeaderBytes + (largest_body_bytes(topic) + 3) / 4 * 4);
   m_isGetKeyDefined = true;
 }

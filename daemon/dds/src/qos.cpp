@@ -6,14 +6,15 @@ namespace {
 using namespace eprosima::fastdds::dds;
 using eprosima::fastrtps::Duration_t;
 
-/// abbe-dds asserts the liveliness of the ModelState writer explicitly, and only while abbed is
-/// alive.
+/// Lease of the liveliness of ModelState. abbe-dds asserts the liveliness explicitly
+/// (MANUAL_BY_TOPIC), and only while abbed is alive.
 const Duration_t kLivelinessLease(1, 0);
-/// A late joiner waits for the next heartbeat; with the default period it would wait up to 3 s.
+/// A late joiner receives old samples after the next heartbeat; with Fast DDS's default period it
+/// would wait for up to 3 s.
 const Duration_t kHeartbeatPeriod(0, 100'000'000);
 
-/// The default limit of Fast DDS is 10 instances; a grid has more slices, and a machine may have
-/// more streams.
+/// Most instances of a topic. Fast DDS's default is 10, but a grid may have more slices and a
+/// machine more streams.
 constexpr int kMostInstances = 128;
 constexpr int kInstancesAtStart = 4;
 

@@ -34,8 +34,8 @@ WriterId writer_id(const eprosima::fastrtps::rtps::InstanceHandle_t& publication
   return id;
 }
 
-/// The writers that keep their lease. Fast DDS calls the listener from its own threads for every
-/// change of a writer; a status that is read later contains only the last change.
+/// The writers that keep their lease. This is a listener, called by Fast DDS from its own threads
+/// for every change of a writer, because a status that is polled contains only the last change.
 class AliveWriters final : public fast::DataReaderListener {
  public:
   [[nodiscard]] bool contains(const WriterId& writer) const {
@@ -43,13 +43,14 @@ class AliveWriters final : public fast::DataReaderListener {
     return alive_.contains(writer);
   }
 
-  /// Triggered by every change. A status condition cannot be used: the listener's read of the
-  /// status resets it.
+  /// Triggered by every change of a writer. The reader's status condition cannot be used instead:
+  /// the status is reset when Fast DDS passes it to the listener.
   fast::GuardCondition changed;
 
-  /// A sample of this writer was received at `arrived`. Needed because Fast DDS may report two
-  /// simultaneous changes in the wrong order. A sample that arrived before its writer was lost, and
-  /// was in the reader since then, does not make the writer alive.
+  /// Records that a sample of `writer` arrived at `arrived`: the writer is alive if it was not lost
+  /// after that. Needed because Fast DDS may report that a writer is lost and alive again in the
+  /// wrong order. A sample that had arrived before the loss, and is taken from the reader only now,
+  /// does not make the writer alive.
   void heard(const WriterId& writer, const Time& arrived) {
     const std::lock_guard lock(mutex_);
     const auto lost = lost_at_.find(writer);

@@ -37,7 +37,7 @@ void ReceivedModel::state(v1::ModelState state) {
 }
 
 void ReceivedModel::slice(v1::ErrorGrid slice) {
-  // The model of the state, the next one, and remaining slices of old ones.
+  // Enough for the model that ModelState names, the next one, and remaining slices of old models.
   constexpr std::size_t kMostModels = 4;
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
     std::erase_if(slices_,
@@ -77,7 +77,7 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
   if (!c.tool_ok()) return refuse("the model is not valid for this tool");
   if (!delay) return refuse("the transit time is not known yet");
 
-  // The values may come from any participant: a sum of two of them could overflow.
+  // The values may come from any participant, so the comparison avoids sums, which could overflow.
   if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - delay->count())
     return refuse("older than its validity");
   return decision;
@@ -85,7 +85,8 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
 
 std::optional<std::chrono::nanoseconds> Delay::of(const v1::Compensation& vector, Instant now) {
   constexpr std::chrono::nanoseconds kLongestStep = std::chrono::seconds{1};
-  // abbe-dds never sends more, and sums of larger values overflow.
+  // Longest time that is accepted in a vector. abbe-dds sends none longer, and the sum of two
+  // longer ones could overflow.
   constexpr std::int64_t kLongest_ns = std::int64_t{1} << 60;
   for (const std::int64_t time : {vector.host_time_ns(), vector.age_ns()})
     if (time < 0 || time > kLongest_ns) return std::nullopt;

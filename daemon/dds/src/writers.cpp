@@ -15,8 +15,9 @@ std::size_t index_of(daemon::Topic topic) {
   return static_cast<std::size_t>(topic);
 }
 
-/// The writer that is announced when DDS Security is on. Empty if the permissions of the site do
-/// not allow it; then a new subscriber may need up to a second to find the writers.
+/// The writer, without readers, that is announced when DDS Security is on. Empty if the permissions
+/// of the site do not allow this writer; a new subscriber may then need up to a second to find the
+/// other writers.
 std::vector<eprosima::fastdds::dds::DataWriter*> announcement_writer(
     Participant& participant, eprosima::fastdds::dds::Publisher& publisher) {
   namespace fast = eprosima::fastdds::dds;
@@ -65,8 +66,8 @@ bool Writers::write(daemon::Topic topic, std::span<const std::byte> payload) {
 
 void Writers::dispose(daemon::Topic topic, std::span<const std::byte> payload) {
   buffer_.bytes.assign(payload.begin(), payload.end());
-  // Fast DDS returns an error for an instance that was never written; there is nothing to dispose
-  // of then.
+  // Fast DDS returns an error if the instance was never written. Nothing needs to be disposed of
+  // then, so the result is ignored.
   static_cast<void>(writers_[index_of(topic)]->dispose(
       &buffer_, eprosima::fastrtps::rtps::c_InstanceHandle_Unknown));
 }

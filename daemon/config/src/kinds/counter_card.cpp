@@ -59,7 +59,7 @@ drivers::CounterAxis read_counted_axis(Section& section, const MachineConfig& ma
   return axis;
 }
 
-/// Another device reads an axis already.
+/// Adds a fault for each axis of the card that another device reads already.
 void refuse_claimed_axes(Section& table, const drivers::CounterCardWiring& wiring,
                          const Config& config) {
   for (const auto& axis : wiring.axes)

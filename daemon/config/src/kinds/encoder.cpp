@@ -16,7 +16,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// Keys that apply only to the other transport are refused instead of being ignored silently.
+/// Adds a fault for each of `keys`, which apply only to the other transport: ignoring them silently
+/// would hide a mistake.
 void refuse_encoder_keys(Section& encoder, std::initializer_list<std::string_view> keys,
                          std::string_view transport) {
   for (const auto key : keys)
@@ -57,8 +58,8 @@ void read_encoder_transport(Section& encoder, EncoderConfig& out) {
   }
 }
 
-/// Position of the reading in the TPDO. With sync = "external" abbed sends no SDO request to the
-/// node, so the configuration must give it.
+/// Reads the position of the axis value in the TPDO. With sync = "external" abbed sends no SDO
+/// request to the node to find this position, so the configuration must state it.
 void read_mapping(Section& section, SyncConfig sync, EncoderNodeConfig& node) {
   constexpr int kLastByte = 4;  // a TPDO has 8 bytes, the position has 4
   section.get_integer("tpdo", node.tpdo, 1, 2);
@@ -122,8 +123,8 @@ void read_encoder(Section& root, Config& out, StreamNames& names) {
   get_bounded(encoder, "name", config.name, bound_of<v1::AxisSample>("device"));
   read_encoder_transport(encoder, config);
 
-  // Shorter than the 350 ms after which a node counts as silent, and the 500 ms after which an axis
-  // counts as unknown.
+  // The longest sync_period is shorter than the 350 ms after which a node counts as silent and the
+  // 500 ms after which an axis position counts as unknown.
   encoder.get("sync_period_us", config.sync_period, kMicro, {100.0, 100e3});
   encoder.get("sampling_delay_us", config.sampling_delay, kMicro, kNotNegative);
   encoder.get("u_sampling_delay_us", config.u_sampling_delay, kMicro, kNotNegative);

@@ -22,8 +22,8 @@ using drivers::modbus::WordOrder;
 
 constexpr std::string_view kCustom = "custom";
 
-/// Adds a temperature name and returns its channel. A fault if the name exists already, or if
-/// there is no channel left for it.
+/// Adds a temperature name to `names` and returns its index, the channel. Adds a fault if the name
+/// exists already, or if the largest number of channels is reached.
 std::uint8_t channel_of(const std::string& name, Section& section, std::string_view key,
                         std::vector<std::string>& names) {
   const auto found = std::find(names.begin(), names.end(), name);
@@ -218,7 +218,7 @@ void read_map(Section& device, std::vector<std::string>& names, drivers::Registe
   }
 
   device.get_integer("base_offset", map.base_offset, -1, 1);
-  if (!valid_map || names.size() > protocol::kMaxTemperatures) return;  // has a fault already
+  if (!valid_map || names.size() > protocol::kMaxTemperatures) return;  // already reported
   if (const auto valid = drivers::check(map); !valid) device.fault("map", valid.error().text);
 }
 

@@ -96,8 +96,8 @@ drivers::TouchOptions touch_options(const ProbeConfig& probe,
   wiring.use_latch = card.latch_channel.has_value();
   wiring.scan_period = nanoseconds_of(1.0 / drivers::scan_rate_hz(card));
 
-  // A debounce of microseconds only filters noise; one that is longer than the chatter time
-  // confirms the touch.
+  // A debounce of microseconds only filters noise. A debounce longer than the chatter of the
+  // contact passes only a touch that lasts, and thus replaces the confirmation by the driver.
   const auto& debounce = card.edge_debounce;
   const auto debounce_time = nanoseconds_of(drivers::quad08::kDebounce_s[debounce.time_code]);
   const bool confirms = card.edge_channel && debounce.enabled && !debounce.trigger_before_stable;

@@ -53,7 +53,8 @@ void read_point_rate(Section& tracker, TrackerConfig& out) {
   out.point_rate_hz = 1e3 / period_ms;
 }
 
-/// Keys that apply only to the other mode are refused instead of being ignored silently.
+/// Adds a fault for each key that applies only to the other mode: ignoring it silently would hide a
+/// mistake.
 void read_tracker_mode(Section& tracker, TrackerConfig& out) {
   constexpr int kLongest_ms = 60'000;  // emScon
   tracker.get_word<TrackerModeConfig>("mode", out.mode,
@@ -110,7 +111,8 @@ void read_beam(Section& tracker, TrackerConfig& out) {
   read_search(tracker, out);
 }
 
-/// `air`: the table [air], which is read after [tracker]; null if absent.
+/// The default of u_scale. `air` is the TOML table [air], which is read after [tracker]; null if
+/// absent.
 double default_u_scale(WeatherConfig weather, const toml::node* air) {
   if (weather == WeatherConfig::Compute) return TrackerConfig::kControllersAir;
   const bool corrected =

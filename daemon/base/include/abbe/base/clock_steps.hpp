@@ -17,8 +17,10 @@ class ClockSteps {
  public:
   explicit ClockSteps(const ClockReading& start) : start_(start.utc - start.since_boot) {}
 
-  /// True if the wall clock was off by more than five minutes at this call or an earlier one. Stays
-  /// true when the clock is corrected, because files got wrong dates in between.
+  /// True if, at this call or an earlier one, the wall clock (`utc`) differed by more than five
+  /// minutes from where it would be without having been set: from its value at construction plus
+  /// the advance of `since_boot`. Stays true when the wall clock is corrected later, because files
+  /// got wrong dates in between.
   [[nodiscard]] bool look(const ClockReading& now);
 
  private:

@@ -38,9 +38,9 @@ struct ControlPeer {
   std::vector<gid_t> groups = {};      ///< primary group and supplementary groups
 };
 
-/// When a limit is exceeded, the server closes the connection that has been idle longest: one of
-/// the same user if that user reached `of_one_user`, else one of the user with the most
-/// connections.
+/// If a new connection exceeds one of these limits, the server closes the connection that has been
+/// idle longest: among those of the new client's user if that user already has `of_one_user`, else
+/// among those of the user with the most connections.
 struct ControlLimits {
   std::size_t connections = 32;
   std::size_t of_one_user = 16;
@@ -62,7 +62,7 @@ class ControlServer {
   virtual ~ControlServer() = default;
 };
 
-/// The answer on the socket that reports `error`.
+/// The answer ("ok": false) that reports `error` to the client.
 [[nodiscard]] nlohmann::json refusal(const Error& error);
 
 /// Sends one request and returns its answer. An answer with "ok": false is returned as an Error.

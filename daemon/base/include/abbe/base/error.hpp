@@ -12,11 +12,11 @@
 namespace abbe::daemon {
 
 enum class ErrorCode {
-  DataInsufficient,  ///< the data do not allow an answer (rank, alignment, too few points)
+  DataInsufficient,  ///< too few points, a singular fit, lost samples: there is no result
   Usage,             ///< a command was called wrongly
   BadInput,          ///< a file, message or configuration is invalid
   Io,                ///< a call to the operating system failed: file, socket, process
-  Refused,           ///< the model checks, or the present state, do not allow it
+  Refused,           ///< the request is valid, but a check or the present state forbids it
 };
 
 struct Error {

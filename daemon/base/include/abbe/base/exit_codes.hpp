@@ -1,5 +1,5 @@
 #pragma once
-/// The exit codes of all programs, under the names of the daemon.
+/// The exit codes of all programs, defined in protocol, as names of this namespace.
 
 #include "abbe/protocol/exit_codes.hpp"
 

@@ -12,7 +12,7 @@ using protocol::suggestion;
 class Faults : public protocol::Faults {
  public:
   using protocol::Faults::Faults;
-  [[nodiscard]] Error to_error() const {  ///< BadInput; needs any()
+  [[nodiscard]] Error to_error() const {  ///< code BadInput; requires any()
     return {ErrorCode::BadInput, heading(), lines()};
   }
 };

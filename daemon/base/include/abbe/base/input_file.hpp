@@ -1,5 +1,6 @@
 #pragma once
-/// What every file reader returns or reports beside the content.
+/// Types that all readers of files share: the identity of the file that was read, and the callback
+/// that reports the progress of reading.
 
 #include <string>
 

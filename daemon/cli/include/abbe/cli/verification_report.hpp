@@ -34,7 +34,8 @@ struct Verification {
 /// report.html, self-contained. Begins with the verdict.
 [[nodiscard]] std::string verification_report(const ModelDocument&, const Verification&);
 
-/// grid.csv:
+/// grid.csv, one row per grid point: position, measured error (las), error of the model (model),
+/// error of the model after its best-fit rigid motion (turned), and R_resmag of model and turned:
 /// `x_mm,y_mm,z_mm,las_x_um,las_y_um,las_z_um,model_x_um,...,turned_x_um,...,R_stated,R_turned`.
 [[nodiscard]] std::string to_grid_csv(const calib::verify::Comparison&);
 

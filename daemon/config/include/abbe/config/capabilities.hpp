@@ -19,18 +19,20 @@ struct Config;
 struct TrackerSource {
   /// The air for which the controller corrects its distances.
   enum class Air {
-    Measured,  ///< it measures the air
+    Measured,  ///< the controller measures the air
     Assumed,   ///< assumed_air()
-    LastSet,   ///< the refractive index that was last set in it
+    LastSet,   ///< as the refractive index last set in the controller
   };
 
   std::string_view key;  ///< of its table
   double point_rate_hz = 0.0;
-  /// Time of each mean value. nullopt: it delivers points during motion; else at standstills only.
+  /// Duration of a measurement of a stationary reflector; the device then delivers one mean value
+  /// for each. nullopt: the device delivers points during motion.
   std::optional<std::chrono::nanoseconds> stationary_time = std::nullopt;
   double u_scale = 0.0;  ///< relative standard uncertainty common to all distances
   Air air = Air::Measured;
-  std::string air_setting = {};  ///< that selects `air`, as in messages
+  /// the configuration key that selects `air`, as text for messages
+  std::string air_setting = {};
 };
 [[nodiscard]] std::optional<TrackerSource> tracker_source(const Config& config);
 
@@ -38,26 +40,30 @@ struct TrackerSource {
 struct TouchSource {
   std::string_view key;  ///< of its table
   std::string device;    ///< its name
-  /// True: it reports the position of each touch. False: a touch has the readings of the axes.
+  /// True: the device reports the position of each touch. False: a touch has the readings of the
+  /// axes.
   bool reports_positions = false;
-  bool compensated = false;  ///< it corrects the positions that it reports
+  bool compensated = false;  ///< the device corrects the positions that it reports
 };
 [[nodiscard]] std::optional<TouchSource> touch_source(const Config& config);
 
-/// The card whose counters read the axes. Their zeros are unknown when it is set up; see Datum.
+/// The card whose counters read the axes. When the card is set up its counters start at 0, so the
+/// axis readings have an unknown offset until the axes are referenced; see Datum.
 struct CountedAxes {
   std::string_view key;       ///< of its table
   const UsbCardConfig& card;  ///< in the Config
-  /// An axis without marks is at its offset at the first set-up of the card.
+  /// True: an axis without reference marks has its configured offset as reading when the card is
+  /// set up for the first time. False: such an axis is not referenced then.
   bool zero_is_here = false;
 
   [[nodiscard]] const auto& axes() const noexcept { return card.wiring.axes; }
 };
 [[nodiscard]] std::optional<CountedAxes> counted_axes(const Config& config);
-/// In the Config; null: no card latches the counted axes at their marks.
+/// The reference marks in `config` (no copy); null if no card latches the counted axes at their
+/// marks.
 [[nodiscard]] const ReferenceMarks* reference_marks(const Config& config);
 
-/// Time between the axis samples, `periods` times. nullopt: no device has a fixed sample rate.
+/// `periods` times the time between two axis samples. nullopt: no device has a fixed sample rate.
 [[nodiscard]] std::optional<std::chrono::nanoseconds> time_of_axis_samples(const Config& config,
                                                                            double periods);
 
@@ -76,8 +82,8 @@ enum class Capability {
   Motion,       ///< moves and touches points under its own control
   Environment,  ///< measures air or temperatures
 };
-/// The tables, as in messages, of all kinds of devices with a capability, also if they are not
-/// configured: "[a], [b] CONJUNCTION [c]".
+/// The tables of all kinds of devices that have the capability, whether configured or not, as text
+/// for messages: "[a], [b] CONJUNCTION [c]".
 [[nodiscard]] std::string tables_with(Capability capability, std::string_view conjunction = "or");
 
 }  // namespace abbe::daemon

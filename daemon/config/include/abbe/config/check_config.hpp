@@ -14,13 +14,13 @@ namespace abbe::daemon {
 
 struct CheckedConfig {
   Config config;
-  /// Possible but improbable, "file:line:column: key: what": another unit, a forgotten table, or a
-  /// CPU that another computer has.
+  /// One for each value that is possible but probably wrong, "file:line:column: key: what": a value
+  /// in another unit, a forgotten table, or the number of a CPU that this computer does not have.
   std::vector<std::string> warnings;
 };
 
-/// As load_config(); further faults are a folder that cannot exist, and a missing DDS profile or
-/// folder of keys. `cpus`: number of CPUs of this computer.
+/// As load_config(). Further faults are the path of a folder that cannot be created, a missing DDS
+/// profile and a missing folder of DDS keys. `cpus`: number of CPUs of this computer.
 [[nodiscard]] Result<CheckedConfig> check_config(const std::filesystem::path& file, int cpus);
 
 /// One line per fact, without a line end: machine, axes with travel and nodes, target, devices with

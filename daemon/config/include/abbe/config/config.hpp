@@ -26,8 +26,8 @@ namespace abbe::daemon {
 
 using drivers::AxisKind;
 
-/// [axes.NAME]. At `reference` the tables of positioning and angular errors are zero. Default: 0 if
-/// it is within the range, else the minimum.
+/// [axes.NAME]. The tables of positioning and angular errors are zero at the axis position
+/// `reference`. Default of `reference`: 0 if 0 is within the range, else the minimum.
 struct AxisConfig {
   std::string name;
   AxisKind kind = AxisKind::Linear;
@@ -98,7 +98,7 @@ struct DaemonConfig {
   [[nodiscard]] std::filesystem::path models_dir() const { return data_dir / "models"; }
   std::filesystem::path runtime_dir = "/run/abbe";
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
-  /// The longest time for which the hub waits for a late stream.
+  /// The longest time for which the hub waits for samples of a stream that arrive late.
   std::chrono::nanoseconds watermark{std::chrono::milliseconds{600}};
   bool simulated = false;  ///< the devices are simulated: only then may `speed` differ from 1
   double speed = 1.0;      ///< host time = speed x CLOCK_MONOTONIC
@@ -195,7 +195,8 @@ struct ControlConfig {
   std::string move_group = "abbe-move";  ///< may move a machine; empty: as change_group
 };
 
-/// The whole file. A device whose table is missing is not connected; one device reads the axes.
+/// The whole file. A kind of device whose table is missing is not used; at most one device reads
+/// the axes.
 struct Config {
   MachineConfig machine;
   DeviceConfigs devices;
@@ -220,8 +221,8 @@ struct Config {
     return devices_of<Kind>(devices);
   }
 
-  /// The axes in a sample of the device that reads them, in order; empty: there is none, or it
-  /// reads the first axes of the machine.
+  /// The names of the axes in the samples of the device that reads the axes, in their order. Empty
+  /// if no device reads the axes, or if the samples have the first axes of the machine.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
   /// True if the control already corrects the axis readings, for any device that reads them.
@@ -237,8 +238,8 @@ struct Config {
 /// of relative paths.
 [[nodiscard]] Result<Config> parse_config(std::string_view text, const std::filesystem::path& file);
 
-/// Same as parse_config() for the text in a recording: values that no machine has are accepted (a
-/// travel below 1 mm, a step above 1 mm, a host that no resolver accepts).
+/// Same as parse_config() for the text in a recording, which must stay readable: implausible values
+/// are accepted (a travel below 1 mm, a step above 1 mm, a host name that no resolver accepts).
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 

@@ -21,7 +21,8 @@ namespace abbe::daemon {
 ///
 ///   SI value = number / per_si
 ///
-/// The division makes 300 mm exactly the double 0.3 m.
+/// per_si: numbers in the file per SI unit, for example 1000 for mm. With a division 300 mm is
+/// exactly the double 0.3.
 struct Unit {
   double per_si = 1.0;
 };
@@ -42,8 +43,9 @@ inline constexpr Bounds kNotNegative{0.0, std::numeric_limits<double>::infinity(
 
 enum class Need { Optional, Required };
 
-/// Recorded: the file of a run that has taken place. Its values are not judged by what is plausible
-/// for a machine, so that a limit which is added later does not make the recording unreadable.
+/// Recorded: the configuration was read from the recording of a completed run. Its values are not
+/// checked for plausibility, so that a limit added to a later version does not make the recording
+/// unreadable.
 enum class Origin { Written, Recorded };
 
 class Section {
@@ -80,7 +82,8 @@ class Section {
 
   /// Adds a fault at the position of the key, or of the table if the key is absent.
   void fault(std::string_view key, std::string_view what);
-  /// fault() for a value that can be used, but that no machine has; none in a recorded file.
+  /// As fault(), for a value that could be used but that no real machine has. Does nothing if the
+  /// origin is Recorded.
   void implausible(std::string_view key, std::string_view what);
   /// Adds a fault for every key that was not read. Call it last.
   void close();

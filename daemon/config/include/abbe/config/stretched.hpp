@@ -6,9 +6,9 @@
 
 namespace abbe::daemon {
 
-/// A time-out in host time. With simulated devices and `speed` > 1 host time runs faster than the
-/// operating system, but the answer of the peer does not come faster; so the time-out is multiplied
-/// by `speed`.
+/// A time-out in host time. With simulated devices and `speed` > 1 host time runs `speed` times
+/// faster than the clock of the operating system, but the peer does not answer faster. The time-out
+/// is therefore multiplied by `speed`.
 [[nodiscard]] inline std::chrono::nanoseconds stretched(std::chrono::nanoseconds time_out,
                                                         double speed) {
   const std::chrono::duration<double, std::nano> longer = time_out * std::max(speed, 1.0);

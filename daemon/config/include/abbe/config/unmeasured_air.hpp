@@ -1,6 +1,6 @@
 #pragma once
-/// The case that the tracker's distances are not corrected for measured air: there is no [air]
-/// assumed_index, and
+/// The uncertainty of the tracker's distances when they are not corrected for measured air. This is
+/// so if [air] assumed_index is absent and either
 /// - weather = "none": the controller is set to assumed_air(), or
 /// - weather = "read": the refractive index set in the controller is not changed.
 ///
@@ -17,12 +17,13 @@ namespace abbe::daemon {
 /// The air to which the controller is set with weather = "none": 20 C, 1013.25 hPa, 50 %.
 [[nodiscard]] calib::Air assumed_air() noexcept;
 
-/// Relative standard uncertainty of all distances in this case, for the range of air on shop
-/// floors: 1.05e-5.
+/// Relative standard uncertainty common to all distances that are not corrected for measured air,
+/// for the range of air on shop floors: 1.05e-5.
 [[nodiscard]] double u_of_unmeasured_air() noexcept;
 
-/// Text for verdict and status: the assumed air, and `u_scale` of the model. nullopt if the air is
-/// measured.
+/// Text for verdict and status: for which air the distances are corrected, and the uncertainty
+/// `u_scale` that the model assumes for this. nullopt if the distances are corrected for measured
+/// air.
 [[nodiscard]] std::optional<std::string> unmeasured_air_text(const Config& config, double u_scale);
 
 }  // namespace abbe::daemon

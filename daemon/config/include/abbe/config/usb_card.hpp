@@ -19,7 +19,8 @@ struct UsbCardConfig {
   std::string bus_id = "1-1";      ///< USB/IP only
   std::string serial_number;       ///< empty: the only connected card
   drivers::CounterCardWiring wiring;
-  /// Upper bound of the constant, unobservable part of the delay.
+  /// Upper bound of the constant part of the delay between a scan and its arrival. This part cannot
+  /// be estimated from arrival times.
   std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{1}};
 };
 

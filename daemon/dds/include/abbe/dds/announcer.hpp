@@ -1,8 +1,8 @@
 #pragma once
 /// Repeats the discovery announcements of the writers: soon after another participant is
 /// discovered, then every 2 s. There are two reasons:
-/// - Cyclone DDS misses the first heartbeat of Fast DDS's discovery; the next one would come 1 s
-///   later. Every announcement is sent with a heartbeat.
+/// - Cyclone DDS misses the first heartbeat of Fast DDS's discovery, and Fast DDS sends the next
+///   one 1 s later. Every announcement that this class causes is sent with a heartbeat.
 /// - After an outage longer than the lease of one participant and shorter than that of the other,
 ///   or after this process was suspended, only one of the two has dropped the other. Fast DDS then
 ///   regards its announcements as acknowledged and does not repeat them, so that the subscriber

@@ -19,18 +19,19 @@ namespace abbe::dds {
 class InterfaceWatch {
  public:
   using Clock = std::chrono::steady_clock;
-  /// A change is evaluated after this time without a further one: an interface that comes up gets
-  /// its addresses one after the other, and the link may drop a few times while a cable is plugged
-  /// in.
+  /// Changes are evaluated once no further change has come for this time: an interface that comes
+  /// up gets its addresses one after the other, and its link may drop a few times while a cable is
+  /// plugged in.
   static constexpr std::chrono::milliseconds kSettles{500};
-  /// A change is evaluated after this time even if further ones follow, for example because
-  /// containers start and stop all the time.
+  /// Changes are evaluated this time after the first one at the latest, because interfaces may
+  /// change without end, for example while containers start and stop.
   static constexpr std::chrono::seconds kLongestWait{5};
-  /// No address is reported before the watch has run this long: abbe-dds must publish for a while
-  /// even if interfaces change all the time.
+  /// cycle() reports no address before the watch has existed for this time. A report restarts
+  /// abbe-dds, which must publish for a while even if interfaces change all the time.
   static constexpr std::chrono::seconds kShortestLife{5};
 
-  /// Create it before the participant, so that no address is missed in between.
+  /// Create the watch before the participant: an address that appears after the participant was
+  /// created is then reported.
   explicit InterfaceWatch(Clock::time_point now);
   ~InterfaceWatch();
   InterfaceWatch(const InterfaceWatch&) = delete;

@@ -1,15 +1,15 @@
 #pragma once
 /// Removes from received RTPS messages what would crash Fast DDS. Any computer of the network can
-/// send two things, with and without DDS Security, that end every process with Debian's Fast DDS
-/// 2.9.1:
+/// send two things that end every process with Debian's Fast DDS 2.9.1, with and without DDS
+/// Security:
 /// - An announced TypeObject with a sequence of structs that Fast DDS does not know (Fast-DDS issue
 ///   3296). The topics of abbe need no type parameters: in endpoint announcements the filter
-///   replaces their parameter ids by an unused one, which every implementation skips.
+///   replaces the ids of type parameters by an unused id, which every implementation skips.
 /// - A statistics submessage (80h, specific to Fast DDS) with a length other than the one that Fast
-///   DDS asserts. The filter cuts it off at the end of a message, as Fast DDS does itself; anywhere
-///   else no valid sender puts one, and the message is dropped.
+///   DDS asserts. The filter cuts such a submessage off at the end of a message, as Fast DDS does
+///   itself. No valid sender puts one elsewhere; a message with one elsewhere is dropped.
 ///
-/// Besides, the filter drops messages with wrong lengths: a message passes only if its submessages
+/// The filter also drops messages with wrong lengths: a message passes only if its submessages
 /// follow each other as the standard requires, and its endpoint announcements have their parameters
 /// where the standard puts them. So the filter and Fast DDS read the same parameters.
 ///

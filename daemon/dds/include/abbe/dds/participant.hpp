@@ -1,6 +1,6 @@
 #pragma once
-/// The only DDS participant of a process, created from an XML profile that the site may replace.
-/// As thread-safe as Fast DDS; create and destroy it from one thread.
+/// The DDS participant of a process (one per process), created from an XML profile. A site may
+/// replace the built-in profile. As thread-safe as Fast DDS; create and destroy it from one thread.
 
 #include <cstdint>
 #include <filesystem>

@@ -41,20 +41,22 @@ class PublisherPin {
  public:
   using Instant = std::chrono::steady_clock::time_point;
 
-  /// Another participant can be pinned once the pinned one has sent nothing for this time. abbe
-  /// sends at 50 to 100 Hz.
+  /// Another participant can be pinned once the pinned one has sent nothing for this time: 15 or
+  /// more samples are then missing, because abbe sends at 50 to 100 Hz.
   static constexpr std::chrono::milliseconds kSilence{300};
-  /// The next participant must have sent for kAlone while the pinned one sent nothing. A pause
-  /// between two of its samples counts as at most kLongestPause, so that a subscriber that was
-  /// suspended itself receives from the pinned participant before it pins another.
+  /// Another participant is pinned only if it has sent for kAlone while the pinned one sent
+  /// nothing. Of each interval between two of its samples at most kLongestPause is counted: a
+  /// subscriber that was suspended thereby receives again from the pinned participant before it
+  /// pins another.
   static constexpr std::chrono::milliseconds kAlone{30}, kLongestPause{10};
-  /// A participant is foreign if the pinned one still sends this long after its first sample. A
-  /// restarted publisher never is, because its predecessor has ended.
+  /// Another participant is foreign if the pinned one still sends this long after the other's first
+  /// sample. The successor of a restarted publisher is never foreign, because the old process has
+  /// ended before the new one sends.
   static constexpr std::chrono::milliseconds kOverlap{100};
   /// A foreign participant is pinned only after the pinned one has sent nothing for this time.
   static constexpr std::chrono::seconds kSilenceForForeign{10};
-  /// At most this many other participants are remembered; the one with the oldest last sample is
-  /// dropped.
+  /// At most this many participants beside the pinned one are remembered. For a further one, that
+  /// with the oldest last sample is forgotten.
   static constexpr std::size_t kMostOthers = 7;
 
   enum class Verdict {
@@ -88,7 +90,8 @@ class PublisherPin {
 
   [[nodiscard]] const std::optional<ParticipantId>& pinned() const noexcept { return pinned_; }
 
-  /// False: the samples of this participant need not be kept.
+  /// Whether `id` is the pinned participant or a remembered one; if not, its samples need not be
+  /// kept.
   [[nodiscard]] bool remembers(const ParticipantId& id) const {
     return pinned_ == id || std::ranges::find(others_, id, &Other::id) != others_.end();
   }

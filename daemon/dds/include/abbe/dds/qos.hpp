@@ -1,6 +1,6 @@
 #pragma once
-/// The quality of service of every topic. It is the contract with the subscribers and therefore
-/// fixed in code, not in the profile of the site. Pure.
+/// The quality of service (QoS) of every topic. Subscribers must request a compatible QoS, so it is
+/// fixed in code and not in the XML profile, which a site may change. Pure.
 
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
@@ -11,8 +11,8 @@ namespace abbe::dds {
 
 [[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(daemon::Topic topic);
 
-/// The QoS that a subscriber should request. The lease on ModelState lets it detect an abbe-dds
-/// that has ended or hangs.
+/// The QoS that a subscriber should request. The liveliness lease on ModelState lets the subscriber
+/// detect that abbe-dds has ended or hangs.
 [[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(daemon::Topic topic);
 
 }  // namespace abbe::dds

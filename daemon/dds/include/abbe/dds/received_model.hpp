@@ -25,8 +25,8 @@ class ReceivedModel {
  public:
   void state(v1::ModelState state);
   void model(v1::ErrorModel model) { model_ = std::move(model); }
-  /// Keeps the slices by model: the slices of the next model arrive before its state, and a late
-  /// joiner may receive slices of an old model among them.
+  /// Keeps the slice under its model id. Slices of several models are kept: those of the next model
+  /// arrive before its ModelState, and a late joiner may also receive slices of an old model.
   void slice(v1::ErrorGrid slice);
 
   [[nodiscard]] const std::optional<v1::ModelState>& state() const noexcept { return state_; }
@@ -51,25 +51,26 @@ class ReceivedModel {
                               std::optional<std::chrono::nanoseconds> delay,
                               const std::optional<v1::ModelState>& state, bool publisher_alive);
 
-/// The transit time of the vectors of one publisher in excess of the shortest one: in the network,
-/// or in the socket while this process was suspended. The clocks of publisher and subscriber may
-/// have any offset, and drift against each other by up to kDrift.
+/// The transit delay of the vectors from one publisher: how much longer a vector took, in the
+/// network or in the socket of a suspended subscriber, than the fastest vector so far. The clocks
+/// of publisher and subscriber may have any offset, and drift against each other by up to 1/kDrift.
 class Delay {
  public:
   using Instant = std::chrono::steady_clock::time_point;
   static constexpr int kDrift = 5000;  ///< 1 part in 5000, 200 ppm
 
-  /// The shortest transit time is regarded as known after this time.
+  /// The shortest transit time is regarded as known once vectors have arrived for this long.
   static constexpr std::chrono::milliseconds kFirst{200};
 
-  /// nullopt during the first kFirst, because all of the first vectors may have been delayed.
+  /// The delay of `vector`. nullopt during the first kFirst, because all vectors since the start
+  /// may have been delayed.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> of(const v1::Compensation& vector,
                                                            Instant now);
 
-  /// The initial value for the publisher that follows this one and may have the same clock, for
-  /// example abbe-dds after a restart. With the same clock the shortest transit time stays valid;
-  /// if the offset of the first vector differs from it by more than kSameClock, the clock is
-  /// another one and the estimate starts again.
+  /// The initial value for the next publisher, which may have the same clock as this one, for
+  /// example after a restart of abbe-dds. With the same clock the sum of clock offset and shortest
+  /// transit time stays valid. If this sum for the first vector differs from the stored one by more
+  /// than kSameClock, the next publisher has another clock and the estimate starts again.
   [[nodiscard]] Delay for_next_publisher() const;
   static constexpr std::chrono::milliseconds kSameClock{20};
 

@@ -53,7 +53,7 @@ class TrackerOrders {
 
   [[nodiscard]] virtual drivers::DeviceStatus status() const = 0;
   virtual void order(drivers::TrackerOrder order) = 0;
-  /// Longest host time until the outcome of an order is reported.
+  /// Longest host time from an order to the report of its outcome.
   [[nodiscard]] virtual std::chrono::nanoseconds longest_order() const = 0;
   [[nodiscard]] virtual std::vector<drivers::TrackerOrderReport> reports() = 0;
 };
@@ -70,17 +70,18 @@ class RunningDevices {
   /// raw bytes. A driver delivers the bytes before the samples, so bytes are never drained in a
   /// later cycle than the samples decoded from them; a replay relies on this order.
   virtual void drain(Batch& batch) = 0;
-  /// One thread for each device in the health report, in the order of the configuration.
+  /// For each device in the health report the thread that runs it, in the order of the
+  /// configuration.
   [[nodiscard]] virtual std::vector<const drivers::DeviceThread*> threads() const = 0;
-  /// Real-time settings that the operating system refused in real-time mode `ignore`, and
-  /// assumptions of the driver.
+  /// One sentence for each real-time setting that the operating system refused (real-time mode
+  /// `ignore`), and for each assumption of the driver.
   [[nodiscard]] virtual std::vector<std::string> warnings() const;
 
   // Functions of some kinds only; null or nullopt: this kind does not have the function.
   [[nodiscard]] virtual MachineMotion* motion() noexcept { return nullptr; }
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }
-  /// The latest progress that drain() read; its samples are already in the batch. Each progress is
-  /// returned at most once.
+  /// The latest state of the counters that drain() has read. The samples up to this state are
+  /// already in the batch of that drain(). Each state is returned at most once.
   [[nodiscard]] virtual std::optional<CountingProgress> take_progress() { return std::nullopt; }
 };
 
@@ -93,17 +94,18 @@ class RawDecoders {
   RawDecoders& operator=(const RawDecoders&) = delete;
   virtual ~RawDecoders() = default;
 
-  /// Appends the samples that the block completes. Ignores a block from a device of another kind.
+  /// Appends the samples that are complete with this block. Ignores a block from a device of
+  /// another kind.
   virtual void take(const protocol::RawBlock& block, std::string_view device, Batch& batch) = 0;
-  /// The recording has ended: appends the samples that waited for further blocks.
+  /// Call it at the end of the recording: appends the samples that waited for further blocks.
   virtual void finish(Batch& /*batch*/) {}
 };
 
 [[nodiscard]] DeviceNames device_names(const Config& config);
 
 /// Arguments of DeviceKind::start. `first`: index in DeviceNames::all of the first device of the
-/// kind. `left`: state of the counters at the end of an earlier run; counting continues from it if
-/// the card kept counting.
+/// kind. `left`: state of the counters when abbed ended last; the driver continues from it if the
+/// card has kept counting since.
 struct DeviceStart {
   const Config& config;
   const drivers::TimeSource& time;
@@ -112,14 +114,15 @@ struct DeviceStart {
 };
 
 struct DeviceKind {
-  /// It moves, or is sent orders that move it: starts after the devices that only measure, and ends
-  /// before them.
+  /// True if the device moves by itself or on orders: it is started after the devices that only
+  /// measure, and ended before them.
   bool moves = false;
-  /// Adds the configured devices of this kind.
+  /// Adds the names of the configured devices of this kind to `names`.
   void (*name)(const Config& config, DeviceNames& names);
   /// Starts the devices. Null if the configuration has no device of this kind.
   Result<std::unique_ptr<RunningDevices>> (*start)(const DeviceStart& start);
-  /// Null if the configuration has no device of this kind.
+  /// Creates the decoders of recorded raw bytes. Null if the configuration has no device of this
+  /// kind.
   std::unique_ptr<RawDecoders> (*decoders)(const Config& config,
                                            const std::optional<CountingProgress>& left);
 };

@@ -24,8 +24,8 @@ class DeviceSet final : public SampleSource {
  public:
   /// Creates the devices and starts their threads. Io if the operating system refuses a setting
   /// that real-time mode `enforce` requires, BadInput for a device that cannot be opened as
-  /// configured. `time` must outlive the set. `left`: state of the counters at the end of an
-  /// earlier run; counting continues from it if the card kept counting.
+  /// configured. `time` must outlive the set. `left`: state of the counters when abbed ended last;
+  /// the driver continues from it if the card has kept counting since.
   [[nodiscard]] static Result<DeviceSet> start(
       const Config& config, const drivers::TimeSource& time,
       const std::optional<CountingProgress>& left = std::nullopt);
@@ -35,16 +35,17 @@ class DeviceSet final : public SampleSource {
 
   void drain(Batch& batch) override;
   [[nodiscard]] std::vector<StreamHealth> health(protocol::HostTime now) override;
-  /// Real-time settings that the operating system refused in real-time mode `ignore`, and
-  /// assumptions of the drivers; one sentence each.
+  /// One sentence for each real-time setting that the operating system refused (real-time mode
+  /// `ignore`), and for each assumption of a driver.
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::optional<CountingProgress> card_progress() override;
   /// True if a device moves and probes under its own control (a measuring machine).
   [[nodiscard]] bool moves() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
   void stop_machine() override;
-  /// May be called from any thread; takes no lock. Stops a motion of the measuring machine and ends
-  /// its session, also if this object is never destroyed. No release is needed afterwards.
+  /// Stops a motion of the measuring machine and ends its session, also if this object is never
+  /// destroyed. The machine then needs no release (see release_machine()). May be called from any
+  /// thread; takes no lock.
   void end_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;
   [[nodiscard]] Result<void> release_machine() override;
@@ -53,7 +54,7 @@ class DeviceSet final : public SampleSource {
   [[nodiscard]] Result<std::array<double, 3>> machine_position() const override;
   [[nodiscard]] std::optional<drivers::DeviceStatus> tracker_status() const override;
   void order_tracker(drivers::TrackerOrder order) override;
-  /// Longest host time until the outcome of an order to the tracker is reported; 0 without a
+  /// Longest host time from an order to the tracker to the report of its outcome; 0 without a
   /// tracker.
   [[nodiscard]] std::chrono::nanoseconds longest_tracker_order() const;
   [[nodiscard]] std::vector<drivers::TrackerOrderReport> tracker_reports() override;

@@ -42,7 +42,8 @@ struct EncoderConfig {
   std::uint16_t peer_port = 0;   ///< UDP only
   SyncConfig sync = SyncConfig::Daemon;
   std::chrono::nanoseconds sync_period{std::chrono::milliseconds{1}};
-  /// From the SYNC (its echo; with UDP: its sending) to the latching of the position in the node.
+  /// Time from the SYNC (on CAN: the reception of its echo; on UDP: its sending) to the instant at
+  /// which the node latches its position.
   std::chrono::nanoseconds sampling_delay{};
   /// Standard uncertainty of sampling_delay; 0 only with simulated devices.
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};

@@ -1,7 +1,7 @@
 #pragma once
-/// [reference]: a second card that latches the counts of the counted axes at their reference marks.
-/// These axes are not referenced until `abbe reference` has found the positions at which their
-/// counters started. Pure data.
+/// [reference]: a second card that latches the axis counts at the reference marks of the scales.
+/// With this table the axes are not referenced until `abbe reference` has found, for each axis, the
+/// position at which its counter started. Pure data.
 
 #include "abbe/config/reference_marks.hpp"
 #include "abbe/config/usb_card.hpp"

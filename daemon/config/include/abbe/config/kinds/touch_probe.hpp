@@ -23,8 +23,8 @@ struct ProbeConfig {
   std::chrono::nanoseconds window_after{std::chrono::milliseconds{10}};
 };
 
-/// Options of the touch detector in drivers. `wiring`: of the card. `machine` gives the kind of
-/// each axis, linear or rotary.
+/// Options of the touch detector in drivers. `wiring` is that of the counter card. `machine`
+/// defines the kind of each axis, linear or rotary.
 [[nodiscard]] drivers::TouchOptions touch_options(const ProbeConfig& probe,
                                                   const drivers::CounterCardWiring& wiring,
                                                   const MachineConfig& machine);

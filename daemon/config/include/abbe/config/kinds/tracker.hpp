@@ -11,8 +11,9 @@ namespace abbe::daemon {
 
 struct ConfigKind;
 
-/// None: the controller's environment is not read. Read: it is read. Compute: the controller
-/// computes the refractive index and corrects the distances.
+/// None: the controller's weather station is not read. Read: its values are read and recorded.
+/// Compute: besides, the controller computes the refractive index from them and corrects its
+/// distances.
 enum class WeatherConfig { None, Read, Compute };
 
 /// Continuous: for on-the-fly runs. Stationary: one mean value after another, for verification at
@@ -34,18 +35,20 @@ struct TrackerConfig {
   double point_rate_hz = 500.0;                                              ///< mode Continuous
   std::chrono::nanoseconds stationary_time{std::chrono::milliseconds{500}};  ///< per mean; whole ms
   WeatherConfig weather = WeatherConfig::Compute;
-  /// Relative standard uncertainty common to all distances. Default:
-  /// - weather = "compute": from the controller's own sensors, 0.2 K and 30 Pa: 2e-7;
-  /// - with [air] assumed_index: 0; the uncertainty from [air] is added later;
-  /// - else no correction for measured air is made: u_of_unmeasured_air().
+  /// Relative standard uncertainty common to all distances of the tracker. Default:
+  /// - weather = "compute": 2e-7, from the controller's own sensors (0.2 K and 30 Pa);
+  /// - with [air] assumed_index: 0, because the uncertainty of the air measured by abbe is added
+  ///   later;
+  /// - else u_of_unmeasured_air(), because the distances are not corrected for measured air.
   double u_scale = kControllersAir;
   static constexpr double kControllersAir = 0.2 / 1e6;
-  /// Upper bound of the constant, unobservable part of the delay.
+  /// Upper bound of the constant part of the delay between measurement and arrival of a point. This
+  /// part cannot be estimated from arrival times.
   std::chrono::nanoseconds max_constant_delay{std::chrono::milliseconds{2}};
   std::chrono::nanoseconds connect_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds initialize_timeout{std::chrono::seconds{120}};
-  /// A longer time without data during a measurement is a fault.
+  /// During a measurement, no data for a longer time than this is a fault.
   std::chrono::nanoseconds silence_timeout{std::chrono::milliseconds{1500}};
   std::string reflector;  ///< name or id in the controller's list; empty: the current one
   /// The tracker moves its beam to the home position (bird bath) after Initialize.

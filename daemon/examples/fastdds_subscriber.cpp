@@ -56,8 +56,9 @@ class Delay {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const std::int64_t now_ns = SteadyClock::now().time_since_epoch().count();
     const std::int64_t offset_ns = now_ns - (c.host_time_ns() + c.age_ns());
-    // If the first vector differs by more than 20 ms, the publisher has another clock than the
-    // previous one: the measurement starts again.
+    // After a change of publisher: if clock offset plus transit time of its first vector differs by
+    // more than 20 ms from that of the previous publisher, its clock is another one, and the
+    // measurement starts again.
     if (inherited_ && std::abs(offset_ns - least_ns_) > kSecond_ns / 50) first_ns_ = 0;
     inherited_ = false;
     if (first_ns_ == 0) first_ns_ = last_ns_ = now_ns, least_ns_ = offset_ns;
@@ -66,11 +67,11 @@ class Delay {
     known_ = now_ns - first_ns_ > kSecond_ns / 5;
     return offset_ns - least_ns_;
   }
-  /// True after 0.2 s: the fastest vector of that time gives the reference delay, single vectors
-  /// may be late.
+  /// True 0.2 s after the first vector: the fastest vector of this time serves as the reference. A
+  /// single vector would not suffice, because it may be late.
   [[nodiscard]] bool known() const { return known_; }
-  /// The initial measurement for the next publisher: after a restart of abbe-dds the clock is the
-  /// same.
+  /// The initial measurement for the next publisher, whose clock is the same if abbe-dds only
+  /// restarted.
   [[nodiscard]] Delay for_next_publisher() const {
     Delay next = *this;
     next.inherited_ = next.first_ns_ != 0;
@@ -90,7 +91,8 @@ struct Publisher {
   Delay delay;
 };
 
-/// A domain may have several machines. Only samples of the pinned publisher are used.
+/// One of the machines whose data are published in the domain. Only samples of its pinned publisher
+/// are used (publisher_pin.hpp).
 struct Machine {
   PublisherPin pin;
   std::map<ParticipantId, Publisher> publishers;

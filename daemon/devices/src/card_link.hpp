@@ -20,7 +20,7 @@ namespace abbe::daemon {
                                                           const drivers::UsbIdentity& identity,
                                                           const drivers::TimeSource& time);
 
-/// `warnings` and what the driver assumes of the card.
+/// Appends to `warnings` the unverified assumption of the driver about this card, if there is one.
 [[nodiscard]] std::vector<std::string> with_assumption(std::vector<std::string> warnings,
                                                        const drivers::CounterCardDevice& card);
 

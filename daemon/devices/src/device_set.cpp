@@ -22,7 +22,8 @@ struct DeviceSet::State {
   State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
-  /// In reverse order: a machine that moves ends first.
+  /// Destroys the devices in reverse order of starting. A device that moves was started last, so it
+  /// ends first.
   ~State() {
     while (!started.empty()) started.pop_back();
   }

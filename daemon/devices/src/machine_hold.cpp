@@ -39,7 +39,8 @@ drivers::IppMachine unreadable(const std::filesystem::path& file, const std::str
   return {fmt::format("{}unknown reason, {} cannot be read: {}", kSince, file.string(), why), true};
 }
 
-/// A missing file means that the machine is not held. An unreadable file means that it is held.
+/// State of the machine from the file. A missing file means that the machine awaits no release. If
+/// the file cannot be read, the machine is taken to await one.
 drivers::IppMachine read_hold(const std::filesystem::path& file) {
   std::error_code failed;
   const auto status = std::filesystem::status(file, failed);

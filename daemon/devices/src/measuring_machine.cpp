@@ -33,10 +33,11 @@ drivers::IppDeviceOptions machine_options(const CmmConfig& config, double speed)
   return options;
 }
 
-// Wall time. A position older than this is not used; a machine that is ready reports ten positions
-// in this time.
+// Wall time. A tip position older than this is not used; a machine that is ready to move reports
+// ten positions in this time.
 constexpr auto kPositionIsOld = std::chrono::seconds{1};
-// Largest delay until the device thread handles a request to stop: 2 mm at 200 mm/s.
+// Largest delay until the device thread handles a request to stop. At 200 mm/s the machine moves 2
+// mm in this time.
 constexpr auto kMostStopDelay = std::chrono::milliseconds{10};
 
 /// A measuring machine behind an I++ DME server. It delivers the touches, and also the axis samples

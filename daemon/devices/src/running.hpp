@@ -17,7 +17,7 @@
 
 namespace abbe::daemon {
 
-/// Largest numbers of elements popped from a ring at once: several bursts.
+/// Largest numbers of elements that are popped from a ring at once; several bursts of a device fit.
 inline constexpr std::size_t kMostSamples = 1024;
 inline constexpr std::size_t kMostBlocks = 128;
 

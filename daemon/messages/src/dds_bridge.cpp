@@ -92,7 +92,8 @@ struct DdsBridge::State {
     }
   }
 
-  /// Also discards the retained states and marks all other durable samples to be written again.
+  /// Writes every retained ModelState once more as invalid and discards it. All other durable
+  /// samples are marked to be written again when abbed is alive again.
   void report_source_lost() {
     alive = false;
     for (const auto& entry : durable.entries()) {
@@ -120,7 +121,8 @@ void DdsBridge::beat(WallTime at, WallTime now) {
 }
 
 void DdsBridge::publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now) {
-  // Newer beats may follow an old one in the socket, so silence is reported by cycle() only.
+  // Nothing is written while abbed seems silent, but only cycle() reports the silence: the beat
+  // that ends it may follow this payload in the socket.
   const bool alive = state_->alive && !state_->silent(now);
   const auto key = payload_key(topic, payload);
   if (!key) {

@@ -29,7 +29,8 @@ fs::path identity_in(const fs::path& folder, DdsRole role) {
   return fs::exists(own / kCertificate, error) ? own : folder;
 }
 
-/// A private key that others can read does not prove an identity; ssh refuses such keys as well.
+/// An Error if all users can read the private key: it then does not prove an identity. ssh also
+/// refuses such keys.
 Result<void> check_key_mode(const fs::path& key) {
   struct stat file {};
   if (::stat(key.c_str(), &file) != 0 || (file.st_mode & S_IROTH) == 0) return {};

@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 
 constexpr mode_t kOwnerOnly = 0600;
 constexpr mode_t kWorldReadable = 0644;
-/// Keys are valid from one day before now: a subscriber whose clock is slow accepts new keys.
+/// New keys are valid from one day before they are made, so that a computer whose clock is slow
+/// accepts them at once.
 constexpr auto kClockTolerance = std::chrono::hours{24};
 
 /// The participant whose subject has the smaller SHA-256 begins the handshake. When Fast DDS 2.9

@@ -22,13 +22,15 @@ struct Pending {
   bool to_send = true;
 };
 
-/// Checks the process id or user id that the kernel reports for the other end.
+/// Whether the process at the other end, as the kernel reports it, is the supervised abbe-dds;
+/// without supervision, whether it belongs to the user of abbed.
 bool may_connect(int fd, const DdsProcess* process) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
   if (process == nullptr) return credentials.uid == ::geteuid();
-  // 0: a process of another PID namespace; pid() is 0 while no abbe-dds runs.
+  // A process of another PID namespace has the pid 0, which pid() also returns while no abbe-dds
+  // runs.
   return credentials.pid != 0 && credentials.pid == process->pid();
 }
 
@@ -36,7 +38,8 @@ bool may_connect(int fd, const DdsProcess* process) {
 class Beats {
  public:
   void ask(DdsLink::WallTime now) {
-    // After a pause of the hub, or of all of abbed, the silence is counted from this beat.
+    // After a pause of the hub, or of all of abbed, the silence of abbe-dds is counted from this
+    // beat, because no answers were read during the pause.
     if (!unanswered_since_ || now - asked_ > DdsProcess::kPause) unanswered_since_ = now;
     asked_ = now;
   }
@@ -77,8 +80,8 @@ struct DdsLink::State {
   void send_or_keep(const Frame& frame, const PayloadKey& key);
 };
 
-/// A new connection of abbe-dds replaces the old one: the old process hangs, or the supervisor has
-/// replaced it.
+/// Accepts connections of abbe-dds. A new one replaces the old one, whose process hangs or was
+/// replaced by the supervisor.
 void DdsLink::State::accept_newest() {
   for (int i = 0; i < kAcceptsPerCycle; ++i) {
     FileDescriptor accepted(
@@ -164,7 +167,8 @@ void DdsLink::State::send_live() {
   if (peer) waiting.erase(waiting.begin(), next);  // else disconnect() has dropped them
 }
 
-/// For live topics: a newer sample replaces a waiting one.
+/// Sends a live sample. While the socket is full the sample waits, and replaces a waiting one of
+/// the same key.
 void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
   if (live.entries().empty() && send_now(frame)) return;
   if (!peer) {
@@ -216,7 +220,8 @@ void DdsLink::beat(WallTime now) {
   state_->beats.ask(now);
   if (state_->process != nullptr) state_->process->asked(now);
   // A beat is not queued when the socket is full: abbe-dds has not read for some time and detects
-  // the silence. A beat must not overtake a waiting state: abbe-dds would repeat the previous one.
+  // the silence itself. A beat is not sent before a waiting ModelState: abbe-dds would take abbed
+  // for alive and repeat the previous ModelState.
   if (state_->send_durable() && state_->send_now({FrameKind::Beat, {}, now, {}}))
     state_->last_beat = now;
 }

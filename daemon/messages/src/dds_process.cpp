@@ -49,8 +49,9 @@ std::optional<DdsEnd> DdsProcess::last_end() const noexcept {
                 std::chrono::system_clock::from_time_t(packed >> kSecondsShift)};
 }
 
-/// If the hub was blocked, or abbed was suspended, the hub could not read answers during that
-/// pause.
+/// Records that a beat was due. If the previous one was longer ago than kPause (the hub was
+/// blocked, or abbed suspended), the silence of abbe-dds is counted from now: the hub could not
+/// read answers during that pause.
 void DdsProcess::asked(WallTime now) noexcept {
   const WallTime before{std::chrono::nanoseconds{asked_ns_.load(std::memory_order_relaxed)}};
   if (now - before > kPause) store(asks_since_ns_, now);

@@ -46,8 +46,8 @@ class RetainedPayloads {
   [[nodiscard]] std::vector<Entry>& entries() noexcept { return entries_; }
 
  private:
-  /// If the newest grid has fewer slices than the previous one, the surplus slices belong to the
-  /// previous model.
+  /// Removes slices with a number beyond those of the newest grid. They remain from the grid of the
+  /// previous model, which had more slices.
   void drop_surplus_slices(std::span<const std::byte> newest) {
     const auto machine = payload_key(Topic::ErrorGrid, newest);
     const auto slices = grid_slices(newest);

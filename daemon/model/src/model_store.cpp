@@ -129,7 +129,8 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
 
   StoreEvent event{StoreAction::Added, id, actor, accepted, std::move(reasons)};
 
-  // The caller repeats a change whose last step failed, for example the fsync of the folder.
+  // An equal last event means that the caller repeats a change whose last step failed, for example
+  // the fsync of the folder: it is not added twice.
   if (const auto* last = state->last_added(id); last != nullptr && *last == event) return id;
   if (const auto done = append(folder_, std::move(*state), std::move(event)); !done)
     return tl::make_unexpected(done.error());

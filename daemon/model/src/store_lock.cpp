@@ -42,7 +42,7 @@ FileDescriptor open_lock(const fs::path& file) {
     lock = FileDescriptor{::open(file.c_str(), kLockFlags | O_CREAT | O_EXCL, 0600)};
     // Owner as the folder: if root creates the lock file, the daemon can still lock it.
     if (lock) inherit_ownership(lock.get(), folder);
-    // Another process created it in the meantime.
+    // EEXIST: another process created the lock file in the meantime.
     else if (errno == EEXIST)
       lock = FileDescriptor{::open(file.c_str(), kLockFlags)};
   }

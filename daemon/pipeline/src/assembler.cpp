@@ -13,7 +13,8 @@
 namespace abbe::daemon {
 namespace {
 
-// In sample periods. With a gap of one lost cycle the axes are still interpolated.
+// Largest gap between axis samples over which the axes are interpolated, in sample periods: one
+// lost sample is bridged, two are not.
 constexpr double kMostLostCycles = 2.5;
 
 using protocol::AxisSample;
@@ -67,7 +68,8 @@ void Assembler::take(const Batch& batch) {
   for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
 }
 
-/// After a bus-off or a restart of the bus, a sample may be earlier than the last one.
+/// Inserts the sample by its time: after a bus-off or a restart of the bus, it may be earlier than
+/// the sample that arrived before it.
 void Assembler::take(const AxisSample& sample) {
   const auto after =
       std::upper_bound(axes_.begin(), axes_.end(), sample.head.time,

@@ -14,7 +14,8 @@ namespace {
 
 using protocol::SampleFlag;
 
-/// Wall time for which a tracker point or touch is shown: three bursts of a tracker.
+/// Wall time for which the latest tracker point or touch is shown: three of the bursts in which a
+/// tracker delivers points.
 constexpr std::chrono::seconds kCurrentFor{1};
 }  // namespace
 

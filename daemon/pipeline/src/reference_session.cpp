@@ -11,9 +11,11 @@ using protocol::AxisSample;
 using protocol::HostTime;
 using protocol::SampleFlag;
 
-// Live samples are kept for this time, for mark crossings that arrive late.
+// Axis samples of the counting card are kept for this time, because the mark crossings of the other
+// card arrive late.
 constexpr auto kMemory = std::chrono::seconds{2};
-// Largest spread of the marks' positions at which the scale signals are taken to be correct.
+// Largest spread of the zero as determined from the single marks, in signal periods. With a larger
+// spread the scale signals are taken to be faulty, and no datum is given.
 constexpr double kMostSpreadPeriods = 0.5;
 
 /// Smallest and largest live count of the samples around [from, to].
@@ -83,8 +85,8 @@ void ReferenceSession::process_crossings() {
   }
 }
 
-/// Passes the live positions up to `until` to the traverse, in counts of the latching card. Without
-/// a known difference of the zeros no position is passed.
+/// Passes the axis positions up to `until` to the traverse, as counts of the latching card. While
+/// the difference between the zeros of the two counters is not known, no position is passed.
 void ReferenceSession::follow(Axis& axis, HostTime until) {
   const auto difference = axis.alignment.difference();
   for (const AxisSample& sample : live_) {

@@ -57,7 +57,8 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
 
-  // Marks give the same zero again; a zero stated by the operator is only approximate.
+  // Reference marks give an axis the same zero again after the counters restarted. A zero that the
+  // operator states again is only approximately the same, so it counts as lost.
   const auto counted = counted_axes(config);
   options.zero_is_lost_by_restart =
       touches && !touches->reports_positions && counted &&

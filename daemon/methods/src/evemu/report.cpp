@@ -191,7 +191,8 @@ void add_coefficients(HtmlReport& page, const evemu::EvemuModel& model,
   page.table({"", "value", "u", "unit"}, rows);
 }
 
-/// Volumetric error along each axis through the centre, inside the hull.
+/// Adds charts of V along three lines through the centre of the volume, one parallel to each axis.
+/// A chart shows only the part inside the model's validity volume.
 void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("V through the middle of the volume");
   const auto& box = model.polynomials()->design().box();

@@ -120,7 +120,7 @@ void OtfAcquisition::compare_with_path(const Snapshot& s, const Vector3& q) {
   };
 
   const std::size_t vertex = near(leg_) ? leg_ : leg_ + 1;
-  // If two vertices are within the tolerance, it is ambiguous at which one the machine is.
+  // Near two vertices at once it is ambiguous at which one the machine is: no comparison is made.
   if (!near(vertex) || (vertex == leg_ && near(leg_ + 1)) || (leg_ > 0 && near(leg_ - 1))) return;
   const Vector3& nominal = vertices[vertex];
   const auto effect = effect_of(s, options_.environment);
@@ -145,7 +145,8 @@ void OtfAcquisition::tick(HostTime now) {
   }
 }
 
-/// False: the point is left out, because the identification needs ascending times.
+/// False if the device time of the point is not later than that of the previous point. Such a point
+/// is left out, because the identification needs ascending times.
 bool OtfAcquisition::in_order(const RunPoint& point) {
   const auto last = std::exchange(last_device_time_, point.device_time);
   if (!last || point.device_time > *last) return true;
@@ -269,8 +270,9 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
   driven_m_ = driven_at_m_[leg_] + here.along_m;
 }
 
-/// The rest of the path need only be within its tolerance: the machine may have driven the last
-/// short legs between two points.
+/// The run is complete when the machine stands still at the last vertex and is on the last leg, or
+/// on one from whose end the rest of the path is shorter than path_tolerance_m: it may have driven
+/// the last short legs between two points.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
   return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&

@@ -14,7 +14,7 @@ namespace {
 
 using calib::Vector3;
 
-/// Largest distance at which a vertex is reached, as in a session.
+/// A vertex is reached if the machine comes within this distance; the same as in a live run.
 const double kNear_m = AcquisitionOptions{}.vertex_tolerance_m;
 
 Vector3 vector(const AxisPosition& q) {

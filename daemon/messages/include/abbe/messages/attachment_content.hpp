@@ -1,5 +1,6 @@
 #pragma once
-/// Parses the JSON of an attachment of a recording. A requested path of 10^5 vertices is 7 MB.
+/// Parses the JSON of an attachment of a recording. The size limit of 64 MiB leaves room for the
+/// largest attachment, a requested path: 10^5 vertices are 7 MB.
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/messages/recording_info.hpp"

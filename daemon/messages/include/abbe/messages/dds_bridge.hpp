@@ -45,7 +45,8 @@ class DdsBridge {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kSilence{500};
   static constexpr std::chrono::milliseconds kAssertPeriod{200};
-  /// A machine control cannot use an older compensation vector.
+  /// Live samples that waited longer in the socket are discarded: a machine control could not use
+  /// so old a compensation vector.
   static constexpr std::chrono::milliseconds kLongestWait{100};
 
   /// `outlet` must outlive the bridge.
@@ -57,7 +58,8 @@ class DdsBridge {
   /// A new connection to abbed. abbed sends all durable samples again, so the retained ones are
   /// discarded.
   void connected();
-  /// `at`: when abbed sent it. publish() changes the age in a Compensation payload in place.
+  /// `at`: when abbed sent the beat or the payload. publish() adds the delay since then to the age
+  /// in a Compensation payload, in place.
   void beat(WallTime at, WallTime now);
   void publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now);
   void lost();  ///< the socket closed, or abbe-dds shuts down
@@ -66,7 +68,8 @@ class DdsBridge {
 
   [[nodiscard]] bool source_alive() const noexcept;
   [[nodiscard]] std::uint64_t written() const noexcept;
-  [[nodiscard]] std::uint64_t refused() const noexcept;  ///< by the outlet, or malformed
+  /// number of payloads that the outlet refused or that are malformed
+  [[nodiscard]] std::uint64_t refused() const noexcept;
   /// Live samples discarded because they were delayed too long.
   [[nodiscard]] std::uint64_t outdated() const noexcept;
 

@@ -5,7 +5,8 @@
 /// - No call blocks. While the socket is full, the newest sample per key waits; older live samples
 ///   are dropped and counted.
 /// - After each new connection all durable samples are sent again.
-/// - A beat is sent only when no durable sample waits.
+/// - Beats are frames without content that prove that abbed runs. A beat is sent only when no
+///   durable sample waits.
 /// - One thread uses the link: the thread that assembles snapshots. If it hangs, the beats stop.
 /// - Not for real-time threads: makes system calls and allocates.
 /// - The caller must publish ModelState at least once a second: its age changes, and abbe-dds
@@ -40,7 +41,8 @@ struct DdsLinkCounters {
 /// Which process may connect: the supervised abbe-dds; without supervision, any process of the user
 /// that abbed runs as.
 struct DdsLinkPeer {
-  /// Must outlive the link. The link also records the times of beats and answers in it.
+  /// The supervised process; null without supervision. Must outlive the link, which records in it
+  /// the times of beats and answers.
   DdsProcess* process = nullptr;
 };
 

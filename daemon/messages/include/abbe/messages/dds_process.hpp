@@ -45,8 +45,8 @@ class DdsProcess {
   }
   [[nodiscard]] std::optional<DdsEnd> last_end() const noexcept;
 
-  /// Time from the last answer of abbe-dds to the last beat of the hub. Before the first answer it
-  /// counts from the start of abbe-dds. If the hub sent no beat for longer than kPause, it counts
+  /// Time from the last answer of abbe-dds to the last beat of the hub. Before the first answer,
+  /// this time counts from the start of abbe-dds; after a pause of more than kPause without a beat,
   /// from the first beat after that pause.
   [[nodiscard]] std::chrono::nanoseconds silent_for() const noexcept;
   [[nodiscard]] bool has_answered() const noexcept;  ///< since its last start

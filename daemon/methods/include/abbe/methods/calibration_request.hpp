@@ -33,7 +33,8 @@ struct CalibrationRequest {
                                                      const Config* config = nullptr);
 
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationRequest& request);
-/// The same in two steps: this one is O(size of the task), set_from() is O(1).
+/// Makes the attachment for a recording in two steps, so that the hub has little to do:
+/// to_attachment() is O(size of the task), set_from() only replaces the start time and is O(1).
 [[nodiscard]] RecordingAttachment to_attachment(const CalibrationTask& task);
 void set_from(RecordingAttachment& attachment, protocol::HostTime from) noexcept;
 [[nodiscard]] Result<CalibrationRequest> from_attachment(const RecordingAttachment& attachment);

@@ -66,8 +66,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   [[nodiscard]] Result<void> cancel(std::string who, protocol::HostTime now);
 
   void take(const protocol::Snapshot& snapshot);
-  /// Fails an acquisition that receives no more samples; `now` is host time. Only called live: see
-  /// tick() of the acquisitions.
+  /// Fails the acquisition if no samples arrive any more; `now` is host time. Called in a live run
+  /// only: in a replay the run is incomplete without it and gives no model either.
   void tick(protocol::HostTime now);
 
   /// The acquired run, in the state Identifying; nullopt after it was returned once.
@@ -81,7 +81,8 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// Outcome of the identification: a model was judged, or no model could be identified.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
   void not_identified(const Error& why, protocol::HostTime now);
-  /// The judged model is not stored yet. Adds an event whenever the reason changes.
+  /// Reports that the identified model could not be stored so far. Adds an event whenever `reason`
+  /// changes.
   void not_stored(std::string reason, protocol::HostTime now);
 
   [[nodiscard]] const SessionStatus& status() const noexcept { return status_; }

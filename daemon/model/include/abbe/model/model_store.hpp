@@ -66,7 +66,7 @@ class ModelStore {
   /// (the models are not changed).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
-  /// Does not access the disk. For a caller that continues to run while the store is not available.
+  /// Does not access the disk: for abbed, which continues to run while the store is not available.
   explicit ModelStore(std::filesystem::path folder);
   /// Creates the folder if it does not exist.
   [[nodiscard]] Result<void> create() const;

@@ -1,18 +1,18 @@
 #pragma once
 /// Merges the streams of all devices by host time into snapshots, one per tracker point and one per
-/// touch, with the axes interpolated to its instant. A touch that contains axis positions (latched
-/// by the counter card, reported by a measuring machine) keeps them. Points keep their order of
-/// arrival, and so do touches.
+/// touch, with the axes interpolated to the instant of the point or touch. A touch that contains
+/// axis positions (latched by the counter card, reported by a measuring machine) keeps them. Points
+/// keep their order of arrival, and so do touches.
 ///
 /// Tracker points arrive in bursts, up to a third of a second late; axis samples arrive without
-/// delay. A point is assembled as soon as three axis samples at or after its instant have arrived:
-/// the interpolation uses two on either side, and a sample at a bus-off may be earlier than the one
-/// that arrived before it. If they do not arrive, the point is assembled from the available samples
-/// once any stream has advanced `watermark` beyond it; it is flagged AxisMissing if they are not
-/// enough. Both rules use only the times in the samples, and an axis or
-/// environment sample that arrives late is inserted by its time. Therefore neither the order of
-/// arrival (within the watermark) nor the speed of a replay changes a result. Not for the RT path;
-/// not thread-safe.
+/// delay. A point is assembled as soon as three axis samples at or after its instant have arrived.
+/// The interpolation uses two on either side; the third is awaited because after a bus-off a sample
+/// may be earlier than the one that arrived before it. If these samples do not arrive, the point is
+/// assembled from the available ones once any stream has advanced by `watermark` beyond the point;
+/// the snapshot is flagged AxisMissing if they are too few. Both rules use only the times in the
+/// samples, and an axis or environment sample that arrives late is inserted by its time. Therefore
+/// neither the order of arrival (within the watermark) nor the speed of a replay changes a result.
+/// Not for the RT path; not thread-safe.
 
 #include <chrono>
 #include <deque>

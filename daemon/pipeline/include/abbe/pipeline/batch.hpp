@@ -20,8 +20,9 @@ struct RawFromDevice {
   protocol::RawBlock block;
 };
 
-/// Key in the versions of a recording. If present, its axis samples have an instant of their own
-/// each; else a second sample of an instant marks further axes of the first one as missing.
+/// Key in the version entries of a recording. With it, no two axis samples of the recording have
+/// the same instant. Without it (older versions of abbe), a second sample of the same instant may
+/// follow, which only marks further axes of the first sample as missing.
 inline constexpr const char* kAxisSamplesRule = "axis_samples";
 
 struct Batch {

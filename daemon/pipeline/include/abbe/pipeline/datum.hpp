@@ -81,7 +81,7 @@ class Datum {
 
 /// Name of the attachment of a FoundDatum in the recording, for a replay from raw bytes.
 inline constexpr std::string_view kDatumName = "datum.json";
-/// Key in the versions of a recording. If present, axes without marks needed a datum, too
+/// Key in the version entries of a recording. With it, axes without marks needed a datum, too
 /// (WithoutMarks::NeedAZero).
 inline constexpr const char* kDatumRule = "datum";
 /// Name of the attachment with the start of the search for marks: crossings and samples later than

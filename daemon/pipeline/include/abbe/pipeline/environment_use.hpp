@@ -47,7 +47,8 @@ struct EnvironmentEffect {
   /// correction, and TrackerSource::u_scale.
   double u_scale = 0.0;
 };
-/// nullopt: a configured quantity was not available at that instant.
+/// The effect at the instant of the snapshot. nullopt: a configured quantity was not available
+/// then.
 [[nodiscard]] std::optional<EnvironmentEffect> effect_of(const protocol::Snapshot& snapshot,
                                                          const EnvironmentUseOptions& options);
 
@@ -73,9 +74,9 @@ class MeanEffect {
 /// that a tracker assumes without measuring are not merged.
 class EnvironmentMerge {
  public:
-  /// A sample of an environment device applies from `lag` after its instant. By then it has
-  /// arrived, so that the order of arrival does not matter; the delay of half a second is
-  /// negligible.
+  /// A sample of an environment device is used only for instants later than its own by `lag`: by
+  /// then it has arrived, so that the order of arrival does not matter. The environment changes so
+  /// slowly that a delay of half a second is negligible.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);

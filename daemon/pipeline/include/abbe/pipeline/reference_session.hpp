@@ -90,8 +90,8 @@ class ReferenceSession {
 /// Reading at count 0 of an axis in state Found, m or rad.
 [[nodiscard]] double reading_at_zero(const AxisMarks& marks, const AxisReference& found);
 
-/// Request to set the datum of axes without marks: their current position is the one at which they
-/// read their offset.
+/// Request to set the datum of axes without marks: the current position of each axis is defined as
+/// the one at which the axis reads its configured offset.
 struct SetDatumHere {
   static constexpr double kByEye = 100e-6;  ///< m or rad; for a position set by eye
 

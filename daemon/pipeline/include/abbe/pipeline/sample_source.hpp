@@ -34,7 +34,7 @@ class SampleSource {
 
   /// Appends everything that arrived since the last call to `batch`.
   virtual void drain(Batch& batch) = 0;
-  /// Rates are over the time since the previous call.
+  /// Status of all streams. The rates are means over the time since the previous call.
   [[nodiscard]] virtual std::vector<StreamHealth> health(protocol::HostTime now) = 0;
 
   /// Starts to touch the points with the measuring machine; the touches arrive in drain(). No
@@ -45,15 +45,17 @@ class SampleSource {
   /// Reason why the measuring machine does not move until the operator releases it; nullopt: no
   /// release is needed.
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }
-  /// Clears the errors and starts a new session. Refused if no release is awaited.
+  /// Releases the measuring machine: clears its errors and starts a new session with its server.
+  /// Refused if no release is awaited.
   [[nodiscard]] virtual Result<void> release_machine() {
     return fail(ErrorCode::Refused, "machine: there is no measuring machine, " +
                                         tables_with(Capability::Motion) + ", in the configuration");
   }
-  /// Available also while the machine is not ready; nullopt: no position was reported yet.
+  /// The latest reported tip position, also while the machine is not ready to move; nullopt: none
+  /// was reported yet.
   [[nodiscard]] virtual std::optional<TipPlace> tip_place() const { return std::nullopt; }
-  /// Number of requested points that are neither touched nor discarded. At 0, the next drain()
-  /// returns the last touches.
+  /// Number of requested points that are neither touched nor discarded. When it is 0, the next
+  /// drain() returns the last touches.
   [[nodiscard]] virtual std::size_t points_left() const { return 0; }
   /// Position of the measuring machine, m, reported within the last second. Refused, with the
   /// reason, if there is none or the machine is not ready to move.
@@ -61,15 +63,16 @@ class SampleSource {
     return fail(ErrorCode::Refused, "there is no measuring machine");
   }
 
-  /// Latest state of the counter card's counters that drain() read; its samples are already in the
-  /// batch. Each state is returned at most once.
+  /// The latest state of the card's counters that drain() has read. The samples up to this state
+  /// are already in the batch of that drain(). Each state is returned at most once.
   [[nodiscard]] virtual std::optional<CountingProgress> card_progress() { return std::nullopt; }
 
   /// Current status; nullopt: no tracker is configured.
   [[nodiscard]] virtual std::optional<drivers::DeviceStatus> tracker_status() const {
     return std::nullopt;
   }
-  /// The outcome is reported in tracker_reports(). No effect without a tracker.
+  /// Sends an order to the tracker; tracker_reports() reports its outcome. No effect without a
+  /// tracker.
   virtual void order_tracker(drivers::TrackerOrder) {}
   /// Reports since the last call.
   [[nodiscard]] virtual std::vector<drivers::TrackerOrderReport> tracker_reports() { return {}; }

@@ -18,10 +18,11 @@
 namespace abbe::daemon {
 
 struct StandstillOptions {
-  /// Largest change of an axis reading from the start of the standstill: noise and vibration.
+  /// Largest change of an axis reading since the start of a standstill that still counts as
+  /// standstill: noise and vibration.
   double tolerance_m = 50e-6;
-  /// At least the averaging time of a stationary tracker, which is 0.5 s unless configured
-  /// otherwise.
+  /// Time at either end of a standstill that is left out. At least the averaging time of a tracker
+  /// in stationary mode, whose default is 0.5 s.
   std::chrono::nanoseconds settle = std::chrono::milliseconds{500};
 };
 

@@ -21,19 +21,20 @@ struct VertexReading {
 
 class VertexReadings {
  public:
-  /// Largest speed between two points at standstill. If the control rounds a corner, the machine is
-  /// faster and the vertex has no reading.
+  /// A machine slower than this between two points is at standstill. A control that rounds the
+  /// corner at a vertex is faster; such a vertex has no reading.
   static constexpr double kStands_m_per_s = 1e-3;
 
   /// `tolerance_m`: largest difference between the position of a machine at standstill and the
   /// commanded position (following error, in-position window).
   explicit VertexReadings(double tolerance_m) : tolerance_m_(tolerance_m) {}
 
-  /// Takes a reading near a vertex, in order of time. Of each vertex, the reading with the lowest
-  /// speed is used, the latest of several. On the first reading of another vertex, returns the
-  /// contradiction() of the previous one.
+  /// Takes a reading near a vertex; call in order of time. Of the readings at one vertex, the one
+  /// with the lowest speed is used, and of several equally slow ones the latest. At the first
+  /// reading of another vertex, returns the contradiction() of the previous one.
   [[nodiscard]] std::optional<std::string> take(const VertexReading& reading);
-  /// Discards the reading: the machine has moved before its run began.
+  /// Discards the reading of the current vertex. Call it when the machine moves there before its
+  /// run has begun.
   void forget() { slowest_.reset(); }
   /// Message if the reading of the last vertex differs from the path by more than is allowed.
   [[nodiscard]] std::optional<std::string> contradiction() const;

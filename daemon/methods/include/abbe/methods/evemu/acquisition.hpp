@@ -45,18 +45,19 @@ struct EvemuRun {
 struct EvemuAcquisitionOptions {
   std::string device = "probe";  ///< name of the probing device, for messages
   /// True: a restart of the device during the run fails the run, because the counters of a counter
-  /// card restart at 0 at the current position. With reference marks the same zero is found again.
+  /// card then start again at 0 at the current position. False if all axes have reference marks,
+  /// which give the same zero as before.
   bool zero_is_lost_by_restart = true;
-  /// Longest host time between two touches; the run fails after it. The operator turns and clamps
-  /// the artefact by hand between positions.
+  /// The run fails if no touch arrives for longer than this host time. It is long because the
+  /// operator turns and clamps the artefact by hand between positions.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
-  /// Touches more than 1 mm outside are not used; thermal correction moves readings by less.
-  /// nullopt: no limit.
+  /// Travel of the axes. Touches more than 1 mm outside the travel are not used; thermal correction
+  /// changes a reading by less. nullopt: no limit.
   std::optional<calib::MachineNodes> travel{};
-  /// A run without a usable touch fails after this many successive unusable ones.
+  /// A run that has no usable touch yet fails after this many unusable ones.
   std::size_t most_refused = 20;
-  /// Source of the temperature of the array. A touch is not used if its sensor has no valid value
-  /// then, because the identification needs the temperature.
+  /// Source of the temperature of the array. A touch is not used if the sensor has no valid value
+  /// at its instant, because the identification needs the temperature.
   std::optional<ArtefactTemperatureConfig> artefact{};
   std::string artefact_sensor{};  ///< name of the temperature
 };

@@ -16,7 +16,7 @@ class ArtefactThermometer {
  public:
   explicit ArtefactThermometer(std::optional<ArtefactTemperatureConfig> config) : config_(config) {}
 
-  /// False if the sensor has no valid value at this touch.
+  /// Adds the temperature at a touch. False if the sensor has no valid value at this instant.
   [[nodiscard]] bool take(const protocol::Snapshot& touch);
 
   /// Mean of the sensor's values. Its standard uncertainty is the root sum of squares of the

@@ -28,9 +28,9 @@ struct EvemuMethod {
   [[nodiscard]] static MethodNeeds needs(const Config& config);
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
-  /// Members of the plan that are not in the object are taken from [evemu] of `config`; null: the
-  /// defaults.
-  /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
+  /// Members of the plan that `object` does not contain are taken from [evemu] of `config`; if
+  /// `config` is null, they get their default values. Throws nlohmann::json::exception for a member
+  /// that is missing or of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
   [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);

@@ -50,33 +50,35 @@ class RunPoints {
 };
 
 struct AcquisitionOptions {
-  /// A machine that stays within this distance of one place is at standstill.
+  /// A machine whose position stays within this distance of one place is at standstill.
   double stand_tolerance_m = 0.2e-3;
   /// largest distance of the machine from the first and last vertex at its standstill there
   double vertex_tolerance_m = 2e-3;
   double reading_tolerance_m = 20e-6;  ///< see VertexReadings
-  /// A machine farther than this from every leg is driving another path; the run fails.
+  /// If the machine is farther than this from every leg of the path, it drives another path, and
+  /// the run fails.
   double path_tolerance_m = 10e-3;
-  /// shortest standstill before the run: 20 points at 100 Hz, see [calib] alignment
+  /// shortest standstill before the run: the 20 points that calib's alignment of tracker and path
+  /// needs, at 100 Hz
   std::chrono::nanoseconds stand_before = std::chrono::milliseconds{200};
-  /// length of the standstill before the run that is kept
+  /// points of the standstill before the run that are kept: those of this time before its end
   std::chrono::nanoseconds keep_before = std::chrono::milliseconds{400};
   /// shortest standstill at the end; longer than any dwell at a vertex
   std::chrono::nanoseconds stand_after = std::chrono::milliseconds{1000};
-  /// length of the standstill after the run that is kept
+  /// points of the standstill after the run that are kept: those of this time after its beginning
   std::chrono::nanoseconds keep_after = std::chrono::milliseconds{400};
-  /// Longest time inside the run between two tracker points, or without axis positions; the run
-  /// fails after it.
+  /// The run fails if, during it, no tracker point arrives for longer than this, or none with axis
+  /// positions. Counted in the times of the samples.
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
-  /// Host time without an arriving point after which tick() fails the run: `silence` and the delay
-  /// of a backlog that a stalled tracker delivers later.
+  /// If no point arrives for longer than this host time, tick() fails the run. It is `silence` plus
+  /// the delay with which a stalled tracker may deliver its backlog.
   std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
   /// longest time until the machine has stopped at the first vertex and left it
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
   /// longest standstill on the path; the run fails after it
   std::chrono::nanoseconds longest_stop = std::chrono::minutes{15};
-  /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. It limits the
-  /// memory if the machine drives its path again and again.
+  /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. Limits the memory
+  /// if the machine never stops at the end of the path, for example because it repeats the path.
   std::size_t most_points = 4'000'000;
   EnvironmentUseOptions environment;  ///< with which the snapshots were corrected
   /// A step back of the tracker's clock by more than this means that the clock restarted. Packets
@@ -94,10 +96,11 @@ class OtfAcquisition {
 
   /// To be called before the first take(). Snapshots before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { from_ = from; }
-  /// Points whose device time is not later than that of the point before are left out and counted.
+  /// Takes one snapshot. A point whose device time is not later than that of the previous point is
+  /// left out and counted.
   void take(const protocol::Snapshot& snapshot);
-  /// Fails a run that receives no more points; `now` is host time. A replay does not need it: such
-  /// a run has no points that could complete it.
+  /// Fails a run that receives no more points; `now` is host time. A replay need not call it:
+  /// without it the run stays incomplete, and gives no model either.
   void tick(protocol::HostTime now);
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
@@ -110,7 +113,7 @@ class OtfAcquisition {
   /// The path of the request; O(1).
   [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
   [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
-  /// Mean of the environment's effect over the run.
+  /// Mean over the run of the effect of the environment (temperatures of the scales, air).
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
  private:

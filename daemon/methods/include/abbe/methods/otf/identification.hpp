@@ -21,9 +21,9 @@
 namespace abbe::daemon {
 
 struct OtfRun {
-  /// Vertices in the coordinates of the snapshots: with [[thermal]], corrected for the thermal
-  /// expansion of the scales. The model then refers to corrected positions and does not contain the
-  /// thermal expansion of the scales a second time.
+  /// Vertices of the path in the coordinates of the snapshots. With [[thermal]], both are corrected
+  /// for the thermal expansion of the scales; the model then applies to corrected readings and does
+  /// not contain this expansion itself.
   std::vector<AxisPosition> path_m;
   std::vector<RunPoint> points;
   double u_scale = 0.0;                  ///< see calib::otf::Noise

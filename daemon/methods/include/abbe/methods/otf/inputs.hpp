@@ -21,18 +21,19 @@ namespace abbe::daemon {
 /// outside the travel, or no [target].
 [[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m,
                                           const MachineConfig& machine);
-/// Times are of the tracker's clock, relative to the first point.
+/// Converts the points. Times are those of the tracker's clock, relative to the first point.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(
     std::span<const RunPoint> points);
-/// Options of fit and judgement for these points under [gate], the same for the daemon, a replay
-/// and files. The evidence of the path's orientation contains only what is configured; the caller
-/// sets orientation.scales_agree.
+/// Options of fit and judgement for these points under [gate], used alike by the daemon, a replay
+/// and an identification from files. Of the evidence about the orientation of the path only the
+/// configured part is set; the caller sets orientation.scales_agree.
 [[nodiscard]] calib::otf::Options otf_options(
     std::span<const calib::otf::TrackerObservation> points, const MachineConfig& machine,
     const GateConfig& gate);
 [[nodiscard]] calib::GateLimits gate_limits(const GateConfig& gate);
 
-/// The standstill times are at least long enough for the alignment's points at the tracker's rate.
+/// Options of an acquisition. At the configured point rate of the tracker, each required standstill
+/// is long enough for the number of points that the alignment needs.
 [[nodiscard]] AcquisitionOptions acquisition_options(const Config& config);
 
 }  // namespace abbe::daemon

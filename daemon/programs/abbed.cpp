@@ -110,7 +110,8 @@ int run(Abbed& abbed, const sigset_t& stop) {
                  hangs ? "the hub hangs: it has completed no cycle for 1 s" : "the hub runs again");
     }
     if (hangs) {
-      // Without a watchdog nothing restarts abbed: the threads that still work go on.
+      // The hub hangs. Without a watchdog nothing would restart abbed, so it continues: the threads
+      // of devices and recorder may still work.
       if (!feed_period) continue;
       return kInternal;
     }

@@ -17,7 +17,8 @@ std::chrono::nanoseconds period(double rate_hz) {
 
 }  // namespace
 
-/// The next sample is due one period after this one was sent, not after it was due.
+/// True if a sample is to be sent now. The next one is due one period after this one was sent, not
+/// one period after this one was due.
 bool Publisher::due(Pace& pace, const protocol::Snapshot& view, WallTime now, double rate_hz) {
   const bool axis_lost = (view.missing_mask & ~pace.missing_mask) != 0;
   if (now < pace.next && !axis_lost) return false;
@@ -30,8 +31,8 @@ Publisher::Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset
 
 template <class T>
 void Publisher::send(Topic topic, const T& message, WallTime at) {
-  // A value exceeds the IDL's bounds, although the configuration is checked. The link counts the
-  // empty payload as refused.
+  // encode() fails if a value exceeds the bounds of the IDL; the configuration alone cannot cause
+  // this. The payload is then empty, and the link counts it as refused.
   if (auto encoded = encode(message, payload_); !encoded) {
     refusal_ = fmt::format("{} not sent: {}", traits(topic).name, encoded.error().text);
   }

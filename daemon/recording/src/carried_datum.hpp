@@ -18,8 +18,9 @@ struct TimedAttachment {
   std::uint64_t time_ns = 0;
 };
 
-/// Whether the next file needs the attachment. Call it from the newest attachment to the oldest.
-/// `settled`: mask of the axes whose earlier datums are not valid any more; updated by the call.
+/// Whether the next file needs the attachment. Call it for the attachments of a file from the
+/// newest to the oldest. `settled`: mask of the axes whose earlier datums are not valid any more;
+/// updated by the call.
 inline bool is_carried_on(const RecordingAttachment& attachment, const DatumState& state,
                           std::uint32_t& settled) {
   if (attachment.name == kReferenceRequestName || attachment.name == kDatumStateName ||

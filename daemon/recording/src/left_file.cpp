@@ -96,7 +96,7 @@ Result<std::vector<std::byte>> LeftFile::bytes(std::uint64_t offset, std::uint64
   return out;
 }
 
-/// nullopt: there is no whole record at `offset`.
+/// The record head at `offset`; nullopt if the record there is truncated.
 Result<std::optional<LeftFile::Head>> LeftFile::head_at(std::uint64_t offset) const {
   if (size_ - offset < mcap::kRecordHeadSize) return std::nullopt;
   const auto head = bytes(offset, mcap::kRecordHeadSize);
@@ -129,7 +129,7 @@ Result<void> LeftFile::read(const std::atomic<bool>& stop) {
       const auto last = bytes(size_ - mcap::kMagic.size(), mcap::kMagic.size());
       if (!last) return tl::unexpected(last.error());
       complete_ = std::ranges::equal(*last, mcap::kMagic);
-      break;  // if not complete_, the end is truncated and will be written again
+      break;  // not complete_: the end is truncated and is rewritten
     }
     if (auto taken = take(**record); !taken) return taken;
     whole_until_ = (*record)->end();
@@ -181,7 +181,8 @@ void LeftFile::take_index(const Head& record, Bytes content) {
   chunk_->indexed += index->entries.size();
 }
 
-/// Metadata that cannot be decoded are indexed, too, so that a reader reports them.
+/// Adds a metadata record to the index of the summary, even if the record cannot be decoded: a
+/// reader then finds and reports it.
 void LeftFile::take_metadata(const Head& record, Bytes content) {
   const auto metadata = mcap::decode<mcap::Metadata>(content);
   summary_.add(mcap::MetadataIndex{record.offset, record.end() - record.offset,
@@ -315,7 +316,8 @@ Result<void> LeftFile::write(std::uint64_t offset, Bytes piece) {
 
 Result<void> LeftFile::write_end() {
   if (!complete_) {
-    // With this order the next start can close the file even after a kill or a full disk.
+    // First the chunk, then the cut, then the end of the file: after a kill or on a full disk the
+    // next start of abbed finds a file that it can still close.
     if (auto done = write(rebuilt_at_, rebuilt_); !done) return done;
     if (::ftruncate(fd_.get(), static_cast<off_t>(whole_until_)) != 0)
       return tl::unexpected(io_error("truncate"));

@@ -52,7 +52,7 @@ Result<fs::path> take_finished_name(const fs::path& part) {
   return finished;
 }
 
-/// nullopt: another process writes the file.
+/// Closes one recording; nullopt if another process is writing it.
 Result<std::optional<LeftRecording>> close_one(const fs::path& part,
                                                const std::atomic<bool>& stop) {
   auto file = recording::LeftFile::open(part);

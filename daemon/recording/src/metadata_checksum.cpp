@@ -25,7 +25,8 @@ Checked check(const std::map<std::string, MetadataEntries>& metadata, std::strin
                                                                       : Checked::Wrong;
 }
 
-/// For recordings of older versions, which only have the hash of the text.
+/// Compares the text of the configuration with its hash, the only checksum in recordings of older
+/// versions.
 MetadataCheck check_text(const MetadataEntries& configuration) {
   const auto text = configuration.find("text"), hash = configuration.find("sha256");
   if (text == configuration.end() || hash == configuration.end()) return MetadataCheck::Unchecked;

@@ -52,7 +52,8 @@ void Recorder::State::forget_finished_requests() {
 }
 
 IoResult Recorder::State::begin_file() {
-  // Here and not in open(), because the disk may have been read-only until now.
+  // The directory is created here and not in open(), because the disk may have been read-only at
+  // that time.
   std::error_code made;
   std::filesystem::create_directories(options.directory, made);
   if (made) return tl::unexpected(recording::io_fault("create", options.directory, made.value()));
@@ -194,8 +195,8 @@ void Recorder::State::enter_fault(const IoFault& fault) {
     return;
   }
 
-  // The end is small and may still fit. If not, the whole chunks are readable without it, and
-  // retry() tries again.
+  // The end of the file (indexes and footer) is small and may still fit on a full disk. If it does
+  // not, the whole chunks are readable without it, and retry() writes it again.
   const bool ended = end_file().has_value();
   previous_file = file->path().filename().string();
   if (ended || !file->is_open()) file.reset();

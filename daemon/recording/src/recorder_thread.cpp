@@ -15,11 +15,12 @@
 namespace abbe::daemon {
 namespace {
 
-// Longest time that a sample waits in memory before it is encoded; a tenth of the shortest chunk.
+// Period of the recorder: the longest time that a sample waits in memory before it is encoded.
 constexpr std::chrono::milliseconds kCycle{20};
-// How long the recorder waits if the hub is adding samples at that moment.
+// Pause before the recorder tries again to take samples, if the hub is adding some just then.
 constexpr std::chrono::microseconds kHubAdds{50};
-// The waiting samples are kept in parts of this size: a growing vector is copied, by the hub.
+// The waiting samples are kept in parts of at most this size. In one vector they would be copied
+// whenever it grows, on the hub's thread.
 constexpr std::size_t kMostInOnePart = 1 << 20;
 
 /// A sample with the time of the hub cycle in which it came.
@@ -81,8 +82,8 @@ struct Waiting {
   std::vector<OfCycle<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
   std::vector<DigestRequest> digests;
-  /// Further batches are dropped until the recorder has taken this object, so that there is one gap
-  /// and not many.
+  /// True after a batch was dropped. Further batches are then dropped until the recorder has taken
+  /// this object, so that the recording gets one gap and not many.
   bool full = false;
   std::unique_ptr<Waiting> earlier;  ///< the parts before this one
   std::size_t bytes_earlier = 0;
@@ -92,7 +93,8 @@ struct Waiting {
            size_of(touch_scans) + raw.bytes();
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_earlier + bytes_here(); }
-  /// Keeps the memory that normal cycles need; frees the larger memory used during a disk stall.
+  /// Empties this object. It keeps the memory that normal cycles need, and frees the larger memory
+  /// that was used while the disk stalled.
   void clear() {
     if (bytes() > kMostInOnePart) {
       *this = {};
@@ -217,8 +219,8 @@ struct RecorderThread::State {
     delete new_status.exchange(status.release(), std::memory_order_acq_rel);
   }
 
-  /// An exception means an internal error or a lack of memory: the recorder then begins a new file,
-  /// as after a disk fault.
+  /// Passes the data to the recorder. An exception means an internal error or a lack of memory: the
+  /// recorder then begins a new file, as after a disk fault.
   void write_all(Waiting& data) {
     try {
       if (!internal_error.empty()) recorder.fail(std::exchange(internal_error, {}));
@@ -266,8 +268,8 @@ struct RecorderThread::State {
 
   void write_part(Waiting& data) {
     for (auto& a : data.attachments) recorder.attach(std::move(a.what), a.time);
-    // Environment first: a further file begins with the repeated environment samples, which must
-    // not come after the new ones.
+    // Environment samples are recorded first: a further file begins with the repeated environment
+    // samples, which must precede the new ones.
     for (const auto& [taken, e] : data.environment) recorder.record(e.sample, e.device, taken);
     for (const auto& [taken, s] : data.axes) recorder.record(s, options.devices.axes, taken);
     for (const auto& [taken, s] : data.points) recorder.record(s, options.devices.tracker, taken);
@@ -321,7 +323,7 @@ RecorderThread::~RecorderThread() {
   state_->thread.join();
   try {
     (void)state_->recorder.close();  // a file that cannot be finished stays readable as .part
-  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): the same, lack of memory
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): no memory: stays .part
   }
 }
 

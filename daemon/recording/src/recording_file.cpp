@@ -22,7 +22,8 @@ std::uint64_t free_bytes_from(const struct statvfs& fs) noexcept {
   return std::uint64_t{fs.f_bavail} * std::uint64_t{fs.f_frsize};
 }
 
-/// A created or renamed file survives a power cut only once its directory is on the disk.
+/// Makes the directory entry of `file` durable: a created or renamed file survives a power cut only
+/// once its directory is on the disk.
 tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file) {
   const std::filesystem::path directory = file.has_parent_path() ? file.parent_path() : ".";
   const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -37,8 +38,8 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
 int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;
-  // The file system has no RENAME_NOREPLACE. The recorder checked that `to` did not exist when the
-  // recording began.
+  // Here the file system has no RENAME_NOREPLACE. A plain rename is safe, because the recorder
+  // checked that `to` did not exist when the recording began.
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
@@ -111,7 +112,8 @@ tl::expected<void, IoFault> RecordingFile::append(std::span<const std::byte> pie
       done += static_cast<std::size_t>(n);
     } else if (n == 0 || errno != EINTR) {
       const int error = n == 0 ? ENOSPC : errno;
-      // If this fails too, a truncated chunk remains at the end; readers skip it.
+      // If the file cannot be cut back either, a truncated chunk remains at its end; readers skip
+      // it.
       if (::ftruncate(fd_, static_cast<off_t>(size_)) != 0) { /* see above */
       }
       return unexpected(io_fault("write", path_, error));

@@ -54,7 +54,8 @@ std::optional<RecordingInfo> info_of(const Contents& contents) {
   return info;
 }
 
-/// Wraps around for impossible dates, so that damaged bytes cause no undefined behaviour.
+/// Host time of a UTC date in the file. Unsigned arithmetic wraps around for impossible dates, so
+/// that damaged bytes cause no undefined behaviour.
 protocol::HostTime host_time(std::uint64_t utc_ns, protocol::UtcOffset offset) {
   const std::uint64_t host_ns = utc_ns - static_cast<std::uint64_t>(offset.value.count());
   return protocol::HostTime{std::chrono::nanoseconds{static_cast<std::int64_t>(host_ns)}};
@@ -240,7 +241,8 @@ struct RecordingReader::Cursor::State {
 };
 
 void RecordingReader::Cursor::State::open_chunk() {
-  // At equal times the message recorded first, which is the one at the lower address.
+  // At equal times the message that was recorded first comes first: it has the lower address,
+  // because the file is mapped.
   const auto earlier = [](const mcap::Message& a, const mcap::Message& b) {
     return a.log_time_ns != b.log_time_ns ? a.log_time_ns < b.log_time_ns
                                           : std::less<>{}(a.data.data(), b.data.data());

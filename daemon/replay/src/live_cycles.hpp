@@ -19,13 +19,13 @@ class LiveCycles {
  public:
   using HostTime = protocol::HostTime;
 
-  /// The live run has a sample of the instant `time` in the cycle `turn`, which is not replayed
-  /// yet.
+  /// Announces a live sample before the replay has reached it: the live run had the sample of the
+  /// instant `time` in the cycle of the time `turn`.
   void expect(HostTime time, HostTime turn) { turn_of_.emplace(time, turn); }
 
   /// Leaves in `decoded` the samples that the live run had by the cycle `now`, and holds the
-  /// others. A sample that the live run never had (lost, or other settings) waits only for those
-  /// before it.
+  /// others. A sample that the live run never had (lost, or other settings) is held only as long as
+  /// samples decoded before it.
   void hold(HostTime now, std::vector<Sample>& decoded) {
     for (Sample& sample : decoded) {
       const HostTime turn = turn_of(sample.head.time, now);
@@ -39,7 +39,8 @@ class LiveCycles {
   }
 
  private:
-  // Only the backlog of a tracker reaches the hub later than this; the replay need not hold it.
+  // Announced samples that are older than this are forgotten: their bytes were lost. Only the
+  // backlog of a stalled tracker reaches the hub later, and it need not be held.
   static constexpr auto kForgotten = std::chrono::minutes{1};
   struct Waiting {
     HostTime turn;

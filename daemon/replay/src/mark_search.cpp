@@ -45,7 +45,8 @@ template <class Sample>
 void MarkSearch::take(const Sample& sample, HostTime time) {
   if (axes_.empty()) return;
   for (; next_ < requests_.size() && time > requests_[next_]; ++next_) begin();
-  // Replay batches do not begin where live batches did.
+  // A batch of the replay may begin earlier than in the live run. Samples from before the request
+  // are skipped, because the live search did not get them.
   if (!session_ || time <= requests_[next_ - 1] || session_->finished()) return;
   session_->take(sample);
   for (std::size_t i = 0; i < axes_.size(); ++i) note(i);

@@ -15,14 +15,16 @@ namespace abbe::daemon {
 
 class MarkSearch {
  public:
-  /// BadInput: the recording's own requests cannot be read. Without marks it finds nothing.
+  /// BadInput: the requests for a search in the recording cannot be read. If `config` has no
+  /// reference marks, take() does nothing.
   [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
                                              const Config& config);
 
-  /// Call before the datum is applied to the samples.
+  /// Call it before the datum is applied to the samples, because the search uses them as the
+  /// devices delivered them.
   void take(const Batch& batch);
 
-  /// The datums of the live run in their order, each with the replayed value.
+  /// The datums that the live run found, in their order, each with the value that the replay found.
   [[nodiscard]] std::vector<ReplayedDatum> compared(const RecordingReader& recording) const;
 
  private:

@@ -14,14 +14,14 @@ namespace abbe::daemon {
 
 class RawDecoder {
  public:
-  /// `left`: as in the live run (DeviceStart).
+  /// `left`: the state of the counters with which the live run started; see DeviceStart.
   explicit RawDecoder(const Config& config,
                       const std::optional<CountingProgress>& left = std::nullopt);
 
-  /// Appends to `batch` the samples that the block completes; nothing for a device that `config`
-  /// does not have.
+  /// Appends the samples that are complete with this block. Ignores a block from a device that
+  /// `config` does not have.
   void take(const protocol::RawBlock& block, std::string_view device, Batch& batch);
-  /// The recording has ended: appends the samples that waited for further blocks.
+  /// Call it at the end of the recording: appends the samples that waited for further blocks.
   void finish(Batch& batch);
 
  private:

@@ -33,7 +33,7 @@ constexpr std::uint64_t kMessagesPerProgress = 256;
 // with simulated time many times faster than real time.
 constexpr auto kLongestAhead = std::chrono::seconds{10};
 
-/// The calibrations the recording asks for, one after the other.
+/// The calibrations that were requested during the recording, replayed one after the other.
 class Calibrations {
  public:
   Calibrations(const RecordingReader& recording, std::vector<CalibrationRequest> requests,
@@ -44,8 +44,8 @@ class Calibrations {
         options_(options),
         session_(Methods::options(config)) {}
 
-  /// Starts the requests made before the cycle `taken`. A later request ends the calibration before
-  /// it, which was cancelled in the live run.
+  /// Starts the calibrations that were requested before the cycle `taken`. A request ends the
+  /// calibration before it, which must have been cancelled in the live run.
   void begin_cycle(HostTime taken) {
     while (next_ < requests_.size() && requests_[next_].from < taken) begin_next();
   }
@@ -71,7 +71,8 @@ class Calibrations {
     identified_ = false;
     ++next_;
   }
-  /// `cause` is the reason if the session still takes readings: it has no state of its own then.
+  /// Ends the present calibration unless it has been identified. If its session still takes
+  /// readings, its result becomes Refused with the reason `cause`.
   void end(std::string_view cause) {
     if (next_ > 0 && !identified_) done_.push_back({.ended = ended(session_.status(), cause)});
     identified_ = true;
@@ -121,13 +122,15 @@ std::optional<std::size_t> environment_place(const DeviceNames& names, std::stri
   return static_cast<std::size_t>(found - names.environment.begin());
 }
 
-/// True if the recording was made by the rule `name`, else by that of earlier versions.
+/// True if the recording states that it follows the rule `name`. Recordings of earlier versions of
+/// abbe do not.
 bool has_rule(const RecordingReader& recording, const char* name) {
   const auto versions = recording.metadata().find("abbe.versions");
   return versions != recording.metadata().end() && versions->second.contains(name);
 }
 
-/// The datum of the live run: the raw bytes do not contain the time from which it applies.
+/// The datum of each axis as found in the live run. It is taken from attachments even in a replay
+/// from raw bytes, because these do not show from which time a datum applies.
 Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   const bool asked = has_rule(recording, kDatumRule);
   Datum datum{config, asked ? Datum::WithoutMarks::NeedAZero : Datum::WithoutMarks::Untouched};
@@ -149,8 +152,9 @@ Result<Datum> datum_of(const RecordingReader& recording, const Config& config) {
   return datum;
 }
 
-/// Handles a card that was configured during one recording file and delivered its first sample in
-/// the next. The raw bytes of the next file do not show this restart; the recorded live samples do.
+/// For a counter card that was set up while one recording file was written and whose first sample
+/// is in the next file. The raw bytes in the next file do not show this restart of the counters,
+/// but the recorded live samples do.
 class SetUpBefore {
  public:
   explicit SetUpBefore(const RecordingReader& recording)
@@ -161,7 +165,8 @@ class SetUpBefore {
   void take_live(const protocol::SampleHead& head) {
     if (has(head.flags, protocol::SampleFlag::Restarted)) at_ = head.time;
   }
-  /// Call before `datum` is applied to the samples from the bytes.
+  /// Applies the restart, if a live sample had one that the bytes do not show. Call it before
+  /// `datum` is applied to the samples decoded from the bytes.
   void apply(const Batch& batch, Datum& datum) {
     const bool seen = std::ranges::any_of(batch.axes, [](const auto& s) {
       return has(s.head.flags, protocol::SampleFlag::Restarted);
@@ -204,7 +209,7 @@ class Pace {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Input of the live run from the attachments of the recording.
+/// What the live run got besides samples, from the attachments of the recording.
 struct Attached {
   std::vector<CalibrationRequest> requests;
   Datum datum;
@@ -221,8 +226,9 @@ Result<Attached> attached_to(const RecordingReader& recording, const Config& con
   return Attached{std::move(*requests), std::move(*datum), std::move(*marks)};
 }
 
-/// State of the counters at the end of an earlier run, if the live run had it. One that cannot be
-/// read is ignored: the counters then differ only by whole counter periods.
+/// State of the counters at the end of the previous run, if the live run started with it. A state
+/// that cannot be read is ignored: the decoded counts then differ only by whole periods of the
+/// counters.
 std::optional<CountingProgress> left_progress(const RecordingReader& recording) {
   for (const auto& attachment : recording.attachments()) {
     if (attachment.name != kCountingStateName) continue;
@@ -232,7 +238,7 @@ std::optional<CountingProgress> left_progress(const RecordingReader& recording) 
   return std::nullopt;
 }
 
-/// Decodes samples from raw bytes and gives each in the cycle in which the live run had it.
+/// Decodes samples from raw bytes and delivers each in the cycle in which the live run had it.
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
@@ -242,8 +248,8 @@ class FromBytes {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
     sink_.axis_sample = [this](const auto& s, std::string_view) { expect(axes_, s); };
     sink_.probe_trigger = [this](const auto& t, std::string_view) { expect(touches_, t); };
-    // Samples of the environment devices are used only after the watermark, so that a difference of
-    // one cycle has no effect.
+    // No cycle is announced for samples of environment devices: the pipeline uses them only after
+    // the watermark, so that a difference of one cycle has no effect.
     sink_.environment = [this, names = device_names(config)](const auto& e,
                                                              std::string_view device) {
       if (!environment_place(names, device)) expect(weather_, e);
@@ -334,7 +340,9 @@ class Replay : private PipelineObserver {
     };
     if (set_up_.possible())
       sink_.axis_sample = [this](const auto& s, std::string_view) { set_up_.take_live(s.head); };
-    // A sample carried over from the previous file was decoded from bytes in that file.
+    // Only environment samples repeated from the previous file are used (their instant is earlier
+    // than their date in this file): their bytes are in the previous file. All others are decoded
+    // from bytes.
     sink_.environment = [this](const auto& e, std::string_view device) {
       if (e.head.time != published_) take(e, device);
     };

@@ -8,7 +8,8 @@
 namespace abbe::daemon {
 namespace {
 
-// A second answer came within a SYNC period; the hub of a busy computer took it later.
+// A recorded second sample of an instant is at most this much later than the first: its answer
+// arrived within one SYNC period, but the hub of a busy computer may have taken it later.
 constexpr auto kLatestSecond = std::chrono::seconds{10};
 
 }  // namespace

@@ -1,7 +1,8 @@
 #pragma once
-/// The axis samples of a recording that lacks kAxisSamplesRule. In those versions a second answer
-/// of an encoder was recorded as a second sample of the same instant, with that axis missing. The
-/// pipeline expects one sample for each instant: both are combined in the cycle of the first one.
+/// Combines axis samples of the same instant in recordings without kAxisSamplesRule. In those
+/// versions of abbe, a second answer of an encoder to one SYNC was recorded as a second sample of
+/// the same instant that marks the axis as missing. The pipeline expects one sample for each
+/// instant, so the two are combined and delivered in the cycle of the first.
 
 #include <cstddef>
 #include <map>

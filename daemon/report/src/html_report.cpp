@@ -195,7 +195,8 @@ void HtmlReport::chart(const Histogram& histogram) {
 }
 
 void HtmlReport::chart(const VectorChart& chart) {
-  // All vectors are one line with a gap after each; only the origins have a dot.
+  // All vectors are drawn as one line with a gap after each vector; only the origins of the vectors
+  // have a dot.
   const json gap{{"x", nullptr}, {"y", nullptr}};
   json line = json::array(), dots = json::array();
   for (const auto& a : chart.arrows) {
@@ -230,7 +231,8 @@ void HtmlReport::canvas(std::string_view configuration) {
 }
 
 std::string HtmlReport::text() const {
-  // Band edges have no name; the filter removes them from the legend.
+  // The curves at the edges of an uncertainty band have no name; the filter removes them from the
+  // legend.
   constexpr std::string_view kShow =
       "function show(id,c){c.options.plugins.legend={labels:{filter:l=>l.text!==''}};"
       "new Chart(document.getElementById(id),c)}";

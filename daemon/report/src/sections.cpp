@@ -8,7 +8,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// A table of the files and their hashes; no table if there are no files.
+/// Adds a table of the files and their hashes; nothing if there are no files.
 void add_inputs(HtmlReport& page, const std::vector<InputFile>& inputs) {
   if (inputs.empty()) return;
   std::vector<std::vector<std::string>> rows;

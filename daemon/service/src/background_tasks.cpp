@@ -96,12 +96,13 @@ class BackgroundThreads {
     lock.unlock();
     try {
       threads_.emplace_back([this] { serve(); });
-    } catch (const std::system_error&) {  // no further thread is possible: another one runs it
+    } catch (const std::system_error&) {  // no new thread possible: an existing one runs the task
       if (threads_.empty()) work_here();
     }
   }
 
-  /// Runs the task on the dispatcher, which then dispatches later tasks late.
+  /// Runs the oldest waiting task on the dispatcher's thread. Later tasks are dispatched only after
+  /// it.
   void work_here() {
     std::unique_lock lock{mutex_};
     BackgroundTask work = std::move(waiting_.front());

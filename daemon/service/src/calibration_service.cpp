@@ -61,8 +61,8 @@ CalibrationService::~CalibrationService() {
              to_keep_->id, stored.error().text, to_keep_->document.method);
 }
 
-/// Waits for the background task; if that did not store its model, tries once more. An error
-/// without `to_keep_`: no model was identified.
+/// Waits for the background task. If the task has not stored its model, tries to store it once
+/// more. An error while `to_keep_` is null means that no model was identified.
 Result<void> CalibrationService::store_before_end(WallTime until) {
   if (task_.valid()) {
     const bool ended = task_.wait_until(until - kLastTry) == std::future_status::ready;
@@ -205,8 +205,9 @@ void CalibrationService::begin_identification(Acquisition acquired) {
       .who = who_});
 }
 
-/// Whether the task has begun to store its model. Until then no activation in the store can be
-/// newer than that of the model, so `revision_before_storing_` follows the authority.
+/// Takes the model once the task has begun to store it. `revision_before_storing_` is the revision
+/// of the authority in the last cycle before that: an activation with a later revision may be newer
+/// than the one that the task makes.
 void CalibrationService::follow_task(HostTime now) {
   if (!task_.valid() || to_keep_) return;
   const auto revision = authority_.revision();

@@ -50,7 +50,7 @@ std::string who(const json& request) {
 }
 
 /// Refused if the method needs readings of X, Y and Z and one of these axes is not referenced: the
-/// run would wait for its readings forever.
+/// run would wait for readings forever.
 Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
   if (parts.reference == nullptr || !needs.axis_readings) return {};
   auto unknown = parts.reference->unknown();
@@ -146,7 +146,7 @@ json point_json(const StandstillPoint& p) {
           {"scatter_m", p.scatter_m}};
 }
 
-/// Standstills of a verification from the requested index on.
+/// Points of a verification from the requested index on, as copied on the hub's thread.
 struct SeenPoints {
   std::size_t standing = 0;
   std::vector<StandstillPoint> points;
@@ -211,7 +211,7 @@ Result<OnHub> tracker_reflectors(const HubParts&, const json& request) {
   return give_tracker({.what = drivers::TrackerOrder::What::ListReflectors}, who(request));
 }
 
-/// One request. The constructor requires a role.
+/// One kind of request. The constructor makes it impossible to leave out the role.
 struct Verb {
   using Task = Result<OnHub> (*)(const HubParts&, const json&);
   constexpr Verb(std::string_view does, std::string_view with, Role needs, Task runs)
@@ -261,7 +261,7 @@ Result<const Verb*> verb_of(const json& request) {
               fmt::format("unknown request \"{}\": known are {}", what, known_verbs()));
 }
 
-/// The task of the request; Refused if `peer` does not have its role.
+/// The task for the request. Refused if `peer` does not have the role that the request requires.
 Result<Verb::Task> task_of(const json& request, const ControlPeer& peer,
                            const ControlConfig& control) {
   const auto verb = verb_of(request);

@@ -44,7 +44,7 @@ struct CountingStateThread::Work {
   std::mutex mutex = {};
   std::condition_variable wake = {};
   bool stopping = false;      // under mutex
-  std::mutex outside = {};    // while look_at or report runs
+  std::mutex outside = {};    // locked while look_at or report runs
   bool left_running = false;  // under outside: the owner has ended
   WakeUp ended = {};
   detail::RunningWork running = {};

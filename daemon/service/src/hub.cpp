@@ -55,7 +55,7 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
   return h;
 }
 
-/// Restarts and last end of abbe-dds; empty if it has not ended yet.
+/// Text about the restarts and the last end of abbe-dds; empty if abbe-dds has not ended yet.
 std::string report_of(const DdsProcess& process) {
   const auto end = process.last_end();
   if (!end) return {};
@@ -153,7 +153,8 @@ void Hub::on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime t
   if (parts_.verification != nullptr) parts_.verification->cycle(snapshots);
 }
 
-/// Collects the last fault of the machine only when a job may have ended: health is too slow for
+/// Passes the batch to the running touch job, together with the last fault of the machine. The
+/// fault is looked up only if the job may have ended, because collecting health takes too long for
 /// every cycle.
 void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
@@ -192,8 +193,8 @@ void Hub::collect_health(HostTime now) {
 }
 
 void Hub::run() {
-  // Without SCHED_FIFO the kernel may wake a thread 50 us late to spare a processor a wake-up: a
-  // fifth of the usual period, in every cycle.
+  // Without SCHED_FIFO the kernel may wake a thread up to 50 us late (timer slack, to save wake-ups
+  // of the processor). That would be a fifth of the usual hub_period in every cycle.
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const auto period = parts_.config.daemon.hub_period;
   auto next = std::chrono::steady_clock::now();
@@ -201,7 +202,7 @@ void Hub::run() {
     cycle(std::chrono::steady_clock::now());
     next += period;
     if (const auto now = std::chrono::steady_clock::now(); next < now)
-      next = now;  // late: skip the missed cycles
+      next = now;  // the hub is late: missed cycles are skipped
     sleep_until(next);
   }
 }
@@ -213,7 +214,8 @@ bool Hub::run_in_cycle(std::function<void()> task, std::chrono::milliseconds tim
   calls_.put(call.get());
 
   if (!call->done.wait_for(time_out)) {
-    // Not started yet: calls_ still holds the call, and the hub moves it to given_up_.
+    // Whoever sets `claimed` first decides. The hub has not started the task: calls_ still holds
+    // the call, and the hub will move it to given_up_.
     if (!call->claimed.exchange(true)) {
       (void)call.release();
       return false;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookForStop{100};
 
-// Longer than a slow disk needs. After it the model is stored without the hash of its recording.
+// Longest wait for the hash of the recording; longer than a slow disk needs. After this time the
+// model is stored without this hash.
 constexpr auto kDigestTimeout = std::chrono::seconds{10};
 
 /// Digest of the recording of the run. Never fails: RecordingDigest::gap states why there is none.
@@ -32,7 +33,7 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
 /// a recording with a gap is therefore added at the end.
 void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   if (recording.bytes == 0) return;
-  // The hash is that of the first `bytes` bytes: the recording continues.
+  // The recording continues, so its hash covers only the first `bytes` bytes of the file.
   const auto name =
       fmt::format("{} ({} bytes)", recording.file.filename().string(), recording.bytes);
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});

@@ -31,7 +31,8 @@ class IdentificationState {
   std::atomic<bool> stopped{false};
   std::atomic<protocol::HostTime> now{};  ///< time of the hub's latest cycle
 
-  /// The task: no later cancel() discards the model. False: it is discarded already.
+  /// For the task, before it stores the model: afterwards no cancel() can discard the model. False
+  /// if the model is already discarded.
   [[nodiscard]] bool begin_storing(std::shared_ptr<JudgedModel> model) {
     model_ = std::move(model);
     auto stage = Stage::Identifying;
@@ -41,12 +42,13 @@ class IdentificationState {
     model_ = nullptr;  // here, because the hub's thread must not free a model
     return false;
   }
-  /// The hub: the model is not stored when its identification ends. False: it is being stored.
+  /// For the hub: the model will not be stored when its identification ends. False if it is already
+  /// being stored.
   [[nodiscard]] bool discard() noexcept {
     auto stage = Stage::Identifying;
     return stage_.compare_exchange_strong(stage, Stage::Discarded) || stage == Stage::Discarded;
   }
-  /// The hub: the model, once, after begin_storing() returned true; before that null.
+  /// For the hub: returns the model, once, after begin_storing() returned true; before that null.
   [[nodiscard]] std::shared_ptr<JudgedModel> take_model() noexcept {
     // acquire: pairs with the release in begin_storing()
     if (stage_.load(std::memory_order_acquire) != Stage::Storing) return nullptr;
@@ -71,7 +73,8 @@ struct IdentificationTask {
   protocol::UtcOffset utc;
   std::string who;
 
-  /// An error before begin_storing(): no model was identified; after it: the model is not stored.
+  /// An error before begin_storing() means that no model was identified; an error after it means
+  /// that the model could not be stored.
   [[nodiscard]] Result<KeptModel> operator()();
 
  private:

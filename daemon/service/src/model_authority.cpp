@@ -12,8 +12,8 @@ namespace {
 
 using protocol::HostTime;
 
-// A person may repair a model file that cannot be used, or restore it from a backup. The stamp of
-// the store does not change then.
+// A model file that cannot be used is read again with this period, because a person may repair it
+// or restore it from a backup, which does not change the stamp of the store.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
 /// Why the model may be used: the gate accepted it, or a user, who is named, forced it.
@@ -93,7 +93,8 @@ void ModelAuthority::begin_to_look(HostTime now) {
                               now]() mutable -> Result<Look> {
     Look look{.stamp = keeper.stamp()};
     if (look.stamp == seen && !read_anyway) return look;
-    // Only at the second reading: another process may be writing the file now.
+    // A damaged state file is renamed only at the second reading of the same content: at the first,
+    // another process may be writing the file.
     auto active =
         look.stamp == failed ? keeper.read_active_or_set_aside(now) : keeper.read_active(now);
     if (active)
@@ -104,8 +105,8 @@ void ModelAuthority::begin_to_look(HostTime now) {
   });
 }
 
-/// The active model stays active. The fault is reported in model_state() and in health(), and the
-/// next call reads the store again.
+/// Keeps the active model although reading the store failed. The fault is reported in model_state()
+/// and in health(), and the next call reads the store again.
 ModelAuthority::Following ModelAuthority::report_look(std::string fault) {
   fault_ = std::move(fault);
   read_again_ = true;

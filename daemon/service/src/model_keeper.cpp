@@ -51,8 +51,9 @@ Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::
   return KeptModel{*id, std::move(*active)};
 }
 
-/// Reads the model of the store only if that is not `document`: another process activated another
-/// model meanwhile, or the same model was stored earlier with other dates or inputs.
+/// The active model after `document` was activated. The model file in the store is read only if the
+/// active model is not exactly `document`: another process has activated another model meanwhile,
+/// or the same model was stored earlier with other dates or inputs.
 Result<ActiveModel> ModelKeeper::active_after(const std::string& id, const ModelDocument& document,
                                               protocol::HostTime now) const {
   const auto activation = store_.activation();

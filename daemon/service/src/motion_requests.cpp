@@ -25,7 +25,8 @@ OnHub with_touching(std::function<Reply(TouchService&)> task) {
   };
 }
 
-/// The outcome of a job; of each touch only the fields of the answer.
+/// The outcome of a touch job, copied on the hub's thread. Of each touch it has only the fields
+/// that the answer contains.
 struct SeenTouches {
   struct Made {
     std::array<double, 3> at_m{};

@@ -7,7 +7,7 @@
 
 namespace abbe::daemon {
 
-/// {"do": "touch", "points": [...], "leave": [...]}; a plan that is too long is Usage.
+/// {"do": "touch", "points": [...], "leave": [...]}. A plan that is too long is an Error Usage.
 [[nodiscard]] Result<OnHub> begin_touching(const HubParts& parts, const nlohmann::json& request);
 /// {"do": "touch", "cancel": true}
 [[nodiscard]] Result<OnHub> cancel_touching(const HubParts& parts, const nlohmann::json& request);
@@ -15,9 +15,9 @@ namespace abbe::daemon {
 [[nodiscard]] Result<OnHub> where_it_stands(const HubParts& parts, const nlohmann::json& request);
 /// {"do": "touches"}
 [[nodiscard]] Result<OnHub> look_at_touches(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine", "release": true}: for a person who has looked at the machine.
+/// {"do": "machine", "release": true}: only for a person who has looked at the machine.
 [[nodiscard]] Result<OnHub> release_machine(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine", "stop": true}: every motion.
+/// {"do": "machine", "stop": true}: stops every motion.
 [[nodiscard]] Result<OnHub> stop_machine(const HubParts& parts, const nlohmann::json& request);
 /// {"do": "machine"}
 [[nodiscard]] Result<OnHub> machine_state(const HubParts& parts, const nlohmann::json& request);

@@ -1,7 +1,7 @@
 #pragma once
 /// The three steps of a control request: the client's thread reads it, a short step runs on the
-/// hub's thread, and the client's thread writes the answer. Only the first and the third depend on
-/// the size of the request.
+/// hub's thread, and the client's thread writes the answer. The duration of the step on the hub's
+/// thread does not depend on the size of the request.
 
 #include <functional>
 #include <nlohmann/json.hpp>

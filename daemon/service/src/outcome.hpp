@@ -8,7 +8,7 @@
 
 namespace abbe::daemon {
 
-/// Waits for `work`, which must be valid, and leaves it invalid.
+/// Waits for the task and returns its result. `work` must be valid, and is invalid afterwards.
 template <class T>
 [[nodiscard]] Result<T> outcome_of(std::future<Result<T>>& work) {
   try {

@@ -60,8 +60,8 @@ void ReferenceService::on_delivered(const Batch& batch) {
   if (running_) look_for_marks(batch);
 }
 
-/// Takes over the datum of the earlier run if the counters continued. The datum is recorded in the
-/// same way as at the start of a further recording file.
+/// Takes over the datum of every axis from the previous run, if the counters have continued. These
+/// datums are recorded in the same way as at the start of a further recording file.
 void ReferenceService::use_datum_left(const protocol::AxisSample& first) {
   const Counting left = *std::exchange(left_, std::nullopt);
   if (has(first.head.flags, protocol::SampleFlag::Restarted)) return;
@@ -76,8 +76,8 @@ void ReferenceService::use_datum_left(const protocol::AxisSample& first) {
   }
 }
 
-/// Progress newer than the newest sample waits: a sample that shows that the counters restarted
-/// must be taken before the progress after it.
+/// Takes a state of the counters. If it is later than the newest sample it waits, because a sample
+/// that shows a restart of the counters must be taken before a state after that restart.
 void ReferenceService::take(const std::optional<CountingProgress>& progress) {
   if (progress) coming_ = progress;
   if (!coming_ || coming_->head.time > newest_) return;
@@ -97,7 +97,7 @@ void ReferenceService::look_for_marks(const Batch& batch) {
   for (std::size_t i = 0; i < datum_used_.size(); ++i) {
     const bool found = session_->axis(i).state == AxisReference::State::Found;
     if (found && !datum_used_[i]) use_datum(i);
-    datum_used_[i] = found;  // false again if the card restarted
+    datum_used_[i] = found;  // false again after a restart of the card
   }
   if (session_->finished()) running_ = false;
 }

@@ -192,7 +192,8 @@ std::optional<JournalEntry> StateObserver::compare(const ObservedPart& part, Wal
                      .fields = part.fields};
   if (part.counted > r.counted && !r.logged.empty())
     entry.message += fmt::format("; {} faults or lost samples more", part.counted - r.counted);
-  // The change that is logged now does not count as left out, unless it returns to the old state.
+  // `suppressed` may contain the change that is logged now (if it was observed in an earlier call).
+  // This one does not count as not logged, unless the part has returned to the last logged state.
   const std::uint64_t is_one_of_them = !changed && part.state != r.logged ? 1 : 0;
   if (const auto left_out = r.suppressed - is_one_of_them; left_out > 0) {
     entry.message += fmt::format("; {} changes before this were not logged", left_out);

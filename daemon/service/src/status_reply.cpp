@@ -153,7 +153,8 @@ json reference_json(const SeenReference& reference, const MachineConfig& machine
   return {{"running", reference.running}, {"axes", std::move(axes)}};
 }
 
-/// A position that is not current is null: a client could take an old one for the current one.
+/// The positions; null for one that is not current, because a client could take an old position for
+/// the current one.
 json positions_json(const protocol::Snapshot& live, bool old) {
   json positions = json::array();
   for (std::size_t axis = 0; axis < live.axis_count; ++axis) {
@@ -164,8 +165,9 @@ json positions_json(const protocol::Snapshot& live, bool old) {
   return positions;
 }
 
-/// Names and kinds of the axes that "position_m" has, in its order: those with an encoder or a
-/// counter; else those of a measuring machine, which are the first of the machine.
+/// Names and kinds of the axes of "position_m", in the same order: the axes that have an encoder or
+/// a counter, or if there are none, the first axes of the machine, which a measuring machine
+/// reports.
 json axes_json(const Config& config, std::size_t count) {
   const auto& axes_of_machine = config.machine.axes;
   auto names = config.connected_axes();

@@ -5,8 +5,8 @@
 
 namespace abbe::daemon {
 
-/// Copies what the answer needs; the hub's thread. Positions older than half a second of wall time,
-/// and those of axes that are missing, are null.
+/// Copies what the answer to "status" needs; to be called on the hub's thread. Positions older than
+/// half a second of wall time, and those of missing axes, are null in the answer.
 [[nodiscard]] Reply status_reply(const Hub& hub);
 
 }  // namespace abbe::daemon

@@ -66,7 +66,8 @@ const TouchService::Status& TouchService::look() {
   return status_;
 }
 
-/// No further motion is requested after a stop: only the operator can judge which path is free.
+/// Stops the motion. No further motion is requested afterwards, not even a retraction: only the
+/// operator can judge which path is free.
 void TouchService::stop(std::string reason) {
   if (std::exchange(stopping_, true)) return;
   devices_.stop_machine();
@@ -105,8 +106,9 @@ void TouchService::ask_next() {
   devices_.measure(next.way);
 }
 
-/// Retracts along `leave_`, which begins at the last point of the job. After an earlier end the
-/// machine stands elsewhere, where no free path is known.
+/// After the last touch, retracts along `leave_`, which begins at the last point of the job. If the
+/// job ended earlier, the machine stands elsewhere and does not retract, because no free path is
+/// known.
 void TouchService::leave() {
   leaving_ = status_.reason.empty() && !leave_.empty();
   status_.running = leaving_;
@@ -137,10 +139,11 @@ void TouchService::cycle(const Batch& batch, std::size_t points_left, const std:
     if (touch.latch != protocol::TouchLatch::Reported) continue;
     if (has(touch.touch_flags, TouchFlag::NoPosition)) {
       refused_ = true;
-      return;  // the reason follows with the report of the driver
+      return;  // the driver reports the reason later
     }
     status_.touches.push_back(touch);
-    return ask_next();  // one touch at a time is requested: a further one was made by hand
+    // touches are requested one at a time: a further one in this batch was made by hand
+    return ask_next();
   }
 
   if (points_left != 0) return;

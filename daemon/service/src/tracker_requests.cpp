@@ -17,7 +17,7 @@ using drivers::TrackerOrder;
 using drivers::TrackerOrderReport;
 using nlohmann::json;
 
-/// All but the list, which moves nothing and is a request of its own.
+/// All orders except the list of reflectors, which moves nothing and has a request of its own.
 constexpr std::array kMovingOrders{TrackerOrder::What::Initialize, TrackerOrder::What::GoHome,
                                    TrackerOrder::What::FindReflector,
                                    TrackerOrder::What::SetReflector};

@@ -1,5 +1,5 @@
 #pragma once
-/// The tracker on the control socket: what `abbe tracker` asks for.
+/// The requests about the tracker on the control socket, which `abbe tracker` sends.
 
 #include <cstdint>
 #include <deque>
@@ -16,14 +16,15 @@ struct SeenTracker {
   drivers::DeviceStatus status;
   std::deque<TrackerService::Order> orders;
 };
-/// None without a tracker. The hub's thread.
+/// State of the tracker; nullopt without a tracker. To be called on the hub's thread.
 [[nodiscard]] std::optional<SeenTracker> look_at_tracker(const HubParts& parts);
 /// Member "tracker" of "status": state, cause and the latest orders. Any thread.
 [[nodiscard]] nlohmann::json tracker_json(const SeenTracker& seen);
 
-/// Of {"do": "tracker", "order": WORD, ...}. Any thread.
+/// The order in {"do": "tracker", "order": WORD, ...}. Any thread.
 [[nodiscard]] Result<drivers::TrackerOrder> tracker_order_from_json(const nlohmann::json& request);
-/// The number of the order of `by`. The hub's thread.
+/// Starts the order for the user `by` and returns the number of the order. To be called on the
+/// hub's thread.
 [[nodiscard]] Result<std::uint64_t> order_tracker(const HubParts& parts,
                                                   const drivers::TrackerOrder& order,
                                                   const std::string& by);

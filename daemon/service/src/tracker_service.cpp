@@ -80,8 +80,9 @@ void TrackerService::cycle(protocol::HostTime now) {
   report_silence(now);
 }
 
-/// Sets the outcome of an order without a report to Failed: the tracker's thread, which reports
-/// every order, has ended or hangs. A report that arrives later replaces this outcome.
+/// Sets the outcome of an order to Failed if no report has come within longest_order_. The
+/// tracker's thread reports every order, so without a report it has ended or hangs. A report that
+/// arrives later replaces this outcome.
 void TrackerService::report_silence(protocol::HostTime now) {
   const Order* const order = running();
   if (order == nullptr || now - order->since <= longest_order_) return;

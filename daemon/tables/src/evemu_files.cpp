@@ -19,10 +19,12 @@ namespace abbe::daemon {
 
 namespace {
 
-// Limit of position and feature numbers: far above any procedure, far below overflow.
+// Largest number of a position or feature (ball, block): far above that of any procedure, and far
+// below integer overflow.
 constexpr int kMostNumber = 1000;
 
-/// The cell as a whole number of at least 1. Adds a fault and returns 1 if it is none.
+/// The cell as a whole number. If it is not a whole number of at least 1, adds a fault and returns
+/// 1.
 int number_at(const NumberTable& table, std::size_t row, std::size_t column, std::string_view name,
               Faults& faults) {
   const double value = table.at(row, column);

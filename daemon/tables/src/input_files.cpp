@@ -20,7 +20,7 @@ AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t f
           table.at(row, first + 2) / kMmPerM};
 }
 
-// The checks below skip rows that already have a fault.
+// The check_...() functions below skip rows that already have a fault.
 
 void check_time_ascends(ParsedTable& parsed) {
   const auto& table = parsed.table;

@@ -37,7 +37,8 @@ class DdsSupervisor {
     std::chrono::milliseconds longest_delay{5000};
     /// Destructor: time from SIGTERM to SIGKILL.
     std::chrono::milliseconds stop_patience{3000};
-    /// Must outlive the supervisor. null: a hanging child is not detected.
+    /// State shared with the hub, which records the answers of the child in it; must outlive the
+    /// supervisor. null: a hanging child is not detected.
     DdsProcess* process = nullptr;
     std::chrono::milliseconds hung_after{2000};       ///< time without an answer
     std::chrono::milliseconds hung_at_start{10'000};  ///< before the first answer

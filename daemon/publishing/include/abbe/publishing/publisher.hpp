@@ -82,8 +82,8 @@ class Publisher {
   std::vector<std::byte> payload_;  // reused; keeps its capacity
   std::string refusal_;
   std::uint64_t sequence_number_ = 0;
-  /// Limits the rate of a live topic. A sample with an axis missing that was not missing in the
-  /// sample sent before is sent at once.
+  /// Limits the rate of a live topic. Exception: a sample in which an axis has become missing since
+  /// the last sent sample is sent at once.
   struct Pace {
     WallTime next{};
     std::uint8_t missing_mask = 0;

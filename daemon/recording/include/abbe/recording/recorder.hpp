@@ -91,8 +91,8 @@ struct RecordingDigest {
   std::string sha256;  ///< hex
   std::uint64_t bytes = 0;
   std::filesystem::path file;
-  /// What is missing of the calibration requested last: "12 messages of the run are missing".
-  /// Empty: nothing.
+  /// Which part of the calibration that was requested last is not recorded: "12 messages of the run
+  /// are missing". Empty: nothing is missing.
   std::string gap;
 };
 
@@ -110,7 +110,8 @@ class Recorder {
   Recorder(Recorder&&) noexcept;
   Recorder& operator=(Recorder&&) noexcept;
 
-  /// `taken`: when the hub took the sample; nullopt: the instant that the sample describes.
+  /// `taken`: the time at which the hub took the sample; nullopt: the same as the instant that the
+  /// sample describes.
   using Taken = std::optional<protocol::HostTime>;
   void record(const protocol::TrackerPoint& point, std::string_view device, Taken taken = {});
   void record(const protocol::AxisSample& sample, std::string_view device, Taken taken = {});

@@ -43,13 +43,14 @@ class RecorderThread : public PipelineObserver {
   void hand_over(v1::CalibrationEvent event, protocol::HostTime taken);
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// When the future is ready, everything handed over before this call has been written to the file
-  /// (not necessarily synced). The future reports a broken promise if the recorder failed.
+  /// A digest of everything that was handed over before this call. The future is ready once all of
+  /// it has been written to the file (not necessarily synced). It reports a broken promise if the
+  /// recorder failed.
   [[nodiscard]] std::future<RecordingDigest> digest();
   /// The last report of the recorder, at most two of its cycles (40 ms) old. Valid until the next
   /// call.
   [[nodiscard]] const RecorderStatus& status() const;
-  /// Number of messages that were dropped because too much was waiting.
+  /// Number of messages that were dropped because more than most_waiting_bytes would have waited.
   [[nodiscard]] std::uint64_t dropped() const noexcept;
 
  private:

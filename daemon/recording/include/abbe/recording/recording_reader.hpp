@@ -47,7 +47,7 @@ struct RecordingLoss {
 /// One message of the file.
 struct RecordedMessage {
   std::string_view topic;  ///< "abbe/v1/TrackerPoint"
-  // Host times: the UTC dates of the file minus the recorded offset.
+  // Host times of the message, computed as the UTC dates in the file minus the recorded offset.
   protocol::HostTime taken;  ///< when the hub took it; the same for all messages of a cycle
   /// The instant that the message describes; for a message repeated from the previous file, the
   /// beginning of this file.
@@ -100,7 +100,7 @@ class RecordingReader {
 
   [[nodiscard]] std::uint64_t message_count() const noexcept;
   [[nodiscard]] std::uint64_t size_bytes() const noexcept;
-  /// When the hub took the first and the last message; nullopt if there are no messages.
+  /// Times at which the hub took the first and the last message; nullopt if there are no messages.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
       const noexcept;
   /// SHA-256 of the whole file in hex; reads all of it.

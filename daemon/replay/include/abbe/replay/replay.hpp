@@ -40,8 +40,8 @@ struct ReplayOptions {
 
 /// One calibration of the recording, replayed.
 struct ReplayedCalibration {
-  /// State Identifying: the run was complete. Refused: why it was not, for example because the
-  /// recording ends before.
+  /// State Identifying: the run was complete. State Refused: the run was not complete; the status
+  /// gives the reason, for example that the recording ends too early.
   SessionStatus ended;
   std::optional<Result<Candidate>>
       outcome;             ///< of a complete run; nullopt if it was passed to ReplayOptions::runs

@@ -54,14 +54,15 @@ template <class Work>
   return result;
 }
 
-/// Destroys `object` on an ordinary thread: freeing much memory takes long.
+/// Destroys `object` on an ordinary thread, because freeing much memory takes too long for the
+/// caller.
 template <class T>
 void destroy_in_background(T object) {
   run_background_task([held = std::make_shared<T>(std::move(object))] {});
 }
 
 namespace detail {
-/// Counted by background_tasks_running() during its lifetime.
+/// While an object of this class exists, background_tasks_running() returns true.
 class RunningWork {
  public:
   RunningWork() noexcept;

@@ -49,7 +49,8 @@ class CalibrationService {
   /// access to this object; see background_tasks_running(). A lost model is reported on stderr.
   ~CalibrationService();
   static constexpr std::chrono::seconds kStopTimeout{4};
-  /// Part of kStopTimeout for the lock of the store.
+  /// The part of kStopTimeout for which the last attempt to store a model waits for the lock of the
+  /// store.
   static constexpr std::chrono::seconds kLastTry{1};
   static constexpr std::size_t kEndedKept = 4;  ///< length of ended()
   CalibrationService(const CalibrationService&) = delete;
@@ -58,8 +59,8 @@ class CalibrationService {
   /// Refused or BadInput for a task that cannot give a calibration with this configuration. Any
   /// thread except the hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
-  /// Starts a session and returns its id. Refused while another session runs. The caller destroys
-  /// `prepared`.
+  /// Starts a session and returns its id. Refused while another session runs. Afterwards `prepared`
+  /// may hold data of the previous session; the caller destroys it.
   [[nodiscard]] Result<std::uint64_t> start(PreparedCalibration&& prepared, const std::string& who,
                                             protocol::HostTime now);
   /// prepare() and start() in one call, for callers without a real-time thread.

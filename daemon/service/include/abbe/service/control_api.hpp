@@ -53,7 +53,8 @@ struct ControlVerb {
     Hub& hub, const nlohmann::json& request, const ControlPeer& peer,
     std::chrono::milliseconds time_out = std::chrono::seconds{3});
 
-/// The same, with all steps on the calling thread, for a hub without a thread of its own.
+/// As answer_request(), but executes all steps on the calling thread: for a hub that has no thread
+/// of its own.
 [[nodiscard]] nlohmann::json answer_on_hub(const Hub& hub, const nlohmann::json& request,
                                            const ControlPeer& peer);
 

@@ -33,14 +33,14 @@ class ModelAuthority {
                                            const Config& config, protocol::UtcOffset utc,
                                            protocol::HostTime now);
 
-  /// A copy with which another thread stores a model. The caller then passes the active model that
-  /// the keeper returns to set_active().
+  /// A copy of the keeper, with which another thread stores a model. The hub's thread then calls
+  /// set_active() with the active model that the keeper returned.
   [[nodiscard]] ModelKeeper keeper() const { return keeper_; }
   /// Makes `active` the active model. The previous one is destroyed on an ordinary thread.
   void set_active(ActiveModel active);
-  /// The same for a model whose reading or storing began when revision() was `since`. If another
-  /// model became active meanwhile, `active` may be the older one: it is not used, and the next
-  /// follow_store() reads the store again.
+  /// As set_active(active), for a model that another thread began to read or store when revision()
+  /// was `since`. If another model has become active since then, `active` may be the older one: it
+  /// is not used, and the next follow_store() reads the store again.
   void set_active(ActiveModel active, std::uint64_t since);
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
@@ -54,20 +54,20 @@ class ModelAuthority {
   ///   model_state() and fault(), and read again.
   Following follow_store(protocol::HostTime now);
   static constexpr std::chrono::seconds kStoreTimeout{5};
-  /// Why the last reading of the store, or of the model that is active in it, failed; empty: it
-  /// succeeded.
+  /// Why the store, or the model that is active in it, could not be read the last time. Empty if
+  /// both were read.
   [[nodiscard]] const std::string& fault() const noexcept {
     return fault_.empty() ? active_.fault : fault_;
   }
 
-  /// `axes_known_at`: the last time at which all axis positions were known; `patience`: its largest
-  /// age before the model is STALE.
+  /// `axes_known_at`: the last time at which all axis positions were known. The model is STALE if
+  /// that is longer ago than `patience`.
   [[nodiscard]] ActiveModelState model_state(protocol::HostTime now,
                                              std::optional<protocol::HostTime> axes_known_at,
                                              std::chrono::nanoseconds patience) const;
   [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
-  /// The model with which the gate compares a new one: the active model, or null if that was made
-  /// for another machine configuration.
+  /// The model with which the gate compares a new one: the active model, or null if the active
+  /// model was made for another machine configuration.
   [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const noexcept {
     return active_.made_for_this_machine ? active_.model : nullptr;
   }

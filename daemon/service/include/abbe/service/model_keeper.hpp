@@ -19,9 +19,9 @@
 
 namespace abbe::daemon {
 
-/// The active model of the store, checked and encoded. If `model` is null, `fault` is the
-/// cause; if that is empty, too, no model is active. An identification whose result is compared
-/// with the model shares it.
+/// The active model of the store, checked and encoded. If `model` is null, `fault` gives the cause;
+/// if `fault` is empty, too, no model is active. An identification whose result is compared with
+/// the model shares ownership of the model.
 struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const PublishedModel> model;
@@ -64,8 +64,8 @@ class ModelKeeper {
   /// An error only if the store itself cannot be read; a damaged model is reported in
   /// ActiveModel::fault.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
-  /// The same. If that fails, renames a damaged state file and reads again. Waits for the store's
-  /// lock at most kRenameTimeout.
+  /// As read_active(); if that fails, renames a damaged state file and reads again. Waits for the
+  /// store's lock at most kRenameTimeout.
   [[nodiscard]] Result<ActiveModel> read_active_or_set_aside(protocol::HostTime now);
   static constexpr std::chrono::seconds kRenameTimeout{1};
   /// While the stamp is unchanged, read_active() gives the same result. One system call.

@@ -27,8 +27,8 @@ class ReferenceService : public PipelineObserver {
     bool known = false;            ///< the axis is referenced now
   };
 
-  /// `recorder` may be null. `left`: the datum of an earlier run; used if the first sample shows
-  /// that the counters continued, else discarded.
+  /// `recorder` may be null. `left`: counters and datums at the end of the previous run. They are
+  /// used if the first sample shows that the counters have continued since, else discarded.
   ReferenceService(const Config& config, RecorderThread* recorder,
                    std::optional<Counting> left = {});
 
@@ -36,22 +36,23 @@ class ReferenceService : public PipelineObserver {
   /// referenced axis keeps its datum until the new one is found.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
-  /// Sets the datum of axes without marks: they read their offset now. Usage for an axis that has
-  /// marks or is not counted, and for an uncertainty that is not positive. Refused while a
-  /// calibration takes readings, without a recent sample, and unless the axes have stood for half a
-  /// second.
+  /// Sets the datum of axes without marks such that their present readings become their configured
+  /// offsets. Usage for an axis that has marks or is not counted, and for an uncertainty that is
+  /// not positive. Refused while a calibration takes readings, without a recent sample, and unless
+  /// the axes have stood for half a second.
   [[nodiscard]] Result<void> set_datum_here(const SetDatumHere& here);
-  /// Searches the marks while a search is running.
+  /// While a search is running, passes the samples of the batch to it.
   void on_delivered(const Batch& batch) override;
   /// The datum of every axis, for the pipeline.
   [[nodiscard]] Datum& datum() noexcept { return datum_; }
-  /// Takes the progress of the card as the devices report it. Call after on_delivered().
+  /// Takes the latest state of the card's counters, as the devices report it. Call it after
+  /// on_delivered().
   void take(const std::optional<CountingProgress>& progress);
 
-  /// State of the counters and datums for a later run; nullopt until the first progress after a
-  /// restart of the counters.
+  /// State of the counters and datums, to be kept for the next run of abbed. nullopt after a
+  /// restart of the counters until the card has reported their state.
   [[nodiscard]] std::optional<Counting> counting() const;
-  /// Axes whose datum was taken over from an earlier run.
+  /// Names of the axes whose datum was taken over from the previous run.
   [[nodiscard]] const std::vector<std::string>& carried_on() const noexcept { return carried_on_; }
   [[nodiscard]] bool configured() const noexcept { return marks_ != nullptr; }
   [[nodiscard]] bool running() const noexcept { return running_; }

@@ -20,7 +20,7 @@
 
 namespace abbe::daemon {
 
-/// One touch: the places of the approach path, in order, then the point to touch.
+/// One touch: the places that the tip passes on its way, in order, and then the point to touch.
 struct TouchRequest {
   std::vector<drivers::ProbePoint> way;  ///< `touch` is false
   drivers::ProbePoint point;
@@ -28,7 +28,7 @@ struct TouchRequest {
 
 /// A checked job of touches.
 struct TouchJob {
-  /// Limits of one job; an artefact of ten balls takes some hundred touches.
+  /// Limits of one job, far above the some hundred touches of an artefact with ten balls.
   static constexpr std::size_t kMostTouches = 5'000, kMostPlaces = 20'000;
 
   std::vector<TouchRequest> touches;
@@ -42,7 +42,8 @@ struct TouchJob {
 class TouchService {
  public:
   using WallTime = std::chrono::steady_clock::time_point;
-  /// A machine must not continue to move if no client has called look() for this time.
+  /// The motion is stopped if no client has called look() for this time: a machine must not
+  /// continue to move unsupervised.
   static constexpr std::chrono::seconds kLongestUnwatched{2};
 
   struct Status {
@@ -61,10 +62,11 @@ class TouchService {
   /// Starts a job. Refused without a machine, while another job runs, and while the machine is not
   /// ready. Afterwards `job` holds the memory of the previous job, which the caller destroys.
   [[nodiscard]] Result<void> start(TouchJob&& job);
-  /// Stops the present motion. The job keeps running until the machine stands.
+  /// Stops the present motion. The job counts as running until the machine has stopped.
   [[nodiscard]] Result<void> cancel();
-  /// Call in every cycle. `points_left`: value before the batch was drained. `seen`: the last fault
-  /// that the machine reported. Acts as cancel() if look() was not called for kLongestUnwatched.
+  /// Call in every cycle. `points_left`: SampleSource::points_left() before the batch was drained.
+  /// `seen`: the last fault that the machine reported. Acts as cancel() if look() was not called
+  /// for kLongestUnwatched.
   void cycle(const Batch& batch, std::size_t points_left, const std::string& seen, WallTime now);
 
   /// The status, for the client that started the job. Resets the time of kLongestUnwatched.

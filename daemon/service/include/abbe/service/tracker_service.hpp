@@ -35,7 +35,7 @@ class TrackerService {
     protocol::HostTime now{};
   };
 
-  /// `longest_order`, host time: an order without a report after it counts as Failed.
+  /// `longest_order`: host time. An order that is not reported within this time counts as Failed.
   TrackerService(SampleSource& devices, std::chrono::nanoseconds longest_order)
       : devices_(devices), longest_order_(longest_order) {}
 

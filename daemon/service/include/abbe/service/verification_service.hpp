@@ -26,9 +26,9 @@ class VerificationService {
   [[nodiscard]] Result<std::uint64_t> begin();
   /// Ends the verification. The present standstill becomes its last point.
   [[nodiscard]] Result<void> end(std::uint64_t number);
-  /// Refused after another verification was begun.
+  /// The points so far. Refused after another verification was begun.
   [[nodiscard]] Result<const StandstillPoints*> points(std::uint64_t number) const;
-  /// Why no more points are taken before end(); empty: points are taken.
+  /// Why no more points are taken although end() was not called; empty: points are taken.
   [[nodiscard]] std::string stopped() const;
 
   void cycle(std::span<const protocol::Snapshot> snapshots);

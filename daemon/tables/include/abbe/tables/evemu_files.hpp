@@ -36,7 +36,7 @@ struct BallErrorsFile {
 };
 [[nodiscard]] Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file);
 
-/// The face of a block that is touched: a square with this centre.
+/// The square face of a gauge block that is touched, with this centre.
 struct BlockFace {
   calib::Vector3 centre_m = calib::Vector3::Zero();
   double half_size_m = 5e-3;

@@ -27,7 +27,8 @@ namespace abbe::daemon {
 struct PathFile {
   InputFile source;
   std::vector<AxisPosition> vertices_m;
-  /// One per vertex, NaN for an empty cell; empty if the file has no such column.
+  /// The feed at each vertex, NaN for an empty cell; empty if the file has no column
+  /// feed_mm_per_min.
   std::vector<double> feed_m_per_s;
   std::vector<std::size_t> lines;  ///< line in the file, one per vertex
 };

@@ -7,8 +7,8 @@
 
 namespace abbe::daemon {
 
-/// Finds the first position whose touches do not determine the pose of the calibrator, and returns
-/// the first line of that position as ":42". Empty if all positions are valid.
+/// Finds the first position of the array whose touches do not determine the pose of the calibrator.
+/// Returns ":42", the line of its first touch in the file; empty if there is no such position.
 [[nodiscard]] std::string line_not_seen(const TouchesFile& file,
                                         const calib::evemu::Calibrator& calibrator,
                                         const calib::evemu::ObserveOptions& options);

@@ -117,8 +117,9 @@ const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher&
 }
 
 class Listener : public DataReaderListener {
-  /// Called when the liveliness of one writer changes. The state of a lost writer is discarded. If
-  /// the writer becomes alive again, it repeats its state within a second.
+  /// Called by Fast DDS when a writer of ModelState loses or regains its liveliness. The state from
+  /// a writer that lost it is discarded; a writer that regains it repeats its state within a
+  /// second.
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
@@ -172,7 +173,8 @@ class Listener : public DataReaderListener {
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// `abbe watch` also prints the address of the publisher.
+  /// Prints at most every 10 s that another publisher of this machine is ignored. (`abbe watch`
+  /// also prints the network address of that publisher.)
   static void report_foreign_publisher(const std::string& name, Machine& machine,
                                        const ParticipantId& id) {
     constexpr std::chrono::seconds kReportPeriod{10};
@@ -184,7 +186,8 @@ class Listener : public DataReaderListener {
     std::printf("%s: another publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
   }
 
-  /// Keeps the state also of a publisher that is not pinned: it may be pinned later.
+  /// Keeps a ModelState, also one from a publisher that is not pinned, because it may be pinned
+  /// later.
   void keep(const ModelState& state, const Writer& writer) {
     const auto [publisher, pinned] = heard(state.machine(), writer);
     publisher.state = state;
@@ -216,8 +219,8 @@ class Listener : public DataReaderListener {
   std::set<Writer> alive_;  ///< writers of ModelState that are alive
 };
 
-/// DDS Security: only participants with keys of the same authority can publish to this one or read
-/// it.
+/// Switches DDS Security on: only participants with keys of the same authority can then publish to
+/// this participant or read from it.
 void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
@@ -247,8 +250,8 @@ void filter_messages(DomainParticipantQos& qos) {
     transport = abbe::dds::with_message_filter(transport);
 }
 
-/// Without these two calls Fast DDS announces a TypeObject, which Cyclone DDS does not accept and
-/// which may crash older versions of Fast DDS.
+/// Prevents that Fast DDS announces a TypeObject, which Cyclone DDS does not accept and which may
+/// crash older versions of Fast DDS.
 TypeSupport without_type_object(TopicDataType* type) {
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
@@ -268,8 +271,8 @@ int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   auto* factory = DomainParticipantFactory::get_instance();
   DomainParticipantQos participant_qos;
-  // The default lease of 20 s may be shorter than a suspension of this process: abbe-dds would then
-  // drop this participant, and this participant would not announce its readers again.
+  // The default lease of 20 s may be shorter than a suspension of this process. abbe-dds would then
+  // drop this participant, which would not announce its readers again.
   participant_qos.wire_protocol().builtin.discovery_config.leaseDuration =
       eprosima::fastrtps::Duration_t(40, 0);
   if (argc > 2 && (factory->load_XML_profiles_file(argv[2]) != ReturnCode_t::RETCODE_OK ||

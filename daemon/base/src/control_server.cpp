@@ -61,8 +61,9 @@ std::string name_of(uid_t uid) {
   return found != nullptr ? found->pw_name : fmt::format("uid {}", uid);
 }
 
-/// SO_PEERGROUPS, socket(7): fails with ERANGE and reports the size if the buffer is too small. An
-/// empty list if the kernel does not support it.
+/// Groups of the process at the other end (SO_PEERGROUPS, socket(7)). The call fails with ERANGE
+/// and reports the required size if the buffer is too small. An empty list if the kernel does not
+/// support this option.
 std::vector<gid_t> supplementary_groups_at(int fd) {
   std::vector<gid_t> groups(64);
   for (;;) {
@@ -100,7 +101,7 @@ class Server final : public ControlServer {
       try {
         serve();
       } catch (const std::exception& error) {
-        // Only the control socket stops; measuring and recording continue.
+        // After such an exception only the control socket stops; measuring and recording continue.
         fmt::print(stderr,
                    "abbed: the control socket stopped with an internal error: {}; commands get no "
                    "answer until abbed is restarted\n",
@@ -153,7 +154,8 @@ class Server final : public ControlServer {
         0, std::chrono::ceil<std::chrono::milliseconds>(until - now).count()));
   }
 
-  /// While a complete request waits for its answer, nothing more is read from the client.
+  /// Events to wait for at a client's socket. While a complete request of the client waits for its
+  /// answer, nothing more is read from the client.
   static short events_of(const Client& c) {
     return static_cast<short>((c.has_request() ? 0 : POLLIN) | (c.outbox.empty() ? 0 : POLLOUT));
   }

@@ -9,7 +9,8 @@ namespace abbe::daemon {
 ExitDeadline::ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, std::string message)
     : thread_([this, time_limit, exit_code, text = std::move(message)] {
         if (met_.wait_for(time_limit)) return;
-        // write(), not stdio: the hanging thread may hold the lock of stderr.
+        // write() is used because the hanging thread may hold the lock of stderr, for which stdio
+        // would wait.
         (void)!::write(STDERR_FILENO, text.data(), text.size());
         ::_exit(exit_code);
       }) {}

@@ -20,7 +20,8 @@ namespace {
 // Limits the wait for a journal that does not read its socket, so that abbed can still exit.
 constexpr std::chrono::milliseconds kJournalSendTimeOut{50};
 
-/// NAME=VALUE; a value with a line break is preceded by its length, 64 bits, little-endian.
+/// Appends NAME=VALUE. A value with a line break is written as NAME, line feed, the length of the
+/// value in 64 bits (little-endian), and the value.
 void append_field(std::string& datagram, std::string_view name, std::string_view value) {
   datagram += name;
   if (value.find('\n') == std::string_view::npos) {

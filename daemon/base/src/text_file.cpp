@@ -29,7 +29,8 @@ bool write_all(int fd, std::string_view text) {
   return true;
 }
 
-/// Syncs the folder: only then the new name of a file is on the disk.
+/// Syncs the folder to the disk: only then a file that was renamed in it has its new name after a
+/// power failure.
 bool sync_folder(const std::filesystem::path& folder) {
   const FileDescriptor fd(
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));

@@ -46,7 +46,8 @@ Result<FileDescriptor> connect_unix(const std::filesystem::path& path,
   FileDescriptor fd{::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)};
   if (!fd) return tl::unexpected(failed("connect", path));
 
-  // unix(7): SO_SNDTIMEO limits how long connect() waits for a place in the backlog.
+  // SO_SNDTIMEO also limits how long connect() waits for a place in the listener's backlog
+  // [unix(7)].
   set_send_time_out(fd.get(), time_out);
   const auto* generic = reinterpret_cast<const sockaddr*>(&*address);  // as the socket API requires
 

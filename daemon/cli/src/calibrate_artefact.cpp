@@ -1,6 +1,6 @@
 /// `abbe calibrate artefact`: calibrates a ball array on the measuring machine of the running
-/// daemon: touches it at the positions of its nominal description, fits balls and faces, and writes
-/// calibrator.toml with uncertainties.
+/// daemon. It touches balls and block faces at their nominal places, fits spheres and planes, and
+/// writes calibrator.toml with uncertainties.
 
 #include <fmt/format.h>
 

@@ -24,8 +24,8 @@ struct CalibrateEvemuArguments {
   std::size_t points_per_ball = 0, points_per_block = 0;  // 0: from the daemon's configuration
 };
 
-/// The request. Parts of the plan that the arguments do not give are left out, so that the daemon
-/// takes them from its configuration.
+/// The request for the daemon. Parts of the plan that the arguments do not give are left out of the
+/// request; the daemon takes them from its configuration.
 Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());

@@ -1,7 +1,7 @@
 #pragma once
-/// One function per subcommand. It adds the subcommand to `parent`; the callback of the subcommand
-/// runs it and stores the exit code in `exit`. The variables of the options live as long as the
-/// callback.
+/// One function per subcommand. Each adds its subcommand to `parent`. CLI11 calls the callback of
+/// the subcommand, which executes the command and stores the exit code in `exit`. The callback owns
+/// the variables of the options.
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>

@@ -11,7 +11,8 @@
 
 namespace abbe::daemon {
 
-/// A command that follows the daemon gives up after this time without an answer.
+/// A command that waits for the daemon ends with an error if the daemon has not answered for this
+/// time.
 inline constexpr std::chrono::seconds kDaemonTimeout{5};
 
 struct DaemonSocket {
@@ -21,7 +22,8 @@ struct DaemonSocket {
 
 void add_socket_options(CLI::App& command, DaemonSocket& where);
 [[nodiscard]] Result<std::filesystem::path> socket_path(const DaemonSocket& where);
-/// The name of the user who runs this command, for the records of the daemon and the store.
+/// The name of the user who runs this command, recorded by the daemon and the store with what the
+/// command changes.
 [[nodiscard]] std::string user_name();
 
 }  // namespace abbe::daemon

@@ -11,7 +11,7 @@ struct EmbeddedText {
   std::string_view text;
 };
 
-/// In the order in which `abbe example` lists them.
+/// The files, in the order in which `abbe example` lists them.
 [[nodiscard]] std::span<const EmbeddedText> example_files() noexcept;
 
 }  // namespace abbe::daemon

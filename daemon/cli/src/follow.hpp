@@ -21,8 +21,9 @@ struct Following {
   std::function<std::optional<int>(const nlohmann::json& status)> look;
 };
 
-/// Requests the status periodically. Ctrl-C stops the following, not the task (exit code 130). Io
-/// if the daemon does not answer for 5 s, or has restarted: the task is lost then.
+/// Requests the status periodically until `look` returns an exit code. Ctrl-C ends this function
+/// (exit code 130), but not the task of the daemon. Io if the daemon does not answer for 5 s, or
+/// has restarted, because the task is lost then.
 [[nodiscard]] int follow(const Following& following, ProgressBar& bar);
 
 }  // namespace abbe::daemon

@@ -35,8 +35,8 @@ int print_session_verdict(const json& session, bool as_json) {
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
-/// Prints one line whenever state or reason of the session change ("warming: waiting for the
-/// machine to stand at ..."), and one line per new note.
+/// Prints one line whenever state or reason of the session change, for example "warming: waiting
+/// for the machine to stand at ...", and one line per new note.
 class SessionLog {
  public:
   void print_notes(ProgressBar& bar, const json& session) {
@@ -62,8 +62,9 @@ class SessionLog {
   std::size_t noted_ = 0;
 };
 
-/// The session with this number, running or ended; nullopt if the daemon has it no more. Number 0:
-/// an older daemon without session numbers; its current session is returned.
+/// The session with the number `id`, running or ended; nullopt if the daemon does not keep it any
+/// more. Number 0 means that an older daemon does not number sessions; its current session is
+/// returned.
 std::optional<json> session_in(const json& status, std::uint64_t id) {
   if (id == 0 || status["session"].value("id", std::uint64_t{0}) == id) return status["session"];
   for (const json& ended : status.value("ended_sessions", json::array()))

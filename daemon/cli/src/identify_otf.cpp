@@ -126,7 +126,7 @@ double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   return tracker ? tracker->u_scale : 0.0;
 }
 
-/// The same checks that a session of the daemon makes before the machine drives. The message for a
+/// Makes the checks of the path that the daemon makes before the machine drives. The message for a
 /// vertex outside the travel gives line and column.
 Result<void> check_path(const std::string& file, const PathFile& path,
                         const MachineConfig& machine) {

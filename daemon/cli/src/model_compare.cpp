@@ -1,4 +1,4 @@
-/// `abbe model compare A B`: the difference of two models where both are valid.
+/// `abbe model compare A B`: the difference of two models, in the volume where both are valid.
 
 #include <fmt/format.h>
 
@@ -26,7 +26,7 @@ struct Comparison {
   calib::ModelDifference difference;
 };
 
-/// The nodes of both models that are in the validity volume of both.
+/// The points of comparison: those nodes of the two models that are in the validity volume of both.
 std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
                                           const calib::VolumetricModel& b) {
   std::vector<calib::Vector3> points;

@@ -23,8 +23,8 @@ struct ModelEvalArguments {
   bool correction = false;
 };
 
-/// One row: position, vector, standard uncertainty, inside. The correction is a function of V and
-/// has the same uncertainty.
+/// One row of the output: position, error V or correction, its standard uncertainty, inside. The
+/// correction is a function of V and has the same uncertainty.
 Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
                         const calib::Vector3& tool_m, bool correction) {
   const calib::Vector3 position_m(q[0], q[1], q[2]);

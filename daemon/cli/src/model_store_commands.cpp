@@ -106,7 +106,8 @@ Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
   return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
 }
 
-/// The file need not be in a store: state and verdict are then not known.
+/// Shows a model file. It need not be in a store; without a store the state of the model and the
+/// verdict of the gate are not known.
 int show_file(const ModelStoreArguments& arguments) {
   const auto document = read_model(arguments.id);
   if (!document) return report(document.error());

@@ -17,7 +17,8 @@ struct OpenedRecording {
   InputFile source;
 };
 
-/// The configuration is that of the file `config`, or the recorded one if that is empty.
+/// Opens `file`. The configuration is read from the file `config`; if `config` is empty, it is the
+/// recorded one.
 [[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file,
                                                      const std::string& config = {});
 

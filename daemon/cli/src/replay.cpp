@@ -1,5 +1,5 @@
-/// `abbe replay FILE`: passes a recording through receivers, assembler, session and identification
-/// again.
+/// `abbe replay FILE`: repeats a recorded run: the recording passes through receivers, assembler,
+/// session and identification like the live data.
 
 #include <fmt/format.h>
 
@@ -118,7 +118,8 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
   fmt::print("{}\n", out.dump(1));
 }
 
-/// With another configuration (-c) the model may differ from the live one.
+/// Exit code of the replay. A model that differs from the live one is an error, unless another
+/// configuration was given (-c).
 int exit_code_of(const RecordingReader& recording, const ReplayReport& report,
                  const ReplayArguments& arguments) {
   constexpr int kDone = number(ExitCode::Done), kNoAnswer = number(ExitCode::DataInsufficient);

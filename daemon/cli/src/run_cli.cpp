@@ -51,8 +51,8 @@ std::filesystem::path own_folder() {
   return std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
 }
 
-/// Replaces this process by the program. Returns only if the program cannot be run.
-/// words[0] is its name without "abbe-".
+/// Replaces this process by the program of the subcommand words[0], whose name is "abbe-" followed
+/// by words[0]. Returns only if the program cannot be run.
 Error exec_program(std::vector<std::string> words) {
   const auto program = words[0] = fmt::format("abbe-{}", words[0]);
   const auto beside = (own_folder() / program).string();

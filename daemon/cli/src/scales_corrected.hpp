@@ -1,8 +1,8 @@
 #pragma once
-/// Readings from files with a configuration that has [[thermal]]. The daemon applies a model to
-/// readings that are corrected for the temperature of the scales. A model identified from
-/// uncorrected readings contains the thermal expansion of the scales, which would then be corrected
-/// twice.
+/// Check of an identification from files whose configuration has [[thermal]] (correction of the
+/// readings for the temperature of the scales). The daemon applies a model to corrected readings. A
+/// model identified from uncorrected readings contains the thermal expansion of the scales, which
+/// would then be corrected twice.
 
 #include <CLI/App.hpp>
 #include <string_view>

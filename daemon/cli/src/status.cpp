@@ -66,7 +66,7 @@ void print_reference(const json& reference) {
   fmt::print("\n");
 }
 
-/// An axis without a current position is shown as "-".
+/// Text for the position of an axis, in mm or degrees; "-" for an axis without a current position.
 std::string position_text(const json& axis, const json& position) {
   constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
   const bool rotary = axis["kind"] == "rotary";
@@ -76,7 +76,7 @@ std::string position_text(const json& axis, const json& position) {
                      rotary ? "deg" : "mm");
 }
 
-/// Older versions of abbed send no "axes".
+/// Prints the axis positions. Older versions of abbed send no "axes"; nothing is printed then.
 void print_positions(const json& status) {
   const json axes = status.value("axes", json::array());
   const json positions = status.value("position_m", json::array());

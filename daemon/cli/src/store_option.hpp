@@ -14,13 +14,14 @@ struct StoreOption {
 };
 
 void add_store_options(CLI::App& command, StoreOption& where);
-/// An existing store; creates nothing. Io if the folder does not exist, BadInput if it is no store.
+/// Opens an existing store; creates nothing. Io if the folder does not exist, BadInput if the
+/// folder is not a store.
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
 
 /// The id that `name` stands for: "active" or the beginning of an id. Refused if `name` is "active"
 /// and no model is; the other errors are those of ModelStore::find().
 [[nodiscard]] Result<std::string> id_named(const ModelStore& store, const std::string& name);
-/// True for a path, a name with an extension, and a file that exists.
+/// True if `name` is a path with a folder, has an extension, or is the name of an existing file.
 [[nodiscard]] bool names_a_file(const std::string& name);
 
 /// Reads a model file, or a model of the store by its id, the beginning of its id, or "active". A

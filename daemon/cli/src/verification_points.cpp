@@ -32,8 +32,8 @@ void print_point(std::size_t number, const json& point) {
              1e6 * point.at("scatter_m").get<double>());
 }
 
-/// Requests the new points from the daemon, prints and keeps them. Returns why the daemon collects
-/// no more points; empty if it still does.
+/// Requests the points that are new since the last call from the daemon, prints them and keeps them
+/// in `out`. Returns why the daemon collects no more points; empty if it still collects.
 Result<std::string> poll_points(const std::filesystem::path& socket, const json& number,
                                 const char* step, VerificationFile& out, const Keep& keep) {
   const auto answer = ask_daemon(
@@ -49,8 +49,8 @@ Result<std::string> poll_points(const std::filesystem::path& socket, const json&
   return answer->value("stopped", std::string{});
 }
 
-/// After an error: the points collected so far with the error as `cut_short`; without any points,
-/// the error.
+/// The result after an error: the points collected so far, with the error as `cut_short`; if there
+/// are no points, the error.
 Result<LivePoints> points_so_far(VerificationFile& points, const Error& error) {
   if (points.points.empty()) return tl::make_unexpected(error);
   Error cut_short{ErrorCode::Io,

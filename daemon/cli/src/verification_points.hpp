@@ -19,12 +19,13 @@ struct LivePoints {
   std::optional<Error> cut_short;
 };
 
-/// One point per standstill in the recording.
+/// The points of a recording: one for each standstill of the machine.
 [[nodiscard]] Result<LivePoints> points_of_recording(const std::string& file);
 
-/// One point per standstill of the daemon's machine, until there are `count` points (0: as many as
-/// the daemon collects), or Ctrl-C, SIGTERM or SIGHUP. Prints one line per point to stderr. `keep`
-/// is called with all points whenever there are new ones; its error ends the collection.
+/// Collects points from the daemon: one for each standstill of its machine, until there are `count`
+/// points (0: as many as the daemon collects), or until Ctrl-C, SIGTERM or SIGHUP. Prints one line
+/// per point to stderr. `keep` is called with all points whenever there are new ones; an error of
+/// `keep` ends the collection.
 [[nodiscard]] Result<LivePoints> points_of_daemon(
     const std::filesystem::path& socket, std::size_t count,
     const std::function<Result<void>(const VerificationFile&)>& keep);

@@ -79,8 +79,8 @@ void add_left(HtmlReport& page, const Verification& v) {
                         {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
-/// The points with the largest residuals: a single wrong row, for example after a jump of the beam,
-/// is visible here.
+/// Adds a table of the points with the largest residuals, which shows a single wrong row of the
+/// file, for example after the beam was interrupted.
 void add_farthest(HtmlReport& page, const Verification& v) {
   constexpr std::size_t kShown = 5;
   const auto& c = v.comparison;
@@ -219,7 +219,8 @@ void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double 
   page.chart(chart);
 }
 
-/// As Fig. 12 of [Li OMM]: measured vectors, model and residual in planes normal to z, x and y.
+/// Adds charts of measured vectors, model and residual in planes normal to z, x and y, as in Fig.
+/// 12 of [Li OMM].
 void add_planes(HtmlReport& page, const Verification& v) {
   const auto& c = v.comparison;
   calib::Vector3 low = c.grid.front().q_m, high = low;

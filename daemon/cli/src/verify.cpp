@@ -64,8 +64,8 @@ Result<verify::Options> options_of(const VerifyArguments& arguments) {
   return options;
 }
 
-/// Saves the points to OUT, if given, before they are evaluated: a later error does not lose the
-/// measurement.
+/// Saves the points to the folder OUT, if given, before they are evaluated, so that an error in the
+/// evaluation does not lose the measurement.
 Result<void> keep(const VerifyArguments& arguments, const VerificationFile& points) {
   if (arguments.out.empty()) return {};
   if (auto made = create_folder(arguments.out); !made) return made;

@@ -21,7 +21,8 @@ namespace fs = std::filesystem;
 
 // ---- What the configuration refers to on this computer ----
 
-/// `folder` if it exists, else the nearest parent that exists. Empty if it cannot be determined.
+/// `folder` if it exists, else the nearest folder above it that exists. Empty if this cannot be
+/// determined.
 fs::path existing_part(const fs::path& folder) {
   std::error_code error;
   auto part = fs::absolute(folder, error).lexically_normal();

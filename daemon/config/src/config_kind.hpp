@@ -1,6 +1,6 @@
 #pragma once
-/// What the configuration needs to know of one kind of device. Each kind is defined in one file of
-/// src/kinds; config_kinds() are the kinds of DeviceConfigs.
+/// What the configuration module needs to know of one kind of device. Each kind of DeviceConfigs is
+/// defined in one file of src/kinds; config_kinds() lists all of them.
 
 #include <chrono>
 #include <optional>
@@ -64,7 +64,7 @@ struct ConfigKind {
 
 /// Of all devices that read the axes.
 [[nodiscard]] std::vector<AxisReadings> axis_readings(const Config& config);
-/// True if a device of a kind without `axes_if_no_other` reads the axes.
+/// True if a device that always reads the axes (a kind without `axes_if_no_other`) is configured.
 [[nodiscard]] bool axes_have_own_device(const Config& config);
 
 }  // namespace abbe::daemon

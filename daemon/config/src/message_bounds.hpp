@@ -1,7 +1,7 @@
 #pragma once
-/// Names that are published and recorded in messages with bounded strings (abbe_v1.idl) are checked
-/// when the configuration is read: a name that is too long would make every message with it
-/// invalid.
+/// Checks names that are published and recorded in messages with bounded strings (abbe_v1.idl).
+/// They are checked when the configuration is read, because a name that is too long would make
+/// every message that contains it invalid.
 
 #include <cstddef>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
-/// One reader per group of tables. Each reader sets the valid values, adds a fault for each invalid
-/// one, and closes its sections.
+/// The readers of the configuration file, one per group of tables. Each reader sets the valid
+/// values, adds a fault for each invalid value, and closes its sections.
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"

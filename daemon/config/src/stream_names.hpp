@@ -1,5 +1,6 @@
 #pragma once
-/// Names of the devices in a configuration file. Each is also the name of a stream in Health.
+/// Collects the names of the devices in a configuration file, which must be unique: each name is
+/// also the name of a stream in Health.
 
 #include <set>
 #include <string>
@@ -10,8 +11,8 @@ namespace abbe::daemon {
 
 class StreamNames {
  public:
-  /// Adds a fault at the key `name` of the device's table if another device, or a part of the
-  /// daemon, has this name.
+  /// Adds `name` to the names in use. If another device or a part of the daemon has this name
+  /// already, adds a fault at the key `name` of `table` instead.
   void take(const std::string& name, Section& table);
 
  private:

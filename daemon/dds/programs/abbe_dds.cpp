@@ -82,8 +82,8 @@ void log_source_change(const DdsBridge& bridge, bool& alive) {
                              : "abbe-dds: no data from abbed: ModelState INVALID is published\n");
 }
 
-/// For abbe-dds as a systemd service: reads the options from abbed.toml. Refused unless supervise
-/// is "systemd", because abbed would start a second abbe-dds.
+/// Reads the options from abbed.toml when abbe-dds runs as a systemd service. Refused unless
+/// supervise is "systemd": with another value abbed starts an abbe-dds of its own.
 abbe::daemon::Result<void> take_from_config(Options& options) {
   auto config = abbe::daemon::load_config(options.config);
   if (!config) return tl::make_unexpected(config.error());
@@ -125,8 +125,8 @@ class ServiceManager {
   Instant next_{};
 };
 
-/// Publishes until it is stopped and returns the exit code. Returns nullopt if a new network
-/// address requires another participant.
+/// Publishes until a signal or the end of abbed stops it, and returns the exit code. Returns
+/// nullopt if a new network address requires that the participant is created again.
 std::optional<int> publish(const Options& options) {
   using Clock = std::chrono::steady_clock;
   abbe::dds::InterfaceWatch interfaces(Clock::now());

@@ -25,7 +25,7 @@ struct WatchOptions {
 /// Keeps the received data of every machine, and prints what has changed.
 class WatchedMachines {
  public:
-  /// Uses `readers` and `addresses` as long as it exists.
+  /// `readers` and `addresses` must outlive this object.
   WatchedMachines(WatchOptions options, const Readers& readers,
                   const ParticipantAddresses& addresses);
 
@@ -35,7 +35,7 @@ class WatchedMachines {
   /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
   /// that becomes alive again repeats its ModelState within a second.
   void notice_losses();
-  /// The first model that may be applied and is complete; nullptr if there is none.
+  /// The first received model that is complete and may be applied; nullptr if there is none.
   [[nodiscard]] const ReceivedModel* applicable() const;
   /// Why applicable() is nullptr, for each machine.
   [[nodiscard]] std::string why_not() const;
@@ -93,8 +93,8 @@ class WatchedMachines {
   void show_model(Machine& machine, const Publisher& publisher);
   void show_health(const v1::Health& h);
   void show_event(const v1::CalibrationEvent& e);
-  /// The line with position, vector and decision. On a terminal it is updated in place, otherwise a
-  /// new line is printed once a second.
+  /// Prints the line with position, vector and decision. On a terminal the line is updated in
+  /// place; otherwise a new line is printed once a second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c);
 
   const WatchOptions options_;

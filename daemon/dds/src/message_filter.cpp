@@ -20,7 +20,7 @@ constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimesta
 constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08;
 constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from the end of its own field
 /// Limits of octetsToInlineQos. Reader id, writer id and sequence number take 16 bytes; Fast DDS
-/// replaces a smaller value by 16. It reads a signed number, hence the upper limit.
+/// replaces a smaller value by 16. Fast DDS reads a signed 16-bit number, hence the upper limit.
 constexpr std::size_t kShortestToInlineQos = 16, kLongestToInlineQos = 0x7fff;
 
 /// Entity ids of the writers that announce writers and readers: kind c2, ids 0003 and 0004.
@@ -60,9 +60,9 @@ std::uint32_t entity_id(Bytes bytes, std::size_t at) {
 }
 
 /// Calls use(id, offset of the id) for every parameter of the list that begins at `at`. Returns the
-/// offset behind the sentinel of the list. Returns nullopt if a length is not a multiple of four,
-/// as the standard requires [DDSI-RTPS 2.5, 9.4.2.11], or exceeds the list: DDS implementations
-/// interpret such a list differently.
+/// offset behind the sentinel that ends the list. Returns nullopt if the length of a parameter is
+/// not a multiple of four, as the standard requires [DDSI-RTPS 2.5, 9.4.2.11], or exceeds the list:
+/// DDS implementations interpret such a list differently.
 template <class Use>
 std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, Use use) {
   for (; at + 4 <= list.size();) {

@@ -22,8 +22,8 @@ bool is_durable(daemon::Topic topic) {
   return daemon::traits(topic).kind == daemon::TopicTraits::Kind::Durable;
 }
 
-/// Sets the policies that writer and reader have in common. Their other policies have the same
-/// values, but different places in the QoS types of Fast DDS.
+/// Sets the policies whose places are the same in the QoS types of writer and reader. The other
+/// policies of writer and reader agree in value, but not in place.
 template <class Qos>
 void set_common(daemon::Topic topic, Qos& qos) {
   qos.reliability().kind =

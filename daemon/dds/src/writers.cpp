@@ -77,7 +77,7 @@ void Writers::assert_liveliness() {
 }
 
 void Writers::announce(std::size_t index) {
-  // Fast DDS announces a writer whenever its QoS is set, even if nothing changes.
+  // Setting the QoS, even to the same values, makes Fast DDS announce the writer.
   const auto unchanged = announced_[index]->get_qos();
   announced_[index]->set_qos(unchanged);
 }

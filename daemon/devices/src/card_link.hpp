@@ -13,7 +13,8 @@
 
 namespace abbe::daemon {
 
-/// Time-outs are multiplied by `speed`; see stretched().
+/// Options for `config`. `speed`: host seconds per second; time-outs are multiplied by it, see
+/// stretched().
 [[nodiscard]] drivers::CounterCardOptions card_options(const UsbCardConfig& config, double speed);
 
 [[nodiscard]] std::unique_ptr<drivers::UsbLink> make_link(const UsbCardConfig& config,

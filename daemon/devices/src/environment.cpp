@@ -89,7 +89,8 @@ class RunningEnvironment final : public RunningDevices {
     const auto& configured = start.config.of<EnvironmentConfig>();
     for (const std::size_t i : devices)
       options.push_back(environment_options(configured[i], start.config.daemon.speed));
-    // The line is read once a second: a thread without real-time priority is sufficient.
+    // The devices on the line are read once a second, so a thread without real-time priority is
+    // sufficient.
     auto running = run(drivers::EnvironmentLine::create(options, start.time),
                        thread_options(start.config.daemon, "abbe-environ", 0, std::nullopt));
     if (!running) return tl::unexpected(running.error());

@@ -12,7 +12,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// First line of the file when a motion is under way.
+/// First line of the file while a motion is under way.
 constexpr std::string_view kMoving = "a motion is under way\n";
 constexpr std::string_view kSince = "since before the restart: ";
 

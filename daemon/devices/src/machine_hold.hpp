@@ -1,8 +1,8 @@
 #pragma once
-/// State of a measuring machine that survives a restart of the daemon. DATA_DIR/machine-hold
-/// contains the reason why the machine awaits a release, until the operator releases it, and a flag
-/// while a motion is under way. If the daemon finds the flag at its start, or cannot read the file,
-/// it stops the motion (AbortE) and awaits a release.
+/// State of a measuring machine that survives a restart of the daemon. The file
+/// DATA_DIR/machine-hold contains a flag while a motion is under way, and the reason why the
+/// machine awaits a release by the operator. If the daemon finds the flag at its start, or cannot
+/// read the file, it stops the motion (AbortE) and awaits a release.
 
 #include <filesystem>
 
@@ -10,7 +10,8 @@
 
 namespace abbe::daemon {
 
-/// Sets session.held and session.moving from the file, and machine_changed to write it.
+/// Sets session.held and session.moving in `options` from the file, and sets machine_changed to a
+/// function that writes the file.
 void keep_hold(const std::filesystem::path& data_dir, drivers::IppDeviceOptions& options);
 
 }  // namespace abbe::daemon

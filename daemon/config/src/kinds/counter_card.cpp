@@ -86,7 +86,7 @@ void read_counter_card(Section& root, Config& out, StreamNames& names) {
   put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, table, "axes", "channel",
                               card.wiring.axes);
 
-  // The driver checks the wiring; its error text names axis and channel.
+  // The driver checks the wiring; the text of its error names axis and channel.
   if (const auto possible = drivers::check(card.wiring); !possible)
     table.fault("", possible.error().text);
   refuse_claimed_axes(table, card.wiring, out);

@@ -234,7 +234,8 @@ EnvironmentConfig read_device(Section& device, Config& out) {
   return config;
 }
 
-/// All devices on one serial line share its baud rate, parity and stop bits.
+/// Adds a fault if another device on the same serial line has another baud rate, parity or number
+/// of stop bits: the line has only one setting.
 void check_line(const EnvironmentConfig& config, const Config& out, Section& section) {
   for (const auto& other : out.of<EnvironmentConfig>()) {
     if (!drivers::same_line(config.address, other.address) ||

@@ -71,7 +71,8 @@ void read_latched_axes(Section& table, const CountedAxes& live, const MachineCon
   }
 }
 
-/// One card cannot both count continuously and latch at marks.
+/// True if two tables name the same card: one card cannot both count continuously and latch at
+/// marks.
 bool same_card(const UsbCardConfig& a, const UsbCardConfig& b) {
   if (a.transport != b.transport) return false;
   if (a.transport == CardTransport::Usb)

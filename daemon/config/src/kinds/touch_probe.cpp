@@ -33,7 +33,7 @@ void read_switching(Section& probe, drivers::ProbeSwitching& out) {
   probe.get("rearm_retract_um", out.rearm_retract_m, kMicro, kNotNegative);
 }
 
-/// Touches of the probe have a time only if it is wired to the card.
+/// True if the probe is wired to a channel of the counter card; otherwise its touches have no time.
 bool is_wired(const std::optional<CountedAxes>& counted) {
   return counted && (counted->card.wiring.latch_channel || counted->card.wiring.edge_channel);
 }

@@ -39,8 +39,8 @@ void read_placement(Section& tracker, MachineConfig& machine) {
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
 }
 
-/// The measurement period of emScon is a whole number of milliseconds. Other rates are refused,
-/// because the controller would change them silently.
+/// Reads point_rate_hz. The measurement period of emScon is a whole number of milliseconds; a rate
+/// with another period is a fault, because the controller would change it silently.
 void read_point_rate(Section& tracker, TrackerConfig& out) {
   constexpr double kRounded = 5e-3;  // relative; accepts 333 for 333.3
   if (!tracker.get("point_rate_hz", out.point_rate_hz, kPlain, {1.0, 1000.0})) return;

@@ -18,8 +18,8 @@ struct JsonBounds {
   std::size_t values = 1'000'000;  ///< elements of arrays and objects, all levels together
 };
 
-/// Checks that `text` is within `bounds`, for any parser that reads it afterwards. Same errors as
-/// parse_json(). Pure; no recursion.
+/// Checks that `text` has at most the depth and the number of values that `bounds` allows, so that
+/// any parser may read it afterwards. The errors are those of parse_json(). Pure; no recursion.
 [[nodiscard]] Result<void> check_json(std::string_view text, std::string_view what,
                                       const JsonBounds& bounds);
 
@@ -30,8 +30,8 @@ struct JsonBounds {
 [[nodiscard]] Result<nlohmann::json> parse_json(std::string_view text, std::string_view what,
                                                 const JsonBounds& bounds = {});
 
-/// What the library reports, without the name of its exception type: "key 'events' not found", or
-/// for a syntax error "line 2, column 5: syntax error ...".
+/// The cause that the JSON library reports, without the name of the exception type: "key 'events'
+/// not found", or for a syntax error "line 2, column 5: syntax error ...".
 [[nodiscard]] std::string cause_of(const nlohmann::json::exception& exception);
 
 }  // namespace abbe::daemon

@@ -1,7 +1,7 @@
 #pragma once
 /// Detects that the wall clock was set while abbed ran, for example by a time server after the
-/// battery of the real-time clock failed. Dates of files must not be compared with such a clock.
-/// Not for real-time threads; one thread.
+/// battery of the real-time clock failed. Files then have wrong dates, from which their age must
+/// not be computed. Not for real-time threads; one thread.
 
 #include <chrono>
 

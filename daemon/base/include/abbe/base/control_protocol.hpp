@@ -31,7 +31,8 @@ namespace abbe::daemon {
 /// positions on the way to a touch).
 inline constexpr JsonBounds kRequestBounds{.bytes = 4u << 20, .depth = 16};
 
-/// The process at the other end of a connection, as the kernel knew it when it connected.
+/// The process at the other end of a connection, with the ids that the kernel recorded when the
+/// process connected.
 struct ControlPeer {
   std::string user = "unknown";
   uid_t uid = static_cast<uid_t>(-1);  ///< the default is not a user

@@ -22,7 +22,7 @@ enum class ErrorCode {
 struct Error {
   ErrorCode code = ErrorCode::BadInput;
   std::string text;
-  /// further lines, for example one for each fault of a file
+  /// further lines of the message, for example one for each fault of a file
   std::vector<std::string> details = {};
 };
 
@@ -33,7 +33,8 @@ using Result = tl::expected<T, Error>;
   return tl::make_unexpected(Error{code, std::move(text)});
 }
 
-/// Exit code of a program that ends with this error; never 0. Listed in every --help.
+/// Exit code of a program that ends with an error of this code; never 0. Every --help lists the
+/// exit codes.
 [[nodiscard]] constexpr int exit_code(ErrorCode code) noexcept {
   switch (code) {
     case ErrorCode::DataInsufficient:

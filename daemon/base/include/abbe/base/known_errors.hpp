@@ -14,8 +14,8 @@ namespace abbe::daemon {
 
 /// errors.csv, as `abbe model eval` writes it:
 ///   x_mm,y_mm,z_mm,ex_um,ey_um,ez_um[,ux_um,uy_um,uz_um][,inside]
-/// The error is true position - scale reading, given at scale readings x, y, z. At least one row.
-/// The columns u and inside are not used.
+/// (ex, ey, ez): true position - scale reading, at the scale readings (x, y, z). At least one row.
+/// The columns u (standard uncertainty) and inside are not used.
 struct KnownErrorsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;

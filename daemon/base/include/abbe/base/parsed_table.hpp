@@ -22,12 +22,14 @@ struct ParsedTable {
   Faults faults;
 };
 
-/// Io if the file cannot be read; BadInput with all faults if its header is invalid.
+/// Reads and parses the file; its header must match one of `forms`. Io if the file cannot be read;
+/// BadInput with all faults if the header is invalid.
 [[nodiscard]] Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                               const std::vector<TableForm>& forms,
                                               const ReadProgress& progress = {});
 
-/// Adds a fault if there are fewer than `least` rows. `what` names them in the message: "vertices".
+/// Adds a fault if there are fewer than `least` rows. `what` is the name of the rows in the
+/// message: "vertices".
 void check_rows(ParsedTable& parsed, std::size_t least, std::string_view what);
 
 }  // namespace abbe::daemon

@@ -5,7 +5,8 @@
 
 namespace abbe::daemon {
 
-/// `answer` has "ok": false. An unknown code (from a newer daemon) becomes ErrorCode::Refused.
+/// The Error that an answer with "ok": false reports. An unknown code, which a newer daemon may
+/// send, becomes ErrorCode::Refused.
 [[nodiscard]] Error error_of_refusal(const nlohmann::json& answer);
 
 /// "data_insufficient", "io" ...: the value of "code" in an answer.

@@ -23,7 +23,7 @@ class Sha256 {
 
   void update(std::span<const std::byte> bytes);
   void update(std::string_view text);
-  /// The bytes of a value without padding, as they lie in memory.
+  /// Adds the bytes of a value, as they lie in memory. The type must have no padding.
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void update_bytes_of(const T& value) { update(std::as_bytes(std::span{&value, 1})); }

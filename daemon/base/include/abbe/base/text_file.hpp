@@ -23,16 +23,16 @@ namespace abbe::daemon {
 /// can read what root writes there.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
 
-/// What a new folder gets if root creates it. LikeItsParent: owner and mode of the parent, so that
-/// the owner of the parent can use it. OfTheCaller: owner and umask of the process.
+/// Owner and mode of a folder that root creates. LikeItsParent: those of the parent folder, so that
+/// the owner of the parent can use the new folder. OfTheCaller: owner and umask of the process.
 enum class NewFolder { LikeItsParent, OfTheCaller };
 
 /// Creates `folder` and its missing parents.
 [[nodiscard]] Result<void> create_folder(const std::filesystem::path& folder,
                                          NewFolder kind = NewFolder::LikeItsParent);
 
-/// Gives the newly created file `fd` the owner and mode of the folder that contains it. Best
-/// effort: only root may change the owner.
+/// Gives the newly created file `fd` the owner and mode of `folder`, which contains it. Failures
+/// are ignored, because only root may change the owner.
 void inherit_ownership(int fd, const std::filesystem::path& folder) noexcept;
 
 }  // namespace abbe::daemon

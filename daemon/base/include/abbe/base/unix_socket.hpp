@@ -25,7 +25,8 @@ namespace abbe::daemon {
 /// True if a process listens at `path`, even if it accepts no connection. Does not block.
 [[nodiscard]] bool is_listened_at(const std::filesystem::path& path);
 
-/// A send on `fd` that makes no progress for `time_out` fails with EAGAIN; 0: it waits forever.
+/// Sets a time-out: a send on `fd` that makes no progress for `time_out` fails with EAGAIN; with 0
+/// it waits forever.
 void set_send_time_out(int fd, std::chrono::milliseconds time_out) noexcept;
 
 }  // namespace abbe::daemon

@@ -10,8 +10,8 @@
 namespace abbe::daemon {
 
 [[nodiscard]] std::string to_text(protocol::UtcTime time);
-/// nullopt for any other format, and for years before 1678 or after 2261, which UtcTime cannot
-/// represent.
+/// The time in an RFC 3339 text. nullopt for any other format, and for years before 1678 or after
+/// 2261, which UtcTime cannot represent.
 [[nodiscard]] std::optional<protocol::UtcTime> utc_from_text(std::string_view text);
 
 }  // namespace abbe::daemon

@@ -18,7 +18,7 @@ class WakeUp {
   WakeUp& operator=(const WakeUp&) = delete;
   ~WakeUp() { ::sem_destroy(&semaphore_); }
 
-  /// Any thread. Signals are counted: each signal lets one wait return.
+  /// May be called from any thread. Signals are counted: each signal lets one wait return.
   void signal() noexcept {
     signals_.fetch_add(1, std::memory_order_release);
     ::sem_post(&semaphore_);

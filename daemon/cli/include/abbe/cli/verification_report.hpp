@@ -25,13 +25,15 @@ struct Verification {
   std::optional<calib::Vector3> planes_m;
 };
 
-/// "better with the model: 0.090 um rms left, 41.300 um without it; 340 of 343 points improved".
+/// The verdict in one sentence, for example "better with the model: 0.090 um rms left, 41.300 um
+/// without it; 340 of 343 points improved".
 [[nodiscard]] std::string verdict_text(const calib::verify::Comparison&);
 
-/// The reason why R_resmag is not given; nullopt if it is given.
+/// Why the report does not give R_resmag (residual / error without compensation); nullopt if it
+/// does.
 [[nodiscard]] std::optional<std::string> why_no_ratio(const calib::verify::Comparison&);
 
-/// report.html, self-contained. Begins with the verdict.
+/// The text of report.html, a page that needs no other file and begins with the verdict.
 [[nodiscard]] std::string verification_report(const ModelDocument&, const Verification&);
 
 /// grid.csv, one row per grid point: position, measured error (las), error of the model (model),

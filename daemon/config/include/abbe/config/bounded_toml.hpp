@@ -1,6 +1,7 @@
 #pragma once
 /// TOML with limits on size and nesting depth, checked before the text is parsed: parsed tables are
-/// copied and destroyed recursively, and each part of a dotted key adds one level.
+/// copied and destroyed recursively, so deep nesting could exhaust the stack. Each part of a dotted
+/// key (a.b.c) adds one level.
 
 #include <toml++/toml.h>
 #include <cstddef>
@@ -14,8 +15,8 @@ namespace abbe::daemon {
 
 using protocol::TomlBounds;
 
-/// The parsed table, or BadInput with one fault, "FILE:LINE:COLUMN: ...": faults after the first
-/// syntax error would not be reliable.
+/// The parsed table, or BadInput with one fault, "FILE:LINE:COLUMN: ...". Only the first syntax
+/// error is reported, because the faults after it would not be reliable.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlBounds& bounds = {});
 

@@ -7,11 +7,12 @@
 
 namespace abbe::daemon {
 
-/// BadInput if the chain or the nodes do not describe a machine with three linear axes.
+/// The input of calib. BadInput if the chain or the nodes do not describe a machine with three
+/// linear axes.
 [[nodiscard]] Result<calib::otf::Machine> otf_machine(const MachineConfig& machine);
 
-/// BadInput if [target] offset_mm is missing. Every calibration needs it; without this check the
-/// default zeros would be used as the offset.
+/// BadInput if [target] offset_mm (tool reference point to reflector) is missing. Every calibration
+/// needs this offset; without this check the default zeros would be used.
 [[nodiscard]] Result<void> require_target(const MachineConfig& machine);
 
 }  // namespace abbe::daemon

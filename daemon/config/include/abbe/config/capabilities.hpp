@@ -1,6 +1,7 @@
 #pragma once
-/// What the configured devices provide, whatever their kinds are: the other modules ask here, and
-/// only the code of a kind looks at its own table. Pure.
+/// What the configured devices provide, independent of their kinds (tracker, encoder, ...). Other
+/// modules use these functions; only the source files of a kind read the configuration table of
+/// that kind. Pure.
 
 #include <chrono>
 #include <optional>

@@ -1,7 +1,8 @@
 #pragma once
-/// `abbed --check-config`: the configuration together with what it refers to on this computer, and
-/// what abbe understood of it. abbed itself starts without a data folder or a DDS profile and
-/// reports them, because acquisition comes first; here they are faults.
+/// `abbed --check-config`: checks the configuration together with the files and folders that it
+/// names on this computer, and reports how abbe understood it. abbed itself starts without a data
+/// folder or a DDS profile and only reports this, because acquisition must not depend on them; here
+/// a missing one is a fault.
 
 #include <filesystem>
 #include <string>
@@ -23,8 +24,8 @@ struct CheckedConfig {
 /// profile and a missing folder of DDS keys. `cpus`: number of CPUs of this computer.
 [[nodiscard]] Result<CheckedConfig> check_config(const std::filesystem::path& file, int cpus);
 
-/// One line per fact, without a line end: machine, axes with travel and nodes, target, devices with
-/// their addresses, folders, DDS.
+/// Describes the configuration, one line per fact, without line ends: machine, axes with travel and
+/// nodes, target, devices with their addresses, folders, DDS.
 [[nodiscard]] std::vector<std::string> summary_of(const Config& config);
 
 }  // namespace abbe::daemon

@@ -64,7 +64,8 @@ struct MachineConfig {
   friend bool operator==(const MachineConfig&, const MachineConfig&) = default;
 };
 
-/// One [[thermal]]: the readings of an axis are corrected for the thermal expansion of its scale.
+/// One [[thermal]] table: the readings of one axis are corrected for the thermal expansion of the
+/// scale.
 struct ThermalConfig {
   std::string axis;
   std::uint8_t temperature = 0;  ///< index into Config::temperatures
@@ -117,13 +118,13 @@ struct DaemonConfig {
 struct RecordingConfig {
   std::filesystem::path dir;  ///< default: data_dir/recordings
   std::uint32_t chunk_bytes = 256 * 1024;
-  /// A chunk is closed after this time at the latest.
+  /// A chunk of the recording is closed after this time, even if it has not reached chunk_bytes.
   std::chrono::nanoseconds chunk_period{std::chrono::seconds{1}};
   bool raw = true;  ///< also record the raw bytes of the devices
-  /// With less free disk space recording stops; acquisition continues.
+  /// If less disk space than this is free, recording stops; acquisition continues.
   std::uint64_t min_free_bytes = 256ull * 1024 * 1024;
   std::uint64_t max_file_bytes = 4096ull * 1024 * 1024;  ///< then the next part begins; 0: no limit
-  /// Recordings that are older than this and not used by a model are removed; 0: never.
+  /// Recordings older than this are removed, unless a model names them among its inputs; 0: never.
   std::chrono::hours keep{0};
 };
 
@@ -148,11 +149,11 @@ struct DdsConfig {
 struct GateConfig {
   double max_error_m = 1e-3;   ///< largest |V| inside the validity volume
   double max_gradient = 5e-3;  ///< largest |dV/dq|, m per m; 250 um between nodes 50 mm apart
-  /// Allowed difference between the scale readings and a vertex of the commanded on-the-fly path,
-  /// in addition to their uncertainty.
+  /// Largest allowed difference between the scale readings and a vertex of the commanded on-the-fly
+  /// path, in addition to the uncertainty of the readings.
   double path_tolerance_m = 20e-6;
-  /// Fraction of the legs of an on-the-fly run that are excluded from a fit and used to check it.
-  /// For a ball array, one position after another is excluded and used to check the fit.
+  /// Fraction of the legs of an on-the-fly run that are excluded from the fit, to check the model
+  /// with them. For a ball array this value is not used: each position is excluded once.
   double holdout_fraction = 0.2;
   /// Conditions that the user accepts, by name:
   /// - "evemu-shape-only": a model from a ball array whose rotation about Ball1 is not referenced;
@@ -180,7 +181,7 @@ struct EvemuConfig {
   std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
-  /// The session ends after this time without a touch.
+  /// The calibration fails if no touch arrives for longer than this.
   std::chrono::nanoseconds longest_pause{std::chrono::hours{1}};
   std::optional<ArtefactTemperatureConfig> artefact;  ///< nullopt: 20 C is assumed
 };
@@ -225,13 +226,13 @@ struct Config {
   /// if no device reads the axes, or if the samples have the first axes of the machine.
   [[nodiscard]] std::vector<std::string> connected_axes() const;
 
-  /// True if the control already corrects the axis readings, for any device that reads them.
+  /// True if the control already corrects the readings of any axis.
   [[nodiscard]] bool axes_compensated() const;
 };
 
-/// Reads and checks a whole file. Io if it cannot be read; else BadInput with one line per fault in
-/// Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with a fault
-/// is not used at all.
+/// Reads and checks a whole file. Io if the file cannot be read, else BadInput with one line per
+/// fault in Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with
+/// a fault is not used at all.
 [[nodiscard]] Result<Config> load_config(const std::filesystem::path& file);
 
 /// Same as load_config() for the text of a file. `file` is used in error messages and is the base
@@ -243,10 +244,10 @@ struct Config {
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 
-/// SHA-256 in hex over the configuration that a model depends on: the machine (name, chain, axes,
-/// target, basis, nodes) and the meaning of a scale reading (node and axis, step, offset,
-/// correction by the control). A stored model is ACTIVE only if its hash is equal to this one.
-/// Noise values and transport settings are not included.
+/// SHA-256 in hex over the part of the configuration that a model depends on: the machine (name,
+/// chain, axes, target, basis, nodes) and the meaning of a scale reading (node and axis, step,
+/// offset, correction by the control). A stored model is ACTIVE only if its hash equals that of the
+/// present configuration. Noise values and transport settings are not included.
 [[nodiscard]] std::string machine_hash(const Config& config);
 
 }  // namespace abbe::daemon

@@ -17,8 +17,8 @@
 
 namespace abbe::daemon {
 
-/// Of each kind at most one device (optional), or any number of them in the order of the file
-/// (vector).
+/// The configured devices of every kind. optional: at most one device of the kind; vector: any
+/// number of devices, in the order of the file.
 using DeviceConfigs = std::tuple<std::optional<TrackerConfig>, std::optional<EncoderConfig>,
                                  std::optional<CounterCardConfig>, std::optional<ReferenceConfig>,
                                  std::optional<ProbeConfig>, std::optional<CmmConfig>,

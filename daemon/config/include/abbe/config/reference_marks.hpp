@@ -9,7 +9,7 @@
 
 namespace abbe::daemon {
 
-/// The marks of the scale of one axis.
+/// The marks of the scale of one axis, with
 ///
 ///   reading at a mark = zero_mark + position of the mark on the scale
 ///   reversed:           zero_mark - position of the mark on the scale

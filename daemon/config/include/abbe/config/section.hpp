@@ -73,7 +73,8 @@ class Section {
   template <class Integer>
   bool get_integer(std::string_view key, Integer& out, std::int64_t min, std::int64_t max,
                    Need need = Need::Optional);
-  /// The value must be one of `words`; sets `out` to its enumerator.
+  /// Reads a text that must be one of the first elements of `words`; sets `out` to the enumerator
+  /// beside it.
   template <class Enum>
   bool get_word(std::string_view key, Enum& out,
                 std::vector<std::pair<std::string_view, Enum>> words, Need need = Need::Optional);

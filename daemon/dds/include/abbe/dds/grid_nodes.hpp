@@ -10,7 +10,7 @@
 
 namespace abbe::dds {
 
-/// Error BadInput under the conditions of calib::ErrorLattice::create().
+/// The lattice of the nodes. Error BadInput if calib::ErrorLattice::create() refuses them.
 [[nodiscard]] daemon::Result<calib::ErrorLattice> lattice_of(std::span<const v1::GridNode> nodes);
 
 /// Writes the columns `x_mm,y_mm,z_mm,ex_um,ey_um,ez_um,ux_um,uy_um,uz_um`; u: standard

@@ -6,8 +6,9 @@
 
 namespace abbe::dds {
 
-/// The interface index is part of the comparison: an interface that is deleted and created again
-/// with the same address has another index, and the multicast memberships of the old one are lost.
+/// The interface index is part of the comparison. An interface that is deleted and created again
+/// with the same address has another index, and the multicast memberships of the deleted one are
+/// lost.
 struct InterfaceAddress {
   unsigned interface = 0;
   std::string address;

@@ -1,9 +1,10 @@
 #pragma once
-/// Detects addresses that a network interface gets while a participant runs: a cable is plugged
+/// Detects addresses that a network interface gets while a DDS participant runs: a cable is plugged
 /// in, DHCP assigns an address, or the program started before the network was up. Fast DDS 2.9 does
-/// not use such addresses, not even when its QoS is set again: its writers and readers keep the
-/// addresses of their creation. The participant has to be created again, in a new process image,
-/// because Fast DDS never gives a participant id (and with it the port) twice to one process.
+/// not use such addresses, not even when the QoS of the participant is set again: writers and
+/// readers keep the addresses that existed when they were created. The participant has to be
+/// created again, in a new process image, because Fast DDS never gives a participant id (and with
+/// it the port) twice to one process.
 
 #include <chrono>
 #include <optional>
@@ -14,8 +15,8 @@
 
 namespace abbe::dds {
 
-/// For one thread. Where rtnetlink(7) is not available, for example in a sandbox, it detects
-/// nothing.
+/// For one thread. Where rtnetlink(7) is not available, for example in a sandbox, no address is
+/// detected.
 class InterfaceWatch {
  public:
   using Clock = std::chrono::steady_clock;
@@ -37,9 +38,9 @@ class InterfaceWatch {
   InterfaceWatch(const InterfaceWatch&) = delete;
   InterfaceWatch& operator=(const InterfaceWatch&) = delete;
 
-  /// Returns a new address for which the participant has to be created again: its interface is
-  /// running, the profile allows it (`allowed`; empty: all), and no earlier call and not the
-  /// constructor has seen it. Never blocks.
+  /// Returns a new address for which the participant has to be created again. "New": its interface
+  /// is running, the profile allows it (`allowed`; empty: all addresses), and neither the
+  /// constructor nor an earlier call has found it. Never blocks.
   [[nodiscard]] std::optional<std::string> cycle(const std::vector<std::string>& allowed,
                                                  Clock::time_point now);
 

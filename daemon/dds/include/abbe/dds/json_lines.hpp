@@ -11,7 +11,7 @@
 
 namespace abbe::dds {
 
-/// Without the newline. Error BadInput: the payload does not decode.
+/// The line of one sample, without the newline. Error BadInput if the payload cannot be decoded.
 [[nodiscard]] daemon::Result<std::string> json_line(daemon::Topic topic,
                                                     std::span<const std::byte> payload);
 

@@ -29,7 +29,7 @@ namespace abbe::dds {
 /// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
 [[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message) noexcept;
 
-/// The same transport with the filter between it and Fast DDS.
+/// Wraps `low_level`: a transport that passes received messages through the filter to Fast DDS.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>
 with_message_filter(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level);

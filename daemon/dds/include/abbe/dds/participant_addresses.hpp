@@ -14,7 +14,8 @@ namespace abbe::dds {
 
 class ParticipantAddresses final : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  /// Replaces the listener of the participant. `participant` must outlive this object.
+  /// Becomes the listener of the participant, in place of an earlier one. `participant` must
+  /// outlive this object.
   explicit ParticipantAddresses(Participant& participant);
   ~ParticipantAddresses() override;
   ParticipantAddresses(const ParticipantAddresses&) = delete;

@@ -1,8 +1,9 @@
 #pragma once
-/// The data type of a topic for Fast DDS: a payload that is CDR already. Fast DDS sends the bytes
-/// that abbed encoded unchanged. Received bytes are decoded by daemon::decode, which returns an
-/// error for malformed input where generated code would throw. On the wire the type is identical to
-/// the generated one. Used by Fast DDS from any thread.
+/// The data type of a topic for Fast DDS: payloads that are encoded (CDR) already. Fast DDS sends
+/// the bytes that abbed encoded without changing them. A subscriber decodes received bytes with
+/// daemon::decode, which returns an error for malformed input where generated code would throw. On
+/// the wire this type is identical to the type generated from the IDL. Used by Fast DDS from any
+/// thread.
 
 #include <fastdds/dds/topic/TopicDataType.hpp>
 

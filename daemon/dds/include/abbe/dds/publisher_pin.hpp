@@ -1,8 +1,8 @@
 #pragma once
 /// Decides which participant a subscriber uses when several DDS participants publish data of the
-/// same machine: the first one it receives from is pinned until it stops sending. The header uses
-/// the standard library only, so that subscribers can copy it; the Cyclone DDS example implements
-/// the same rule in C.
+/// same machine: the one from which the first sample arrives is pinned until it stops sending. The
+/// header uses the standard library only, so that subscribers can copy it; the Cyclone DDS example
+/// implements the same rule in C.
 ///
 /// The rule protects against a participant that starts later. It does not protect against one that
 /// starts first, one that takes over after the pinned one has stopped, or one that forges the GUID:
@@ -67,7 +67,8 @@ class PublisherPin {
     Foreign,  ///< keep the sample, do not use it, and report the participant
   };
 
-  /// Call it for every sample of this machine, on any topic; `from` is its sender.
+  /// Call it for every received sample of this machine, on any topic. `from`: the participant that
+  /// sent it.
   Verdict heard(const ParticipantId& from, Instant now) {
     if (pinned_ == from) {
       pinned_heard_ = now;

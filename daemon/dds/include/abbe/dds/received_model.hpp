@@ -1,6 +1,6 @@
 #pragma once
 /// The error model of one machine as a subscriber received it, and the decision whether it may be
-/// applied by the rule of abbe_v1.idl. Pure; used by one thread. SI: m.
+/// applied by the rule in abbe_v1.idl. Pure; used by one thread. Lengths in m.
 
 #include <chrono>
 #include <cstddef>
@@ -36,7 +36,8 @@ class ReceivedModel {
   /// slice is missing.
   [[nodiscard]] std::optional<std::vector<v1::GridNode>> grid() const;
 
-  /// Whether the grid may be applied. `publisher_alive`: the writer of ModelState keeps its lease.
+  /// Whether the received grid may be applied. `publisher_alive`: the writer of ModelState has not
+  /// lost its liveliness.
   [[nodiscard]] Decision decide(bool publisher_alive) const;
 
  private:
@@ -46,7 +47,8 @@ class ReceivedModel {
   std::map<std::string, Slices> slices_;  // by model
 };
 
-/// Whether this vector may be applied. `delay`: from Delay::of(); nullopt while it is not known.
+/// Whether this compensation vector may be applied. `delay`: the transit delay from Delay::of();
+/// nullopt while the delay is not known.
 [[nodiscard]] Decision decide(const v1::Compensation& compensation,
                               std::optional<std::chrono::nanoseconds> delay,
                               const std::optional<v1::ModelState>& state, bool publisher_alive);

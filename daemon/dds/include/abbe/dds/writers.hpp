@@ -1,5 +1,5 @@
 #pragma once
-/// One writer per abbe topic, in one participant. Used by one thread.
+/// The DDS writers of a participant, one per topic of abbe. Used by one thread.
 
 #include <array>
 #include <chrono>

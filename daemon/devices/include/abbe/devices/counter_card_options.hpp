@@ -1,12 +1,13 @@
 #pragma once
-/// The options of the card driver. A live device and its replay use the same ones. Pure.
+/// The options of the counter card's driver, the same for a live device and for its replay. Pure.
 
 #include "abbe/config/kinds/counter_card.hpp"
 #include "abbe/drivers/counter_card/device.hpp"
 
 namespace abbe::daemon {
 
-/// Time-outs are multiplied by `speed`; see stretched().
+/// Options for `config`. `speed`: host seconds per second; time-outs are multiplied by it, see
+/// stretched().
 [[nodiscard]] drivers::CounterCardOptions device_options(const CounterCardConfig& config,
                                                          double speed);
 

@@ -23,8 +23,8 @@
 
 namespace abbe::daemon {
 
-/// A device that moves and probes under its own control (a measuring machine). The functions are
-/// described in SampleSource.
+/// A device that moves and probes under its own control (a measuring machine). SampleSource
+/// describes the functions, which have the same names there.
 class MachineMotion {
  public:
   MachineMotion() = default;
@@ -66,9 +66,9 @@ class RunningDevices {
   RunningDevices& operator=(const RunningDevices&) = delete;
   virtual ~RunningDevices() = default;
 
-  /// Appends what arrived since the last call. Of each device, the samples are drained before the
-  /// raw bytes. A driver delivers the bytes before the samples, so bytes are never drained in a
-  /// later cycle than the samples decoded from them; a replay relies on this order.
+  /// Appends what arrived since the last call. For each device, the samples are drained before the
+  /// raw bytes, while a driver delivers the bytes before the samples decoded from them. Therefore
+  /// bytes are never drained in a later cycle than their samples, on which a replay relies.
   virtual void drain(Batch& batch) = 0;
   /// For each device in the health report the thread that runs it, in the order of the
   /// configuration.
@@ -77,7 +77,7 @@ class RunningDevices {
   /// `ignore`), and for each assumption of the driver.
   [[nodiscard]] virtual std::vector<std::string> warnings() const;
 
-  // Functions of some kinds only; null or nullopt: this kind does not have the function.
+  // Functions of some kinds only. null or nullopt: this kind of device does not have the function.
   [[nodiscard]] virtual MachineMotion* motion() noexcept { return nullptr; }
   [[nodiscard]] virtual TrackerOrders* orders() noexcept { return nullptr; }
   /// The latest state of the counters that drain() has read. The samples up to this state are

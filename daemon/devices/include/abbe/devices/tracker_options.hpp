@@ -1,12 +1,13 @@
 #pragma once
-/// The options of the tracker driver. A live device and its replay use the same ones. Pure.
+/// The options of the tracker driver, the same for a live device and for its replay. Pure.
 
 #include "abbe/config/kinds/tracker.hpp"
 #include "abbe/drivers/tracker/device.hpp"
 
 namespace abbe::daemon {
 
-/// Time-outs are multiplied by `speed`; see stretched().
+/// Options for `config`. `speed`: host seconds per second; time-outs are multiplied by it, see
+/// stretched().
 [[nodiscard]] drivers::TrackerDeviceOptions device_options(const TrackerConfig& config,
                                                            double speed);
 

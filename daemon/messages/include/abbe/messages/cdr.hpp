@@ -26,7 +26,7 @@ template <class T>
 template <class T>
 [[nodiscard]] Result<T> decode(std::span<const std::byte> payload);
 
-/// Fully qualified name as DDS and MCAP schemas use it: "abbe::v1::Snapshot".
+/// Fully qualified name of the type, as in DDS and in MCAP schemas: "abbe::v1::Snapshot".
 template <class T>
 [[nodiscard]] std::string_view type_name() noexcept;
 

@@ -1,18 +1,18 @@
 #pragma once
-/// The rules of abbe-dds, without DDS: forwards payloads from abbed to an outlet, and reports to
-/// the subscribers when abbed is silent. abbed proves that it runs by sending beats.
+/// The rules of abbe-dds, without DDS: forwards payloads from abbed (the source) to an outlet, and
+/// reports to the subscribers when abbed is silent. abbed proves that it runs by sending beats.
 ///
 /// - Source alive: abbed sent the last beat within kSilence; the time of sending counts, not the
-///   time of reading. Only then samples other than MODEL_INVALID are written and liveliness is
-///   asserted.
+///   time of reading. Only while the source is alive, samples other than MODEL_INVALID are written
+///   and liveliness is asserted.
 /// - Source silent, or socket closed: every known ModelState is written once more as MODEL_INVALID
 ///   with reason SOURCE_LOST. After that nothing is written, so that the liveliness lease of the
 ///   ModelState writer expires.
 /// - Source alive again: durable topics are written again, but ModelState only after abbed has sent
 ///   it again. A stale ACTIVE is never republished.
-/// - Durable topics are repeated with the period of their traits.
-/// - The age of a compensation vector includes its delay on the way here. Live samples delayed by
-///   more than kLongestWait are discarded.
+/// - Durable topics are repeated with the period TopicTraits::repeat.
+/// - The age of a compensation vector is increased by the delay between abbed and this process.
+///   Live samples delayed by more than kLongestWait are discarded.
 /// - Slices of ErrorGrid with a number beyond those of the newest grid are disposed.
 ///
 /// Used by one thread. The caller passes the time.
@@ -35,7 +35,7 @@ class DdsOutlet {
   virtual ~DdsOutlet() = default;
   /// Returns false if the writer refused the payload.
   virtual bool write(Topic topic, std::span<const std::byte> payload) = 0;
-  /// Disposes the instance that `payload` belongs to, so that late joiners do not receive it.
+  /// Disposes the DDS instance that `payload` belongs to, so that late joiners do not receive it.
   virtual void dispose(Topic topic, std::span<const std::byte> payload) = 0;
   virtual void assert_liveliness() = 0;
 };
@@ -55,8 +55,8 @@ class DdsBridge {
   DdsBridge(const DdsBridge&) = delete;
   DdsBridge& operator=(const DdsBridge&) = delete;
 
-  /// A new connection to abbed. abbed sends all durable samples again, so the retained ones are
-  /// discarded.
+  /// Call it after a new connection to abbed. abbed then sends all durable samples again, so the
+  /// retained ones are discarded.
   void connected();
   /// `at`: when abbed sent the beat or the payload. publish() adds the delay since then to the age
   /// in a Compensation payload, in place.
@@ -70,7 +70,8 @@ class DdsBridge {
   [[nodiscard]] std::uint64_t written() const noexcept;
   /// number of payloads that the outlet refused or that are malformed
   [[nodiscard]] std::uint64_t refused() const noexcept;
-  /// Live samples discarded because they were delayed too long.
+  /// Number of live samples that were discarded because they were delayed by more than
+  /// kLongestWait.
   [[nodiscard]] std::uint64_t outdated() const noexcept;
 
  private:

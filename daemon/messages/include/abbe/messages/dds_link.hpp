@@ -48,8 +48,8 @@ struct DdsLinkPeer {
 
 class DdsLink {
  public:
-  /// CLOCK_MONOTONIC, even with simulated devices: abbe-dds compares the beats with the same
-  /// clock.
+  /// CLOCK_MONOTONIC, even with simulated devices, because abbe-dds compares the times of the beats
+  /// with this clock.
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kBeatPeriod{100};
 
@@ -62,8 +62,8 @@ class DdsLink {
   DdsLink(DdsLink&&) noexcept;
   DdsLink& operator=(DdsLink&&) noexcept;
 
-  /// Sends one payload made by encode(). The key is read from the payload. `at`: the time to which
-  /// the age in a live sample refers; abbe-dds adds the delay after that time.
+  /// Sends one payload made by encode(). The key of the instance is read from the payload. `at`:
+  /// the time to which the age in a live sample refers; abbe-dds adds the delay since then.
   void publish(Topic topic, std::span<const std::byte> payload,
                WallTime at = WallTime::clock::now());
 
@@ -76,7 +76,7 @@ class DdsLink {
   void poll();
 
   [[nodiscard]] bool connected() const noexcept;
-  /// True if connected and no beat is unanswered for longer than kUnanswered. Otherwise abbe-dds
+  /// True if connected and no beat has been unanswered for longer than kUnanswered. False: abbe-dds
   /// hangs or is not connected.
   [[nodiscard]] bool answers() const noexcept;
   static constexpr std::chrono::seconds kUnanswered{1};

@@ -1,8 +1,8 @@
 #pragma once
-/// State of the process abbe-dds, shared without a lock between two threads: the supervisor's
-/// thread (main) writes when it started and how it ended, the hub's thread writes the times of
-/// beats and answers. Any thread may read. Values read together may come from different times; they
-/// are used only for reports and for time limits of seconds.
+/// State of the process abbe-dds, shared without a lock between two threads. The supervisor's
+/// thread (main) writes when abbe-dds started and how it ended; the hub's thread writes the times
+/// of beats and answers. Any thread may read. Values that are read together may come from different
+/// times; they are used only for reports and for time limits of seconds.
 
 #include <sys/types.h>
 
@@ -56,10 +56,10 @@ class DdsProcess {
     out.store(t.time_since_epoch().count(), std::memory_order_relaxed);
   }
 
-  // relaxed: each value is independent; no other data are published with it
+  // relaxed: each value is used alone, and no other data are published with it
   std::atomic<pid_t> pid_{0};
   std::atomic<std::uint64_t> restarts_{0};
-  // seconds UTC << 24 | hung << 16 | wait status; 0: it has not ended yet
+  // seconds UTC << 24 | hung << 16 | wait status; 0: abbe-dds has not ended yet
   std::atomic<std::int64_t> last_end_{0};
   std::atomic<std::int64_t> started_ns_{0};
   std::atomic<std::int64_t> asked_ns_{0};

@@ -21,8 +21,8 @@
 
 namespace abbe::daemon {
 
-/// The warning that DDS Security is off: what it means and what to do. For the log, `abbe status`
-/// and Health.
+/// Text of the warning that DDS Security is off: what this means and what to do. For the log, `abbe
+/// status` and Health.
 [[nodiscard]] std::string dds_security_is_off(std::uint32_t domain);
 
 /// The participant profile that abbe's programs use from the XML file of the site.
@@ -40,9 +40,9 @@ struct DdsKeysOptions {
   std::chrono::days validity{3650};
 };
 
-/// Creates the folder described above: keys on EC P-256, governance and permissions signed by a new
-/// certificate authority. Error Refused if the folder is not empty. Error Io if it cannot be
-/// written or OpenSSL fails; the folder is then removed.
+/// Creates the folder of keys: keys on the curve EC P-256, with governance and permissions
+/// documents signed by a new certificate authority. Error Refused if the folder is not empty. Error
+/// Io if it cannot be written or OpenSSL fails; the folder is then removed.
 [[nodiscard]] Result<void> make_dds_keys(const DdsKeysOptions& options,
                                          std::chrono::system_clock::time_point now);
 

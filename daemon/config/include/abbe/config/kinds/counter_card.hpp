@@ -19,9 +19,10 @@ struct CounterCardConfig {
   UsbCardConfig card{.name = "counter_card"};
   std::uint32_t sample_every = 1;  ///< one axis sample per this number of scans
   bool axes_compensated = false;   ///< true: the control already corrects these readings
-  /// True: an axis without reference marks is referenced where it is when the card is configured
-  /// for the first time; it then reads its offset. If false, and always after the card restarted
-  /// during operation, the axis is not referenced until `abbe reference --here`.
+  /// True: when the card is configured for the first time, the position of an axis without
+  /// reference marks is defined as its offset, so that the axis is referenced. If false, and always
+  /// after the card restarted during operation, the axis is not referenced until `abbe reference
+  /// --here`.
   bool zero_is_here = false;
 };
 

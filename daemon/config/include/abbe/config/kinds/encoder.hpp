@@ -13,13 +13,15 @@ namespace abbe::daemon {
 struct ConfigKind;
 
 enum class EncoderTransport { Udp, SocketCan };
-/// The SYNC producer. Daemon: the device thread. Kernel: CAN_BCM with its timer. External: the
-/// machine; abbed then sends nothing on the bus.
+/// The producer of the SYNC messages. Daemon: the device thread of abbed. Kernel: the timer of the
+/// kernel's CAN_BCM sockets. External: the machine; abbed then sends nothing on the bus.
 enum class SyncConfig { Daemon, Kernel, External };
 
-/// One element of [encoder] nodes. The step is negative with `invert = true`:
+/// One element of [encoder] nodes, with
 ///
 ///   reading = offset + count * step
+///
+/// `invert = true` in the file makes the step negative.
 struct EncoderNodeConfig {
   std::string axis;
   std::uint8_t node = 0;  ///< CANopen node id, 1 to 127
@@ -48,7 +50,7 @@ struct EncoderConfig {
   /// Standard uncertainty of sampling_delay; 0 only with simulated devices.
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
   /// True: the control already corrects these readings. Then no model becomes ACTIVE and none can
-  /// be identified, because it would add to the correction of the control.
+  /// be identified, because a model would correct the same errors a second time.
   bool axes_compensated = false;
   /// In the order of MachineConfig::axes; contains X, Y and Z.
   std::vector<EncoderNodeConfig> nodes;

@@ -1,6 +1,6 @@
 #pragma once
-/// [cmm]: a measuring machine with an I++ DME server. The daemon takes its touches, and its
-/// positions as axis readings if no other device reads the axes. Pure data.
+/// [cmm]: a measuring machine with an I++ DME server. The daemon uses the touches of the machine,
+/// and its positions as axis readings if no other device reads the axes. Pure data.
 
 #include <chrono>
 #include <cstdint>

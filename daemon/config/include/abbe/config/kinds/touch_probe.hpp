@@ -1,6 +1,7 @@
 #pragma once
-/// [probe]: the touch probe on the latch and edge channels of the card that counts the axes. `abbe
-/// calibrate probe` determines delay and jitter of this probe; the wiring comes from the card.
+/// [probe]: the touch probe that is wired to the latch or edge channel of the card that counts the
+/// axes. Delay and jitter of the probe are determined by `abbe calibrate probe`. The channels are
+/// part of the table of the card. Pure data.
 
 #include <chrono>
 #include <string>

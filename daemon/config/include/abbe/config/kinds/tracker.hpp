@@ -1,6 +1,6 @@
 #pragma once
-/// [tracker]: the connected laser tracker. Pure data. The noise in the same table is part of
-/// MachineConfig.
+/// [tracker]: the connected laser tracker. Pure data. The standard deviations of its points, in the
+/// same table, are members of MachineConfig.
 
 #include <chrono>
 #include <cstdint>
@@ -16,11 +16,11 @@ struct ConfigKind;
 /// distances.
 enum class WeatherConfig { None, Read, Compute };
 
-/// Continuous: for on-the-fly runs. Stationary: one mean value after another, for verification at
-/// standstills; on-the-fly runs are then not possible.
+/// Continuous: the tracker measures during motion, for on-the-fly runs. Stationary: it delivers one
+/// mean value after another, for verification at standstills; on-the-fly runs are not possible.
 enum class TrackerModeConfig { Continuous, Stationary };
 
-/// Search of the tracker for its reflector. emScon sets both values with one command.
+/// How the tracker searches its reflector. One command of emScon sets both values.
 struct TrackerSearchConfig {
   double radius_m = 0.0;
   std::chrono::nanoseconds timeout{};  ///< whole ms

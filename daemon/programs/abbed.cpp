@@ -84,7 +84,8 @@ int check(const std::string& file) {
   return kDone;
 }
 
-/// Blocks the signals before any thread is started, so that only the main thread receives them.
+/// Blocks SIGINT and SIGTERM before any thread is started, so that only the main thread receives
+/// them.
 sigset_t block_stop_signals() {
   sigset_t stop;
   sigemptyset(&stop);
@@ -165,7 +166,8 @@ int abbed_main(int argc, char** argv) {
   abbed->reset();
   fmt::print(stderr, "abbed: stopped\n");
 
-  // An identification checks its stop flag only from time to time: do not wait for it.
+  // A running identification checks its stop flag only from time to time, so the process ends
+  // without waiting for it.
   if (background_tasks_running()) {
     std::fflush(nullptr);
     ::_exit(code);

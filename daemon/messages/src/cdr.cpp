@@ -68,7 +68,8 @@ Result<T> decode(std::span<const std::byte> payload) {
 
   T value;
   try {
-    // Fast CDR has no const interface, but does not write to a buffer that it decodes.
+    // Fast CDR only has an interface for writable buffers, but does not write to a buffer that it
+    // decodes.
     auto* bytes = const_cast<char*>(reinterpret_cast<const char*>(payload.data()));
     eprosima::fastcdr::FastBuffer buffer(bytes, payload.size());
     auto cdr = little_endian_cdr(buffer);

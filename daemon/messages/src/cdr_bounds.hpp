@@ -116,14 +116,15 @@ void visit(const v1::Health& m, V&& v) {
   v("fault", m.fault(), 256);
 }
 
-/// A struct of abbe_v1.idl that is an element of a sequence; its own members are checked as well.
+/// True for the structs of abbe_v1.idl that are elements of a sequence. The members of such an
+/// element are checked as well.
 template <class E>
 inline constexpr bool kIsNested =
     std::is_same_v<E, v1::Parameter> || std::is_same_v<E, v1::AxisRange> ||
     std::is_same_v<E, v1::HullVertex> || std::is_same_v<E, v1::GridNode>;
 
-/// Visits one value. Afterwards `broken` describes the first violated bound; empty if there is
-/// none.
+/// A visitor that checks the bounds of one value. After visit(), `broken` describes the first bound
+/// that is violated; it is empty if there is none.
 class Checker {
  public:
   std::string broken;

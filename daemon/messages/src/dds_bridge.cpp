@@ -58,8 +58,9 @@ struct DdsBridge::State {
     if (topic == Topic::ErrorGrid) follow_slices(payload);
   }
 
-  /// DDS retains written slices for late joiners, including those of an earlier abbed. Slices with
-  /// a number beyond the newest grid belong to another model and are disposed.
+  /// Disposes the slices with a number beyond those of the grid that `payload` belongs to: they
+  /// belong to another model, perhaps of an earlier abbed, and DDS would retain them for late
+  /// joiners.
   void follow_slices(std::span<const std::byte> payload) {
     const auto key = payload_key(Topic::ErrorGrid, payload);
     const auto slices = grid_slices(payload);

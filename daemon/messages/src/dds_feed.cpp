@@ -31,7 +31,7 @@ struct DdsFeed::State {
     bridge.lost();
   }
 
-  /// Reads all waiting bytes: the latest state of abbed is at their end.
+  /// Reads all bytes that wait in the socket, because the latest state of abbed is at their end.
   void read() {
     constexpr int kMostReads = 64;  // together more than the socket buffer holds
     for (int i = 0; i < kMostReads && read_once(); ++i) {
@@ -50,8 +50,8 @@ struct DdsFeed::State {
     return false;
   }
 
-  /// Tells abbed that this loop runs. An answer may be lost if the socket is full: then abbed is
-  /// not reading.
+  /// Answers a beat, so that abbed knows that this loop runs. If the socket is full the answer is
+  /// lost; abbed then does not read, so nothing more is lost.
   void answer() const {
     const std::byte alive{};
     static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));

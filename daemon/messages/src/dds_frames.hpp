@@ -41,7 +41,8 @@ struct Frame {
   std::span<const std::byte> payload;
 };
 
-/// `payload` is a part of the reader's buffer: the caller may change it before it forwards it.
+/// One frame. `payload` is a part of the reader's buffer, so the caller may change the payload
+/// before forwarding it.
 struct ReceivedFrame {
   FrameKind kind = FrameKind::Beat;
   Topic topic = Topic::Snapshot;

@@ -24,11 +24,11 @@ constexpr mode_t kWorldReadable = 0644;
 /// accepts them at once.
 constexpr auto kClockTolerance = std::chrono::hours{24};
 
-/// The participant whose subject has the smaller SHA-256 begins the handshake. When Fast DDS 2.9
-/// begins it, it sends a Diffie-Hellman key in a format that Cyclone DDS 0.10 cannot read (Fast-DDS
-/// issue 3802). Therefore this subject was chosen so that its hash is above that of every
-/// subscriber: its hash begins with 18 one bits, the largest of the first thousand subscribers
-/// with 11.
+/// The participant whose subject has the smaller SHA-256 begins the handshake. If a Fast DDS 2.9
+/// participant begins, it sends a Diffie-Hellman key in a format that Cyclone DDS 0.10 cannot read
+/// (Fast-DDS issue 3802). The daemon uses Fast DDS, so its subject was chosen such that its hash is
+/// above that of every subscriber: the hash begins with 18 one bits, the largest of the first
+/// thousand subscribers with 11.
 constexpr const char* kDaemonSubject = "abbe-daemon-336310";
 
 Result<void> write_new(const fs::path& file, std::string_view text, mode_t mode) {

@@ -63,8 +63,7 @@ struct DdsLink::State {
   std::vector<std::byte> out;  ///< not yet sent: at most the rest of one frame
   std::size_t out_begin = 0;
   RetainedPayloads<Pending> durable;
-  /// Waiting live samples, with the times to which their ages refer. Empty unless the socket is
-  /// full.
+  /// Live samples that wait because the socket is full, with the times to which their ages refer.
   RetainedPayloads<WallTime> live;
   WallTime last_beat{};
   Beats beats;
@@ -101,7 +100,8 @@ void DdsLink::State::accept_newest() {
   }
 }
 
-/// abbe-dds sends one byte for each beat it has read, and nothing else.
+/// Reads the answers to beats. abbe-dds sends one byte for each beat that it has read, and nothing
+/// else.
 void DdsLink::State::read_answers() {
   std::array<std::byte, 64> bytes{};
   const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
@@ -139,7 +139,8 @@ bool DdsLink::State::send_waiting() {
   return static_cast<bool>(peer);
 }
 
-/// True if the frame was accepted for sending; false if the socket is full or disconnected.
+/// Queues `frame` if all earlier frames have been handed to the kernel, and sends as much as fits.
+/// False if the socket is full or disconnected; `frame` is then not sent.
 bool DdsLink::State::send_now(const Frame& frame) {
   if (!send_waiting()) return false;
   append_frame(out, frame);

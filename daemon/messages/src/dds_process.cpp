@@ -15,7 +15,8 @@ constexpr std::int64_t kStatusMask = 0xffff;
 }  // namespace
 
 std::string DdsEnd::text() const {
-  // Called by the hub: gmtime_r() is not used because it takes a lock for the time zone.
+  // gmtime_r() takes a lock for the time zone and must not be used, because the hub calls this
+  // function.
   const auto day = std::chrono::floor<std::chrono::days>(when);
   const std::chrono::year_month_day date{day};
   const std::chrono::hh_mm_ss time{std::chrono::floor<std::chrono::seconds>(when - day)};

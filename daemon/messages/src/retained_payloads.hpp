@@ -1,7 +1,7 @@
 #pragma once
-/// The newest payload per topic and key, as a durable topic sends it to late joiners. Ordered by
-/// time of publication, oldest first: a model that was published before its state is also sent
-/// again before it. Single-threaded; allocates.
+/// Keeps the newest payload of each topic and key, which a durable topic sends to late joiners.
+/// Entries are in the order of publication, oldest first, and are sent again in this order: a model
+/// before the ModelState that names it. Single-threaded; allocates.
 
 #include <algorithm>
 #include <cstddef>

@@ -16,8 +16,8 @@ namespace {
 
 using nlohmann::json;
 
-// An attachment begins with this key; its number has a fixed width, so that set_from() can replace
-// it.
+// The text of an attachment begins with this key. The number after the key has a fixed width, so
+// that set_from() can replace it.
 constexpr std::string_view kFromKey = R"({"from_ns":)";
 constexpr std::size_t kDigitsOfFrom = 20;
 

@@ -11,8 +11,8 @@ namespace abbe::daemon {
 
 namespace {
 
-/// Moves the decimal point of "d.ddde-05" by `shift`. Very small and very large numbers get an
-/// exponent, all others are written without one.
+/// Moves the decimal point of a number like "d.ddde-05" to the right by `shift` digits. Very small
+/// and very large results get an exponent, all others are written without one.
 std::string move_point(const std::string& scientific, int shift) {
   const auto e = scientific.find('e');
   const bool negative = scientific.front() == '-';

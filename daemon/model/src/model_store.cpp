@@ -117,8 +117,9 @@ fs::path ModelStore::model_path(const std::string& id) const {
 Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted,
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
-  // The model file is written first and without the lock: its content depends only on the id, so it
-  // need not wait for another process. A damaged file of the same id is replaced.
+  // The model file is written first and without the lock. Another process may write the same file,
+  // but with the same model, because the id is a hash of the model. A damaged file of this id is
+  // replaced.
   if (!load(id))
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
       return tl::make_unexpected(written.error());

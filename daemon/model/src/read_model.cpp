@@ -24,8 +24,8 @@ constexpr JsonBounds kModelBounds{
 using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, long double>;
 
-/// Reads values by path. A value that cannot be read adds a fault and becomes a default; the first
-/// 20 faults are kept.
+/// Reads values by their path in the JSON text. For a value that cannot be read, a fault is added
+/// and a default value is returned; the first 20 faults are kept.
 class Reader {
  public:
   Reader(const Json& root, std::string file) : root_(root), file_(std::move(file)) {}
@@ -63,7 +63,8 @@ class Reader {
     const Json* value = find(in, path, key);
     return value == nullptr ? 0.0 : number(*value, path + "." + key, shift);
   }
-  /// Adds a fault if the value is not in `least` to `most`, both in SI.
+  /// The number `key` of `in`, in SI. Adds a fault if it is not between `least` and `most`, both in
+  /// SI.
   double number_within(const Json& in, const std::string& path, const std::string& key, int shift,
                        double least, double most) {
     const Json* value = find(in, path, key);
@@ -266,7 +267,8 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
       within("u_temperature_K", 0, 0.0, kHighest_K - kLowest_K)};
 }
 
-/// Absent in models with a complete recording and in models of earlier versions.
+/// The recording gap of the model. The key is absent in models with a complete recording and in
+/// models of earlier versions.
 std::string read_recording_gap(Reader& in) {
   const std::string key = "recording_gap";
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
@@ -288,7 +290,8 @@ std::vector<InputFile> read_inputs(Reader& in) {
 Result<ModelDocument> read_document(Reader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
-    // With another schema all further faults would be meaningless.
+    // In a file with another schema all further faults would be meaningless, so only this one is
+    // reported.
     return tl::make_unexpected(in.to_error());
   }
 

@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 constexpr auto kLockPollPeriod = std::chrono::milliseconds{10};
 constexpr int kLockFlags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
 
-/// Sets mode 0600, or 0660 if the group may write to the folder. Also corrects an existing lock
-/// file with another mode.
+/// Sets the mode of the lock file to 0660 if the group may write to the folder, else to 0600, also
+/// if the file existed with another mode.
 void restrict_access(int lock, const fs::path& folder) noexcept {
   struct stat file {
   }, of_folder{};
@@ -40,7 +40,8 @@ FileDescriptor open_lock(const fs::path& file) {
   FileDescriptor lock{::open(file.c_str(), kLockFlags)};
   if (!lock && errno == ENOENT) {
     lock = FileDescriptor{::open(file.c_str(), kLockFlags | O_CREAT | O_EXCL, 0600)};
-    // Owner as the folder: if root creates the lock file, the daemon can still lock it.
+    // If root creates the lock file, it gets the owner of the folder, so that the daemon can lock
+    // it, too.
     if (lock) inherit_ownership(lock.get(), folder);
     // EEXIST: another process created the lock file in the meantime.
     else if (errno == EEXIST)
@@ -55,7 +56,8 @@ std::string name_in_proc(const struct stat& file) {
   return fmt::format("{:02x}:{:02x}:{}", major(file.st_dev), minor(file.st_dev), file.st_ino);
 }
 
-/// " (process 4711)"; empty if /proc/locks is not readable or does not list this file system.
+/// Which process holds the lock, as text " (process 4711)"; empty if /proc/locks is not readable or
+/// does not list this file system.
 std::string holder_of(int lock) {
   struct stat file {};
   if (::fstat(lock, &file) != 0) return {};

@@ -31,8 +31,8 @@ json to_json(const StoreEvent& event) {
   return object;
 }
 
-/// nullopt for an unknown action or a malformed time. Throws json::exception if a member is missing
-/// or has the wrong type.
+/// The event in one object of state.json. nullopt for an unknown action or a malformed time. Throws
+/// json::exception if a member is missing or has the wrong type.
 std::optional<StoreEvent> event_from(const json& object) {
   const auto action =
       std::find(kActions.begin(), kActions.end(), object.at("action").get<std::string>());
@@ -100,7 +100,8 @@ std::string to_text(const StoreState& state) {
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {
-  // Enough for one event per hour over the life of a machine; the depth is that of to_text().
+  // These limits are sufficient for one event per hour over the life of a machine, and for the
+  // nesting depth that to_text() writes.
   const auto parsed =
       parse_json(text, file, {.bytes = 256u << 20, .depth = 8, .values = 20'000'000});
   if (!parsed) return tl::make_unexpected(parsed.error());

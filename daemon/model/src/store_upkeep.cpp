@@ -41,8 +41,8 @@ std::optional<pid_t> writer_of(std::string name) {
                                                                   : std::nullopt;
 }
 
-/// True if the process does not exist. The own PID also counts: a file with it was written by an
-/// earlier process with the same PID.
+/// True if `process`, which wrote a temporary file, does not exist any more. True also for the PID
+/// of this process: the file was then written by an earlier process with the same PID.
 bool is_gone(pid_t process) noexcept {
   return process == ::getpid() || (::kill(process, 0) != 0 && errno == ESRCH);
 }

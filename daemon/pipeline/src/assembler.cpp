@@ -22,8 +22,8 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// Axis samples older than this are discarded. They are needed for the backlog that a stalled
-// tracker delivers later; ten seconds at 1 kHz take 2 MB.
+// Axis samples older than this are discarded. Older samples are needed because a stalled tracker
+// later delivers its backlog of points; ten seconds at 1 kHz take 2 MB.
 constexpr auto kAxisMemory = std::chrono::seconds{10};
 
 bool earlier(const AxisSample& sample, HostTime t) {
@@ -128,7 +128,8 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
     s.u_position = touch.u_position;
   }
 
-  // A position reported by a measuring machine is not corrected: it is not a scale reading of abbe.
+  // A position that a measuring machine reports is not corrected, because it is not the reading of
+  // a scale that abbe knows.
   if (touch.latch != protocol::TouchLatch::Reported)
     correct_for_temperature(s, options_.environment);
   return s;
@@ -147,8 +148,8 @@ Snapshot Assembler::begin(const protocol::SampleHead& head) const {
 }
 
 void Assembler::interpolate(Snapshot& s) const {
-  // The interpolation uses two samples on either side. Passing only these makes the result
-  // independent of other samples that have arrived.
+  // The interpolation uses two samples on either side of the instant. Only these four are passed,
+  // so that the result does not depend on which other samples have arrived.
   const auto after = std::lower_bound(axes_.begin(), axes_.end(), s.head.time, earlier);
   const auto first = after - std::min<std::ptrdiff_t>(2, after - axes_.begin());
   const auto end = after + std::min<std::ptrdiff_t>(2, axes_.end() - after);

@@ -57,7 +57,8 @@ FoundDatum datum_from(const json& content) {
                     .stated = content.at("stated").get<bool>()};
 }
 
-/// nullopt: more axes than a sample can have, or an invalid datum. Throws json::exception.
+/// The state in the JSON text. nullopt if it has more axes than a sample can have, or an invalid
+/// datum. Throws json::exception if a member is missing or has the wrong type.
 std::optional<CountingState> state_from(const json& content) {
   CountingState state;
   state.boot_id = content.at("boot_id").get<std::string>();

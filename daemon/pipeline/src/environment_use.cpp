@@ -25,7 +25,7 @@ void copy_if(EnvironmentMask mask, EnvironmentMask bit, double from, double& to)
   if ((mask & bit) != 0) to = from;
 }
 
-/// Copies the quantities of `mask` from `from` to `to`; NaN if `from` is too old.
+/// Copies the quantities in `mask` from `from` to `to`; they become NaN if `from` is too old.
 void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
            EnvironmentSample& to) {
   const auto value = [too_old](double v) { return too_old ? kNotAvailable : v; };
@@ -38,14 +38,15 @@ void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
   if (from.head.time > to.head.time) to.head = from.head;
 }
 
-/// Inserts by time: after a restart of a device's clock, a sample may be earlier than the last one.
+/// Inserts the sample by its time: after a restart of a device's clock, it may be earlier than the
+/// sample that arrived before it.
 void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSample& sample) {
   const auto later = [](HostTime t, const EnvironmentSample& other) { return t < other.head.time; };
   in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later),
                   sample);
 }
 
-/// The last sample not after `t`; null if there is none.
+/// The latest sample whose time is not after `t`; null if there is none.
 const EnvironmentSample* latest_at(const std::deque<EnvironmentSample>& samples, HostTime t) {
   const auto later = [](HostTime at, const EnvironmentSample& sample) {
     return at < sample.head.time;
@@ -103,7 +104,8 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
   bool any = false;
 
   if (const auto* weather = latest_at(weather_, t); weather != nullptr && weather->measured != 0) {
-    // The controller sends its weather only when it changes, so that the age is not checked.
+    // The tracker's controller sends its weather values only when they change, so their age is not
+    // checked.
     merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
     any = true;
   }

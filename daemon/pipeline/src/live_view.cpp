@@ -75,9 +75,9 @@ void LiveView::take(const protocol::AxisSample& sample) {
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }
 
-/// Removes an old tracker point and an old touch. The published message has one instant, that of
-/// the axes. If a tracker has lost its beam or its connection, its last point would appear as new
-/// as the axes.
+/// Removes a tracker point and a touch that are older than kCurrentFor. The published message has a
+/// single instant, that of the axes: after the tracker has lost its beam or connection, its last
+/// point would otherwise appear to be as new as the axes.
 bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   bool forgotten = false;
   const auto forget = [&](bool& has, auto& sample) {
@@ -91,7 +91,8 @@ bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
   return mark_axes_missing(now) || forgotten;
 }
 
-/// The last positions stay in the view; missing_mask shows that they are not current.
+/// Marks all axes missing once no axis sample has come for too long. Their last positions stay in
+/// the view; missing_mask shows that they are not current.
 bool LiveView::mark_axes_missing(protocol::HostTime now) {
   if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
   const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);

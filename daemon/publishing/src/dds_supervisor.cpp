@@ -57,7 +57,8 @@ void keep_capabilities_from_children() {
 }  // namespace
 
 Result<DdsSupervisor> DdsSupervisor::start(Options options, WallTime now) {
-  // abbe-dds ends when this process has ended, after it has published the loss to its subscribers.
+  // With this argument abbe-dds ends after abbed has ended, once it has published the loss to its
+  // subscribers.
   options.arguments.insert(options.arguments.end(), {"--parent", std::to_string(::getpid())});
   DdsSupervisor supervisor(std::move(options));
   if (auto spawned = supervisor.spawn(now); !spawned) return tl::make_unexpected(spawned.error());
@@ -134,8 +135,8 @@ bool DdsSupervisor::reap(WallTime now) {
   last_end_ = DdsEnd{status, hung_, std::chrono::system_clock::now()};
   if (options_.process != nullptr) options_.process->ended(*last_end_);
   const bool ended_at_start = now - started_ < options_.steady_after;
-  // A crash by a signal may not recur, so the delay stays short. The cause of an exit usually
-  // persists.
+  // After a signal (crash) the delay stays short, because the crash may not recur. The cause of an
+  // exit usually persists, so the delay grows.
   const auto longest = WIFSIGNALED(status) ? options_.first_delay : options_.longest_delay;
   delay_ = ended_at_start ? std::clamp(2 * delay_, options_.first_delay, longest) : 0ms;
   next_start_ = now + delay_;

@@ -194,7 +194,8 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
 
-  // Age of the position of this vector; subscribers compare it with validity_ns.
+  // Age of the axis position to which this vector belongs; subscribers compare the age with
+  // validity_ns.
   m.age_ns((stamp.now - s.head.time).count());
   m.validity_ns(validity.count());
   if (active == nullptr) return m;

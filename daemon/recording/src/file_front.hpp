@@ -15,8 +15,8 @@ struct PartOf {
   std::string follows;     ///< name of the previous file, empty for the first
 };
 
-/// Appends everything from the magic to the channels to `out`, and adds it to `summary`. `out` must
-/// be empty: offsets count from its beginning.
+/// Appends everything from the MCAP magic to the channels to `out`, and adds the index entries to
+/// `summary`. `out` must be empty, because offsets in the file count from its beginning.
 void append_front(const RecordingInfo& info, const PartOf& part,
                   protocol::mcap::SummaryBuilder& summary, protocol::mcap::Buffer& out);
 

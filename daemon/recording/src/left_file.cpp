@@ -32,7 +32,7 @@ std::uint64_t length_at(mcap::Bytes bytes, std::size_t at) {
   return number;
 }
 
-/// True if a whole chunk is in `tail`. A truncated record is followed by nothing else; if a whole
+/// True if `tail` contains a whole chunk. Behind a truncated record nothing follows; if a whole
 /// chunk follows a record that seems truncated, the length of that record is damaged.
 bool contains_whole_chunk(mcap::Bytes tail) {
   constexpr std::byte kChunk{static_cast<std::uint8_t>(mcap::Opcode::Chunk)};
@@ -267,8 +267,8 @@ Result<bool> LeftFile::is_zero_from(std::uint64_t offset) const {
   return true;
 }
 
-/// The last chunk is whole, but some of its indexes may be missing: then chunk and indexes are
-/// written again.
+/// Handles the last chunk, which is whole. Some of its indexes may be missing: then the chunk and
+/// its indexes are written again.
 Result<void> LeftFile::judge_last_chunk() {
   if (!chunk_) return {};
   if (chunk_->length > kLargestPiece) return end_chunk(), Result<void>{};

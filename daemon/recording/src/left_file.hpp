@@ -18,11 +18,12 @@ namespace abbe::daemon::recording {
 
 class LeftFile {
  public:
-  /// nullopt: the file does not exist any more, or another process still writes it.
+  /// Opens and locks the file. nullopt if it does not exist any more, or if another process is
+  /// still writing it.
   [[nodiscard]] static Result<std::optional<LeftFile>> open(const std::filesystem::path& part);
 
-  /// Finds all whole records. BadInput: damaged before its end. Io: `stop` was set, or the file
-  /// cannot be read.
+  /// Finds all whole records of the file. BadInput if it is damaged before its end; Io if `stop`
+  /// was set or the file cannot be read.
   [[nodiscard]] Result<void> read(const std::atomic<bool>& stop);
   /// True if the file has neither messages nor attachments.
   [[nodiscard]] bool holds_nothing() const {

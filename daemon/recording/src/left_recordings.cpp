@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPart = ".mcap.part";
 
-/// True for NAME.mcap.part, NAME-2.mcap.part ... of this run.
+/// True if `file` belongs to the run `running`: its name is NAME.mcap.part, NAME-2.mcap.part ...,
+/// with the NAME of this run.
 bool is_written_by(const std::string& file, const std::string& running) {
   return !running.empty() && file.starts_with(running) &&
          (file[running.size()] == '.' || file[running.size()] == '-');

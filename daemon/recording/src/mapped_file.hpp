@@ -11,7 +11,7 @@ namespace abbe::daemon::recording {
 
 class MappedFile {
  public:
-  /// Error (Io): cannot be opened or mapped. An empty file has no bytes.
+  /// Error (Io) if the file cannot be opened or mapped. For an empty file bytes() is empty.
   [[nodiscard]] static Result<MappedFile> open(const std::filesystem::path& file);
   MappedFile(MappedFile&& other) noexcept;
   MappedFile& operator=(MappedFile&&) = delete;

@@ -1,7 +1,8 @@
 #pragma once
-/// Checksums of the metadata that a replay and an identification read: MCAP has none for metadata
-/// records. Each of the three records of abbe has a checksum over its name and all its other
-/// entries. Recordings of older versions only have a checksum of the configuration's text.
+/// Checksums of the metadata that a replay and an identification read; MCAP itself defines none for
+/// metadata records. Each of the three metadata records of abbe has a checksum over its name and
+/// all its other entries. Recordings of older versions only have a checksum of the configuration's
+/// text.
 
 #include <map>
 #include <string>
@@ -22,7 +23,8 @@ inline constexpr const char* kChecksum = "entries_sha256";
 
 struct MetadataJudgement {
   MetadataCheck configuration = MetadataCheck::Unchecked;
-  /// of the other records: "metadata abbe.versions: its checksum is wrong"; empty: none
+  /// damage in the records other than the configuration: "metadata abbe.versions: its checksum is
+  /// wrong"; empty: none
   std::string damage;
 };
 [[nodiscard]] MetadataJudgement judge_metadata(

@@ -47,8 +47,8 @@ bool is_of_run(const std::string& file, const std::string& name) {
          (file[name.size()] == '.' || file[name.size()] == '-');
 }
 
-/// Files with an earlier date were written with a wrong clock (empty battery of the real-time
-/// clock): abbe did not exist then.
+/// Files with an earlier date were written while the clock was wrong (empty battery of the
+/// real-time clock), because abbe did not exist at that date.
 fs::file_time_type earliest_date() {
   using namespace std::chrono;
   return file_clock::from_sys(sys_seconds{sys_days{year{2026} / January / 1}});

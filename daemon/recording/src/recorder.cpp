@@ -56,8 +56,9 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Repeats the last environment sample of each device, because some devices send only changes. The
-/// message is dated at the beginning of the file; its content keeps the time of measurement.
+/// Repeats the last environment sample of each device in a new file, because some devices send only
+/// changes. The message is dated at the beginning of the file; its content keeps the time of
+/// measurement.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;

@@ -40,8 +40,8 @@ IoResult Recorder::State::write_front(RecordingFile& fresh,
   return fresh.sync();
 }
 
-/// Requests of ended calibrations are not repeated in the next file; the newest request is kept
-/// while its calibration is running.
+/// Removes the requests of ended calibrations from the attachments that are repeated in the next
+/// file. The newest request is kept while its calibration is running.
 void Recorder::State::forget_finished_requests() {
   bool keep_newest = calibrating;
   std::vector<TimedAttachment> kept;
@@ -150,7 +150,8 @@ bool Recorder::State::is_full() const {
          options.max_file_bytes > 0 && file->size() >= options.max_file_bytes && !calibrating;
 }
 
-/// Called between two cycles of the hub, so that a file begins with a whole cycle.
+/// Closes the chunk, and begins the next file if this one is full. Called between two cycles of the
+/// hub, so that a file begins with a whole cycle.
 void Recorder::State::end_cycle() {
   write_chunk();
   if (is_full()) continue_in_next_file();

@@ -55,7 +55,8 @@ struct Recorder::State {
   [[nodiscard]] std::string gap_of_run() const;
   [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
   void put(Stream stream, Dates dates, std::span<const std::byte> payload);
-  /// Marks in `message` how many messages are missing before it, and adds it.
+  /// Sets lost_before of `message` to the number of messages that are missing before it, and adds
+  /// the message to the chunk.
   template <class Message>
   void add_marked(Stream stream, Dates dates, std::string_view device, Message& message);
   void add_carried_environment(protocol::HostTime begin);

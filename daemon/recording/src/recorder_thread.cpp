@@ -114,7 +114,7 @@ struct Waiting {
   }
 };
 
-/// Number of messages of each stream that were dropped since the last accepted one.
+/// Messages of each stream that were dropped since the last one that was not dropped.
 struct Dropped {
   std::uint32_t points = 0, axes = 0, environment = 0, touches = 0, touch_scans = 0;
   std::vector<std::uint32_t> measured;  // of each device of the environment
@@ -174,7 +174,7 @@ struct RecorderThread::State {
     delete new_status.load(std::memory_order_relaxed);
   }
 
-  /// Exists while the hub adds data: the recorder then finds a null pointer.
+  /// While an Adding exists, the hub adds data and the recorder finds `waiting` to be null.
   struct Adding {
     explicit Adding(State& s)
         : state(s), to(s.waiting.exchange(nullptr, std::memory_order_acquire)) {}

@@ -132,7 +132,8 @@ bool is_truncated_end(mcap::Bytes rest) {
 }
 
 void collect_by_scan(mcap::Bytes file, Collector& collector) {
-  // The recording was closed: records that do not continue to its end are damaged, not truncated.
+  // The recording ends with the magic, so it was closed: if the records do not continue to this
+  // end, they are damaged, not truncated.
   collector.cut_is_damage = mcap::ends_with_magic(file);
   mcap::LinearScan scan{file};
   bool cut_chunk = false;

@@ -12,8 +12,8 @@
 
 namespace abbe::daemon::recording {
 
-/// A chunk whose messages can be read. The times are computed from its messages, not read from its
-/// head.
+/// A chunk whose messages can be read. The times are computed from the messages of the chunk, not
+/// read from the chunk's head, which may be damaged.
 struct ReadableChunk {
   protocol::mcap::Bytes records;
   std::uint64_t earliest_ns = 0;  ///< of this chunk and all after it

@@ -30,7 +30,7 @@ tl::expected<void, IoFault> sync_directory_of(const std::filesystem::path& file)
   if (fd < 0) return unexpected(io_fault("open", directory, errno));
   const int error = ::fsync(fd) == 0 ? 0 : errno;
   ::close(fd);
-  // EINVAL: this file system cannot sync a directory.
+  // EINVAL means that this file system cannot sync a directory; that is not treated as a fault.
   if (error != 0 && error != EINVAL) return unexpected(io_fault("fsync", directory, error));
   return {};
 }

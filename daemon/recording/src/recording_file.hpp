@@ -32,26 +32,26 @@ class RecordingFile {
   RecordingFile& operator=(RecordingFile&&) noexcept;
   ~RecordingFile();
 
-  /// Appends all of `piece`, with one pwrite if the system accepts it at once. After a failure the
-  /// file is cut back to its former size.
+  /// Appends all of `piece`, with one pwrite unless the system accepts only a part of it. After a
+  /// failure the file is cut back to the size before the call.
   [[nodiscard]] tl::expected<void, IoFault> append(std::span<const std::byte> piece);
-  /// fdatasync. After a failure the file stays damaged(): Linux reports a write-back error only
-  /// once, so a later success proves nothing.
+  /// Calls fdatasync. After a failure the file stays damaged(), even if a later call succeeds:
+  /// Linux reports a write-back error only once.
   [[nodiscard]] tl::expected<void, IoFault> sync();
-  /// fsync, rename to NAME.mcap or NAME.damaged.mcap (which must not exist), fsync of the
-  /// directory. The file is closed even if fsync failed and the file became damaged().
+  /// Closes the file: fsync, rename to NAME.mcap or, if damaged(), to NAME.damaged.mcap (neither
+  /// may exist), and fsync of the directory. The file is closed even if fsync failed.
   [[nodiscard]] tl::expected<void, IoFault> finish();
-  /// Removes the file, for one that contains no message.
+  /// Closes and removes the file. For a file that contains no message.
   void discard() noexcept;
 
-  /// True if the disk reported an error while the file was written. Its name then is
+  /// True if the disk reported an error while the file was written. The file then gets the name
   /// NAME.damaged.mcap(.part).
   [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] bool is_open() const noexcept { return fd_ >= 0; }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   [[nodiscard]] std::string sha256() const { return hash_->hex_so_far(); }
-  /// Free space of its file system for an unprivileged process.
+  /// Free space, for an unprivileged process, of the file system that contains the file.
   [[nodiscard]] std::uint64_t free_bytes() const noexcept;
 
  private:

@@ -28,7 +28,8 @@ bool parse(std::string_view text, T& value) {
   return error == std::errc{} && end == text.data() + text.size();
 }
 
-/// nullopt if these are not the metadata of a recording of abbe.
+/// The description of the recording; nullopt if `contents` has not the metadata of a recording of
+/// abbe.
 std::optional<RecordingInfo> info_of(const Contents& contents) {
   const auto text = [&](std::string_view record, std::string_view key) -> std::string {
     const auto entries = contents.metadata.find(std::string(record));
@@ -222,8 +223,9 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 
 // --- messages by time
 
-/// Chunks overlap in time, because the recorder writes one stream after the other. The cursor opens
-/// them in file order and delivers a message once no unopened chunk can contain an earlier one.
+/// Position in the messages of all chunks. Chunks overlap in time, because the recorder writes one
+/// stream after the other. The cursor opens chunks in file order and delivers a message once no
+/// unopened chunk can contain an earlier message.
 struct RecordingReader::Cursor::State {
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;

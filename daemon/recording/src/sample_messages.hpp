@@ -22,7 +22,7 @@ void fill(v1::EnvironmentSample& message, const protocol::EnvironmentSample& sam
 [[nodiscard]] protocol::TouchScan sample_of(const v1::TouchScan& message);
 [[nodiscard]] protocol::EnvironmentSample sample_of(const v1::EnvironmentSample& message);
 
-/// Marks in a message that `lost` messages of its stream are missing before it.
+/// Marks in `message` that `lost` messages of the same stream are missing before it.
 template <class Message>
 void mark_gap(Message& message, std::uint32_t lost) {
   message.flags(message.flags() | protocol::SampleFlag::GapBefore);

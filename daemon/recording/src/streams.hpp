@@ -44,8 +44,9 @@ struct StreamNames {
 }
 
 inline constexpr std::string_view kRecordingMetadata = "abbe.recording";
-/// Entry of kRecordingMetadata. In files without it (of older versions) log_time is the instant
-/// described.
+/// Entry of the metadata record kRecordingMetadata. In files without this entry, which older
+/// versions wrote, log_time is the instant that a message describes, not the time of the hub's
+/// cycle.
 inline constexpr const char* kLogTime = "log_time";
 inline constexpr std::string_view kConfigurationMetadata = "abbe.configuration";
 inline constexpr std::string_view kVersionsMetadata = "abbe.versions";

@@ -1,7 +1,7 @@
 #pragma once
-/// Raw blocks of all devices that wait for the recorder. Each takes only the memory of its own
-/// length: most use a twentieth of a RawBlock's capacity. The device names must outlive this
-/// object.
+/// Raw blocks of all devices that wait for the recorder. A block takes only as much memory as its
+/// bytes: most blocks use a twentieth of the capacity of a RawBlock. The device names must outlive
+/// this object.
 
 #include <span>
 #include <string_view>
@@ -18,8 +18,8 @@ class WaitingBlocks {
   [[nodiscard]] static std::size_t bytes_of(const protocol::RawBlock& block) noexcept {
     return sizeof(Head) + block.length;
   }
-  /// `dropped`: number of blocks of the device dropped before this one. It is added to lost_before
-  /// and reset to 0.
+  /// Appends a block. `dropped`: number of blocks of the same device that were dropped before it;
+  /// added to lost_before of the block and then reset to 0.
   void append(protocol::HostTime taken, std::string_view device, const protocol::RawBlock& block,
               std::uint32_t& dropped) {
     const auto from = protocol::to_raw_bytes(block, {}).bytes;

@@ -1,8 +1,8 @@
 #pragma once
 /// The hub cycles in which the live run received the samples of one stream. A driver passes on raw
 /// bytes before the sample decoded from them, and the hub drains samples before bytes. The recorded
-/// bytes can therefore be in an earlier cycle than their sample, and the replay holds the decoded
-/// sample until the cycle of the live run.
+/// bytes can therefore be in an earlier cycle than their sample. So the replay holds a sample that
+/// it decoded from the bytes until the cycle in which the live run received this sample.
 
 #include <chrono>
 #include <deque>

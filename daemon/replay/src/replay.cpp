@@ -29,8 +29,9 @@ namespace {
 using protocol::HostTime;
 
 constexpr std::uint64_t kMessagesPerProgress = 256;
-// Largest delay of a live sample after its raw bytes, in recorded time: threads of a busy computer,
-// with simulated time many times faster than real time.
+// Largest delay of a live sample after its raw bytes, in recorded time. The delay is caused by the
+// threads of a busy computer, and is longer if simulated time runs many times faster than real
+// time.
 constexpr auto kLongestAhead = std::chrono::seconds{10};
 
 /// The calibrations that were requested during the recording, replayed one after the other.
@@ -191,7 +192,8 @@ Result<std::vector<CalibrationRequest>> requests_of(const RecordingReader& recor
   return requests;
 }
 
-/// Holds the replay back to `speed` times the recorded time, which began at `first`.
+/// Slows the replay down to `speed` times the speed of the live run. `first`: recorded time of the
+/// start.
 class Pace {
  public:
   Pace(double speed, HostTime first) : speed_(speed), first_(first) {}

@@ -49,7 +49,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-/// JSON for a script element; "</" is escaped because it would end the element.
+/// The value as JSON text for a script element. "</" is escaped, because it would end the element.
 std::string for_script(const json& value) {
   std::string text = value.dump();
   for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)

@@ -45,7 +45,8 @@ namespace {
 
 using BackgroundTask = std::function<void()>;
 
-/// Only ordinary threads take the mutex: the dispatcher and the threads that run tasks.
+/// The dispatcher and the worker threads. Only these ordinary threads take the mutex; a thread that
+/// passes a task to the dispatcher does not.
 class BackgroundThreads {
  public:
   BackgroundThreads() : dispatcher_([this] { dispatch(); }) {}

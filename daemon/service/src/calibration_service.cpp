@@ -30,7 +30,8 @@ std::string verdict_text(const calib::Verdict& verdict) {
   return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
 }
 
-// A full disk or a lock lasts until an operator acts; one attempt writes one small file.
+// Period of further attempts to store a model. It may be long, because a full disk or a lock
+// usually lasts until an operator acts.
 constexpr auto kStoreAgain = std::chrono::seconds{5};
 
 template <class T>

@@ -71,7 +71,8 @@ Result<void> check_zeros(const HubParts& parts, const MethodNeeds& needs) {
           fmt::format("{} {}", fmt::join(unknown, ", "), unknown.size() == 1 ? "is" : "are")));
 }
 
-/// Refused while the tracker executes an order: points before and after an order must not be mixed.
+/// Refused while the tracker executes an order: a run must not contain points from before and after
+/// an order.
 Result<void> check_tracker_is_free(const HubParts& parts, const MethodNeeds& needs) {
   const auto* order = parts.tracker != nullptr ? parts.tracker->running() : nullptr;
   if (order == nullptr || !needs.tracker) return {};
@@ -180,7 +181,8 @@ Reply look_at_verification(VerificationService& service, std::uint64_t number, s
 }
 
 /// {"step": "begin"} returns the number of the verification. {"step": "look" | "end", "number": ..,
-/// "from": k} returns the points from index k on; "end" first closes the present standstill.
+/// "from": k} returns the points from index k on; with "end", the present standstill becomes the
+/// last point first.
 Result<OnHub> verification(const HubParts& parts, const json& request) {
   if (parts.verification == nullptr) return fail(ErrorCode::Refused, "verify: not in this daemon");
   const auto step = request.at("step").get<std::string>();
@@ -223,8 +225,8 @@ struct Verb {
   Task task;
 };
 
-// The only table of requests: a request is executed with the task and the role of the same row. The
-// first row that matches applies.
+// The only table of requests. A request is executed with the task and the role of the first row
+// that matches it.
 constexpr std::array kVerbs{
     Verb{"status", "", Role::Look, status},
     Verb{"calibrate", "", Role::Change, calibrate},

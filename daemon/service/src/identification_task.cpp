@@ -17,7 +17,8 @@ constexpr std::chrono::milliseconds kLookForStop{100};
 // model is stored without this hash.
 constexpr auto kDigestTimeout = std::chrono::seconds{10};
 
-/// Digest of the recording of the run. Never fails: RecordingDigest::gap states why there is none.
+/// Hash of the recording of the run. Never fails: if there is no hash, RecordingDigest::gap states
+/// the reason.
 RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomic<bool>& stopped) {
   try {
     for (auto waited = kLookForStop; !stopped && waited < kDigestTimeout; waited += kLookForStop)
@@ -29,8 +30,8 @@ RecordingDigest digest_of(std::future<RecordingDigest>& wanted, const std::atomi
   }
 }
 
-/// Adds the recording to `inputs`. The first input is the one with which the model can be checked:
-/// a recording with a gap is therefore added at the end.
+/// Adds the recording to `inputs`, the files that the model names as its inputs. A model is checked
+/// by a replay of its first input, so a recording with a gap is added at the end.
 void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   if (recording.bytes == 0) return;
   // The recording continues, so its hash covers only the first `bytes` bytes of the file.

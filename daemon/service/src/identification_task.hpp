@@ -24,7 +24,8 @@ struct JudgedModel {
   std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
 };
 
-/// Shared by the hub's thread and one task, which may outlive the service.
+/// State of an identification, shared by the hub's thread and the task, which may outlive the
+/// CalibrationService.
 class IdentificationState {
  public:
   std::atomic<double> share{0.0};  ///< progress of the identification, 0 to 1

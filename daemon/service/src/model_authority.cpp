@@ -16,7 +16,8 @@ using protocol::HostTime;
 // or restore it from a backup, which does not change the stamp of the store.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
-/// Why the model may be used: the gate accepted it, or a user, who is named, forced it.
+/// The reason of the state ACTIVE: the gate accepted the model, or a user, who is named, forced its
+/// activation.
 std::string reason_of(const StoreEvent& activation) {
   const auto done_by = [&activation](std::string_view what) {
     const auto& [who, why, when] = activation.actor;

@@ -1,7 +1,7 @@
 #pragma once
-/// Requests that move a measuring machine, stop it or ask where it stands: what
-/// `abbe calibrate artefact` and `abbe machine` send. All run on the client's thread; the step
-/// that they return runs on the hub's thread.
+/// Requests that move a measuring machine, stop it or ask for its position: those of `abbe
+/// calibrate artefact` and `abbe machine`. All functions run on the client's thread; the step that
+/// they return runs on the hub's thread.
 
 #include "on_hub.hpp"
 

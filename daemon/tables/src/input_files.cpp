@@ -66,7 +66,7 @@ void check_spherical(ParsedTable& parsed) {
 }
 
 calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t row) {
-  // emScon point status: the highest one of a valid point
+  // emScon point status "speed warning", the highest status of a valid point
   constexpr double kSpeedWarning = 1.0;
   calib::otf::TrackerObservation point;
   point.time_s = table.at(row, 0);

@@ -18,7 +18,7 @@ namespace evemu = calib::evemu;
 using protocol::HostTime;
 using protocol::TouchFlag;
 
-/// Why a touch cannot be used; empty: it can.
+/// Why the touch cannot be used; empty if it can be used.
 std::string_view fault_of(const protocol::Snapshot& touch) {
   const auto flags = touch.trigger.touch_flags;
   static constexpr std::array<std::pair<TouchFlag, std::string_view>, 6> kFaults{
@@ -37,7 +37,7 @@ std::string_view fault_of(const protocol::Snapshot& touch) {
   return {};
 }
 
-/// Message if a reading is outside the travel; empty: it is inside.
+/// The text of a fault if the reading is outside the travel by more than kTolerance_m; else empty.
 std::string outside(const calib::Vector3& reading_m,
                     const std::optional<calib::MachineNodes>& travel) {
   constexpr double kTolerance_m = 1e-3;

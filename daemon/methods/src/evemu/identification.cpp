@@ -21,7 +21,8 @@ evemu::JudgeOptions judge_options(const Config& config) {
   evemu::JudgeOptions options;
   options.limits = gate_limits(config.gate);
   options.accept_shape_only = config.gate.accepts(evemu::kShapeOnly);
-  // Both names were checked when the configuration was read.
+  // The names of estimator and folds were checked when the configuration was read, so value_or()
+  // never takes effect.
   options.solve.estimator =
       evemu::estimator(config.evemu.estimator).value_or(evemu::Estimator::BayesPose);
   options.solve.sparse.folds =

@@ -90,7 +90,7 @@ void add_array(HtmlReport& page, const evemu::ArtefactUncertainty& artefact) {
   page.facts(facts);
 }
 
-/// Error components (`before`) or residual components of all balls except Ball1, um.
+/// Components, in um, of the errors V (`before`) or of the residuals at all balls except Ball1.
 std::vector<double> components_um(const evemu::Observations& o, const evemu::Solution& solution,
                                   bool before) {
   std::vector<double> out;

@@ -18,8 +18,9 @@ using protocol::HostTime;
 using protocol::SampleFlag;
 using protocol::Snapshot;
 
-// If the machine is off its leg for longer than this, it is on a later leg: the beam was
-// interrupted at the corner. A shorter time is caused by a change of the tracker's clock mapping.
+// A machine that is farther from its leg than the tolerance for longer than this is on a later leg:
+// the beam was interrupted when the machine passed the corner. For a shorter time, a change in the
+// mapping of the tracker's clock can cause such a distance.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
 constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
 
@@ -87,7 +88,7 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
   if (has_linear_axes(snapshot)) axes_known_at_ = point.time;
   give_up_if_stuck(point.time);
 
-  // A point without axis positions keeps its place in the sequence and is not evaluated further.
+  // A point without axis positions is kept in its place of the sequence, but not evaluated further.
   if (!has_linear_axes(snapshot)) {
     if (phase_ == Phase::Running) keep(point);
     return;

@@ -12,7 +12,7 @@ ResidualFigures document_figures(const calib::otf::ResidualStatistics& s) {
   return {s.mean_abs_m, s.rms_m, s.max_abs_m};
 }
 
-/// Without degrees of freedom the value is not defined; the file then contains 0.
+/// Statistics that need degrees of freedom are not finite without any; model.json then contains 0.
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }

@@ -39,7 +39,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   const auto points = otf_observations(run.points);
   calib::otf::Options options = otf_options(points, machine_config, gate);
 
-  // A run needs scale readings, and they were compared with the path at the vertices.
+  // A live run has scale readings, and they were found to agree with the path at its vertices.
   options.orientation.scales_agree = true;
   if (watch.progress) {
     options.progress = [&watch](calib::otf::Stage stage, double fraction) {

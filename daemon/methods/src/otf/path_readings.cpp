@@ -40,8 +40,8 @@ double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
   return way.norm() / (readings[after].time_s - readings[before].time_s);
 }
 
-/// False if a neighbouring vertex is so near that the readings do not show at which of the two the
-/// machine is.
+/// False if a neighbour of vertex `i` is so near that the readings do not show at which of the two
+/// vertices the machine is.
 bool is_isolated(std::span<const AxisPosition> path_m, std::size_t i) {
   const auto far = [&](std::size_t a, std::size_t b) {
     return (vector(path_m[a]) - vector(path_m[b])).norm() > 2.0 * kNear_m;

@@ -43,8 +43,8 @@ void add_residuals(HtmlReport& page, const ModelStatistics& s,
       Histogram{"after", "residual across the path, um", {{"after", in_um(residuals.after_m)}}});
 }
 
-/// Errors of one kind (displacements or rotations) along one axis. `axis` is the last letter of
-/// their names.
+/// Chart of the errors of one kind (rotations if `angles`, else displacements) along one axis.
+/// `axis` is the last letter of the names of these errors, for example X in EAX.
 LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis, bool angles) {
   LineChart chart;
   chart.title =

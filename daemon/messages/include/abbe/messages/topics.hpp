@@ -32,7 +32,8 @@ struct TopicTraits {
   /// Live: only the newest sample is of use; best effort; a sample is dropped, not queued.
   /// Durable: the newest sample per key is retained, sent to late joiners, and repeated.
   enum class Kind : std::uint8_t { Live, Durable };
-  /// The leading members of the IDL type that form its key.
+  /// The leading members of the IDL type that form the DDS key of the topic: machine alone, or
+  /// machine and a number or text.
   enum class Key : std::uint8_t { Machine, MachineAndNumber, MachineAndText };
 
   Topic topic;
@@ -51,7 +52,8 @@ struct TopicTraits {
 /// The key of a payload (CDR_LE with its 4-byte header): the bytes of the leading members in the
 /// payload. nullopt if the bytes are not a payload or end within the key.
 struct PayloadKey {
-  /// From after the header to the end of the key. Equal bytes mean the same instance.
+  /// The bytes of the payload from after its header to the end of the key. Payloads with equal
+  /// bytes belong to the same DDS instance.
   std::span<const std::byte> bytes;
   std::string_view machine;              ///< without its NUL
   std::optional<std::string_view> text;  ///< MachineAndText: the second text

@@ -26,9 +26,9 @@ struct CalibrationRequest {
 
 /// {"method": ..., members of the method's request}. Numbers are written without loss.
 [[nodiscard]] nlohmann::json to_json(const CalibrationTask& task);
-/// BadInput with the member that is missing or of the wrong type; Usage for an unknown method.
-/// `config`: gives the values of optional members that the object does not contain; null: the
-/// defaults.
+/// Reads a request. BadInput names a member that is missing or of the wrong type; Usage for an
+/// unknown method. Optional members that `object` does not contain get their values from `config`;
+/// if `config` is null, from the defaults.
 [[nodiscard]] Result<CalibrationTask> task_from_json(const nlohmann::json& object,
                                                      const Config* config = nullptr);
 

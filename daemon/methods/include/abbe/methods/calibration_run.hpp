@@ -1,5 +1,6 @@
 #pragma once
-/// An acquired run and the judged model identified from it, for any method. Pure functions.
+/// For any method: an acquired run, and the model that is identified from it and judged by the
+/// gate. Pure functions.
 
 #include <functional>
 #include <string>
@@ -16,8 +17,8 @@ namespace abbe::daemon {
 using CalibrationRun = Methods::Run;
 using Candidate = Methods::Candidate;
 
-/// Identifies a model from the run and judges it against `active`, the active model; null if there
-/// is none.
+/// Identifies a model from the run. The gate judges the model and compares it with `active`, the
+/// active model, which is null if there is none.
 [[nodiscard]] Result<Candidate> identify(const CalibrationRun& run, const Config& config,
                                          const calib::VolumetricModel* active,
                                          const IdentificationWatch& watch = {});

@@ -54,11 +54,11 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// `options`: one element for each method, in the order of Methods.
   explicit CalibrationSession(Methods::Options options = {}) : options_(std::move(options)) {}
 
-  /// BadInput for an invalid task. May be called from any thread, also while another thread uses
-  /// the session.
+  /// Checks a task and makes it ready for start(). BadInput for an invalid task. May be called from
+  /// any thread, also while another thread uses the session.
   [[nodiscard]] Result<PreparedSession> prepare(CalibrationTask task) const;
-  /// Refused while a session is running. `prepared` may be left with data of the previous session;
-  /// the caller destroys it.
+  /// Starts a session. Refused while another session is running. Afterwards `prepared` may hold
+  /// data of the previous session; the caller destroys it.
   [[nodiscard]] Result<void> start(PreparedSession&& prepared, protocol::HostTime from);
   /// prepare() and start().
   [[nodiscard]] Result<void> start(CalibrationRequest request);
@@ -70,10 +70,11 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// only: in a replay the run is incomplete without it and gives no model either.
   void tick(protocol::HostTime now);
 
-  /// The acquired run, in the state Identifying; nullopt after it was returned once.
+  /// The acquired run, available in the state Identifying; nullopt in other states and after it was
+  /// returned once.
   [[nodiscard]] std::optional<Acquisition> take_run();
-  /// The acquisition of a refused session, returned once: destroying it may take long, so that the
-  /// caller does it in the background.
+  /// The acquisition of a refused session, returned once. The caller destroys it in the background,
+  /// because destroying it may take long.
   [[nodiscard]] std::optional<Acquisition> take_discarded() {
     return std::exchange(discarded_, std::nullopt);
   }

@@ -1,7 +1,7 @@
 #pragma once
 /// The file model.json, in which a model is stored and exchanged. In the file lengths are in mm,
 /// errors in um and urad, covariances in products of these; in the structs all values are SI.
-/// Reading a written file gives bit-identical values.
+/// Values that are written and read again are bit-identical.
 
 #include <cstddef>
 #include <filesystem>
@@ -49,14 +49,15 @@ struct ModelDocument {
   protocol::UtcTime created{};
   ModelStatistics statistics;
   std::vector<InputFile> inputs;
-  /// Thermal expansion of the ball array, if it was corrected.
+  /// Thermal expansion of the ball array for which the touches were corrected; nullopt: not
+  /// corrected.
   std::optional<calib::Expansion> artefact{};
   /// What is missing in the recording of the run. Empty if the recording is complete, or if
   /// recording was switched off. A gap does not affect the uncertainty of the model, but no replay
   /// can check such a model.
   std::string recording_gap{};
 };
-/// Text for the verdict of a model with this recording gap.
+/// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
 /// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
@@ -64,16 +65,17 @@ struct ModelDocument {
 /// inputs and statistics are not included, so that the live model and its replay have equal hashes.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 
-/// The name of a model in commands and in the store: 16 digits of a hash over model_hash() and the
-/// machine configuration of the model. An equal model for another machine configuration has another
-/// id: for a given configuration one of them is STALE when the other is ACTIVE.
+/// The id of a model in commands and in the store: 16 digits of a hash over model_hash() and the
+/// machine configuration of the model. Equal models for two machine configurations have different
+/// ids, because one of them is STALE with the configuration with which the other is ACTIVE.
 [[nodiscard]] std::string model_id(const ModelDocument& document);
 
 /// The text of model.json; the same document gives the same bytes.
 [[nodiscard]] std::string to_json(const ModelDocument& document);
 
-/// BadInput with the faults in Error::details. `file` is used only in error messages. A text whose
-/// stored hash differs from the hash of its content is refused.
+/// Reads the text of a model.json. BadInput with the faults in Error::details; a text whose stored
+/// hash differs from the hash of its content is such a fault. `file` is used only in error
+/// messages.
 [[nodiscard]] Result<ModelDocument> parse_model(std::string_view text, const std::string& file);
 [[nodiscard]] Result<ModelDocument> read_model(const std::filesystem::path& file);
 

@@ -62,8 +62,8 @@ struct StoreStamp {
 
 class ModelStore {
  public:
-  /// Creates the folder if it does not exist. Io if that fails; BadInput if state.json is damaged
-  /// (the models are not changed).
+  /// Opens a store; creates the folder if it does not exist. Io if that fails; BadInput if
+  /// state.json is damaged (the models are not changed).
   [[nodiscard]] static Result<ModelStore> open(const std::filesystem::path& folder);
 
   /// Does not access the disk: for abbed, which continues to run while the store is not available.
@@ -80,29 +80,30 @@ class ModelStore {
   [[nodiscard]] Result<void> rename_damaged_state(protocol::UtcTime now);
   /// The newest name of a state.json.damaged-DATE; empty: there is none.
   [[nodiscard]] std::string damaged_state() const;
-  /// Removes temporary files (NAME.PID.new) of processes that no longer exist. Best effort. Call it
-  /// at the start of the process, before the first write: a file with the own PID is then also a
-  /// leftover.
+  /// Removes temporary files (NAME.PID.new) of processes that no longer exist; failures are
+  /// ignored. Call it at the start of the process, before the first write, because files with the
+  /// own PID are also removed: they were left by an earlier process with the same PID.
   void remove_leftovers() const;
 
-  /// Stores a model with the verdict of the gate; returns its id. If the model exists already (same
-  /// id), only the event is stored, unless the last Added event of this model is equal (verdict,
-  /// reasons and actor).
+  /// Stores a model with the verdict of the gate; returns its id. If a model with this id exists
+  /// already, only the Added event is stored, unless the last Added event of this model is equal
+  /// (verdict, reasons and actor).
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
-  /// Makes a model active. Refused if the gate did not accept it, unless `force`; an Error if its
-  /// file is missing or damaged.
+  /// Makes a model active. Refused if the gate did not accept the model, unless `force`; an Error
+  /// if the model file is missing or damaged.
   [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
                                       bool force = false);
 
-  /// Activates the previously active model; returns its id. Refused if there was none.
+  /// Activates the model that was active before the present one; returns its id. Refused if there
+  /// was none.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor);
 
   [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
-  /// Reads state.json at every call, because other processes may change it. nullopt: no model is
-  /// active.
+  /// The id of the active model; nullopt if no model is active. Reads state.json at every call,
+  /// because other processes may change it.
   [[nodiscard]] Result<std::optional<std::string>> active_id() const;
   /// The event that made the active model active; `accepted` is the verdict of the gate on that
   /// model. Reads state.json at every call. nullopt: no model is active.
@@ -112,7 +113,8 @@ class ModelStore {
   /// give an equal document.
   [[nodiscard]] bool holds(const std::string& id, const ModelDocument& document) const;
 
-  /// If the stamp is unchanged, nothing was added or activated since.
+  /// Identifies the present state.json. While the stamp is unchanged, nothing was added or
+  /// activated.
   [[nodiscard]] StoreStamp stamp() const noexcept;
 
   /// The id that begins with `prefix` (at least 4 digits); for "active" the active id. Usage if no

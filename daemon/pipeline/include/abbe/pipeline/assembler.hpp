@@ -27,7 +27,7 @@
 namespace abbe::daemon {
 
 struct AssemblerOptions {
-  /// largest time by which a stream may lag behind the others
+  /// largest time by which a stream may lag behind the other streams
   std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};
   drivers::InterpolationOptions interpolation;
   bool axes_compensated = false;  ///< the readings are already corrected by the control

@@ -1,7 +1,7 @@
 #pragma once
-/// The samples that the hub took from the rings in one cycle, or a replay from a recording. Each
-/// stream keeps its order. Reused in each cycle with its capacity, so that it allocates only at
-/// first. Pure data.
+/// The samples that the hub took from the rings in one cycle, or that a replay took from a
+/// recording. The samples of each stream are in their order. The same object is reused in each
+/// cycle and keeps its capacity, so that it allocates only in the first cycles. Pure data.
 
 #include <cstddef>
 #include <vector>
@@ -27,7 +27,7 @@ inline constexpr const char* kAxisSamplesRule = "axis_samples";
 
 struct Batch {
   /// Time of the cycle. It is recorded, so that a replay repeats the same cycles. clear() does not
-  /// reset it.
+  /// reset this time.
   protocol::HostTime taken{};
   std::vector<protocol::TrackerPoint> points;
   std::vector<protocol::AxisSample> axes;
@@ -35,7 +35,8 @@ struct Batch {
   std::vector<FromEnvironment> measured_environment;
   std::vector<protocol::ProbeTrigger> touches;
   std::vector<protocol::TouchScan> touch_scans;
-  /// From the reference card. Its raw bytes are recorded; the crossings are not.
+  /// Crossings of reference marks, from the reference card. They are not recorded; the raw bytes of
+  /// the card are.
   std::vector<drivers::MarkCrossing> marks;
   std::vector<RawFromDevice> raw;
 

@@ -4,7 +4,7 @@
 
 namespace abbe::daemon {
 
-/// State of the counters of counted_axes() at one scan.
+/// State of the counters of the card that reads the axes (counted_axes()), at one of its scans.
 using CountingProgress = drivers::CounterCardProgress;
 
 }  // namespace abbe::daemon

@@ -1,8 +1,8 @@
 #pragma once
 /// State of the counter card that survives a restart of the daemon: DATA_DIR/counting-state.json
 /// contains the counts of the card that counts the axes, and the datum of each axis. The datum
-/// refers to the counters, which continue without the daemon. It stays valid if it is the same card
-/// with the same set-up, the computer was not rebooted, and the clock count of the card shows that
+/// refers to the counters, which continue without the daemon. It stays valid if the card and its
+/// set-up are the same, the computer was not rebooted, and the clock count of the card shows that
 /// the counters have continued (drivers::CounterCardReceiverOptions::resume_from). The file may be
 /// seconds old, because the datum changes only when an axis is referenced. Not for the RT path.
 
@@ -20,7 +20,8 @@
 
 namespace abbe::daemon {
 
-/// `datum` applies to the counts of `progress`. An axis without an element in it is not referenced.
+/// Counts and datums at the same time. `datum` applies to the counts of `progress`; an axis without
+/// an element in `datum` is not referenced.
 struct Counting {
   CountingProgress progress;
   std::vector<FoundDatum> datum;
@@ -36,19 +37,20 @@ struct CountingState {
 /// clock, probe channels, width, reference marks, speed of time. JSON in one line. Requires
 /// counted_axes().
 [[nodiscard]] std::string counting_set_up(const Config& config);
-/// Boot id of this computer: from the kernel, else from the environment variable ABBE_BOOT_ID
-/// (abbed.service sets it, because it hides /proc/sys). Empty: unknown.
+/// Boot id of this computer: from the kernel, else from the environment variable ABBE_BOOT_ID,
+/// which abbed.service sets because it hides /proc/sys from abbed. Empty: unknown.
 [[nodiscard]] std::string boot_id();
 
 [[nodiscard]] std::filesystem::path counting_state_file(const std::filesystem::path& data_dir);
 /// Text of the file, with a checksum: a corrupted digit would shift the zero of an axis.
 [[nodiscard]] std::string to_text(const CountingState& state);
-/// BadInput, with the name `what`, for any text that to_text() does not write.
+/// Reads the text of the file. BadInput, which names `what`, for any text that to_text() does not
+/// write.
 [[nodiscard]] Result<CountingState> counting_state_from_text(std::string_view text,
                                                              std::string_view what);
 
-/// State from the previous run, if it can still be valid. Whether the card has continued counting
-/// is checked later, when it reports its counts.
+/// State from the previous run of abbed, if it can still be valid. Whether the card has continued
+/// counting is checked later, when the card reports its counts.
 struct LeftCounting {
   std::optional<CountingState> state;
   std::string warning;  ///< why there is no state; empty if there is no file

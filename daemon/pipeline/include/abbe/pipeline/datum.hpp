@@ -1,14 +1,14 @@
 #pragma once
-/// Datum of each axis of a counter card: it converts counts to readings. When the card is set up,
-/// its counters start at 0 at the current positions, and the axes are not referenced. An axis gets
-/// its datum from reference marks, or when the operator states that the axis is at its offset
-/// (`abbe reference --here`); it loses the datum when the counters restart. Without a datum the
-/// axis is missing in every sample. With zero = "here" in the table of the card, axes without marks
-/// are taken to be at their offset at the first set-up, but not after a restart of the counters.
-/// Each axis is treated separately. The uncertainty of a datum is a systematic error common to all
-/// readings of the axis and is not added to theirs. Deterministic: depends on the times in the
-/// samples only, so that a replay from raw bytes gives the readings of the live run. Not for the RT
-/// path; not thread-safe.
+/// Datum of each axis of a counter card: the reading at count 0, which converts counts to readings.
+/// When the card is set up, its counters start at 0 at the current positions, and the axes are not
+/// referenced. An axis gets its datum from reference marks, or when the operator states that the
+/// axis is at its configured offset (`abbe reference --here`); it loses the datum when the counters
+/// restart. Without a datum the axis is missing in every sample. With zero = "here" in the table of
+/// the card, axes without marks are taken to be at their offset at the first set-up, but not after
+/// a restart of the counters. Each axis is treated separately. The uncertainty of a datum is a
+/// systematic error common to all readings of the axis and is not added to their uncertainty.
+/// Deterministic: depends on the times in the samples only, so that a replay from raw bytes gives
+/// the readings of the live run. Not for the RT path; not thread-safe.
 
 #include <cstdint>
 #include <deque>
@@ -31,7 +31,7 @@ struct FoundDatum {
   bool stated = false;  ///< true: stated by the operator; false: found from marks
 };
 
-/// Whether the zero of this axis is found from reference marks.
+/// True if the scale of this axis has reference marks, from which its datum is found.
 [[nodiscard]] bool has_marks(const Config& config, const std::string& axis);
 
 /// State of the axes at the start of a further file of a recording.
@@ -42,14 +42,16 @@ struct DatumState {
 
 class Datum {
  public:
-  /// How axes without marks are treated. NeedAZero: they need a stated datum. Untouched: their
-  /// readings are not changed, for recordings that lack kDatumRule.
+  /// How axes without reference marks are treated. NeedAZero: they are referenced once the operator
+  /// states their datum. Untouched: their readings are not changed, as in recordings without
+  /// kDatumRule.
   enum class WithoutMarks { NeedAZero, Untouched };
-  /// If no axes are counted, no sample is changed.
+  /// Without a counter card in `config` the object changes no sample.
   explicit Datum(const Config& config, WithoutMarks without_marks = WithoutMarks::NeedAZero);
 
-  /// Starts from the end of the previous file instead of from the first set-up of the card. Axes in
-  /// `state.unknown` lose every datum found before `state.at`.
+  /// For a replay that begins with a later file: starts from the state at the end of the previous
+  /// file instead of from the first set-up of the card. Axes in the mask `state.unknown` lose every
+  /// datum found before `state.at`.
   void go_on(const DatumState& state);
   /// Adds a datum. To be called in order of time.
   void found(const FoundDatum& datum);
@@ -84,14 +86,14 @@ inline constexpr std::string_view kDatumName = "datum.json";
 /// Key in the version entries of a recording. With it, axes without marks needed a datum, too
 /// (WithoutMarks::NeedAZero).
 inline constexpr const char* kDatumRule = "datum";
-/// Name of the attachment with the start of the search for marks: crossings and samples later than
-/// this time are used.
+/// Name of the attachment with the time at which a search for reference marks started: it uses
+/// crossings and samples later than this time.
 inline constexpr std::string_view kReferenceRequestName = "reference.json";
 [[nodiscard]] RecordingAttachment reference_request(protocol::HostTime from);
 [[nodiscard]] Result<protocol::HostTime> reference_request_from(
     const RecordingAttachment& attachment);
-/// Name of the attachment of a DatumState at the start of each further file. Every datum found
-/// before that and still valid is attached, too.
+/// Name of the attachment of a DatumState, at the start of each further file of a recording. Every
+/// datum that was found before and is still valid is attached, too.
 inline constexpr std::string_view kDatumStateName = "datum-state.json";
 [[nodiscard]] RecordingAttachment to_attachment(const DatumState& state);
 [[nodiscard]] Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment);

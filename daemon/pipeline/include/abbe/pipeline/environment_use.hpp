@@ -19,14 +19,14 @@
 
 namespace abbe::daemon {
 
-/// A [[thermal]] with the index of its axis in AxisSample.
+/// One [[thermal]] table, with the index of its axis in AxisSample.
 struct ThermalAxis {
   std::size_t axis = 0;
   ThermalConfig config;
 };
 
 struct EnvironmentUseOptions {
-  /// quantities measured by the environment devices; the tracker's values are not used then
+  /// quantities that environment devices measure; for these the tracker's values are not used
   protocol::EnvironmentMask measured = 0;
   std::chrono::nanoseconds max_age{std::chrono::seconds{60}};
   std::vector<ThermalAxis> thermal;
@@ -39,12 +39,12 @@ struct EnvironmentUseOptions {
 
 /// Effect of the environment on the measurements of one instant.
 struct EnvironmentEffect {
-  /// of the scales of X, Y, Z; 1 without [[thermal]]
+  /// expansion factor of the scales of X, Y, Z; 1 without [[thermal]]
   std::array<double, 3> expansion_factor{1.0, 1.0, 1.0};
   /// relative standard uncertainty of expansion_factor; 0 without [[thermal]]
   std::array<double, 3> u_expansion_factor{};
-  /// Relative standard uncertainty common to all distances: of the refractive index used for the
-  /// correction, and TrackerSource::u_scale.
+  /// Relative standard uncertainty common to all distances of the tracker, from two parts: the
+  /// refractive index used for the correction, and TrackerSource::u_scale.
   double u_scale = 0.0;
 };
 /// The effect at the instant of the snapshot. nullopt: a configured quantity was not available
@@ -57,8 +57,8 @@ struct EnvironmentEffect {
                                                    const EnvironmentEffect& effect,
                                                    const EnvironmentUseOptions& options);
 
-/// Mean effect over a run. Assumption: the temperatures of the scales drift by less than their
-/// uncertainty during a run.
+/// Mean over a run of the effect of the environment. Assumption: the temperatures of the scales
+/// drift by less than their uncertainty during a run.
 class MeanEffect {
  public:
   void take(const EnvironmentEffect& effect);
@@ -69,9 +69,10 @@ class MeanEffect {
   std::size_t count_ = 0;
 };
 
-/// Takes every quantity from the device that measures it: at most one environment device, else the
-/// tracker. If a device has sent nothing for longer than max_age, its values are NaN. Air values
-/// that a tracker assumes without measuring are not merged.
+/// Merges the environment samples of all devices. Every quantity is taken from the environment
+/// device that measures it (there is at most one), else from the tracker. If a device has sent
+/// nothing for longer than max_age, its values are NaN. Air values that a tracker assumes without
+/// measuring are not merged.
 class EnvironmentMerge {
  public:
   /// A sample of an environment device is used only for instants later than its own by `lag`: by

@@ -1,7 +1,8 @@
 #pragma once
 /// The latest samples of all streams, for displays: the axes at the latest SYNC, the latest tracker
-/// point (up to a third of a second older) and the latest environment. They are not interpolated to
-/// one instant, and identification does not use them. Not for the RT path; not thread-safe.
+/// point (up to a third of a second older) and the latest environment values. The samples are not
+/// interpolated to one instant, and identification does not use them. Not for the RT path; not
+/// thread-safe.
 
 #include <chrono>
 #include <optional>
@@ -14,25 +15,25 @@
 
 namespace abbe::daemon {
 
-/// Without axis samples for this long (wall time, also with simulated devices) the positions are
-/// not known.
+/// If no axis sample has arrived for this time (wall time, also with simulated devices), the axis
+/// positions are not known.
 inline constexpr std::chrono::milliseconds kAxesTimeout{500};
 
-/// True if the positions of X, Y and Z in a live view are valid at its instant: all axes have sent
-/// a sample, and neither the bus nor a node has a fault. Else the positions are the last known
-/// ones, although the instant of the view may be later.
+/// True if the positions of X, Y and Z in a live view are valid at the instant of the view: all
+/// axes have sent a sample, and neither the bus nor a node has a fault. If false, the positions are
+/// the last known ones and older than the view.
 [[nodiscard]] bool axes_known(const protocol::Snapshot& view) noexcept;
 
 class LiveView {
  public:
   LiveView(const AssemblerOptions& options, const drivers::TimeSource& time);
 
-  /// True if the view has changed: new samples have arrived, or a value in it has become too old at
-  /// `batch.taken`. The tracker point and the touch are removed after 1 s, and all axes are set
+  /// Updates the view. True if it has changed: new samples have arrived, or a value has become too
+  /// old at `batch.taken`. Tracker point and touch are removed after 1 s, and all axes are marked
   /// missing after kAxesTimeout.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
-  /// Instant of the latest axis sample, even if axes are missing in it.
+  /// Instant of the latest axis sample, even if axes are missing in that sample.
   [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {
     return previous_ ? std::optional{previous_->head.time} : std::nullopt;
   }

@@ -22,14 +22,14 @@
 
 namespace abbe::daemon {
 
-/// Overrides the functions of the steps it needs. Within a step, observers are called in the order
-/// in which they were added.
+/// An observer overrides the functions of the steps in which it takes part. Within a step,
+/// observers are called in the order in which they were added.
 class PipelineObserver {
  public:
   PipelineObserver() = default;
   virtual ~PipelineObserver() = default;
 
-  /// Step 1. A datum found in this step applies to the samples of this batch, too.
+  /// Step 1. If the observer finds a datum, it already applies to the samples of this batch.
   virtual void on_delivered(const Batch&) {}
   /// Step 3. Called in every cycle, also with an empty batch.
   virtual void on_samples(const Batch&) {}
@@ -45,7 +45,7 @@ class PipelineObserver {
 
 class Pipeline {
  public:
-  /// `datum`: null if the datum was already applied to the samples, as in a recording.
+  /// `datum`: null if the readings in the batches have their datum already, as in a recording.
   Pipeline(AssemblerOptions options, Datum* datum);
 
   /// The observer must outlive the pipeline.

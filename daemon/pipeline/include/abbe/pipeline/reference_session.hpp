@@ -1,14 +1,15 @@
 #pragma once
 /// Finds the datum of each axis from its distance-coded marks, with two cards: one counts the axes
-/// live, the other latches them on their marks. Takes the samples of both cards while the operator
-/// drives the axes over a few marks; each axis ends separately. Reads no clock and starts no
-/// thread, so that a replay gives the results of the live run. Not for the RT path; not
-/// thread-safe.
+/// live, the other latches its counts of the same axes at their marks. Takes the samples of both
+/// cards while the operator drives the axes over a few marks; the search ends separately for each
+/// axis. Reads no clock and starts no thread, so that a replay gives the results of the live run.
+/// Not for the RT path; not thread-safe.
 ///
-/// Each card maps its counted clock to host time, with which the scans of the two cards are aligned
-/// to `u_alignment`. At a mark, the live count is between its smallest and largest value around
-/// that time. Every mark therefore narrows the interval of the difference between the zeros of the
-/// two counters. Drive slowly: at 1 mm/s and 1 ms, one mark gives the difference to 2 um.
+/// Each card maps its counted clock to host time, so that the scans of the two cards are aligned
+/// with a standard uncertainty u_alignment. At a mark, the live count is between its smallest and
+/// its largest value within u_alignment of the crossing. Every mark therefore narrows the interval
+/// that contains the difference between the zeros of the two counters. Drive slowly: at 1 mm/s and
+/// u_alignment = 1 ms, one mark gives the difference to 2 um.
 
 #include <cstdint>
 #include <deque>
@@ -31,7 +32,8 @@ struct ReferenceAxis {
   /// `counts_per_period` has the sign of the live card's step
   drivers::MarkTraverseOptions marks;
   double period = 20e-6;  ///< of the scale's signal, m or rad
-  /// largest half width of the interval of the zeros' difference with which an axis is Found
+  /// An axis is Found once the half width of the interval that contains the difference between the
+  /// zeros of the two counters is at most this.
   double max_half_width_counts = 0.75;
 };
 
@@ -44,7 +46,7 @@ struct AxisReference {
   enum class State : std::uint8_t { Searching, Found, Failed };
   State state = State::Searching;
   std::size_t marks = 0;
-  /// m or rad: the reading at the live counter's zero, relative to the scale's zero mark
+  /// reading (m or rad) at count 0 of the live counter, relative to the zero mark of the scale
   double offset = 0.0;
   double u_offset = 0.0;
   std::string reason;  ///< why the latest mark gave no datum, or why the search failed

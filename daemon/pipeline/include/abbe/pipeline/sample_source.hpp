@@ -42,8 +42,8 @@ class SampleSource {
   virtual void measure(std::span<const drivers::ProbePoint>) {}
   /// Stops a motion of the measuring machine (AbortE) and discards all requested points.
   virtual void stop_machine() {}
-  /// Reason why the measuring machine does not move until the operator releases it; nullopt: no
-  /// release is needed.
+  /// Why the measuring machine does not move until the operator releases it; nullopt: the machine
+  /// awaits no release.
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }
   /// Releases the measuring machine: clears its errors and starts a new session with its server.
   /// Refused if no release is awaited.
@@ -58,7 +58,7 @@ class SampleSource {
   /// drain() returns the last touches.
   [[nodiscard]] virtual std::size_t points_left() const { return 0; }
   /// Position of the measuring machine, m, reported within the last second. Refused, with the
-  /// reason, if there is none or the machine is not ready to move.
+  /// reason, if there is no such position or the machine is not ready to move.
   [[nodiscard]] virtual Result<std::array<double, 3>> machine_position() const {
     return fail(ErrorCode::Refused, "there is no measuring machine");
   }

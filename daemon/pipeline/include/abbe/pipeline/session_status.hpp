@@ -24,7 +24,7 @@ enum class SessionState : std::uint8_t {
   Refused
 };
 [[nodiscard]] std::string_view name(SessionState state) noexcept;
-/// True if samples of the devices in this state may be used in the run.
+/// True if a session in this state takes samples of the devices for its run.
 [[nodiscard]] constexpr bool takes_readings(SessionState state) noexcept {
   return state == SessionState::Warming || state == SessionState::Acquiring;
 }

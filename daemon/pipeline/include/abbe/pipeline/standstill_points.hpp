@@ -1,10 +1,10 @@
 #pragma once
-/// Mean axis readings and mean tracker position of each standstill of the machine: the points of a
-/// verification ([Li OMM] section 5.4). For a tracker in stationary mode, which delivers mean
-/// values, and for one that measures continuously. Tracker points nearer than `settle` to either
-/// end of a standstill are left out: the machine may still vibrate, or the averaging time of a mean
-/// value may include motion. The result depends on snapshots only, not on a clock. Not for the RT
-/// path; not thread-safe.
+/// The points of a verification ([Li OMM] section 5.4): for each standstill of the machine, the
+/// mean axis readings and the mean tracker position. For a tracker in stationary mode, which
+/// delivers mean values, and for a tracker that measures continuously. Tracker points nearer than
+/// `settle` to either end of a standstill are left out: the machine may still vibrate, or the
+/// averaging time of a mean value may include motion. The result depends on snapshots only, not on
+/// a clock. Not for the RT path; not thread-safe.
 
 #include <chrono>
 #include <cstddef>
@@ -65,7 +65,7 @@ class StandstillPoints {
   double tracker_squares_m2_ = 0.0;
 };
 
-/// `settle` is at least the averaging time of the configured tracker.
+/// Options for the configured devices: `settle` is at least the averaging time of the tracker.
 [[nodiscard]] StandstillOptions standstill_options(const Config& config);
 /// Refused if readings at standstills cannot verify a model: there is no tracker, or the control
 /// already corrects the axes.

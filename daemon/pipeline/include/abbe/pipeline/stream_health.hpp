@@ -5,7 +5,8 @@
 
 namespace abbe::daemon {
 
-/// Health of one stream; its source need not be a device.
+/// Health of one stream of samples, or of a part of the daemon that is not a device (recorder,
+/// models, dds, dds_security).
 struct StreamHealth {
   drivers::DeviceStatus status;
   double rate_hz = 0.0;

@@ -25,8 +25,8 @@ class VertexReadings {
   /// corner at a vertex is faster; such a vertex has no reading.
   static constexpr double kStands_m_per_s = 1e-3;
 
-  /// `tolerance_m`: largest difference between the position of a machine at standstill and the
-  /// commanded position (following error, in-position window).
+  /// `tolerance_m`: how far a machine at standstill may be from the commanded position (following
+  /// error, in-position window).
   explicit VertexReadings(double tolerance_m) : tolerance_m_(tolerance_m) {}
 
   /// Takes a reading near a vertex; call in order of time. Of the readings at one vertex, the one

@@ -44,7 +44,8 @@ class DdsSupervisor {
     std::chrono::milliseconds hung_at_start{10'000};  ///< before the first answer
   };
 
-  /// Error (Io) if the program cannot be started at all (missing, not executable).
+  /// Starts the child. Error (Io) if the program cannot be started at all (missing, not
+  /// executable).
   [[nodiscard]] static Result<DdsSupervisor> start(Options options, WallTime now);
   ~DdsSupervisor();
   DdsSupervisor(DdsSupervisor&&) noexcept;
@@ -58,7 +59,8 @@ class DdsSupervisor {
   [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
   /// How the last child ended; nullopt: none has ended yet.
   [[nodiscard]] const std::optional<DdsEnd>& last_end() const noexcept { return last_end_; }
-  /// Why the last start failed; it is repeated. Empty: the last start succeeded.
+  /// Why the last attempt to start the child failed; further attempts follow. Empty: the last
+  /// attempt succeeded.
   [[nodiscard]] const std::string& start_fault() const noexcept { return start_fault_; }
 
  private:

@@ -20,7 +20,7 @@ struct PublishedModel {
   std::string id;
   std::string method;
   std::string estimator;
-  /// SHA-256 of the recording of its identification; empty: not recorded.
+  /// SHA-256 of the recording of the identification; empty if it was not recorded.
   std::string recording_sha256;
   protocol::UtcTime created{};
   protocol::HostTime active_since{};
@@ -37,15 +37,16 @@ struct Stamp {
 [[nodiscard]] v1::Snapshot snapshot_message(const protocol::Snapshot&, protocol::UtcOffset,
                                             const Stamp&);
 [[nodiscard]] v1::ErrorModel model_message(const PublishedModel&, const Stamp&);
-/// V on calib::interpolation_grid() of at most 4096 nodes, in slices with the IDL's bound. If
-/// every_node is false, cov_m2 includes the error of the linear interpolation.
+/// The volumetric error V at the nodes of calib::interpolation_grid(), of which there are at most
+/// 4096, in slices of the size that the IDL allows. If the grid has fewer nodes than the model
+/// (every_node is false), cov_m2 includes the error of the linear interpolation.
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const PublishedModel&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
                                            const PublishedModel*, std::chrono::nanoseconds validity,
                                            const Stamp&);
-/// V at the axis position of the live view, for the given tool. The vector is zero and `inside`
-/// false if there is no model, if the model is not valid for this tool, or if the axis positions
-/// are not known. If they are not known, this message also has STALE instead of ACTIVE.
+/// The volumetric error V at the axis position of the live view, for the given tool. V is zero and
+/// `inside` is false if there is no model, if the model is not valid for this tool, or if the axis
+/// positions are not known. In the last case this message also has STALE instead of ACTIVE.
 [[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const PublishedModel*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,

@@ -18,7 +18,7 @@ struct ModelPublication {
   std::vector<std::vector<std::byte>> slices;  ///< ErrorGrid
 };
 
-/// Error Refused if the model exceeds the bounds of the IDL.
+/// Encodes the messages of a model. Error Refused if the model exceeds the bounds of the IDL.
 [[nodiscard]] Result<ModelPublication> encode_model(const PublishedModel& model,
                                                     std::string_view machine);
 

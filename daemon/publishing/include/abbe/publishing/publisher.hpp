@@ -1,9 +1,9 @@
 #pragma once
 /// Sends the daemon's data to abbe-dds, each topic with its own timing:
-/// - live topics at their configured rates;
-/// - model and grid when they change;
-/// - state when it changes and every second, because its age changes;
-/// - health every second and when it changes.
+/// - live topics (Snapshot, Compensation) at their configured rates;
+/// - ErrorModel and ErrorGrid when the model changes;
+/// - ModelState when it changes and every second, because the age in it changes;
+/// - Health every second and when it changes.
 ///
 /// abbe-dds repeats durable topics for late joiners. Periods are CLOCK_MONOTONIC time, also with
 /// simulated devices. Used by the hub's thread only.
@@ -49,14 +49,15 @@ class Publisher {
 
   Publisher(DdsLink link, PublisherOptions options, protocol::UtcOffset utc);
 
-  /// Polls the link and sends a beat. Call every cycle, after the live topics, because subscribers
-  /// wait for those.
+  /// Polls the link to abbe-dds and sends a beat. Call it in every cycle, after the live topics:
+  /// subscribers wait for live samples, not for beats.
   void beat(WallTime wall);
   /// Call snapshot(), then compensation(), in every cycle that has new data.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
   void compensation(const protocol::Snapshot& view, const ActiveModelState& active,
                     protocol::HostTime now, WallTime wall);
-  /// Call every cycle. Sends the model if it is another one, and the state if it changed or is due.
+  /// Call it in every cycle. Sends the model if another model has become active, and the state if
+  /// it changed or is due.
   void model(const ActiveModelState& active, protocol::HostTime now, WallTime wall);
   void health(std::span<const StreamHealth> streams, protocol::HostTime now);
   void event(const SessionEvent& event);

@@ -20,12 +20,12 @@ struct LeftRecording {
 };
 
 /// Closes the recordings abbe-*.mcap.part in `directory`, except those of the run `running` and
-/// those that another process still writes (it has a lock on the file).
+/// those that another process is still writing, which that process has locked.
 /// - Every whole message is kept, also those of a truncated chunk. Index and summary are added; the
 ///   date of the file is kept. The bytes of finished chunks do not change, so the hashes in models
 ///   stay valid.
 /// - A file is left unchanged, with the reason in `fault`, if its sequence of records breaks before
-///   the end: a record has a damaged length, and a whole chunk follows it.
+///   the end: a record has a damaged length, and a whole chunk follows that record.
 /// - A chunk with a wrong checksum is not checked here; the readers report it.
 ///
 /// Ends early, between two records, once `stop` is set.

@@ -22,14 +22,15 @@ struct KeepRule {
 /// Removes recordings of abbed in `directory` (abbe-*.mcap, abbe-*.mcap.part) that were last
 /// written more than `keep` ago. Returns the removed files.
 ///
-/// The age counts from `now` for files of this run, and for all files once this run has lasted
-/// longer than `keep`. Before that, the age of files of former runs counts from the newest of them,
-/// if that is earlier than `now`: so a clock that is wrongly ahead does not make them old.
+/// The age of a file counts from `now` if the file is of this run, or if this run has lasted longer
+/// than `keep`. Otherwise the age of files of former runs counts from the newest of them, if that
+/// is earlier than `now`: files do not become old because the clock is wrongly ahead.
 ///
 /// These files are kept:
 /// - the file that this run is writing (.part);
 /// - every file that a model in the store names among its inputs;
-/// - files dated before the first version of abbe, because the clock was wrong then.
+/// - files dated before the first version of abbe, because the clock was wrong when they were
+///   written.
 ///
 /// Nothing is removed if the store does not exist or a model cannot be read, because that model
 /// might name one of the files.

@@ -102,8 +102,9 @@ class Recorder {
   /// on simulated time.
   using WallTime = std::chrono::steady_clock::time_point;
 
-  /// Creates the file, and the directory if needed. Error (Io): a file of that name exists. A disk
-  /// that is full, read-only or failing is not an error: recording begins once it is writable.
+  /// Creates the file, and the directory if needed. Error (Io) if a file of that name exists. A
+  /// disk that is full, read-only or failing is not an error: recording begins once the disk is
+  /// writable.
   [[nodiscard]] static Result<Recorder> open(RecorderOptions options, RecordingInfo info,
                                              WallTime now);
   ~Recorder();  ///< closes cleanly if close() was not called
@@ -121,16 +122,16 @@ class Recorder {
   void record(protocol::RawBytes bytes, Taken taken = {});
   void record(const v1::CalibrationEvent& event, Taken taken = {});
 
-  /// Writes the attachment at once, and again into every later file of this recorder, except
-  /// requests of calibrations and searches that have ended.
+  /// Writes the attachment at once, and again into every later file of this recorder; requests for
+  /// calibrations and searches that have ended are not repeated.
   void attach(RecordingAttachment attachment, protocol::HostTime time);
 
-  /// Call between two cycles of the hub, at least every 100 ms: closes the chunk, syncs the file
-  /// and retries after a fault when these are due.
+  /// Closes the chunk, syncs the file and retries after a fault, each when it is due. Call it
+  /// between two cycles of the hub, at least every 100 ms.
   void tick(WallTime now);
 
-  /// Call between two cycles of the hub: closes the open chunk now, so that everything recorded so
-  /// far is in the file and in digest().
+  /// Closes the open chunk now, so that everything recorded so far is in the file and in digest().
+  /// Call it between two cycles of the hub.
   void flush();
 
   /// Reports an internal error or a lack of memory: the open chunk is lost, the file is closed, and

@@ -1,10 +1,10 @@
 #pragma once
 /// Runs the recorder on its own thread, so that a slow disk never delays the hub. Batches from the
 /// hub wait in memory. If more than `most_waiting_bytes` would wait, further batches are dropped
-/// and counted until the recorder has taken the waiting ones; lost_before of the next message of
-/// every stream is the number dropped. All functions are for one thread, that of the hub, which
-/// hands over without a lock and never waits for the recorder. Only dropped() may be called from
-/// any thread.
+/// and counted until the recorder has taken the waiting ones; the next message of every stream
+/// reports the number of dropped ones in lost_before. All functions except dropped() are for the
+/// hub's thread, which hands over batches without a lock and never waits for the recorder.
+/// dropped() may be called from any thread.
 
 #include <cstdint>
 #include <future>
@@ -47,8 +47,8 @@ class RecorderThread : public PipelineObserver {
   /// it has been written to the file (not necessarily synced). It reports a broken promise if the
   /// recorder failed.
   [[nodiscard]] std::future<RecordingDigest> digest();
-  /// The last report of the recorder, at most two of its cycles (40 ms) old. Valid until the next
-  /// call.
+  /// The last status that the recorder reported, at most two of its cycles (40 ms) old. The
+  /// reference is valid until the next call.
   [[nodiscard]] const RecorderStatus& status() const;
   /// Number of messages that were dropped because more than most_waiting_bytes would have waited.
   [[nodiscard]] std::uint64_t dropped() const noexcept;

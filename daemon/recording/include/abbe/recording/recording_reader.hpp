@@ -1,7 +1,7 @@
 #pragma once
 /// Opens a recording, complete or damaged, and delivers its messages in the order in which the hub
-/// took them, and those of a topic in the order in which they were recorded. Used by `abbe replay`.
-/// Damaged parts are skipped and listed in losses(). All messages of undamaged chunks are
+/// took them; messages of one topic keep the order in which they were recorded. Used by `abbe
+/// replay`. Damaged parts are skipped and listed in losses(). All messages of undamaged chunks are
 /// delivered, and all whole messages of a chunk that is truncated by the end of the file.
 ///
 /// The file is mapped into memory: views stay valid as long as the reader exists, and the file must
@@ -39,8 +39,8 @@ struct RecordingLoss {
   std::uint64_t offset = 0;  ///< of the damaged part in the file
   std::uint64_t bytes = 0;   ///< its length
   std::string what;
-  /// True if data within the recording are missing or wrong. False if only its end is missing, as
-  /// after a kill or a power cut, or only an index: all other data are undamaged.
+  /// True if data within the recording are missing or wrong. False if all other data are undamaged:
+  /// only the end is missing, as after a kill or a power cut, or only an index.
   bool inside = true;
 };
 
@@ -66,16 +66,16 @@ struct RecordingSink {
   std::function<void(const v1::CalibrationEvent&)> calibration_event;
 };
 
-/// Decodes a message and calls the callback of its type. False: the callback exists, but the
-/// message cannot be decoded.
+/// Decodes a message and calls the callback for its type. False if there is such a callback, but
+/// the message cannot be decoded.
 [[nodiscard]] bool deliver(const RecordedMessage& message, const RecordingSink& sink);
 
 class RecordingReader {
  public:
   class Cursor;
 
-  /// Error (Io): the file cannot be read. Error (BadInput): it is not a recording of abbe (no MCAP
-  /// magic, or truncated before the end of its metadata).
+  /// Opens the file. Error (Io) if it cannot be read; Error (BadInput) if it is not a recording of
+  /// abbe (no MCAP magic, or truncated before the end of its metadata).
   [[nodiscard]] static Result<RecordingReader> open(const std::filesystem::path& file);
   ~RecordingReader();
   RecordingReader(RecordingReader&&) noexcept;
@@ -87,10 +87,10 @@ class RecordingReader {
   [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata()
       const noexcept;
 
-  /// True if the recorder closed the file, even if it was damaged later.
+  /// True if the recorder closed the file, even if the file was damaged afterwards.
   [[nodiscard]] bool closed_cleanly() const noexcept;
-  /// The missing and the skipped parts. Empty for a complete recording, and for one that is still
-  /// open and ends with a whole chunk.
+  /// The parts that are missing or were skipped. Empty for a complete recording, and for a
+  /// recording that is still being written and ends with a whole chunk.
   [[nodiscard]] std::span<const RecordingLoss> losses() const noexcept;
   /// The damage within the recording in one sentence: "the recording is damaged: chunk 3 ... (and 2
   /// more places)". A model identified from such a recording may be wrong by more than its
@@ -106,9 +106,9 @@ class RecordingReader {
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
-  /// All messages in the order of `taken`; those of equal time in the order of recording. Messages
-  /// of a topic always keep the order of recording, whatever their log_time: in recordings of older
-  /// versions log_time is the instant described.
+  /// All messages in the order of `taken`, at equal times in the order of recording. Messages of
+  /// one topic always keep the order of recording, because log_time of older recordings is the
+  /// instant described and need not ascend.
   [[nodiscard]] Cursor messages() const;
   /// Delivers all messages to the sink. Returns the number of messages that have a callback and
   /// could not be decoded.

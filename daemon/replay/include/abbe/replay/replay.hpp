@@ -25,8 +25,8 @@ enum class ReplaySource { Samples, RawBytes };
 struct ReplayOptions {
   ReplaySource source = ReplaySource::Samples;
   double speed = 0.0;  ///< recorded seconds per second; 0: as fast as possible
-  /// Model with which the gate compares the new one; null: the gate compares with no compensation
-  /// only.
+  /// Model with which the gate compares the new one. null: the gate compares the new model only
+  /// with no compensation.
   const calib::VolumetricModel* active = nullptr;
   std::function<void(double share)> progress;
   /// Called for every cycle with the batch that the assembler gets, and with the time at which the
@@ -50,8 +50,8 @@ struct ReplayedCalibration {
   std::string points_sha256;  ///< of the points or touches that entered the identification
 };
 
-/// The datum of one axis: as found live, and as found again from the reference marks in the raw
-/// bytes of both cards.
+/// The datum of one axis: the one found live, and the one that the replay found from the reference
+/// marks in the raw bytes of both cards.
 struct ReplayedDatum {
   std::string axis;
   double live = 0.0;  ///< reading at count 0, m or rad, from the attachment of the recording
@@ -77,10 +77,10 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict);
 [[nodiscard]] Result<Config> recorded_config(const RecordingReader& recording,
                                              const std::string& file);
 
-/// `config` is the configuration the recording was made with (RecordingInfo::configuration).
-/// BadInput if an attachment of the recording that the replay needs cannot be read: a calibration
-/// request, a search for reference marks, or a datum. judge_recording() is already applied to the
-/// verdicts.
+/// Replays the recording. `config` is the configuration of the live run
+/// (RecordingInfo::configuration). BadInput if an attachment that the replay needs cannot be read:
+/// a calibration request, a search for reference marks, or a datum. judge_recording() is already
+/// applied to the verdicts in the result.
 [[nodiscard]] Result<ReplayReport> replay(const RecordingReader& recording, const Config& config,
                                           const ReplayOptions& options);
 

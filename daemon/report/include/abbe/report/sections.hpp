@@ -17,12 +17,12 @@ namespace abbe::daemon {
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
 [[nodiscard]] std::vector<double> in_um(const std::vector<double>& lengths_m);
 
-/// The verdict of the gate and the values on which it is based. `held_out`: the observations that
-/// were excluded from the fit, "legs" or "positions".
+/// Adds the verdict of the gate and the values on which it is based. `held_out`: name of the groups
+/// of observations that were excluded from the fit, "legs" or "positions".
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
                  int decimals = 2);
 
-/// The origin of a model, the additional rows `more`, and the input files of this report.
+/// Adds the origin of a model, the additional rows `more`, and the input files of this report.
 void add_model_origin(HtmlReport& page, const ModelDocument& document,
                       const std::vector<InputFile>& inputs,
                       const std::vector<std::pair<std::string, std::string>>& more = {});

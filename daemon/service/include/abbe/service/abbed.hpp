@@ -32,8 +32,8 @@ class Abbed {
   /// Call at least every 50 ms from the thread that called start(). Supervises abbe-dds, removes
   /// old recordings in the background and logs which recordings of a killed daemon were closed.
   void cycle();
-  /// True if the hub began a cycle within the last second. The caller notifies the watchdog of
-  /// systemd only then.
+  /// True if the hub began a cycle within the last second. If false, the caller must not notify
+  /// systemd's watchdog, which then restarts abbed.
   [[nodiscard]] bool alive() const;
   /// Warnings of the start, one log line each.
   [[nodiscard]] std::vector<std::string> warnings() const;

@@ -1,9 +1,10 @@
 #pragma once
 /// Runs long tasks for threads that must not wait, such as the hub. A real-time thread must not
-/// start a thread itself: that takes locks and memory, and the new thread inherits scheduling
-/// policy and affinity, so that its work would run at the hub's real-time priority and on the hub's
-/// processor. Instead the task is passed, without a lock, to a dispatcher thread, which runs it on
-/// a worker thread. Dispatcher and workers are ordinary threads; idle workers are reused.
+/// start a thread itself: starting one takes locks and memory, and the new thread inherits
+/// scheduling policy and affinity, so that its work would run at the hub's real-time priority and
+/// on the hub's processor. Instead the task is passed, without a lock, to a dispatcher thread,
+/// which runs it on a worker thread. Dispatcher and workers are ordinary threads; idle workers are
+/// reused.
 
 #include <exception>
 #include <functional>
@@ -28,9 +29,10 @@ void prepare_background_tasks();
 /// all such tasks.
 void run_background_task(std::function<void()> work);
 
-/// Runs `work` on an ordinary thread and destroys it there before the future is ready, so never on
-/// the thread that takes the result. An exception is stored in the future. The destructor of the
-/// future does not wait: `work` must own all it uses, or the caller must wait for the future.
+/// Runs `work` on an ordinary thread. `work` is destroyed on that thread before the future is
+/// ready, so never on the thread that takes the result. An exception is stored in the future. The
+/// destructor of the future does not wait: `work` must own all that it uses, or the caller must
+/// wait for the future.
 template <class Work>
 [[nodiscard]] auto run_in_background(Work work) -> std::future<std::invoke_result_t<Work&>> {
   struct Job {
@@ -82,8 +84,8 @@ template <class Work>
       });
 }
 
-/// Whether work of run_abandonable() still runs. Then the process must exit by _exit(): normal exit
-/// would destroy static objects that this work uses.
+/// Whether work started by run_abandonable() is still running. If so, the process must exit by
+/// _exit(), because a normal exit would destroy static objects that this work uses.
 [[nodiscard]] bool background_tasks_running() noexcept;
 
 }  // namespace abbe::daemon

@@ -56,8 +56,9 @@ class CalibrationService {
   CalibrationService(const CalibrationService&) = delete;
   CalibrationService& operator=(const CalibrationService&) = delete;
 
-  /// Refused or BadInput for a task that cannot give a calibration with this configuration. Any
-  /// thread except the hub's.
+  /// Checks a task and makes it ready for start(). Refused or BadInput if no calibration is
+  /// possible with this task and this configuration. May be called from any thread except the
+  /// hub's.
   [[nodiscard]] Result<PreparedCalibration> prepare(CalibrationTask task) const;
   /// Starts a session and returns its id. Refused while another session runs. Afterwards `prepared`
   /// may hold data of the previous session; the caller destroys it.

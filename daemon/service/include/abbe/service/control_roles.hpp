@@ -17,8 +17,8 @@ enum class Role {
   Move,    ///< moves a machine or a tracker, or keeps it moving
 };
 
-/// Refused unless `peer` has the role; the error names the role, the group and the remedy. Reads
-/// the group database. Any thread.
+/// Refused unless `peer` has the role; the error names the role, the group that has it, and what to
+/// do. Reads the group database. Any thread.
 [[nodiscard]] Result<void> check_role(const ControlPeer& peer, Role role, std::string_view request,
                                       const ControlConfig& control);
 

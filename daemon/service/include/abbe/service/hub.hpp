@@ -1,8 +1,8 @@
 #pragma once
 /// The main loop of the daemon. In every cycle, each `hub_period`, the hub empties the sample rings
-/// of the devices and passes the samples to the live view, the publisher, the recorder, and the
-/// assembler with the calibration behind it. It sends a beat to abbe-dds in every cycle, so that
-/// abbe-dds detects a hung hub by the missing beat.
+/// of the devices and passes the samples to the live view, the publisher, the recorder and the
+/// assembler, which passes snapshots to the calibration. The hub also sends a beat to abbe-dds
+/// every 100 ms, so that abbe-dds detects a hung hub by missing beats.
 ///
 /// Other threads run short tasks on the hub's thread through call(). A cycle takes no lock that an
 /// ordinary thread may hold, and neither reads nor writes a disk.
@@ -36,8 +36,8 @@
 
 namespace abbe::daemon {
 
-/// The objects that a cycle of the hub uses. Owned by Abbed. `publisher` and the pointers after it
-/// may be null.
+/// The objects that a cycle of the hub uses, owned by Abbed. `publisher` and the pointers declared
+/// after it may be null.
 struct HubParts {
   const Config& config;
   const drivers::TimeSource& time;
@@ -69,10 +69,10 @@ class Hub : private PipelineObserver {
   /// Wall time at which the last cycle began, for the watchdog. Any thread.
   [[nodiscard]] WallTime last_cycle() const noexcept;
 
-  /// Runs `task` on the hub's thread in its next cycle and returns the result. Any other thread.
-  /// Returns nullopt if the hub does not start the task within `time_out`; then the task never
-  /// runs. `task` must be short: parse requests before the call and format answers after it.
-  /// Objects that `task` owns are destroyed on the calling thread.
+  /// Runs `task` on the hub's thread in its next cycle and returns the result. May be called from
+  /// any other thread. Returns nullopt if the hub does not start the task within `time_out`; the
+  /// task then never runs. `task` must be short: parse requests before the call and format answers
+  /// after it. Objects that `task` owns are destroyed on the calling thread.
   template <class Task>
   [[nodiscard]] auto call(Task task, std::chrono::milliseconds time_out)
       -> std::optional<std::invoke_result_t<Task&>> {
@@ -109,8 +109,8 @@ class Hub : private PipelineObserver {
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};
   drivers::Mailbox<Call*> calls_;  // each owned by its caller, until the caller timed out
-  // Calls whose caller timed out and that the hub has taken out of calls_; the next caller frees
-  // them.
+  // Calls whose caller timed out and that the hub has taken out of calls_; the next caller of
+  // call() frees these calls.
   drivers::Mailbox<Call*> given_up_;
 };
 

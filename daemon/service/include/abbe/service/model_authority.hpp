@@ -36,7 +36,8 @@ class ModelAuthority {
   /// A copy of the keeper, with which another thread stores a model. The hub's thread then calls
   /// set_active() with the active model that the keeper returned.
   [[nodiscard]] ModelKeeper keeper() const { return keeper_; }
-  /// Makes `active` the active model. The previous one is destroyed on an ordinary thread.
+  /// Makes `active` the active model. The model that was active before is destroyed on an ordinary
+  /// thread, because that may take long.
   void set_active(ActiveModel active);
   /// As set_active(active), for a model that another thread began to read or store when revision()
   /// was `since`. If another model has become active since then, `active` may be the older one: it

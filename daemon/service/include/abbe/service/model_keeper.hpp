@@ -52,8 +52,8 @@ class ModelKeeper {
     store_.set_lock_timeout(patience);
   }
   /// Stores a model with its verdict, activates it if the gate accepted it, and returns the active
-  /// model of the store. The store parses and checks the written file before it activates it; the
-  /// returned model is that of `document` if the file has the same bytes.
+  /// model of the store. Before the activation the store parses and checks the file that it wrote.
+  /// The returned model is that of `document` if the file has the same bytes.
   ///
   /// After an error the call may be repeated with the same `actor`: entries that the store already
   /// has are not made twice. Stops with Refused as soon as `discarded` is true; `discarded` may be

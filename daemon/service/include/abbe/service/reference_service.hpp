@@ -32,8 +32,8 @@ class ReferenceService : public PipelineObserver {
   ReferenceService(const Config& config, RecorderThread* recorder,
                    std::optional<Counting> left = {});
 
-  /// Starts a search for the marks. Refused without a card for marks and while a search runs. A
-  /// referenced axis keeps its datum until the new one is found.
+  /// Starts a search for the reference marks. Refused if no card latches at marks, and while a
+  /// search is running. A referenced axis keeps its datum until the new one is found.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Result<void> cancel();
   /// Sets the datum of axes without marks such that their present readings become their configured

@@ -1,11 +1,11 @@
 #pragma once
-/// Touches points with the measuring machine, one after the other, and keeps the results:
-/// the daemon's part of `abbe calibrate artefact`. A job ends at the first touch or approach move
-/// that the machine refuses, or when the connection to the machine is lost, because the position is
-/// not known then. When the job is cancelled, or the client has not called look() for
+/// Touches points with the measuring machine, one after the other, and keeps the results: the
+/// daemon's part of `abbe calibrate artefact`. A job ends at the first touch or approach move that
+/// the machine refuses, or when the connection to the machine is lost, because the position of the
+/// machine is not known then. When the job is cancelled, or the client has not called look() for
 /// kLongestUnwatched, the motion is stopped at once (AbortE) and no further motion is requested;
-/// the reason states the position of the tip. The touches made before the end are kept. The hub's
-/// thread only; no call waits.
+/// the reason states the position of the tip. The touches made before the end are kept. For the
+/// hub's thread only; no call waits.
 
 #include <array>
 #include <chrono>
@@ -35,7 +35,7 @@ struct TouchJob {
   std::vector<drivers::ProbePoint> leave;    ///< retract path after the last touch
   std::vector<protocol::ProbeTrigger> made;  ///< empty, with capacity for the results
 };
-/// Usage without a touch, and above the limits of TouchJob. Any thread.
+/// Makes a job. Error Usage if `touches` is empty or exceeds the limits of TouchJob. Any thread.
 [[nodiscard]] Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
                                          std::vector<drivers::ProbePoint> leave = {});
 

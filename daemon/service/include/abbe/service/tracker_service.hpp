@@ -1,7 +1,7 @@
 #pragma once
-/// Passes orders of an operator to the laser tracker, one at a time, and keeps their
-/// outcomes: the daemon's part of `abbe tracker`. The thread of the tracker executes an order and
-/// reports the answer of the tracker, or that there was none. The hub's thread only; no call waits.
+/// Passes orders of an operator to the laser tracker, one at a time, and keeps their outcomes: the
+/// daemon's part of `abbe tracker`. The tracker's thread executes an order and reports the answer
+/// of the tracker, or that no answer came. For the hub's thread only; no call waits.
 
 #include <chrono>
 #include <cstddef>

@@ -1,8 +1,9 @@
 #pragma once
 /// Collects the points of a verification in the running daemon, for `abbe verify --live`. Clients
-/// begin and end a verification over the control socket. There is one at a time: a new one
-/// supersedes the one before, so that a client that exited blocks no other. A verification that is
-/// not ended stops at kMostPoints. Used by the hub's thread only.
+/// begin and end a verification over the control socket. Only one verification runs at a time: a
+/// new one supersedes the previous one, so that a client that exited without ending its
+/// verification blocks no other client. A verification that is not ended stops at kMostPoints. Used
+/// by the hub's thread only.
 
 #include <cstdint>
 #include <optional>

@@ -60,7 +60,8 @@ struct CalibratorFile {
                                           const std::array<std::optional<BlockFace>, 2>& faces,
                                           std::string_view comment);
 
-/// The kinematic chain and the target offset (here: of the probe tip) of a configuration.
+/// The kinematic chain and the target offset of a configuration as input of calib. The target is
+/// the probe tip here.
 [[nodiscard]] Result<calib::evemu::Machine> evemu_machine(const MachineConfig& machine);
 
 }  // namespace abbe::daemon

@@ -11,9 +11,9 @@
 
 namespace abbe::daemon {
 
-/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel. The text
-/// also names a likely mistake in the file (an axis reversed, two axes swapped, another unit) if
-/// correcting it would put all positions inside. `lines`: line of each position.
+/// BadInput with line and column (x_mm, y_mm, z_mm) of every position outside the travel. If all
+/// positions would be inside after correcting a likely mistake in the file (an axis reversed, two
+/// axes swapped, another unit), the text also names this mistake. `lines`: line of each position.
 [[nodiscard]] Result<void> check_travel(const std::filesystem::path& file,
                                         std::span<const calib::Vector3> positions_m,
                                         std::span<const std::size_t> lines,

@@ -1,9 +1,9 @@
 #pragma once
-/// Collects the touches of one calibration with a ball array, and states the next one. calib's
-/// TouchGuide assigns touches to balls and blocks. This class rejects unusable touches, with device
-/// and reason, and ends the run when touches stop arriving. The decisions depend on snapshots only,
-/// so that a replay takes exactly the same touches; only tick() is given the time. Not for the RT
-/// path; not thread-safe. Positions are scale readings in m.
+/// Collects the touches of one calibration with a ball array, and tells which ball or block to
+/// touch next. calib's TouchGuide assigns touches to balls and blocks. This class rejects unusable
+/// touches, with device and reason, and ends the run when touches stop arriving. The decisions
+/// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
+/// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
 #include <chrono>
 #include <optional>
@@ -20,8 +20,8 @@
 
 namespace abbe::daemon {
 
-/// Volumetric error V, known from another measurement at some readings. It determines the rotation
-/// about Ball1, which touches of the array do not determine.
+/// Points at which the volumetric error V is known from another measurement. They determine the
+/// rotation about Ball1, which touches of the array do not determine.
 struct RotationPoints {
   std::vector<calib::evemu::BallError> points;
   double sigma_m = 1e-6;  ///< standard uncertainty of V, per component
@@ -66,7 +66,7 @@ class EvemuAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// BadInput for an invalid calibrator or plan.
+  /// Creates the acquisition. BadInput for an invalid calibrator or plan.
   [[nodiscard]] static Result<EvemuAcquisition> create(EvemuRequest request,
                                                        EvemuAcquisitionOptions options = {});
 
@@ -81,7 +81,7 @@ class EvemuAcquisition {
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
   [[nodiscard]] double progress() const noexcept;  ///< fraction of the planned points, 0 to 1
   [[nodiscard]] std::size_t points() const { return guide_.taken(); }
-  /// nullopt once the run is complete or failed.
+  /// The next touch that the operator must make; nullopt once the run is complete or failed.
   [[nodiscard]] std::optional<calib::evemu::NextTouch> next() const;
   /// Remarks on touches since the last call, one sentence each.
   [[nodiscard]] std::vector<std::string> take_notes();

@@ -20,7 +20,7 @@ class ArtefactThermometer {
   [[nodiscard]] bool take(const protocol::Snapshot& touch);
 
   /// Mean of the sensor's values. Its standard uncertainty is the root sum of squares of the
-  /// configured one and of
+  /// configured standard uncertainty and of
   ///     (max - min) / (2 sqrt(3)),
   /// a rectangular distribution over the range of the values ([GUM] 4.3.7). nullopt: the
   /// temperature is not known.

@@ -1,5 +1,5 @@
 #pragma once
-/// The model document of a solution of the ball array method. Pure.
+/// Makes the content of model.json from the solution of a ball-array identification. Pure.
 
 #include <vector>
 

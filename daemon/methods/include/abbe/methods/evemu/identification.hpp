@@ -21,18 +21,19 @@ struct EvemuCandidate {
   calib::Verdict verdict;
 };
 
-/// `active`: the active model; null if there is none. DataInsufficient or BadInput, with the
-/// position and number of the wrong touches. `stopped`: as in IdentificationWatch, polled while the
-/// model is judged. A model without rotation reference is refused as "shape only" unless [gate]
-/// accepts "evemu-shape-only".
+/// Identifies and judges. `active`: the active model, with which the gate compares; null if there
+/// is none. An Error DataInsufficient or BadInput names the position and number of the touches that
+/// caused it. `stopped`: as in IdentificationWatch, polled while the model is judged. A model whose
+/// rotation about Ball1 is not known is refused as "shape only" unless [gate] accepts
+/// "evemu-shape-only".
 [[nodiscard]] Result<EvemuCandidate> identify_touches(const EvemuRun& run, const Config& config,
                                                       const calib::VolumetricModel* active,
                                                       const std::function<bool()>& stopped = {});
 
 [[nodiscard]] calib::evemu::TouchPlan touch_plan(const EvemuConfig& config);
-/// Refused or BadInput if the request cannot give a model: no probe is configured, the measuring
-/// machine already corrects its positions, or the thermal expansion of the array is not known
-/// although its temperature is (or the reverse).
+/// Refused or BadInput if the request cannot give a model: no source of touches is configured, the
+/// measuring machine already corrects its positions, or only one of temperature and expansion
+/// coefficient of the array is known.
 [[nodiscard]] Result<void> check_evemu(const EvemuRequest& request, const Config& config);
 /// Checks that the expansion coefficient and the temperature of the array are given both or not at
 /// all. Returns a message, empty if the check passed. `named`: the calibrator in the message.

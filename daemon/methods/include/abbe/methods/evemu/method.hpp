@@ -24,7 +24,8 @@ struct EvemuMethod {
   using Run = EvemuRun;
   using Candidate = EvemuCandidate;
 
-  /// No axis readings are needed with a measuring machine: it reports the position of each touch.
+  /// Whether the method needs axis readings. With a measuring machine it needs none, because the
+  /// machine reports the position of each touch.
   [[nodiscard]] static MethodNeeds needs(const Config& config);
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);

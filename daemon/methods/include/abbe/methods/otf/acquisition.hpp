@@ -29,7 +29,8 @@ struct RunPoint {
   protocol::HostTime time{};
   protocol::DeviceTime device_time{};
   std::array<double, 3> p_tracker_m{};
-  /// false: too fast, prism error or trigger violation; the point keeps its place in the sequence
+  /// false: the point is too fast, or has a prism error or trigger violation. It keeps its place in
+  /// the sequence but is not used.
   bool usable = true;
 };
 
@@ -52,7 +53,8 @@ class RunPoints {
 struct AcquisitionOptions {
   /// A machine whose position stays within this distance of one place is at standstill.
   double stand_tolerance_m = 0.2e-3;
-  /// largest distance of the machine from the first and last vertex at its standstill there
+  /// largest distance of the machine from the first (last) vertex during the standstill before
+  /// (after) the run
   double vertex_tolerance_m = 2e-3;
   double reading_tolerance_m = 20e-6;  ///< see VertexReadings
   /// If the machine is farther than this from every leg of the path, it drives another path, and
@@ -73,16 +75,16 @@ struct AcquisitionOptions {
   /// If no point arrives for longer than this host time, tick() fails the run. It is `silence` plus
   /// the delay with which a stalled tracker may deliver its backlog.
   std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
-  /// longest time until the machine has stopped at the first vertex and left it
+  /// the run fails if the machine has not stopped at the first vertex and left it within this time
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};
-  /// longest standstill on the path; the run fails after it
+  /// the run fails if the machine stands still on the path for longer than this
   std::chrono::nanoseconds longest_stop = std::chrono::minutes{15};
   /// Largest number of points in a run: 67 min at 1000 points a second, 200 MB. Limits the memory
   /// if the machine never stops at the end of the path, for example because it repeats the path.
   std::size_t most_points = 4'000'000;
   EnvironmentUseOptions environment;  ///< with which the snapshots were corrected
-  /// A step back of the tracker's clock by more than this means that the clock restarted. Packets
-  /// out of order step back by one burst at most (a third of a second).
+  /// If the tracker's clock steps back by more than this, it has restarted. Packets out of order
+  /// make it step back by one burst at most (a third of a second).
   std::chrono::nanoseconds clock_began_anew = std::chrono::seconds{1};
 };
 
@@ -90,8 +92,8 @@ class OtfAcquisition {
  public:
   using Phase = AcquisitionPhase;
 
-  /// `path_m`: vertices of the polyline, at least two. O(n): all work that depends on the number of
-  /// vertices is done here, except release().
+  /// `path_m`: vertices of the polyline, at least two. All work that depends on the number n of
+  /// vertices is done here, in O(n), except that of release().
   explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {});
 
   /// To be called before the first take(). Snapshots before `from` are ignored.

@@ -1,5 +1,5 @@
 #pragma once
-/// The model document of an on-the-fly solution. Pure.
+/// Makes the content of model.json from the solution of an on-the-fly identification. Pure.
 
 #include <vector>
 

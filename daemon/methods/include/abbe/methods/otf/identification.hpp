@@ -38,8 +38,9 @@ struct OtfCandidate {
   calib::Verdict verdict;
 };
 
-/// `active`: the active model; null if there is none. DataInsufficient if the run does not
-/// determine the model, with what is missing.
+/// Identifies and judges. `active`: the active model, with which the gate compares; null if there
+/// is none. An Error DataInsufficient names what is missing if the run does not determine the
+/// model.
 [[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine,
                                                 const GateConfig& gate,
                                                 const calib::VolumetricModel* active,

@@ -34,10 +34,12 @@ struct OtfMethod {
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
   /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
-  /// Refused if the tracker is configured for stationary mode; BadInput as check_otf_path().
+  /// Refused if the tracker is configured for stationary mode; the other errors are those of
+  /// check_otf_path().
   [[nodiscard]] static Result<void> check(const Request& request, const Config& config);
   [[nodiscard]] static Result<Acquisition> acquire(Request&& request, const Options& options);
-  /// The points in one vector, and the path corrected for the temperature of the scales. O(n).
+  /// The input of the identification: all points in one vector, and the path corrected for the
+  /// temperature of the scales. O(n) in points and vertices.
   [[nodiscard]] static Run run_of(Acquisition&& acquisition);
   [[nodiscard]] static Result<Candidate> identify(const Run& run, const Config& config,
                                                   const calib::VolumetricModel* active,

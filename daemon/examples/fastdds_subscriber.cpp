@@ -47,9 +47,9 @@ using SteadyClock = std::chrono::steady_clock;
 /// abbe-dds repeats ModelState every second, even if it does not change.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
-/// Delay of a vector from publication to now, relative to the fastest vector of its publisher. It
-/// includes the network, the time in the socket while this process was suspended, and the wait for
-/// the lock. The clocks of the two computers may differ in offset, and in rate by 200 ppm.
+/// Delay of a vector from publication to now, relative to the fastest vector of its publisher. The
+/// delay includes the network, the time in the socket while this process was suspended, and the
+/// wait for the lock. The clocks of the two computers may differ in offset, and in rate by 200 ppm.
 class Delay {
  public:
   std::int64_t of_ns(const Compensation& c) {

@@ -124,8 +124,8 @@ class Server final : public ControlServer {
     for (;;) {
       const auto now = Clock::now();
 
-      // While accept() is paused the listener would stay readable and poll() would return at once:
-      // its descriptor is replaced by -1, which poll() ignores.
+      // While accept() is paused the listener would stay readable, so that poll() would return at
+      // once. Therefore its descriptor is replaced by -1, which poll() ignores.
       const bool accept_paused = accept_paused_until_ > now;
       std::vector<pollfd> waits{{wake_.get(), POLLIN, 0},
                                 {accept_paused ? -1 : listener_.get(), POLLIN, 0}};

@@ -118,7 +118,7 @@ std::optional<Ownership> ownership_of(const std::filesystem::path& file) noexcep
 /// user could have placed a link there.
 FileDescriptor create_fresh(const std::filesystem::path& file) {
   constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
-  ::unlink(file.c_str());  // left by a killed process with the same process id
+  ::unlink(file.c_str());  // left by a killed process with the same PID
   return FileDescriptor{::open(file.c_str(), kFlags, 0600)};
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 /// The part of `abbe calibrate artefact` that moves the machine: requests the touches of a plan
 /// from the running daemon and follows their progress. The machine must not move unsupervised.
-/// Therefore this program cancels the touching after a signal or when the daemon does not answer,
-/// and the daemon itself cancels it if no client requests its progress for 2 s.
+/// Therefore this program cancels the touching after a signal or when the daemon does not answer.
+/// The daemon itself cancels the touching if no client requests the progress for 2 s.
 
 #include <filesystem>
 #include <string>

@@ -19,7 +19,7 @@ void add_store_options(CLI::App& command, StoreOption& where);
 [[nodiscard]] Result<ModelStore> open_store(const StoreOption& where);
 
 /// The id that `name` stands for: "active" or the beginning of an id. Refused if `name` is "active"
-/// and no model is; the other errors are those of ModelStore::find().
+/// and no model is active; the other errors are those of ModelStore::find().
 [[nodiscard]] Result<std::string> id_named(const ModelStore& store, const std::string& name);
 /// True if `name` is a path with a folder, has an extension, or is the name of an existing file.
 [[nodiscard]] bool names_a_file(const std::string& name);

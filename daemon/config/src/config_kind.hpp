@@ -29,7 +29,7 @@ struct AxisReadings {
 struct ConfigKind {
   std::string_view key;         ///< of the table
   bool several = false;         ///< an array of tables: [[KEY]]
-  std::string_view needs = {};  ///< the key without which a table configures no device
+  std::string_view needs = {};  ///< without this key a table configures no device
 
   /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
   /// kinds that precede this one in DeviceConfigs have been read already.

@@ -9,7 +9,7 @@
 namespace abbe::daemon {
 namespace {
 
-/// The kinds of the elements of DeviceConfigs, in their order.
+/// The ConfigKind of each kind of device, in the order of DeviceConfigs.
 template <class... Devices>
 std::array<ConfigKind, sizeof...(Devices)> kinds_of(std::type_identity<std::tuple<Devices...>>) {
   return {Devices::value_type::kKind...};

@@ -17,7 +17,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   Config config;
   StreamNames names;
   read_machine(root, config.machine);
-  read_daemon(root, base, config);  // before the devices: they depend on [daemon] simulated
+  read_daemon(root, base, config);  // first, because devices depend on [daemon] simulated
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_thermal(root, config);
   read_air(root, config);

@@ -87,8 +87,8 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
   // The domain ids 0 to 232 give valid UDP port numbers [DDSI-RTPS 2.2, 9.6.1.1].
   section.get_integer("domain", dds.domain, 0, 232);
 
-  // 0: with every hub cycle that has new data; the rate is then limited by the hub period and the
-  // rates of the devices.
+  // A rate of 0 means: a sample with every hub cycle that has new data. The hub period and the
+  // rates of the devices then limit the rate.
   section.get("snapshot_hz", dds.snapshot_hz, kPlain, {0.0, 1000.0});
   section.get("compensation_hz", dds.compensation_hz, kPlain, {0.0, 1000.0});
   section.get_integer("priority", dds.priority, 0, 99);

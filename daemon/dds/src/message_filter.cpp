@@ -78,7 +78,8 @@ std::optional<std::size_t> walk_parameters(const Reader& list, std::size_t at, U
 
 /// Whether `body`, a DATA or DATA_FRAG submessage without its header, announces an endpoint.
 bool is_announcement(Bytes body) {
-  constexpr std::size_t kWriterAt = 8;  // after extra flags, octetsToInlineQos and reader id
+  // offset of the writer id, after extra flags, octetsToInlineQos and reader id
+  constexpr std::size_t kWriterAt = 8;
   if (body.size() < kWriterAt + 4) return false;
   const std::uint32_t writer = entity_id(body, kWriterAt);
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;

@@ -50,7 +50,8 @@ class RunningCard final : public RunningDevices {
   }
 
  private:
-  TouchDetectorPointer touch_detector_;  // the card feeds it: destroyed after the card
+  // The card calls the detector, so the card (below) must be destroyed first.
+  TouchDetectorPointer touch_detector_;
   Running<drivers::CounterCardDevice> running_;
   std::size_t place_;
   std::optional<CountingProgress> progress_;

@@ -13,10 +13,10 @@ using protocol::HostTime;
 
 struct DeviceSet::State {
   std::vector<std::unique_ptr<RunningDevices>> started;  // in the order of starting
-  std::vector<RunningDevices*> devices;                  // the same, in the order of device_kinds()
+  std::vector<RunningDevices*> devices;                  // in the order of device_kinds()
   MachineMotion* motion = nullptr;                       // of the measuring machine, if any
   TrackerOrders* tracker = nullptr;                      // of the tracker, if any
-  /// By stream: time of the previous health() and the number of samples then.
+  /// By stream: the time of the previous health() and the number of samples at that time.
   std::map<std::string, std::pair<HostTime, std::uint64_t>> counted;
 
   State() = default;

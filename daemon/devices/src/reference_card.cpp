@@ -38,7 +38,8 @@ class RunningReferenceCard final : public RunningDevices {
   }
 
  private:
-  drivers::MarkWatcher mark_watcher_;  // the card feeds it: destroyed after the card
+  // The card calls the watcher, so the card (below) must be destroyed first.
+  drivers::MarkWatcher mark_watcher_;
   Running<drivers::CounterCardDevice> running_;
   std::size_t place_ = 0;
   std::array<drivers::MarkCrossing, 64> marks_;

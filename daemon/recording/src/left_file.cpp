@@ -222,7 +222,7 @@ void LeftFile::end_chunk() {
   chunk_.reset();
 }
 
-/// Evaluates the bytes behind the last whole record:
+/// Decides what to do with the bytes behind the last whole record:
 /// - a truncated chunk: its whole messages are kept;
 /// - another truncated record: it is discarded;
 /// - zeros, which a power cut leaves if the file had its new size already: they are discarded;
@@ -316,8 +316,8 @@ Result<void> LeftFile::write(std::uint64_t offset, Bytes piece) {
 
 Result<void> LeftFile::write_end() {
   if (!complete_) {
-    // First the chunk, then the cut, then the end of the file: after a kill or on a full disk the
-    // next start of abbed finds a file that it can still close.
+    // The order is: first the chunk, then the cut, then the end of the file. After a kill or on a
+    // full disk the next start of abbed then finds a file that can still be closed.
     if (auto done = write(rebuilt_at_, rebuilt_); !done) return done;
     if (::ftruncate(fd_.get(), static_cast<off_t>(whole_until_)) != 0)
       return tl::unexpected(io_error("truncate"));

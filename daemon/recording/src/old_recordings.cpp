@@ -92,7 +92,7 @@ std::vector<fs::path> outdated(const Recordings& recordings, const KeepRule& rul
   };
 
   add(recordings.own, rule.now - rule.keep);
-  if (rule.lasted > rule.keep) {  // the clock was not set during that time: it is trusted
+  if (rule.lasted > rule.keep) {  // `now` is reliable: the clock was not set in `lasted`
     add(recordings.former, rule.now - rule.keep);
   } else if (!recordings.former.empty()) {
     const auto newest = std::ranges::max(recordings.former, {}, &Dated::written).written;

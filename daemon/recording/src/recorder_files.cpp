@@ -189,7 +189,7 @@ void Recorder::State::enter_fault(const IoFault& fault) {
   if (!file) return;
 
   if (messages_in_file == 0 && part > 1) {
-    file->discard();  // it has no messages; the next attempt uses its name again
+    file->discard();  // no messages in it: the next attempt uses its name again
     --part;
     --status.files;
     file.reset();

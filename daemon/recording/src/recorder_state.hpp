@@ -82,7 +82,8 @@ struct Recorder::State {
   std::uint64_t messages_in_file = 0;
   bool end_written = false;
   std::string previous_file;
-  bool calibrating = false;  ///< no new file is begun, so that the run is in one file
+  /// a calibration is running: no new file is begun, so that its run is in one file
+  bool calibrating = false;
   /// The values when the last calibration was requested.
   struct AtRequest {
     std::uint32_t part = 0;
@@ -95,7 +96,8 @@ struct Recorder::State {
   std::map<std::string, protocol::EnvironmentSample, std::less<>>
       latest_environment;           ///< by device
   bool environment_carried = true;  ///< false: the present file must begin with latest_environment
-  /// repeated environment messages in the open chunk: they are in an earlier file, too
+  /// number of repeated environment messages in the open chunk. They are in an earlier file, too, and
+  /// do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
   std::optional<DatumState> axes_known;  ///< from the last axis sample
   RecorderStatus status;

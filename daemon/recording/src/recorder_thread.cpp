@@ -160,7 +160,7 @@ struct RecorderThread::State {
   RecorderStatus known;                              // used by the thread that calls status()
   Dropped unreported;                                // used by the hub
   std::uint64_t dropped_before_run = 0;              // used by the hub
-  std::string internal_error;  // used by the recorder thread: not yet passed to Recorder::fail()
+  std::string internal_error;  // of the recorder thread; not yet passed to Recorder::fail()
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<bool> stopping{false};
   WakeUp wake_up;
@@ -204,7 +204,7 @@ struct RecorderThread::State {
     auto taken = std::make_unique<Waiting>();
     for (bool last = false; !last;) {
       (void)wake_up.wait_for(kCycle);
-      // pairs with the release in ~RecorderThread()
+      // acquire: pairs with the release in ~RecorderThread()
       last = stopping.load(std::memory_order_acquire);
       taken = take_waiting(std::move(taken));
       write_all(*taken);

@@ -119,7 +119,7 @@ struct RecordingReader::State {
   Contents contents;
   RecordingInfo info;
   MetadataCheck configuration;
-  bool log_time_is_cycle;  ///< false: log_time is the instant described
+  bool log_time_is_cycle;  ///< false: log_time is the instant that a message describes
 };
 
 namespace {

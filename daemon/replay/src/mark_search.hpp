@@ -30,7 +30,7 @@ class MarkSearch {
  private:
   struct Axis {
     bool found = false;
-    std::vector<double> readings;  ///< at count 0, one each time the marks were found
+    std::vector<double> readings;  ///< reading at count 0, each time the marks were found
   };
 
   explicit MarkSearch(const Config& config);

@@ -72,8 +72,8 @@ class Calibrations {
     identified_ = false;
     ++next_;
   }
-  /// Ends the present calibration unless it has been identified. If its session still takes
-  /// readings, its result becomes Refused with the reason `cause`.
+  /// Ends the present calibration unless its run was identified or handed over. If its session
+  /// still takes readings, its result becomes Refused with the reason `cause`.
   void end(std::string_view cause) {
     if (next_ > 0 && !identified_) done_.push_back({.ended = ended(session_.status(), cause)});
     identified_ = true;

@@ -105,7 +105,7 @@ Hub::Hub(HubParts parts)
       live_(assembler_options(parts.config), parts.time),
       touches_by_(device_names(parts.config).touches) {
   if (parts_.reference != nullptr) pipeline_.add(*parts_.reference);
-  pipeline_.add(*this);  // before the recorder: subscribers wait for the live view
+  pipeline_.add(*this);  // before the recorder, because subscribers wait for the live view
   if (parts_.recorder != nullptr) pipeline_.add(*parts_.recorder);
 }
 
@@ -235,7 +235,7 @@ void Hub::run_calls() {
     }
     try {
       call->task();
-    } catch (...) {  // a member of the wrong type in the request: rethrown to the caller
+    } catch (...) {  // rethrown to the caller; e.g. a member of the wrong type
       call->thrown = std::current_exception();
     }
     call->done.signal();  // the caller frees it now

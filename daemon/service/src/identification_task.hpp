@@ -59,7 +59,8 @@ class IdentificationState {
  private:
   enum class Stage : std::uint8_t { Identifying, Storing, Discarded };
   std::atomic<Stage> stage_{Stage::Identifying};
-  std::shared_ptr<JudgedModel> model_;  // the task's before begin_storing(), then the hub's
+  // owned by the task before begin_storing(), then by the hub
+  std::shared_ptr<JudgedModel> model_;
 };
 
 /// Run it once, on an ordinary thread.

@@ -12,7 +12,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kStandsFor = 500ms;
-constexpr double kStill = 2e-6;       // m or rad: a drive in position control stays within this
+// m or rad; the positions of a drive in position control scatter by less than this
+constexpr double kStill = 2e-6;
 constexpr double kStillCounts = 2.0;  // an axis at rest may change by this many counts
 
 }  // namespace

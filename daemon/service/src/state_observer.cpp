@@ -192,8 +192,8 @@ std::optional<JournalEntry> StateObserver::compare(const ObservedPart& part, Wal
                      .fields = part.fields};
   if (part.counted > r.counted && !r.logged.empty())
     entry.message += fmt::format("; {} faults or lost samples more", part.counted - r.counted);
-  // `suppressed` may contain the change that is logged now (if it was observed in an earlier call).
-  // This one does not count as not logged, unless the part has returned to the last logged state.
+  // `suppressed` counts changes that were not logged. It may contain the change that is logged now,
+  // if that was observed in an earlier call; this change is then not counted as omitted.
   const std::uint64_t is_one_of_them = !changed && part.state != r.logged ? 1 : 0;
   if (const auto left_out = r.suppressed - is_one_of_them; left_out > 0) {
     entry.message += fmt::format("; {} changes before this were not logged", left_out);

@@ -22,7 +22,8 @@ struct TrackerSource {
   enum class Air {
     Measured,  ///< the controller measures the air
     Assumed,   ///< assumed_air()
-    LastSet,   ///< as the refractive index last set in the controller
+    /// corrected with the refractive index that was last set in the controller
+    LastSet,
   };
 
   std::string_view key;  ///< of its table
@@ -75,7 +76,7 @@ struct CountedAxes {
 enum class Capability {
   TrackerPoints,
   Axes,         ///< reads the axes
-  NamedAxes,    ///< reads the axes, and its table names them
+  NamedAxes,    ///< reads the axes, and its configuration table names them
   CountedAxes,  ///< counts increments of the axes
   Marks,        ///< latches the counts at reference marks
   Touches,      ///< delivers touches

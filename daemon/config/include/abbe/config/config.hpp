@@ -101,8 +101,9 @@ struct DaemonConfig {
   std::chrono::nanoseconds hub_period{std::chrono::microseconds{250}};
   /// The longest time for which the hub waits for samples of a stream that arrive late.
   std::chrono::nanoseconds watermark{std::chrono::milliseconds{600}};
-  bool simulated = false;  ///< the devices are simulated: only then may `speed` differ from 1
-  double speed = 1.0;      ///< host time = speed x CLOCK_MONOTONIC
+  /// true: the devices are those of abbe-sim; only then may `speed` differ from 1
+  bool simulated = false;
+  double speed = 1.0;  ///< host time = speed x CLOCK_MONOTONIC
   RealTimeMode realtime = RealTimeMode::Ignore;
   int tracker_priority = 40;  ///< SCHED_FIFO, 1 to 99
   int encoder_priority = 50;
@@ -169,7 +170,8 @@ struct GateConfig {
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
   double fixed_K = 293.15;             ///< without a sensor
-  double u_temperature_K = 0.0;        ///< standard uncertainty: sensor, and array relative to it
+  /// standard uncertainty: of the sensor, and of the array's temperature relative to the sensor
+  double u_temperature_K = 0.0;
 };
 
 /// [evemu]: calibration with a ball array.

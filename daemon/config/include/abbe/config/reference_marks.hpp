@@ -22,10 +22,12 @@ struct AxisMarks {
 };
 
 struct ReferenceMarks {
-  std::vector<AxisMarks> axes;  ///< each is one of counted_axes(); order of the latching card
+  /// the axes that the card latches, in the order of its channels; each is one of counted_axes()
+  std::vector<AxisMarks> axes;
   /// Standard uncertainty of the time offset between the scans of the two cards.
   std::chrono::nanoseconds u_alignment{std::chrono::milliseconds{1}};
-  double tolerance_m = 1e-6;  ///< limit of the difference of the two cards' counts, m or rad
+  /// largest difference between the counts of the two cards, m or rad
+  double tolerance_m = 1e-6;
 };
 
 }  // namespace abbe::daemon

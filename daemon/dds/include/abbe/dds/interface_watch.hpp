@@ -24,7 +24,7 @@ class InterfaceWatch {
   /// up gets its addresses one after the other, and its link may drop a few times while a cable is
   /// plugged in.
   static constexpr std::chrono::milliseconds kSettles{500};
-  /// Changes are evaluated this time after the first one at the latest, because interfaces may
+  /// Changes are evaluated at the latest this time after the first change, because interfaces may
   /// change without end, for example while containers start and stop.
   static constexpr std::chrono::seconds kLongestWait{5};
   /// cycle() reports no address before the watch has existed for this time. A report restarts

@@ -46,8 +46,8 @@ class Participant {
   /// - Io: no participant can be created (no port), or no interface of the profile is up.
   [[nodiscard]] static Result<Participant> create(const ParticipantOptions& options);
 
-  /// Creates the topic with its payload type, registered without TypeObject and TypeInformation.
-  /// Error Io: Fast DDS does not create it.
+  /// Creates the DDS topic with its payload type, which is registered without TypeObject and
+  /// TypeInformation. Error Io if Fast DDS does not create the topic.
   [[nodiscard]] Result<eprosima::fastdds::dds::Topic*> topic(daemon::Topic topic);
 
   [[nodiscard]] eprosima::fastdds::dds::DomainParticipant& get() const noexcept {

@@ -17,7 +17,7 @@ namespace abbe::daemon {
 /// How abbe-dds ended.
 struct DdsEnd {
   int wait_status = 0;  ///< of waitpid()
-  bool hung = false;    ///< abbed stopped it because it did not answer
+  bool hung = false;    ///< abbed killed abbe-dds because it did not answer
   std::chrono::system_clock::time_point when{};
 
   /// "signal 11 (Segmentation fault) at 2026-11-22T16:58:22Z"

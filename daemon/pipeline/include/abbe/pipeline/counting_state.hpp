@@ -1,10 +1,11 @@
 #pragma once
 /// State of the counter card that survives a restart of the daemon: DATA_DIR/counting-state.json
-/// contains the counts of the card that counts the axes, and the datum of each axis. The datum
-/// refers to the counters, which continue without the daemon. It stays valid if the card and its
-/// set-up are the same, the computer was not rebooted, and the clock count of the card shows that
-/// the counters have continued (drivers::CounterCardReceiverOptions::resume_from). The file may be
-/// seconds old, because the datum changes only when an axis is referenced. Not for the RT path.
+/// contains the counts of the card that counts the axes, and the datum of each axis (its reading at
+/// count 0). The datum refers to the counters, which continue without the daemon. It stays valid if
+/// the card and its set-up are the same, the computer was not rebooted, and the clock count of the
+/// card shows that the counters have continued (drivers::CounterCardReceiverOptions::resume_from).
+/// The file may be seconds old without harm: a datum changes only when an axis is referenced, and
+/// the file is then written within a second. Not for the RT path.
 
 #include <filesystem>
 #include <optional>

@@ -78,7 +78,8 @@ class Datum {
   void apply_to_counts(Counted& sample) const;
 
   std::vector<Axis> axes_;
-  bool begun_ = false;  // a sample was applied: a restart is not the first set-up
+  // a sample was applied: a restart of the counters is not the first set-up any more
+  bool begun_ = false;
 };
 
 /// Name of the attachment of a FoundDatum in the recording, for a replay from raw bytes.

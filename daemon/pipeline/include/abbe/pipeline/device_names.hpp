@@ -7,7 +7,7 @@
 namespace abbe::daemon {
 
 struct DeviceNames {
-  std::vector<std::string> all;  ///< RawFromDevice::device is an index into it
+  std::vector<std::string> all;  ///< RawFromDevice::device is an index into this list
   std::string tracker = "tracker", axes = "encoder", touches = "probe";
   std::vector<std::string> environment;  ///< FromEnvironment::device is an index into it
 };

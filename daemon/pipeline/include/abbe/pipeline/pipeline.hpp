@@ -2,7 +2,8 @@
 /// Processing steps for the samples of one cycle, the same live (in the hub) and in a replay:
 ///
 ///   1. observers see the batch as the devices delivered it (search for reference marks)
-///   2. every axis reading gets its datum; an axis that is not referenced is marked missing
+///   2. every axis reading gets its datum, the reading at count 0; an axis that is not
+///      referenced is marked missing
 ///   3. observers see the samples (live view, publisher, recorder)
 ///   4. samples are assembled to snapshots: axes are interpolated to the instant of each tracker
 ///      point and touch, axis readings are corrected for the temperature of the scales, ranges for

@@ -70,7 +70,7 @@ class ReferenceSession {
     drivers::CounterAlignment alignment;
     std::optional<drivers::MarkDatum> datum;
     AxisReference result;
-    protocol::HostTime followed{};  ///< the traverse has the positions up to this time
+    protocol::HostTime followed{};  ///< the traverse has the axis positions up to this time
   };
 
   void process_crossings();

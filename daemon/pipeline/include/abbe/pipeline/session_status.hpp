@@ -30,15 +30,15 @@ enum class SessionState : std::uint8_t {
 }
 
 struct SessionStatus {
-  std::uint64_t id = 0;  ///< counts the sessions of this process from 1; 0: none yet
+  std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
   std::string method = "otf";
-  std::string reason;  ///< why it is in this state, or what to do now
+  std::string reason;  ///< why the session is in this state, or what to do now
   /// in state Refused: the kind of error, for the exit code of the client
   ErrorCode refused_as = ErrorCode::DataInsufficient;
   double progress = 0.0;  ///< of the work in this state, 0 to 1
   std::size_t points = 0;
-  std::string model_id;  ///< model that this session identified, active or refused
+  std::string model_id;                         ///< the model of this session, active or refused
   std::optional<calib::evemu::NextTouch> next;  ///< touch requested by a guided acquisition
   std::vector<std::string> notes;               ///< remarks on touches, the latest kMostNotes
   std::size_t noted = 0;                        ///< number of all remarks of the session

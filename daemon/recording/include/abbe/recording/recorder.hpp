@@ -65,12 +65,14 @@ struct RecorderStatus {
   enum class State : std::uint8_t {
     Recording,
     DiskFull,  ///< messages are lost; retried every retry_period
-    Failed,    ///< another I/O error; messages are lost; retried every retry_period
+    /// another I/O error; messages are lost; retried every retry_period
+    Failed,
     Closed,
   };
   State state = State::Closed;
   std::string fault;  ///< empty while Recording: "write rec.mcap.part: No space left on device"
-  /// kept after recording has resumed; then also names the file in which it resumed
+  /// the last interruption of the recording, kept after recording has resumed; then also names the
+  /// file in which it resumed
   std::string last_fault;
   std::uint32_t faults = 0;    ///< number of interruptions of the recording
   std::filesystem::path file;  ///< the present (or last) file

@@ -55,7 +55,8 @@ struct ReplayedCalibration {
 struct ReplayedDatum {
   std::string axis;
   double live = 0.0;  ///< reading at count 0, m or rad, from the attachment of the recording
-  std::optional<double> again;  ///< the same, replayed; nullopt: not found from the recorded marks
+  /// the datum that the replay found; nullopt: not found from the recorded marks
+  std::optional<double> again;
 };
 
 struct ReplayReport {

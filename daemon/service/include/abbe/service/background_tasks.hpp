@@ -21,8 +21,8 @@ namespace abbe::daemon {
 /// that the kernel refuses is left unchanged.
 void become_ordinary_thread() noexcept;
 
-/// Starts the dispatcher if it is not running yet. Call this before a thread that must not wait
-/// starts its first task.
+/// Starts the dispatcher unless it is running already. Call this function before a thread that must
+/// not wait passes its first task.
 void prepare_background_tasks();
 
 /// Runs `work`, which must not throw, on an ordinary thread. At a normal exit the program waits for

@@ -108,7 +108,7 @@ class Hub : private PipelineObserver {
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};
-  drivers::Mailbox<Call*> calls_;  // each owned by its caller, until the caller timed out
+  drivers::Mailbox<Call*> calls_;  // each is owned by its caller until that timed out
   // Calls whose caller timed out and that the hub has taken out of calls_; the next caller of
   // call() frees these calls.
   drivers::Mailbox<Call*> given_up_;

@@ -34,7 +34,8 @@ struct ActiveModel {
 /// Result of storing a model.
 struct KeptModel {
   std::string id;
-  std::optional<ActiveModel> active;  ///< the model now active; nullopt: the gate refused this one
+  /// the model that is active after the call; nullopt: the gate refused the given model
+  std::optional<ActiveModel> active;
 };
 
 class ModelKeeper {

@@ -12,8 +12,8 @@ namespace abbe::daemon {
 struct ConfigKind;
 
 /// None: the controller's weather station is not read. Read: its values are read and recorded.
-/// Compute: besides, the controller computes the refractive index from them and corrects its
-/// distances.
+/// Compute: they are read and recorded, and the controller computes the refractive index from them
+/// and corrects its distances.
 enum class WeatherConfig { None, Read, Compute };
 
 /// Continuous: the tracker measures during motion, for on-the-fly runs. Stationary: it delivers one

@@ -48,7 +48,7 @@ struct EvemuAcquisitionOptions {
   /// card then start again at 0 at the current position. False if all axes have reference marks,
   /// which give the same zero as before.
   bool zero_is_lost_by_restart = true;
-  /// The run fails if no touch arrives for longer than this host time. It is long because the
+  /// The run fails if no touch arrives for longer than this host time. The time is long because the
   /// operator turns and clamps the artefact by hand between positions.
   std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
   /// Travel of the axes. Touches more than 1 mm outside the travel are not used; thermal correction

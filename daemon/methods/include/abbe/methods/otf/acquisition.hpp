@@ -63,17 +63,17 @@ struct AcquisitionOptions {
   /// shortest standstill before the run: the 20 points that calib's alignment of tracker and path
   /// needs, at 100 Hz
   std::chrono::nanoseconds stand_before = std::chrono::milliseconds{200};
-  /// points of the standstill before the run that are kept: those of this time before its end
+  /// length of the standstill before the run whose points are kept, counted back from its end
   std::chrono::nanoseconds keep_before = std::chrono::milliseconds{400};
   /// shortest standstill at the end; longer than any dwell at a vertex
   std::chrono::nanoseconds stand_after = std::chrono::milliseconds{1000};
-  /// points of the standstill after the run that are kept: those of this time after its beginning
+  /// length of the standstill after the run whose points are kept, counted from its beginning
   std::chrono::nanoseconds keep_after = std::chrono::milliseconds{400};
   /// The run fails if, during it, no tracker point arrives for longer than this, or none with axis
   /// positions. Counted in the times of the samples.
   std::chrono::nanoseconds silence = std::chrono::seconds{30};
-  /// If no point arrives for longer than this host time, tick() fails the run. It is `silence` plus
-  /// the delay with which a stalled tracker may deliver its backlog.
+  /// tick() fails the run if no point arrives for longer than this host time, which is `silence`
+  /// plus the delay with which a stalled tracker may deliver its backlog.
   std::chrono::nanoseconds arrival_time_out = std::chrono::seconds{40};
   /// the run fails if the machine has not stopped at the first vertex and left it within this time
   std::chrono::nanoseconds wait_for_start = std::chrono::hours{1};

@@ -56,9 +56,9 @@ class Delay {
     constexpr std::int64_t kSecond_ns = 1'000'000'000;
     const std::int64_t now_ns = SteadyClock::now().time_since_epoch().count();
     const std::int64_t offset_ns = now_ns - (c.host_time_ns() + c.age_ns());
-    // After a change of publisher: if clock offset plus transit time of its first vector differs by
-    // more than 20 ms from that of the previous publisher, its clock is another one, and the
-    // measurement starts again.
+    // After a change of publisher: if the new one's first vector gives a clock offset plus transit
+    // time that differs by more than 20 ms from that of the previous publisher, the new publisher
+    // has another clock, and the measurement starts again.
     if (inherited_ && std::abs(offset_ns - least_ns_) > kSecond_ns / 50) first_ns_ = 0;
     inherited_ = false;
     if (first_ns_ == 0) first_ns_ = last_ns_ = now_ns, least_ns_ = offset_ns;

@@ -40,8 +40,8 @@ constexpr auto kPositionIsOld = std::chrono::seconds{1};
 // mm in this time.
 constexpr auto kMostStopDelay = std::chrono::milliseconds{10};
 
-/// A measuring machine behind an I++ DME server. It delivers the touches, and also the axis samples
-/// if the configuration has no other source of axis readings.
+/// A measuring machine behind an I++ DME server, as source of touches, and also of axis samples if
+/// the configuration has no other device that reads the axes.
 class RunningMachine final : public RunningDevices, private MachineMotion {
  public:
   RunningMachine(Running<drivers::IppDevice> running, bool is_the_axes, const DeviceStart& start)

@@ -248,8 +248,9 @@ ModelStatistics read_statistics(Reader& in) {
   return s;
 }
 
-// Limits wider than those of a sensor (-50 to 200 C), of [evemu], and of a calibrator file
-// (+-50 um/(m K)).
+// Limits of temperatures and expansion coefficients in model.json. They are wider than those of a
+// sensor (-50 to 200 C), of [evemu], and of a calibrator file (+-50 um/(m K)), so that every model
+// that abbe writes can be read.
 constexpr double kLowest_K = 173.15, kHighest_K = 523.15;
 constexpr double kMostAlpha_per_K = 100e-6;
 

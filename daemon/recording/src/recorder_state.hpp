@@ -96,8 +96,8 @@ struct Recorder::State {
   std::map<std::string, protocol::EnvironmentSample, std::less<>>
       latest_environment;           ///< by device
   bool environment_carried = true;  ///< false: the present file must begin with latest_environment
-  /// number of repeated environment messages in the open chunk. They are in an earlier file, too, and
-  /// do not count as lost with the chunk.
+  /// number of repeated environment messages in the open chunk. They are also in an earlier file,
+  /// and do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
   std::optional<DatumState> axes_known;  ///< from the last axis sample
   RecorderStatus status;

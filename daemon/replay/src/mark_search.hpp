@@ -15,8 +15,8 @@ namespace abbe::daemon {
 
 class MarkSearch {
  public:
-  /// BadInput: the requests for a search in the recording cannot be read. If `config` has no
-  /// reference marks, take() does nothing.
+  /// Reads the requests for searches from the recording. BadInput if they cannot be read. If
+  /// `config` has no reference marks, take() does nothing.
   [[nodiscard]] static Result<MarkSearch> of(const RecordingReader& recording,
                                              const Config& config);
 

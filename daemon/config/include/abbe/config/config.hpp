@@ -191,11 +191,12 @@ struct EvemuConfig {
 /// [control]. Root and the daemon's user may send every request; see control_roles.hpp.
 struct ControlConfig {
   std::filesystem::path socket;  ///< default: runtime_dir/control.sock
-  /// May read, and stop a machine; empty: all who may open the socket.
+  /// Group whose members may read, and stop a machine; empty: all who may open the socket.
   std::string look_group;
-  /// May change models and calibrate; empty: only root and the daemon's user.
+  /// Group whose members may change models and calibrate; empty: only root and the daemon's user.
   std::string change_group = "abbe-change";
-  std::string move_group = "abbe-move";  ///< may move a machine; empty: as change_group
+  /// Group whose members may move a machine; empty: only root and the daemon's user.
+  std::string move_group = "abbe-move";
 };
 
 /// The whole file. A kind of device whose table is missing is not used; at most one device reads

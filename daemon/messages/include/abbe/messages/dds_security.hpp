@@ -53,9 +53,10 @@ struct DdsIdentity {
   std::filesystem::path folder;
 };
 
-/// `folder` is the folder of one identity, or a folder made by make_dds_keys(): then daemon/ or
-/// subscriber-1/ in it is used, depending on `role`. Error BadInput, with what to do, if a file is
-/// missing or unreadable, the key is readable by others, or the certificate is not valid at `now`.
+/// Finds and checks an identity. `folder` is the folder of one identity, or a folder made by
+/// make_dds_keys(), in which `role` decides between daemon/ and subscriber-1/. Error BadInput, with
+/// what to do, if a file is missing or unreadable, the key is readable by others, or the
+/// certificate is not valid at `now`.
 [[nodiscard]] Result<DdsIdentity> find_dds_identity(const std::filesystem::path& folder,
                                                     DdsRole role,
                                                     std::chrono::system_clock::time_point now);

@@ -21,14 +21,15 @@ enum { MOST_MACHINES = 16, MOST_PUBLISHERS = 8, MOST_WRITERS = 32 };
 
 static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1000000);
 
-/* abbe-dds repeats ModelState every second, even if it does not change. */
+/* A publisher whose last ModelState is older counts as not alive: abbe-dds repeats ModelState every
+   second, even if nothing in it changes. */
 static const int64_t longest_silence_ns = INT64_C(1500000000);
 
 /* State of one publisher (a DDS participant) of one machine, independent of other publishers. */
 struct publisher {
   dds_guid_t participant;
   int64_t first_ns, last_ns; /* times of its samples; last_ns 0: entry is free */
-  int64_t alone_ns;          /* time it has sent since the last sample of the pinned publisher */
+  int64_t alone_ns;          /* time of sending since the last sample of the pinned publisher */
   bool foreign;
   abbe_v1_ModelState state;
   dds_instance_handle_t state_from; /* writer of `state`; 0: there is no valid state */
@@ -37,7 +38,8 @@ struct publisher {
   bool inherited;
 };
 
-/* A domain may have several machines. Only samples of the pinned publisher are used. */
+/* One of the machines whose data are published in the domain. Only samples of its pinned publisher
+   are used. */
 struct machine {
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
@@ -58,7 +60,7 @@ static void replace_writer(dds_instance_handle_t old, dds_instance_handle_t with
   }
 }
 
-/* Called when the liveliness of one writer changes. */
+/* Called by Cyclone DDS when the liveliness of one writer of ModelState changes. */
 static void liveliness_changed(dds_entity_t reader, const dds_liveliness_changed_status_t status,
                                void* arg) {
   (void)reader, (void)arg;
@@ -82,7 +84,7 @@ static int64_t now_in_ns(void) {
   return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-/* NULL: more than MOST_MACHINES machines. */
+/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already. */
 static struct machine* find_machine(const char* name) {
   for (int i = 0; i < MOST_MACHINES; ++i) {
     if (machines[i].name[0] == '\0') strcpy(machines[i].name, name);
@@ -91,7 +93,8 @@ static struct machine* find_machine(const char* name) {
   return NULL;
 }
 
-/* All writers of a participant share the first 12 bytes of its GUID. */
+/* True if two GUIDs are of the same participant: all of its writers share the first 12 bytes of the
+   GUID. */
 static bool same_participant(const dds_guid_t* a, const dds_guid_t* b) {
   return memcmp(a->v, b->v, 12) == 0;
 }
@@ -104,9 +107,9 @@ static void print_participant(const char* format, const char* machine, const dds
   printf(format, machine, text);
 }
 
-/* A new publisher replaces the one whose last sample is oldest, but never the pinned one. It takes
-   over the delay measurement of the pinned one: after a restart of abbe-dds the clock is the
-   same. */
+/* The entry of a publisher. If all entries are in use, a new publisher gets the entry whose last
+   sample is oldest, but never that of the pinned publisher. The new publisher takes over the delay
+   measurement of the pinned one, because its clock is the same if abbe-dds only restarted. */
 static struct publisher* find_publisher(struct machine* m, const dds_guid_t* participant) {
   struct publisher* entry = NULL;
   for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
@@ -125,9 +128,9 @@ static struct publisher* find_publisher(struct machine* m, const dds_guid_t* par
 }
 
 /* True if `p`, which sent a sample now, is the pinned publisher of the machine. The first publisher
-   is pinned. Another one replaces it when the pinned one has been silent for 300 ms and the other
-   one has sent for 30 ms; 10 s instead of 300 ms for a foreign publisher, that is one that sent
-   while the pinned one did. Reasons and limits: publisher_pin.hpp and dds.md. */
+   is pinned. Another publisher replaces the pinned one if the pinned one has been silent for 300 ms
+   (10 s if the other is foreign) and the other has sent for 30 ms since then. A publisher that
+   sends while the pinned one sends is foreign. Reasons and limits: publisher_pin.hpp, dds.md. */
 static bool is_pinned(struct machine* m, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
   p->last_ns = now_ns;
@@ -161,7 +164,7 @@ static void report_foreign_publisher(struct machine* m, const struct publisher* 
   print_participant("%s: another publisher %s is ignored\n", m->name, &p->participant);
 }
 
-/* The publisher of a sample; NULL: its writer does not exist any more. */
+/* The publisher of a sample; NULL if the writer of the sample does not exist any more. */
 static struct publisher* publisher_of(struct machine* m, dds_entity_t reader,
                                       dds_instance_handle_t writer) {
   dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(reader, writer);
@@ -174,8 +177,8 @@ static struct publisher* publisher_of(struct machine* m, dds_entity_t reader,
   return p;
 }
 
-/* Discards the states of writers that are not alive. If a writer becomes alive again, it repeats
-   its state within a second. */
+/* Discards the ModelState of every writer that is not alive. A writer that becomes alive again
+   repeats its ModelState within a second. */
 static void discard_dead_states(void) {
   for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
     for (struct publisher* p = m->publishers; p < m->publishers + MOST_PUBLISHERS; ++p) {
@@ -187,10 +190,11 @@ static void discard_dead_states(void) {
   }
 }
 
-/* Delay of a vector from publication to now, relative to the fastest vector of its publisher. It
-   includes the network and the time in the socket while this process was suspended. The clocks of
-   the two computers may differ in offset, and in rate by 200 ppm. A measurement taken over from
-   another publisher is kept if the first vector differs from it by at most 20 ms. */
+/* Delay of a vector from publication to now, relative to the fastest vector of its publisher. The
+   delay includes the network and the time in the socket while this process was suspended. The
+   clocks of the two computers may differ in offset, and in rate by 200 ppm. A measurement that was taken
+   over from another publisher is kept if clock offset plus transit time of the first vector differ
+   from it by at most 20 ms. */
 static int64_t delay_of(const abbe_v1_Compensation* c, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), since_last_ns = now_ns - p->last_vector_ns;
   const int64_t offset_ns = now_ns - (c->host_time_ns + c->age_ns);
@@ -214,14 +218,16 @@ static const char* why_not(const abbe_v1_Compensation* c, int64_t age_ns,
   if (strcmp(c->model_id, p->state.model_id) != 0) return "the vector is of another model";
   if (!c->inside) return "outside the volume of the calibration data";
   if (!c->tool_ok) return "the model is not valid for this tool";
-  /* The fastest vector of the first 0.2 s gives the reference delay: single vectors may be late. */
+  /* The fastest vector of the first 0.2 s serves as the reference; before that all vectors may have
+     been late. */
   if (p->last_vector_ns - p->first_vector_ns <= second_ns / 5)
     return "the reference delay is not known yet";
   if (age_ns > c->validity_ns) return "too old";
   return NULL;
 }
 
-/* Keeps the state also of a publisher that is not pinned: it may be pinned later. */
+/* Keeps a ModelState, also one from a publisher that is not pinned, because it may be pinned
+   later. */
 static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
                  dds_instance_handle_t writer) {
   struct machine* m = find_machine(state->machine);
@@ -275,8 +281,8 @@ static void set_file(dds_qos_t* qos, const char* name, const char* folder, const
   dds_qset_prop(qos, name, value);
 }
 
-/* DDS Security: only participants with keys of the same authority can publish to this one or read
-   it. */
+/* Switches DDS Security on: only participants with keys of the same authority can then publish to
+   this participant or read from it. */
 static dds_qos_t* qos_with_keys(const char* folder) {
   dds_qos_t* qos = dds_create_qos();
   set_plugin(qos, "auth", "dds_security_auth", "authentication");
@@ -291,10 +297,11 @@ static dds_qos_t* qos_with_keys(const char* folder) {
   return qos;
 }
 
-/* With keys, if only one of two participants drops the other in a network outage, the other one
-   does not authenticate again. Therefore both need the same lease: that of abbe-dds, 40 s. By
-   default Cyclone DDS announces itself 2 s before its lease ends, at least every 30 s; here every
-   second. Other settings of CYCLONEDDS_URI remain valid. */
+/* Sets lease and announcement period for use with keys. If only one of two participants drops the
+   other in a network outage, the one that did not does not authenticate again. Therefore both need
+   the same lease: that of abbe-dds, 40 s. By default Cyclone DDS announces itself 2 s before its
+   lease ends, at least every 30 s; here it does so every second. Other settings of CYCLONEDDS_URI
+   remain valid. */
 static void configure_for_keys(dds_domainid_t domain) {
   const char* given = getenv("CYCLONEDDS_URI");
   char config[8192];

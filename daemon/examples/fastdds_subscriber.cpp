@@ -44,7 +44,8 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-/// abbe-dds repeats ModelState every second, even if it does not change.
+/// A publisher whose last ModelState is older counts as not alive: abbe-dds repeats ModelState
+/// every second, even if nothing in it changes.
 constexpr std::chrono::milliseconds kLongestSilence{1500};
 
 /// Delay of a vector from publication to now, relative to the fastest vector of its publisher. The

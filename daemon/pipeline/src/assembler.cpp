@@ -135,7 +135,7 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
   return s;
 }
 
-/// A snapshot with the environment that applies at that time.
+/// Begins a snapshot: its head, and the environment values that apply at the time in the head.
 Snapshot Assembler::begin(const protocol::SampleHead& head) const {
   Snapshot s;
   s.head = head;

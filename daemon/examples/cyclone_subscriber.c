@@ -129,8 +129,9 @@ static struct publisher* find_publisher(struct machine* m, const dds_guid_t* par
 
 /* True if `p`, which sent a sample now, is the pinned publisher of the machine. The first publisher
    is pinned. Another publisher replaces the pinned one if the pinned one has been silent for 300 ms
-   (10 s if the other is foreign) and the other has sent for 30 ms since then. A publisher that
-   sends while the pinned one sends is foreign. Reasons and limits: publisher_pin.hpp, dds.md. */
+   (10 s if the other is foreign) and the other has sent for 30 ms since then. A publisher is
+   foreign if the pinned one still sends 100 ms after the first sample of the other. Reasons and
+   limits: publisher_pin.hpp and dds.md. */
 static bool is_pinned(struct machine* m, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
   p->last_ns = now_ns;
@@ -192,9 +193,9 @@ static void discard_dead_states(void) {
 
 /* Delay of a vector from publication to now, relative to the fastest vector of its publisher. The
    delay includes the network and the time in the socket while this process was suspended. The
-   clocks of the two computers may differ in offset, and in rate by 200 ppm. A measurement that was taken
-   over from another publisher is kept if clock offset plus transit time of the first vector differ
-   from it by at most 20 ms. */
+   clocks of the two computers may differ in offset, and in rate by 200 ppm. A measurement that was
+   taken over from another publisher is kept if clock offset plus transit time of the first vector
+   differ from it by at most 20 ms. */
 static int64_t delay_of(const abbe_v1_Compensation* c, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), since_last_ns = now_ns - p->last_vector_ns;
   const int64_t offset_ns = now_ns - (c->host_time_ns + c->age_ns);

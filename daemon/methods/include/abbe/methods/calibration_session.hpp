@@ -79,7 +79,7 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
     return std::exchange(discarded_, std::nullopt);
   }
 
-  /// Outcome of the identification: a model was judged, or no model could be identified.
+  /// Report the outcome of the identification: a model was judged, or none could be identified.
   void judged(std::string model_id, bool passed, std::string reason, protocol::HostTime now);
   void not_identified(const Error& why, protocol::HostTime now);
   /// Reports that the identified model could not be stored so far. Adds an event whenever `reason`

@@ -29,7 +29,7 @@ struct Counting {
 };
 
 struct CountingState {
-  std::string boot_id;  ///< host time restarts with each boot
+  std::string boot_id;  ///< host times are comparable within one boot only
   std::string set_up;   ///< counting_set_up()
   Counting counting;
 };
@@ -61,8 +61,8 @@ struct LeftCounting {
 /// is empty and no file is read.
 [[nodiscard]] LeftCounting left_counting(const Config& config, const std::string& boot_id);
 
-/// Name of the attachment in the recording of the run that continues from the state, for a replay
-/// from raw bytes.
+/// Name of the attachment of a CountingState. It is in the recording of the run that started with
+/// this state, because a replay from raw bytes must start with the same state.
 inline constexpr std::string_view kCountingStateName = "counting-state.json";
 [[nodiscard]] RecordingAttachment to_attachment(const CountingState& state);
 

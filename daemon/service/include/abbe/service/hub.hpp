@@ -81,7 +81,7 @@ class Hub : private PipelineObserver {
     return result;
   }
 
-  // The following may be called only by tasks on the hub's thread.
+  // The following functions may be called only by tasks on the hub's thread.
   [[nodiscard]] const LiveView& live() const noexcept { return live_; }
   [[nodiscard]] const std::vector<StreamHealth>& health() const noexcept { return health_; }
   [[nodiscard]] ActiveModelState model_state() const;

@@ -44,7 +44,7 @@ struct TrackerFile {
 [[nodiscard]] Result<TrackerFile> read_tracker_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 
-/// encoder.csv: `time_s,x_mm,y_mm,z_mm`, machine clock.
+/// One row of encoder.csv: `time_s,x_mm,y_mm,z_mm`, time of the machine's clock and scale readings.
 struct EncoderRow {
   double time_s = 0.0;
   AxisPosition reading_m{};
@@ -56,7 +56,7 @@ struct EncoderFile {
 [[nodiscard]] Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 
-/// points.csv: `x_mm,y_mm,z_mm`, scale readings, at least one.
+/// points.csv: `x_mm,y_mm,z_mm`, scale readings, at least one row.
 struct PointsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;

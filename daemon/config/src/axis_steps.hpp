@@ -1,5 +1,5 @@
 #pragma once
-/// Steps per count of the devices that read the axes.
+/// Checks of the steps per count of the devices that read the axes, and their text in messages.
 
 #include <string>
 

@@ -4,7 +4,8 @@
 /// device time) lies above a straight line (offset and skew), and close to it when the delay is
 /// smallest.
 /// The model is a line below all arrivals of the last minute that touches the lowest one. Its slope
-/// is the slope of their lower convex hull, limited to max_skew.
+/// is the mean slope of the lower convex hull of the arrivals over the middle half of the observed
+/// time, limited to max_skew.
 /// The smallest delay itself cannot be observed. It lies in [0, max_constant_delay]. The estimate
 /// is centred in that interval, and the interval enters the uncertainty as a rectangular
 /// distribution ([GUM] 4.3.7).
@@ -24,9 +25,9 @@ namespace abbe::drivers {
 struct ClockModelOptions {
   /// Long enough to resolve a skew of 1 ppm, short enough to follow changes of temperature.
   std::chrono::nanoseconds window = std::chrono::seconds{60};
-  /// Limit of a quartz in a control cabinet. A larger slope is normally caused by late arrivals. If
-  /// further arrivals confirm it, the clock is reported by skew_beyond_limit(), is never settled,
-  /// and its u_time includes the discrepancy.
+  /// Largest rate error of a quartz clock in a control cabinet. A larger slope is normally caused
+  /// by late arrivals. If further arrivals confirm the larger slope, skew_beyond_limit() returns
+  /// it, the model is never settled, and its u_time includes the discrepancy.
   double max_skew = 200e-6;
   /// Upper bound of the smallest delay (device + wire + kernel).
   std::chrono::nanoseconds max_constant_delay = std::chrono::milliseconds{2};
@@ -75,7 +76,8 @@ class ClockModel {
     double device_s = 0.0;  ///< device time since origin_device_
     double offset_s = 0.0;  ///< (arrival - origin_host_) - device_s
   };
-  /// One point per slice of window / 255: the lowest arrival of the slice.
+  /// The window is divided into slices of window / 255. The lowest arrival of each slice is kept as
+  /// a point.
   static constexpr std::size_t kPoints = 256;
 
   void begin_with(protocol::DeviceTime last_point, protocol::HostTime arrival) ABBE_RT;
@@ -84,7 +86,7 @@ class ClockModel {
   void forget_before(double device_s) ABBE_RT;
   void fit() ABBE_RT;
   void fit_slope() ABBE_RT;
-  /// Indices of the hull's points go to hull_; returns how many.
+  /// Writes the indices of the hull's points to hull_ and returns their number.
   std::size_t find_hull() ABBE_RT;
   [[nodiscard]] double hull_height(std::size_t hull_size, double device_s) const ABBE_RT;
   void judge_lateness() ABBE_RT;
@@ -107,7 +109,8 @@ class ClockModel {
   double free_slope_ = 0.0;  ///< the slope before it is limited to max_skew
   double u_beyond_s_ = 0.0;  ///< excess of the free slope times the window; 0 unless beyond_
   bool beyond_ = false;      ///< the free slope exceeds max_skew significantly
-  // The slope is taken between one quarter and three quarters of the observed device time.
+  // The free slope is that of the hull between these two device times, s: one quarter and three
+  // quarters of the observed span.
   double quarter_s_ = 0.0;
   double three_quarters_s_ = 0.0;
   double median_lateness_s_ = 0.0;

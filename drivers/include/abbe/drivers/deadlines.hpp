@@ -47,7 +47,8 @@ class Deadlines {
     }
     return earliest;
   }
-  /// What is due at `now`. It stays set: its handling sets it again or cancels it.
+  /// The purpose whose deadline has passed at `now`. The deadline stays set: the code that handles
+  /// it sets it again or cancels it.
   [[nodiscard]] std::optional<Purpose> passed(HostTime now,
                                               std::span<const Purpose> waiting = {}) const ABBE_RT {
     for (std::size_t i = 0; i < at_.size(); ++i) {

@@ -1,8 +1,7 @@
 #pragma once
-/// The interface of a device to the rest of the project, and the only place with inheritance. One
-/// cycle of a device is wait(), which may block and allocate, then receive(), which is real-time
-/// code. The device thread calls both. Samples leave through the device's own SampleRing, raw bytes
-/// through its RawRing.
+/// The interface of a device to the rest of the project. One cycle of a device is wait(), which may
+/// block and allocate, then receive(), which is real-time code. The device thread calls both.
+/// Samples leave through the device's own SampleRing, raw bytes through its RawRing.
 
 #include <chrono>
 #include <cstdint>

@@ -10,11 +10,11 @@
 /// than 1.2 T away. Velocity is the derivative.
 ///
 /// Uncertainty: the only assumption is |acceleration| <= a_max. At the fraction theta of the
-/// interval the error of the straight line is at most
+/// interval T the error of the straight line is at most
 ///   (a_max / 2) theta (1 - theta) T^2,   in the middle (a_max / 2) (T / 2)^2.
-/// The error of the cubic is at most 6/5 of that (the integral of the modulus of its Peano kernel).
-/// It is taken as rectangular ([GUM] 4.3.7). Speed times the time uncertainty of the samples and of
-/// the requested instant is added in quadrature.
+/// The error of the cubic is at most 6/5 of the straight line's (the integral of the modulus of its
+/// Peano kernel). The error is taken as rectangular ([GUM] 4.3.7). Speed times the time uncertainty
+/// of the samples and of the requested instant is added in quadrature.
 
 #include <array>
 #include <chrono>
@@ -45,7 +45,8 @@ enum class InterpolationError {
 struct AxesAt {
   protocol::HostTime time{};
   std::uint8_t axis_count = 0;
-  /// bit i: an enclosing sample has no value of axis i; its values here are stale
+  /// bit i: at least one of the two enclosing samples has no value of axis i; the position and
+  /// velocity of axis i are then out of date
   std::uint8_t missing_mask = 0;
   protocol::SampleFlags flags = 0;                      ///< of both enclosing samples
   std::array<double, protocol::kMaxAxes> position{};    ///< m or rad
@@ -53,15 +54,15 @@ struct AxesAt {
   std::array<double, protocol::kMaxAxes> u_position{};  ///< standard uncertainty, m or rad
 };
 
-/// `samples`: in order of time; there is no slope between two of the same instant. `u_time`:
-/// standard uncertainty of `time`.
+/// `samples`: in order of time; two samples of the same instant are used without a slope between
+/// them. `u_time`: standard uncertainty of `time`.
 [[nodiscard]] tl::expected<AxesAt, InterpolationError> interpolate_axes(
     std::span<const protocol::AxisSample> samples, protocol::HostTime time,
     std::chrono::nanoseconds u_time, const InterpolationOptions& options = {}) noexcept;
 
 /// The axes at the instant of `latest`: its positions, and as velocity the slope of the line from
 /// `previous`. The velocity is 0 for an axis that did not answer in both samples, and for all axes
-/// if `previous` is null, not earlier, or more than max_span away.
+/// if `previous` is null, not earlier than `latest`, or more than max_span earlier.
 [[nodiscard]] AxesAt latest_axes(const protocol::AxisSample* previous,
                                  const protocol::AxisSample& latest,
                                  const InterpolationOptions& options = {}) noexcept;

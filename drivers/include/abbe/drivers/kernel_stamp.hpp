@@ -6,10 +6,11 @@
 /// A stamp is accepted on two conditions:
 ///   0 <= age <= time since the receive queue was last known to be empty,
 ///   since then the wall clock has advanced by the same amount as the monotonic clock.
-/// Otherwise one of the clocks was stepped, and the age may be wrong by that step. The reference of
-/// both conditions moves only with nothing_older_than(), so all stamps of one batch are checked
-/// against the same one. If a stamp is rejected, the user-space time with a larger uncertainty is
-/// used, and the event is counted. A wall-clock step therefore changes no arrival.
+/// Otherwise one of the clocks was stepped, and the age may be wrong by that step.
+/// nothing_older_than() sets the moment at which the queue was empty; no other call moves it, so
+/// all stamps of one batch are checked against the same moment. If a stamp is rejected, the
+/// user-space time with a larger uncertainty is used, and the event is counted. A wall-clock step
+/// therefore changes no arrival.
 /// The kernel starts stamping shortly after the first socket requests it (a kernel worker switches
 /// it on): packets before that have no stamp. This class reads no clock: every time is an argument.
 /// One thread.
@@ -41,13 +42,14 @@ struct ClockPair {
 [[nodiscard]] ClockPair read_clock_pair() noexcept;
 
 struct KernelStampOptions {
-  /// From the interrupt to the stamp on an idle shop-floor PC.
+  /// Standard uncertainty of the delay from the interrupt to the stamp, on an idle shop-floor PC.
   std::chrono::nanoseconds u_kernel = std::chrono::microseconds{10};
-  /// Delay of waking up the device thread; applies if only the user-space time is known.
+  /// Standard uncertainty of the delay until the device thread wakes up; applies if only the
+  /// user-space time is known.
   std::chrono::nanoseconds u_user_space = std::chrono::milliseconds{1};
-  /// Smallest clock step that is detected. Smaller differences are caused by a preemption between
-  /// the two readings or by the time from stamp to queue; an undetected step below it is
-  /// negligible.
+  /// Smallest step of a clock that is detected. Smaller differences between the clocks also arise
+  /// from a preemption between the two readings and from the time between stamp and queue; an
+  /// undetected smaller step is negligible.
   std::chrono::nanoseconds step = std::chrono::microseconds{200};
 };
 
@@ -62,9 +64,9 @@ class KernelStampMap {
   Arrival arrival(std::optional<std::chrono::nanoseconds> stamp, const ClockPair& now,
                   protocol::HostTime host_now) ABBE_RT;
 
-  /// `begun`: both clocks just before a read that emptied the queue, or before the socket was
-  /// opened. Bytes that are read from now on did not arrive earlier than that. Before the first
-  /// call every stamp is rejected.
+  /// The receive queue was empty at `begun`: both clocks read just before a read that emptied the
+  /// queue, or before the socket was opened. Bytes that are read later did not arrive before
+  /// `begun`. Before the first call every stamp is rejected.
   void nothing_older_than(const ClockPair& begun) ABBE_RT { empty_at_ = begun; }
 
   /// Number of arrivals whose stamp was missing or rejected. Same thread as arrival().

@@ -37,7 +37,7 @@ class LatencyHistogram {
   [[nodiscard]] static std::chrono::nanoseconds upper_bound(std::size_t bucket) noexcept;
 
  private:
-  // Stored by one thread. relaxed: counts for display only, they order no other access.
+  // One thread stores the counts. relaxed: they are for display only and order no other access.
   std::array<std::atomic<std::uint64_t>, kBuckets> counts_{};
   std::atomic<std::int64_t> largest_ns_{0};
 };

@@ -1,9 +1,9 @@
 #pragma once
 /// Ring of raw bytes from the device thread to the recorder, in blocks of fixed size, so that every
 /// recording can be decoded again. One writer, one reader, wait-free. Bytes of one read that exceed
-/// a block are split over several blocks with `continued`. If not all blocks of a read fit, the
-/// whole read is dropped and its blocks are counted; `lost_before` of the next block holds that
-/// number.
+/// a block are split over several blocks with `continued`. If the blocks of a read do not all fit
+/// into the ring, the whole read is dropped and its blocks are counted; `lost_before` of the next
+/// block holds that number.
 
 #include <atomic>
 #include <cstddef>
@@ -22,8 +22,8 @@ class RawRing {
   /// Allocates and touches the memory.
   explicit RawRing(std::size_t capacity_blocks);
 
-  /// Writer thread. False: all bytes were dropped. A call without bytes writes one empty block: it
-  /// records an event at `time`.
+  /// Writer thread. False: all bytes were dropped. A call without bytes writes one empty block,
+  /// which records an event at `time`.
   bool push_bytes(protocol::HostTime time, protocol::RawBlock::Direction direction,
                   std::span<const std::byte> bytes) ABBE_RT;
 
@@ -42,8 +42,8 @@ class RawRing {
  private:
   RingIndices indices_;
   RingSlots<protocol::RawBlock> blocks_;
-  /// Writer only: blocks dropped since the last read that fitted. On a cache line apart from
-  /// blocks_, which the reader reads.
+  /// Writer only: blocks dropped since the last read whose blocks fitted. On a cache line apart
+  /// from blocks_, which the reader reads.
   alignas(kNoSharing) std::uint64_t lost_ = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };

@@ -24,7 +24,8 @@ namespace abbe::drivers {
 /// seldom need a system call. glibc only.
 void keep_heap() noexcept;
 
-/// Loads 64 kB of the calling thread's stack, so that its loop causes no page faults there.
+/// Loads 64 kB of the calling thread's stack, so that the thread's loop causes no page faults
+/// there.
 void touch_stack() noexcept;
 
 /// For a thread without real-time priority that must not wait for other threads (the hub): loads

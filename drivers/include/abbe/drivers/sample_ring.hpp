@@ -45,8 +45,8 @@ class SampleRing {
   }
 
   /// Writer thread. Pushes the first samples that fit and drops the rest; returns the number
-  /// pushed. The counter is published once for all, which is cheaper than try_push() in a loop when
-  /// a device delivers bursts.
+  /// pushed. The write counter is published once for all samples, which is cheaper than try_push()
+  /// in a loop when a device delivers bursts.
   std::size_t push(std::span<const T> samples) ABBE_RT {
     std::size_t n = 0;
     if (lost_ != 0 && !samples.empty()) [[unlikely]] {
@@ -71,12 +71,12 @@ class SampleRing {
   }
 
  private:
-  /// Only the writer stores, so no atomic read-modify-write is needed.
+  /// Counts `n` dropped samples. Only the writer stores, so no atomic read-modify-write is needed.
   [[gnu::cold, gnu::noinline]] void drop(std::size_t n) ABBE_RT {
     lost_ += n;
     dropped_.store(dropped_.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
   }
-  /// The first sample after a loss carries GapBefore and the number of lost samples.
+  /// Pushes the first sample after a loss: it carries GapBefore and the number of lost samples.
   [[gnu::cold, gnu::noinline]] bool push_marked(T sample) ABBE_RT {
     const std::uint64_t lost = lost_ + sample.head.lost_before;
     sample.head.lost_before = static_cast<std::uint32_t>(

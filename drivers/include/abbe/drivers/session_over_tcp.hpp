@@ -1,8 +1,8 @@
 #pragma once
 /// The part that is common to all devices with a session over one TCP connection. It carries out
-/// the actions of the sans-I/O session, sends it a tick at its deadline, reads bytes for receive(),
-/// and passes the messages decoded by receive() to the session in the next cycle. One device
-/// thread.
+/// the actions of the sans-I/O session, gives the session a tick at its deadline, reads bytes for
+/// receive(), and passes the messages decoded by receive() to the session in the next cycle. One
+/// device thread.
 ///
 /// `Words` declares the types of the session: Session, Input, Action, Open, Send, Close, Connected,
 /// ConnectionLost; Message, the variant that receive() posts; and the capacity of one cycle: kInbox
@@ -129,7 +129,8 @@ class SessionOverTcp {
   protocol::HostTime arrival_{};  ///< of received(), or of the connection
 
  private:
-  /// 8 MB for kMostRead of 64 kB: more than the kernel buffers for one connection by default.
+  /// With kMostRead = 64 kB these reads are 8 MB: more than the kernel buffers by default for one
+  /// connection.
   static constexpr std::size_t kMostLateReads = 128;
 
   /// False if nothing happened on the connection within `wall`.

@@ -34,8 +34,8 @@ class Counter {
 
 /// The latest text, truncated to kCapacity, replaced without locks. There are two buffers: one can
 /// be read while the other is written, so that a reader of high priority never waits for a
-/// preempted writer. A reader reads again only if the writer began two texts meanwhile. The writer
-/// never waits. Memory fences as in the seqlock of [Boehm 2012].
+/// preempted writer. A reader repeats its reading only if the writer began two texts meanwhile. The
+/// writer never waits. Memory fences as in the seqlock of [Boehm 2012].
 class FaultText {
  public:
   static constexpr std::size_t kCapacity = 248;  ///< as much as a Health message carries

@@ -44,7 +44,7 @@ class AxisPresence {
  private:
   std::size_t axes_;
   std::int64_t limit_;
-  std::array<std::int64_t, protocol::kMaxAxes> missed_{};  ///< consecutive samples without it
+  std::array<std::int64_t, protocol::kMaxAxes> missed_{};  ///< consecutive samples without axis i
 };
 
 }  // namespace abbe::drivers

@@ -1,7 +1,8 @@
 #pragma once
-/// Detects bundles: several answers of one node with the same arrival time. A tunnel or gateway
-/// that collects frames for longer than a SYNC period and sends them together (cannelloni: 0.1 s by
-/// default) causes bundles, and every cycle is lost. Sans-I/O. One thread.
+/// Detects bundles: several answers of one node with the same arrival time. The cause is a tunnel
+/// or gateway that collects frames for longer than a SYNC period and sends them together
+/// (cannelloni: 0.1 s by default). The answers then arrive after the end of their cycle, so every
+/// cycle is lost. Sans-I/O. One thread.
 
 #include <array>
 #include <cstdint>
@@ -13,7 +14,8 @@ namespace abbe::drivers {
 
 class BundleDetector {
  public:
-  /// Answers in a bundle. Two can arrive together because one of them was late.
+  /// Least number of answers that counts as a bundle. Two answers also have the same arrival time
+  /// if one of them was late.
   static constexpr unsigned kBundle = 3;
 
   void on_frame(const ReceivedFrame& received) {

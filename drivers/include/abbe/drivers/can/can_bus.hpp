@@ -22,8 +22,8 @@ struct ReceivedFrame {
   protocol::HostTime time{};  ///< arrival; of an echo: transmission
   /// There is no usable kernel timestamp: `time` was read when the frame reached user space.
   bool time_widened = false;
-  /// The frame is our own SYNC (start_sync() or, with echoes_sync(), send()), received back when
-  /// it was transmitted.
+  /// The frame is our own SYNC (sent by start_sync() or, with echoes_sync(), by send()), received
+  /// back when it was transmitted.
   bool echo = false;
 };
 
@@ -35,13 +35,13 @@ struct CanBusCounters {
   std::uint64_t foreign_datagrams = 0;  ///< refused datagrams of senders other than the peer
 };
 
-/// Result of read(). The transport filters frames out: fewer frames than out.size() do not mean
-/// that the receive queue is empty. Only `all` states that.
+/// Result of read(). The transport filters frames out, so fewer frames than out.size() do not mean
+/// that the receive queue is empty. `all` states whether it was read to its end.
 struct CanRead {
   std::size_t frames = 0;
   bool all = false;  ///< the receive queue was read to its end
-  /// Read after the wait and before the first frame: if `all`, every frame that arrived before
-  /// `until` was delivered.
+  /// Time at which read() began to take frames from the queue, after its wait: if `all`, every
+  /// frame that arrived before `until` was delivered.
   protocol::HostTime until{};
 };
 

@@ -23,9 +23,9 @@ class EmergencyReports {
   /// The next fault that was not returned yet: per node the latest emergency, at most one a second,
   /// with the number of other emergencies since the previous report.
   [[nodiscard]] std::optional<std::string> take_fault(protocol::HostTime now);
-  /// Axes that are absent, with the latest emergency of their node, and axes whose emergency is not
-  /// reset; empty: none. The latest emergency is deleted once the axis has been present and free of
-  /// emergencies for kSettledAfter.
+  /// Text that names the axes that are absent, each with the latest emergency of its node, and the
+  /// axes whose emergency is not reset; empty if there are none. The latest emergency of a node is
+  /// forgotten once its axis has been present and free of emergencies for kSettledAfter.
   [[nodiscard]] std::string condition(std::uint8_t absent_mask, protocol::HostTime now);
 
  private:

@@ -10,8 +10,9 @@
 /// SYNC number n is due at start + n x period on the host clock, so the period does not drift. A
 /// SYNC that is late by a period or more is skipped and counted, and the next sample is marked with
 /// a gap. The SYNC runs while at least one node is configured and the bus is not off. With
-/// SyncSource::Kernel the kernel's timer sends it. On SocketCAN the time of a SYNC is that of its
-/// echo, with either source: on most controllers the end of its transmission.
+/// SyncSource::Kernel a timer of the kernel sends the SYNC. On SocketCAN the time of a SYNC is the
+/// time of its echo, with SyncSource::Thread and with Kernel: on most controllers the end of its
+/// transmission.
 ///
 /// States:
 ///   "closed"
@@ -49,8 +50,8 @@
 namespace abbe::drivers {
 
 enum class SyncSource {
-  /// The device thread sends the SYNC, on any transport. Without an echo its time is read
-  /// immediately before send().
+  /// The device thread sends the SYNC, on any transport. On a transport without echoes the time of
+  /// the SYNC is read immediately before send().
   Thread,
   Kernel,  ///< CAN_BCM sends the SYNC, independently of the thread; SocketCAN only
   /// The machine sends the SYNC and configures the nodes; this device sends nothing.
@@ -70,8 +71,9 @@ struct EncoderDeviceOptions {
 
 class EncoderDevice final : public Device {
  public:
-  /// `time` must outlive the device. Error BadConfiguration: as check(), or SyncSource::Kernel on a
-  /// `bus` without cyclic transmission. The first wait() opens the bus.
+  /// `time` must outlive the device. Error BadConfiguration: check() refuses the options, or
+  /// SyncSource::Kernel with a `bus` that has no cyclic transmission. The first wait() opens the
+  /// bus.
   [[nodiscard]] static Result<std::unique_ptr<EncoderDevice>> create(
       const EncoderDeviceOptions& options, std::unique_ptr<CanBus> bus, const TimeSource& time);
 
@@ -101,7 +103,8 @@ class EncoderDevice final : public Device {
   void follow_external_sync(protocol::HostTime now);
   void send_sync();
   void follow_kernel_sync();
-  /// The latest report of a fault that can occur with every frame: it is reported once a second.
+  /// The latest report of a kind of fault that can occur with every frame. Such a fault is reported
+  /// at most once a second, with its count.
   struct Reported {
     std::uint64_t count = 0;
     std::optional<protocol::HostTime> at;
@@ -137,7 +140,7 @@ class EncoderDevice final : public Device {
   ForeignSync foreign_;
   AxisPresence presence_;
   EmergencyReports emergencies_;
-  std::string condition_;  ///< as on board_
+  std::string condition_;  ///< the text last written to board_
 
   bool open_ = false;
   bool sending_ = false;  ///< the supervisor runs

@@ -140,8 +140,8 @@ class EncoderReceiver {
   [[nodiscard]] std::span<const protocol::AxisSample> on_loss() ABBE_RT;
   /// No further event follows: a held sample is output. An open cycle gives no sample.
   [[nodiscard]] std::span<const protocol::AxisSample> on_end() ABBE_RT;
-  /// When on_time() has something to do: the deadline of the open cycle, the end of the period of a
-  /// held sample, else HostTime::max().
+  /// The instant at which on_time() next has something to do: the deadline of the open cycle, the
+  /// end of the period of a held sample, else HostTime::max().
   [[nodiscard]] protocol::HostTime deadline() const ABBE_RT;
 
   /// Replay: processes all events of one raw block and passes every sample to
@@ -239,11 +239,11 @@ class EncoderReceiver {
   std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, also too late
   /// Answered in the latest cycle, but the answer may belong to another SYNC, or came too late.
   std::uint8_t doubtful_mask_ = 0;
-  std::uint8_t mark_next_mask_ = 0;  ///< doubtful in the next cycle, whatever they answer
+  std::uint8_t mark_next_mask_ = 0;  ///< axes doubtful in the next cycle, whatever they answer
   /// Unsettled axes with an answer in current_, which waits for second answers; 0: it does not wait.
   std::uint8_t held_for_ = 0;
   bool bus_off_ = false;
-  bool bus_error_pending_ = false;  ///< since the previous sample
+  bool bus_error_pending_ = false;  ///< an error frame arrived since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
   bool time_widened_ = false;       ///< for the SYNC or an answer of the open cycle

@@ -31,10 +31,11 @@ class EncoderSupervisor {
   EncoderSupervisor(std::span<const EncoderAxis> axes, const SupervisorOptions& options);
 
   void start(protocol::HostTime now);
-  /// From now on nothing may be sent: pending frames are discarded. start() begins again.
+  /// Ends every configuration and discards pending frames: nothing is sent until start() is called.
   void stop();
-  /// The bus has recovered from bus-off: sends NMT reset communication to each of these nodes by
-  /// its own node ID (node ID 0 would address every drive on the bus), then configures them.
+  /// The bus has recovered from bus-off: sends NMT reset communication to each node of this
+  /// supervisor by its own node ID (node ID 0 would address every drive on the bus), then
+  /// configures the nodes.
   void bus_recovered(protocol::HostTime now);
   /// A SYNC was sent: configured nodes must answer.
   void on_sync(protocol::HostTime now);

@@ -22,15 +22,16 @@ class ForeignSync {
   /// The slowest producers send a SYNC every second: older positions are useless to a control. The
   /// additional 0.5 s cover a tunnel that delays frames (cannelloni: 0.1 s) and a late SYNC.
   static constexpr std::chrono::nanoseconds kListenFor = std::chrono::milliseconds{1500};
-  /// A control that restarts within this time finds its nodes unchanged.
+  /// A control (CNC) that restarts within this time finds its nodes unchanged.
   static constexpr std::chrono::nanoseconds kQuietFor = std::chrono::seconds{60};
 
-  /// A control takes longer than this to start: after a shorter interruption no control is on the
-  /// bus that was not on it, or starting, before.
+  /// A control takes longer than this to start. So after a shorter interruption every control on
+  /// the bus was on it, or starting, already before the interruption.
   static constexpr std::chrono::nanoseconds kShortBreak = std::chrono::seconds{2};
-  /// Extended to three times the longest SYNC interval ever measured on this bus, up to kListenFor.
-  /// A slower producer is detected by its first SYNC while we send, like a producer that is
-  /// connected to an open bus.
+  /// Listening time after a short interruption. It is extended to three times the longest SYNC
+  /// interval ever measured on this bus, up to kListenFor. A foreign SYNC with a longer period is
+  /// detected only when its first SYNC arrives, while we already send; so is a producer that is
+  /// connected to a bus that is already open.
   static constexpr std::chrono::nanoseconds kListenAgainFor = std::chrono::milliseconds{200};
 
   /// The bus was opened, or has recovered from bus-off. Listening restarts: time without a SYNC
@@ -44,14 +45,15 @@ class ForeignSync {
 
   [[nodiscard]] bool present() const { return count_ > 0; }
   [[nodiscard]] protocol::HostTime last() const { return last_; }
-  /// Mean over at most a second in which no SYNC was missing; nullopt before the second SYNC.
+  /// Mean period of the foreign SYNC over at most the latest second without a missing SYNC; nullopt
+  /// before the second SYNC.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> period() const;
 
  private:
   std::optional<protocol::HostTime> quiet_since_;
   std::chrono::nanoseconds listen_for_ = kListenFor;
   bool may_send_ = false;
-  bool restarts_measuring_ = false;  ///< no interval from a SYNC before the opening to one after it
+  bool restarts_measuring_ = false;  ///< the next SYNC starts a new measurement of the period
   protocol::HostTime heard_until_{};
   std::uint64_t count_ = 0;  ///< since the foreign SYNC was first detected
   protocol::HostTime first_{}, last_{};

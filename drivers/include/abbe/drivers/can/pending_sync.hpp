@@ -4,12 +4,14 @@
 /// bus that transmits nothing, SYNCs would accumulate in the queue and be transmitted in one burst
 /// later.
 ///
-/// The receiver sees the SYNC with the time of send(), marked as widened, if
+/// EncoderReceiver gets the SYNC with the time of send(), marked as widened (larger uncertainty),
+/// if
 ///  - no echo arrives within the time for answers: the cycle then ends with all axes missing,
 ///  - a node answers before the echo arrives: some controllers report received frames before sent
 ///    frames, or
 ///  - the echo has no usable timestamp.
-/// An echo that arrives after that is discarded. Sans-I/O. One thread.
+/// An echo that arrives after the SYNC was passed on in this way is discarded. Sans-I/O. One
+/// thread.
 
 #include <bitset>
 #include <chrono>
@@ -51,9 +53,9 @@ class PendingSync {
 
  private:
   enum class Due : std::uint8_t {
-    Echo,          ///< without it by then, the receiver sees the SYNC as sent
-    Transmission,  ///< without an echo by then, the SYNC is taken for lost
-    Answers,       ///< to a SYNC that was transmitted after its cycle: all have arrived by then
+    Echo,          ///< no echo by then: the receiver gets the SYNC with the time of send()
+    Transmission,  ///< no echo by then: the SYNC is taken for lost
+    Answers,       ///< by then all answers to a SYNC transmitted after its cycle have arrived
   };
 
   [[nodiscard]] bool pending() const { return deadlines_.is_set(Due::Echo); }

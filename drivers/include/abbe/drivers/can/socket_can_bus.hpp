@@ -53,15 +53,15 @@ class SocketCanBus final : public CanBus {
   SocketCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  int sync_fd_ = -1;          ///< CAN_BCM; closing it ends the SYNC
-  bool kernel_sent_ = false;  ///< start_sync() since open(); its SYNCs may arrive after stop_sync()
-  bool sent_sync_ = false;    ///< since open()
+  int sync_fd_ = -1;          ///< CAN_BCM socket; closing it ends the SYNC
+  bool kernel_sent_ = false;  ///< since open(), start_sync() was called: its SYNCs may arrive late
+  bool sent_sync_ = false;    ///< send() has sent a SYNC since open()
   /// An earlier socket of ours sent a SYNC that may still arrive: a SYNC from this computer that is
   /// not an echo of the open socket is ignored.
   bool left_over_ = false;
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;
-  std::optional<ReceivedFrame> held_;  ///< did not fit into `out` together with a loss mark
+  std::optional<ReceivedFrame> held_;  ///< frame for which `out` had no space beside a loss mark
   std::uint64_t lost_ = 0;
   std::uint32_t last_overflow_ = 0;  ///< of SO_RXQ_OVFL, which counts per socket
 };

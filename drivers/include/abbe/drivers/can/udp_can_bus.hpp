@@ -25,8 +25,8 @@ struct UdpCanOptions {
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
   std::string peer_address = "127.0.0.1";  ///< IPv4 address, or a name that open() resolves
   std::uint16_t peer_port = 20000;
-  /// Host time per monotonic time, as in the TimeSource; 0: the time is stepped, kernel timestamps
-  /// are not used.
+  /// Speed of the TimeSource: host time per monotonic time. 0: the host time is advanced in steps
+  /// by the caller, and kernel timestamps are not used.
   double speed = 1.0;
 };
 

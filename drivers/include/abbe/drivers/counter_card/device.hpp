@@ -2,9 +2,9 @@
 /// A USB-QUAD08 counter card as a Device: CounterCardReceiver and CounterCardSession around one USB
 /// link. wait() sends the requests of the session and collects the card's answers; receive()
 /// converts bytes to scans and raw blocks. States: those of CardState. After a lost connection the
-/// counts continue if the card's clock channel has continued. After a loss of power the counters
-/// restart at zero at the present axis positions (SampleFlag::Restarted): the axes must be
-/// referenced again.
+/// counts continue if the card's clock channel shows that the counters ran on meanwhile. After a
+/// loss of power the counters restart at zero at the present axis positions
+/// (SampleFlag::Restarted): the axes must be referenced again.
 
 #include <array>
 #include <cstddef>
@@ -41,9 +41,9 @@ struct CounterCardOptions {
   std::size_t raw_capacity_blocks = 4096;
 };
 
-/// The device that a link must open.
+/// USB identity of the card that the link must open.
 [[nodiscard]] UsbIdentity identity_of(const CounterCardOptions& options);
-/// Bytes of one transfer: whole packets, at most 16 KiB.
+/// Size of one transfer in bytes: whole packets, at most 16 KiB.
 [[nodiscard]] std::size_t transfer_bytes(const CounterCardOptions& options);
 
 class CounterCardDevice final : public Device {
@@ -61,14 +61,16 @@ class CounterCardDevice final : public Device {
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// One reader each. A card that latches all its axes on their index delivers no samples.
+  /// Each ring has one reader. A card that latches all its axes on their index delivers no samples.
   [[nodiscard]] SampleRing<protocol::AxisSample>& samples() noexcept { return samples_; }
   [[nodiscard]] RawRing& raw() noexcept { return raw_; }
-  /// One entry a second while the clock model is settled, after the scan's sample; one reader.
+  /// While the clock model is settled, one entry a second, written after the sample of the same
+  /// scan. One reader.
   [[nodiscard]] SampleRing<CounterCardProgress>& progress() noexcept { return progress_ring_; }
   /// Only for the device thread.
   [[nodiscard]] const CounterCardReceiver& receiver() const noexcept { return receiver_; }
-  /// The unverified assumption of the configuration, as a sentence; empty: none.
+  /// A sentence that names the assumption about latched counters (wiring.hpp), if the configuration
+  /// relies on it without `latch_verified`; else empty.
   [[nodiscard]] std::string assumption() const;
 
  private:

@@ -16,7 +16,8 @@ namespace abbe::drivers {
 
 class LatchTracker {
  public:
-  /// `in_step`: both counters start together with the clock (the card's own timer): offset 0.
+  /// `in_step`: the clock is the card's own timer, so both counters start together with it: offset
+  /// 0.
   LatchTracker(protocol::quad08::CountWidth width, bool in_step) ABBE_RT : width_(width),
                                                                            in_step_(in_step) {
     reset();
@@ -38,8 +39,8 @@ class LatchTracker {
                std::int64_t previous_clock_count) ABBE_RT;
   /// The latest latch; nullopt before the first edge.
   [[nodiscard]] std::optional<Latch> latest() const ABBE_RT { return latest_; }
-  /// Number of latches outside their scan interval: the latch channel counts another clock, or the
-  /// input does not latch as assumed.
+  /// Number of latches outside the scan interval in which their edge was seen: the latch channel
+  /// counts another clock, or the input does not latch as assumed.
   [[nodiscard]] std::uint64_t disagreements() const ABBE_RT { return disagreements_; }
 
  private:

@@ -4,11 +4,12 @@
 /// Real time: no allocation, no system call. One thread. About 200 kB: keep it on the heap.
 ///
 /// The stream has neither headers nor sequence numbers. The clock channel serves as the check: it
-/// must advance by the same count from scan to scan. A scan that does not fit is held back.
-///  - If the next scan fits to it, both are output after a gap. The clock's count gives the number
-///    of lost scans.
-///  - Otherwise it is refused: it was not a scan. After kMostRefused consecutive refusals the
-///    receiver is out of step.
+/// must advance by the same count from scan to scan. A scan whose clock count does not fit the
+/// previous one is held back.
+///  - If the next scan fits to the held scan, both are output after a gap. The clock's count gives
+///    the number of lost scans.
+///  - Otherwise the held scan is refused: its bytes were not a scan. After kMostRefused consecutive
+///    refusals the receiver is out of step: it has lost the beginning of the scans.
 ///
 /// Raw blocks of a counter card are USB/IP messages (protocol/usbip/urb.hpp), for any transport:
 ///   ToDevice    header of each control request, as sent
@@ -37,10 +38,10 @@ namespace abbe::drivers {
 
 struct CounterCardReceiverOptions {
   CounterCardWiring wiring;
-  /// The delay: FIFO, bus and host controller.
+  /// The constant delay of a scan is that of FIFO, USB bus and host controller.
   ClockModelOptions clock{.max_constant_delay = std::chrono::milliseconds{1}};
   /// State of the counters at the end of an earlier run of the program. Scans are withheld until
-  /// the clock channel agrees for 0.25 s with the count expected if the counters have continued
+  /// the clock channel agrees for 0.25 s with the count expected of counters that ran on since then
   /// (tolerance: 50 ms and 200 ppm of the time between); then the counts continue after a gap.
   /// Otherwise CounterCardCounters::restarted increases, and scans are withheld until the counters
   /// are set up.

@@ -29,7 +29,8 @@ struct CounterCardSessionOptions {
   UsbBulkStream stream;
   std::chrono::nanoseconds open_timeout = std::chrono::seconds{2};
   std::chrono::nanoseconds control_timeout = std::chrono::milliseconds{500};
-  /// No scans for this long is a fault. 90 ms: it is detected within 100 ms.
+  /// Without scans for this long the session reports a fault. 90 ms: within 100 ms of the last
+  /// scan.
   std::chrono::nanoseconds silence = std::chrono::milliseconds{90};
   std::chrono::nanoseconds status_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
@@ -44,8 +45,8 @@ struct CounterCardSessionOptions {
 
 // Inputs.
 struct CardTick {
-  /// All inputs that arrived before this instant were passed on: time-outs are measured up to it.
-  /// So a delayed host reads its input before a time-out expires.
+  /// All inputs that arrived before this instant were passed to the session. Time-outs are measured
+  /// up to it, so that no time-out expires while a delayed host has unread input.
   protocol::HostTime read_until = protocol::HostTime::max();
 };
 struct CardScans {
@@ -116,9 +117,9 @@ class CounterCardSession {
 
  private:
   using Now = protocol::HostTime;
-  /// An input that must arrive by then: else it is a fault.
+  /// Inputs with a deadline: it is a fault if the input has not arrived by then.
   enum class Input : std::uint8_t { Opened, ControlDone, BulkStopped, Scans };
-  /// What the session does at that time.
+  /// What the session does when a deadline of planned_ has passed.
   enum class Plan : std::uint8_t {
     Open,
     Step,    ///< the next request of the stage, or the halt of the scan
@@ -170,7 +171,7 @@ class CounterCardSession {
   std::string serial_;   ///< of the card whose counters were set up
   /// The card was opened with counters set up before; no scan has confirmed yet that they continue.
   bool resuming_ = false;
-  bool resumed_again_ = false;  ///< the scan was restarted once because they were out of step
+  bool resumed_again_ = false;  ///< the scan was restarted once because it was out of step
   unsigned status_tries_ = 0;
   unsigned tries_ = 0;  ///< of the pending control transfer
   Deadlines<Input::Scans> awaited_;

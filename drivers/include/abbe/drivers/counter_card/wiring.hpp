@@ -71,9 +71,11 @@ struct CounterCardWiring {
 /// Actual scans per second of the pacer.
 [[nodiscard]] double scan_rate_hz(const CounterCardWiring& wiring);
 [[nodiscard]] double clock_counts_per_scan(const CounterCardWiring& wiring);
-/// Periods of 48 MHz in one clock period; only for a timer.
+/// Periods of the card's 48 MHz oscillator in one period of the counted clock. Precondition: the
+/// clock source is a timer.
 [[nodiscard]] std::uint32_t timer_divisor(const CounterCardWiring& wiring);
-/// True if the wiring depends on the assumption above and it was not verified; reported at start.
+/// True if the wiring relies on the assumption at the top of this file without `latch_verified`.
+/// The device then reports the assumption at start.
 [[nodiscard]] bool rests_on_assumption(const CounterCardWiring& wiring);
 
 }  // namespace abbe::drivers

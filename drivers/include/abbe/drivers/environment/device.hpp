@@ -3,8 +3,9 @@
 /// ModbusLine. wait() opens the connection, sends one request and blocks for its answer. receive()
 /// converts bytes to samples and raw blocks.
 /// Every fault closes the connection. A connection shared with other devices (see EnvironmentLine)
-/// is closed only if none of them has answered meanwhile. After a fault the device reads the
-/// proving registers again, so that an exchanged device is detected.
+/// is closed only if none of the others has answered since this device's previous fault. After a
+/// fault the device reads the proving registers (register_map.hpp) again, so that an exchanged
+/// device is detected.
 /// States: "closed", "proving", "reading", "refused" (wrong device or map; retried every
 /// `refused_retry`).
 
@@ -50,7 +51,7 @@ class EnvironmentDevice final : public Device {
 
   /// Device thread: an answer is outstanding, or has arrived and is not yet handled.
   [[nodiscard]] bool busy() const noexcept;
-  /// Device thread: the line is open, and this device has begun reading on the current connection.
+  /// Device thread: the line is open, and this device has sent requests on the present connection.
   [[nodiscard]] bool on_line() const noexcept {
     return link_.line.is_open() && opening_ == link_.openings;
   }
@@ -83,7 +84,7 @@ class EnvironmentDevice final : public Device {
   [[nodiscard]] bool open_line();
   [[nodiscard]] bool others_answered() noexcept;
   void leave_line(std::chrono::nanoseconds retry, std::chrono::nanoseconds quiet);
-  /// `quiet`: how long a late answer to the last request may still arrive.
+  /// Handles a fault. `quiet`: for this long a late answer to the last request may still arrive.
   void fail(std::string_view what, std::chrono::nanoseconds retry, const char* state = "closed",
             std::chrono::nanoseconds quiet = std::chrono::milliseconds{50});
 

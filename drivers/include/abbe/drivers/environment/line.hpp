@@ -2,9 +2,9 @@
 /// The Modbus devices of one serial line, or behind one gateway, as one Device with one thread.
 /// Requests are sent one at a time over one connection; the device that has waited longest is next.
 /// Each device has its own rounds, time-outs, faults and status.
-/// A device that does not answer delays the others once per period, by its answer_timeout and by
-/// the same time again in which a late answer is discarded. The connection is closed only if no
-/// other device has answered on it meanwhile.
+/// A device that does not answer delays the others once per period: by its answer_timeout, and by
+/// the same time again, in which a late answer is discarded. Its fault closes the connection only
+/// if no other device has answered on it since its previous fault.
 
 #include <memory>
 #include <vector>

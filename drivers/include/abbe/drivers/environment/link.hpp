@@ -12,7 +12,7 @@ namespace abbe::drivers {
 
 struct EnvironmentLink {
   ModbusLine line;
-  std::uint64_t openings = 0;        ///< a device that stored another number restarts
+  std::uint64_t openings = 0;        ///< a device restarts if it stored another number
   std::uint64_t answers = 0;         ///< of all devices
   protocol::HostTime open_at{};      ///< earliest time to open the line again
   protocol::HostTime quiet_until{};  ///< bytes until then are a late answer and are discarded

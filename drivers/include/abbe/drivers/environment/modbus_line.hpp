@@ -41,10 +41,11 @@ using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 /// "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1"
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
 
-/// Exclusive lock of a serial line (flock). If the adapter is not plugged in at the start, two
-/// paths of the same line cannot be recognised as such; the lock then makes the second opening
-/// fail. It also excludes other programs that use flock. TIOCEXCL would exclude all programs except
-/// those of root, but it stays set after a process is killed while another one has the line open.
+/// Exclusive lock of a serial line (flock). If the adapter is not plugged in at the start, abbe
+/// cannot recognise that two configured paths lead to the same line; the lock then makes the second
+/// opening fail. It also excludes other programs that use flock. TIOCEXCL would exclude all
+/// programs except those of root, but it stays set after a process is killed while another one has
+/// the line open.
 class SerialLock {
  public:
   SerialLock() = default;

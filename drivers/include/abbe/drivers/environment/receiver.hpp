@@ -1,8 +1,8 @@
 #pragma once
 /// Selects the requests to a Modbus device and decodes its answers. Sans-I/O and deterministic: the
 /// same bytes with the same times give the same samples, live or replayed. On a new connection the
-/// proving registers are read first. Then each round of reads gives one sample. Real time:
-/// allocation-free, no system call. One thread.
+/// proving registers (register_map.hpp) are read first. Then each round of reads gives one sample.
+/// Real time: allocation-free, no system call. One thread.
 ///
 /// The time of a sample is the middle between the first request and the last answer of its round;
 /// the uncertainty is rectangular over that interval ([GUM] 4.3.7). The age of a value inside the
@@ -84,7 +84,7 @@ class EnvironmentReceiver {
   bool on_raw(const protocol::RawBlock& block) ABBE_RT;
 
  private:
-  /// Position of a register in the answers: index of the read, index of the byte in its answer.
+  /// Place of a register's value in the answers: index of the read, and of the byte in its answer.
   struct Spot {
     std::size_t read = 0;
     std::size_t byte = 0;

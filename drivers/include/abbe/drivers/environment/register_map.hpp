@@ -29,12 +29,13 @@ struct RegisterPlace {
 enum class Quantity : std::uint8_t { AirTemperature, AirPressure, RelativeHumidity, Temperature };
 
 /// Limits of plausible values, SI. A value outside is treated as not available; in the first round
-/// it means that the map does not fit the device.
+/// of a connection such a value means that the map does not fit the device.
 struct PlausibleRange {
   double min;
   double max;
 };
-/// Air -40 to 85 C, 500 to 1200 hPa, 0 to 105 %; scales and parts -50 to 200 C.
+/// Air: -40 to 85 C, 500 to 1200 hPa, 0 to 105 % relative humidity. Temperatures of scales and
+/// parts: -50 to 200 C.
 [[nodiscard]] PlausibleRange plausible_range(Quantity quantity) noexcept;
 
 /// value [SI] = register * scale + offset.
@@ -68,7 +69,7 @@ struct RegisterMap {
 [[nodiscard]] Result<void> check(const RegisterMap& map);
 
 /// The smallest number of reads that cover all `places`: one read covers adjacent registers of the
-/// same unit and function.
+/// same unit (Modbus address) and function.
 [[nodiscard]] std::vector<modbus::ReadRequest> reads_for(const std::vector<RegisterPlace>& places,
                                                          int base_offset);
 

@@ -37,16 +37,17 @@ struct IppDeviceOptions {
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
-  /// Called on the device thread with each change: before the first command of a motion is sent,
-  /// when the machine has stopped, when a hold begins or ends. Store the value, and pass it in
-  /// session.held and session.moving after a restart.
+  /// Called on the device thread at every change of the state: before the first command of a motion
+  /// is sent, when the machine has stopped, when a hold begins or ends. A hold: the machine awaits
+  /// a release by an operator. Store the value, and pass it in session.held and session.moving
+  /// after a restart.
   std::function<void(const IppMachine&)> machine_changed;
   std::size_t touch_capacity = 256;
   std::size_t position_capacity = 256;  ///< 25 s at 10 positions per second
   std::size_t raw_capacity_blocks = 256;
 };
 
-/// Parameter `Words` of SessionOverTcp.
+/// The types of I++ DME that SessionOverTcp needs, passed as its parameter `Words`.
 struct IppWords {
   using Session = IppSession;
   using Input = IppInput;
@@ -75,12 +76,13 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
 
-  /// Any thread. Moves the machine and touches, in the order of the calls; gives one ProbeTrigger
-  /// per touch, numbered from 1 in that order. Points that are not begun when the connection is
-  /// lost, and points requested before the session is ready, are discarded; each case is a fault.
+  /// Any thread. Moves the machine to the point and touches there. Points are measured in the order
+  /// of the calls; each touch gives one ProbeTrigger, numbered from 1 in that order. Points that
+  /// are not begun when the connection is lost, and points requested before the session is ready,
+  /// are discarded; each case is a fault.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
-  /// As above, for a path. If the connection is lost, all remaining points are discarded: driving
-  /// only a part of the path could lead to a collision.
+  /// As measure() of one point, for a path. If the connection is lost, all remaining points are
+  /// discarded: driving only a part of the path could lead to a collision.
   void measure(std::span<const ProbePoint> points);
   /// Any thread. Stops a motion in progress (AbortE) and discards all points. The session then
   /// awaits release(), whether or not the machine was moving.

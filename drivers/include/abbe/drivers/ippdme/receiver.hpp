@@ -75,8 +75,8 @@ class IppReceiver {
 
   /// Registers a command line that was sent, with its CR LF.
   void sent(std::span<const std::byte> line, protocol::HostTime time) ABBE_RT;
-  /// Adds the bytes of one read and their arrival time; no bytes: a new connection. Call next()
-  /// until it returns nullopt before the next push().
+  /// Adds the bytes of one read and their arrival time; a call without bytes marks a new
+  /// connection. Call next() until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   [[nodiscard]] std::optional<IppMessage> next() ABBE_RT;
 
@@ -90,7 +90,8 @@ class IppReceiver {
     bool known = false;
     bool warned = false;
   };
-  /// Entry 0 is the event that reports motion continuously; the others are the latest commands.
+  /// Commands sent. Entry 0 is the event that reports motion continuously; the others are the
+  /// latest commands.
   static constexpr std::size_t kMostAsked = 16;
 
   [[nodiscard]] Asked* find(ippdme::Tag tag) ABBE_RT;

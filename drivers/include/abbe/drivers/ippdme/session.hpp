@@ -17,15 +17,16 @@
 /// A connection with an unfinished motion is closed only after AbortE was answered or
 /// command_timeout has passed. If such a connection is lost, the next one begins with AbortE,
 /// before StartSession, because servers queue commands behind a motion and StartSession clears
-/// errors. A session is then started only after a release. Exception: if the server refuses AbortE
-/// outside a session, or does not answer it there, a session is started first.
+/// errors. A session is then started only after a release (IppReleaseRequested). Exception: if the
+/// server refuses AbortE outside a session, or does not answer it there, a session is started
+/// first.
 ///
 /// While AwaitingRelease, no command is sent that moves the machine or clears an error. Home is
-/// sent in the first session and after a release, but not after a mere loss of the connection.
+/// sent in the first session and after a release, but not if only the connection was lost.
 ///
-/// While no point is measured, the position is requested once per poll period; this also checks
-/// that the server still answers. Points are accepted in Ready and Measuring. In any other state
-/// they are discarded, which is a fault.
+/// While no point is measured, the position is requested once per poll period; this request also
+/// checks that the server still answers. Points are accepted in Ready and Measuring. In any other
+/// state they are discarded, which is a fault.
 
 #include <array>
 #include <chrono>
@@ -59,11 +60,11 @@ enum class IppState {
 /// Text for messages: "ready", "measuring", ...
 [[nodiscard]] const char* name_of(IppState) noexcept;
 
-/// A target of the machine. touch: nominal position of the centre of the stylus tip at contact, and
-/// the outward surface normal there. The machine moves to this position plus its approach distance
-/// along the normal, and probes against the normal.
-/// Not touch: an intermediate position. The machine moves there in a straight line without probing.
-/// If the server refuses the motion, no later target is begun.
+/// A target of the machine. If touch: nominal position of the centre of the stylus tip at contact,
+/// and the outward surface normal there. The machine moves to this position plus its approach
+/// distance along the normal, and probes against the normal.
+/// If not touch: an intermediate position. The machine moves there in a straight line without
+/// probing. If the server refuses the motion, no later target is begun.
 struct ProbePoint {
   std::array<double, 3> position_m{};
   std::array<double, 3> normal = {0.0, 0.0, 1.0};
@@ -76,7 +77,7 @@ struct IppSessionOptions {
   std::string held;     ///< not empty: awaits a release from the start, for this reason
   bool moving = false;  ///< with held: the machine may be moving; its motion is aborted first
   std::string tool;     ///< tool to set before measuring; empty: keep the current tool
-  /// Request positions during motions; a refusal of severity 1 is no fault.
+  /// Request positions during motions. A refusal of this request with severity 1 is no fault.
   bool move_reports = true;
   std::chrono::nanoseconds poll_period = std::chrono::milliseconds{100};
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
@@ -120,7 +121,8 @@ class IppSession {
   [[nodiscard]] protocol::HostTime deadline() const noexcept { return deadlines_.next(); }
 
   [[nodiscard]] IppState state() const noexcept { return state_; }
-  /// True until the machine is released; also while its motion is still being stopped.
+  /// True until the machine is released by an operator; also while its motion is still being
+  /// stopped.
   [[nodiscard]] bool held() const noexcept { return held_; }
   /// True if IppReleaseRequested has an effect: held, and no motion is still being stopped.
   [[nodiscard]] bool releasable() const noexcept;
@@ -160,7 +162,8 @@ class IppSession {
   enum class Due {
     Abort,   ///< answer to AbortE; none by then: the machine may still be moving
     Answer,  ///< to the pending command; none by then: a fault
-    // Of the state: at most one of the following, and none while a command is pending.
+    // Purposes that belong to the state: at most one of the following deadlines is set, and none
+    // while a command is pending.
     Connect,
     Connection,  ///< none by then: a fault
     Poll,        ///< requests the position
@@ -185,7 +188,7 @@ class IppSession {
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
   [[nodiscard]] IppAction unexpected_response(std::string_view what, ippdme::Tag tag);
   [[nodiscard]] IppAction send(const Step& step);
-  /// The only deadline from now on.
+  /// Cancels all deadlines and sets this one.
   void wait_only_for(Due due, protocol::HostTime at);
   void end_pending();
   [[nodiscard]] IppAction unanswered();
@@ -224,8 +227,8 @@ class IppSession {
   bool in_session_ = false;  ///< StartSession was accepted on this connection
   /// A motion was sent, also on a lost connection, and its end was not reported.
   bool moving_ = false;
-  /// Close the connection when the motion has stopped: after a malformed, unexpected or missing
-  /// response its content is not reliable.
+  /// Close the connection when the motion has stopped. Set after a malformed, unexpected or missing
+  /// response: the further content of the connection is not reliable.
   bool close_then_ = false;
   bool held_ = false;  ///< until the machine is released
   std::string hold_reason_;

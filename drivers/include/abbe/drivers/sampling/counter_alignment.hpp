@@ -1,8 +1,8 @@
 #pragma once
-/// Two cards count the same scale from different zeros: one live, one latched at reference marks.
-/// The clock that both cards count aligns their scans. At a mark, the live count lies between its
-/// values before and after the mark, so every mark bounds the difference of the zeros. The bounds
-/// of all marks must intersect. Pure.
+/// Relates the counts of two counter cards that count the same scale from different zeros: one card
+/// counts live, the other latches at reference marks. The clock that both cards count aligns their
+/// scans. At a mark, the live count lies between its values before and after the mark, so every
+/// mark bounds the difference of the zeros. The bounds of all marks must intersect. Pure.
 
 #include <algorithm>
 #include <cstdint>
@@ -28,7 +28,7 @@ class CounterAlignment {
     if (!known_ || low_ > high_) return std::nullopt;
     return 0.5 * static_cast<double>(low_) + 0.5 * static_cast<double>(high_);
   }
-  /// The true difference lies within this of difference(), counts.
+  /// Half the possible interval: the true difference is difference() +- half_width(), counts.
   [[nodiscard]] double half_width() const noexcept {
     return 0.5 * static_cast<double>(high_) - 0.5 * static_cast<double>(low_);
   }

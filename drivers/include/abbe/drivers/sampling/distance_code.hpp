@@ -2,11 +2,12 @@
 /// Distance-coded reference marks: the position of a scale from the distances between neighbouring
 /// marks. Pure.
 ///
-/// Positions of the marks, in signal periods from the scale's zero mark, k = 0, 1, ...:
+/// Positions of the marks, in signal periods from the scale's zero mark, k = 0, 1, ...; N is the
+/// distance of two fixed marks:
 ///     fixed marks  k N
 ///     coded marks  k N + N / 2 + (k + 1)
 /// Two neighbouring marks at the distance M, crossed in the direction D (+1, -1), give the position
-/// of the mark crossed first:
+/// P1 of the mark crossed first:
 ///     P1 = (|B| - sgn B - 1) N / 2 + (sgn B - sgn D) |M| / 2,   B = 2 M - N
 /// A rotary scale has the same code around a circle of `length` periods; positions are modulo
 /// `length`.
@@ -27,7 +28,8 @@ namespace abbe::drivers {
 
 struct DistanceCode {
   std::int64_t increment = 1000;  ///< N: signal periods between two fixed marks; even
-  /// Signal periods of the measuring length (there are no marks beyond it), or of one revolution.
+  /// Signal periods of the measuring length (there are no marks beyond it) or, on a rotary scale,
+  /// of one revolution.
   std::int64_t length = 50'000;
   bool rotary = false;
 };
@@ -36,7 +38,8 @@ struct DistanceCode {
 
 enum class MarkFault : std::uint8_t {
   NotWhole,  ///< the distance of two marks is not an integer number of periods: wrong period, noise
-  /// The scale has no neighbouring marks at this distance: a mark was missed, or a wrong scale.
+  /// The scale has no neighbouring marks at this distance: a mark was missed, or it is another
+  /// scale.
   NotOfCode,
   Disagree,    ///< the decodings of neighbouring pairs contradict each other: a miscount
   Reversed,    ///< the direction changed between marks

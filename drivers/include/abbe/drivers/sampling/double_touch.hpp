@@ -3,11 +3,12 @@
 /// retraction, slow touches measure it. The slow touches must agree; the point is their mean. Not
 /// for the RT path, but no allocation; one thread.
 ///
-/// Any two slow touches must agree along the approach direction:
+/// Any two slow touches must agree along the approach direction. With p1 and p2 their positions:
 ///     |p1 - p2| <= agree_sigmas * sqrt(2) * u_random
-/// sqrt(2) u_random is the standard deviation of such a difference. u_random is the uncertainty of
-/// a touch including the probe's repeatability, without the part common to all touches (the error
-/// of the delay, u_common = v u_delay). The variance of the mean is
+/// sqrt(2) u_random is the standard deviation of p1 - p2. u_random is the standard uncertainty of a
+/// touch including the probe's repeatability, without the part common to all touches (u_common = v
+/// u_delay, with the probing speed v and the uncertainty u_delay of the probe's delay). The
+/// variance of the mean of n slow touches is
 ///     max(u_random^2, observed variance) / n + u_common^2
 
 #include <array>

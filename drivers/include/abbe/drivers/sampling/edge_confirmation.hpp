@@ -7,8 +7,8 @@
 ///                      \--signal not stable--> Armed, or Pending with the later edge
 ///
 /// An edge counter without debounce counts rising edges only: the signal counts as stable if no
-/// further edge follows. Then a single pulse shorter than the confirmation time is taken for a
-/// touch; debounce the counter to avoid this.
+/// further rising edge follows. A single pulse shorter than the confirmation time is then taken for
+/// a touch; a debounce of the counter avoids this.
 
 #include <cstdint>
 
@@ -38,12 +38,12 @@ class EdgeConfirmation {
 
   explicit EdgeConfirmation(const EdgeRules& rules) noexcept : rules_(rules) {}
 
-  /// A scan without an edge.
+  /// To be called for a scan without an edge.
   [[nodiscard]] Event on_time(std::int64_t now) ABBE_RT;
-  /// A scan with rising edges, the last at `edge`; `several`: more than one edge.
+  /// To be called for a scan with rising edges, the last at `edge`; `several`: more than one edge.
   [[nodiscard]] Event on_edge(const EdgeInterval& edge, bool several) ABBE_RT;
-  /// Debounced counters: a scan in which the counter has counted. `edge`: interval of the edge,
-  /// used if no latch has shown it before.
+  /// For debounced counters: to be called for a scan in which the edge counter has counted. `edge`:
+  /// interval of the edge, used if no latch has shown this edge before.
   [[nodiscard]] Event on_counted(const EdgeInterval& edge) ABBE_RT;
 
   void rearm() ABBE_RT;

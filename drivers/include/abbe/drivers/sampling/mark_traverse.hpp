@@ -1,8 +1,8 @@
 #pragma once
-/// Collects the marks of one scale as they are crossed, until they give a datum: four consecutive
-/// marks, crossed in one direction, whose decodings agree. After a fault four new marks are needed;
-/// too many consecutive refusals mean that the scale is not the configured one. Not for the RT
-/// path, but no allocation; one thread.
+/// Collects the reference marks of one scale as they are crossed, until they give a datum (the
+/// scale's zero relative to the counter): four consecutive marks, crossed in one direction, whose
+/// decodings agree. After a fault four new marks are needed; too many consecutive refusals mean
+/// that the scale is not the configured one. Not for the RT path, but no allocation; one thread.
 
 #include <array>
 #include <cstdint>
@@ -25,10 +25,10 @@ class MarkTraverse {
  public:
   explicit MarkTraverse(const MarkTraverseOptions& options) noexcept : options_(options) {}
 
-  /// The live count; to be called at least about once per period of the scale.
+  /// Takes the live count. To be called at least about once per signal period of the scale.
   void on_position(std::int64_t count) noexcept;
-  /// The count at a mark that was crossed. Returns a datum, the reason why the marks give none, or
-  /// nullopt if more marks are needed.
+  /// Takes the count at a mark that was crossed. Returns a datum, the reason why the marks give
+  /// none, or nullopt if more marks are needed.
   [[nodiscard]] std::optional<tl::expected<MarkDatum, MarkFault>> on_mark(
       std::int64_t count) noexcept;
   void reset() noexcept;

@@ -1,7 +1,8 @@
 #pragma once
 /// Detects crossings of reference marks in the scans of a counter card whose axes are latched on
-/// their index. A CounterScanSink; real time. A mark that latches the same count as the previous
-/// one is not detected: it can only be the same mark, crossed in the other direction.
+/// their index. A CounterScanSink; real time. A crossing is a change of the latched count. A mark
+/// that latches the same count as the previous crossing is not detected: it can only be the same
+/// mark, crossed in the other direction.
 
 #include <array>
 #include <cstddef>
@@ -14,8 +15,8 @@
 namespace abbe::drivers {
 
 struct MarkCrossing {
-  /// Of the scan that shows the crossing. Restarted: the card's counts restarted since the previous
-  /// crossing.
+  /// Head of the scan that shows the crossing. Flag Restarted: the card's counts restarted since
+  /// the previous crossing.
   protocol::SampleHead head;
   protocol::HostTime not_before{};  ///< time of the scan before `head`
   std::uint8_t axis = 0;            ///< index in the sample

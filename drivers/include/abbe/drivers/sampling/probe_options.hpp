@@ -33,14 +33,17 @@ struct ProbeApproach {
 };
 
 struct ProbeSwitching {
-  /// The signal must be stable for this time after its last edge; otherwise it was vibration.
+  /// The signal must be stable for this time after its last edge. A signal that is not was caused
+  /// by vibration, not by a touch.
   std::chrono::nanoseconds confirm = std::chrono::milliseconds{5};
   /// Edges within this time after the first edge are contact chatter: the first edge stays valid. A
   /// later edge before the end of `confirm` replaces the first edge.
   std::chrono::nanoseconds chatter = std::chrono::milliseconds{1};
-  /// The detector is armed again after this time without an edge, and
+  /// The detector is armed again after this time without an edge and after the retraction
+  /// rearm_retract_m.
   std::chrono::nanoseconds rearm_quiet = std::chrono::milliseconds{20};
-  /// after this retraction from the contact: edges before that belong to the release of the probe.
+  /// Least distance from the contact before the detector is armed again: edges at a smaller
+  /// distance belong to the release of the probe.
   double rearm_retract_m = 50e-6;
 };
 
@@ -62,7 +65,7 @@ struct TouchOptions {
   ProbeSwitching switching;
   ProbeWiring wiring;
   std::array<double, protocol::kMaxAxes> max_acceleration = InterpolationOptions{}.max_acceleration;
-  /// recorded scans before and after the contact
+  /// The window of a touch: scans are output for this long before and after the contact.
   std::chrono::nanoseconds window_before = std::chrono::milliseconds{10};
   std::chrono::nanoseconds window_after = std::chrono::milliseconds{10};
   std::size_t touch_capacity = 256;

@@ -19,8 +19,8 @@ class ScanHistory {
   /// Capacity is rounded up to a power of two, at least 8. Allocates.
   ScanHistory(std::size_t capacity, double clock_hz);
 
-  /// Precondition: clock counts of successive scans increase. Call clear() after a restart of the
-  /// card.
+  /// Precondition: the clock counts of successive scans increase. So call clear() after a restart
+  /// of the card.
   void push(const CounterScan& scan) ABBE_RT;
   void clear() ABBE_RT;
 
@@ -36,7 +36,7 @@ class ScanHistory {
   /// Number of the first kept scan later than `instant`; end_number() if there is none.
   [[nodiscard]] std::uint64_t first_after(protocol::DeviceTime instant) const ABBE_RT;
 
-  /// Instant of a clock count: the middle of its period.
+  /// Middle of the clock period with this count.
   [[nodiscard]] protocol::DeviceTime instant(std::int64_t clock_count) const ABBE_RT;
   [[nodiscard]] std::chrono::nanoseconds clock_period() const ABBE_RT;
   [[nodiscard]] double clock_period_s() const ABBE_RT { return period_s_; }

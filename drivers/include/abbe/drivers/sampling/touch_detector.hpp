@@ -68,8 +68,8 @@ class TouchDetector final : public CounterScanSink {
   std::int64_t quiet_counts_ = 0;
   std::int64_t after_counts_ = 0;
 
-  bool refused_latest_ = false;     ///< the latch of this scan's edge is implausible
-  bool refused_first_ = false;      ///< the same of the first edge of the pending touch
+  bool refused_latest_ = false;     ///< the latched count of this scan's edge is implausible
+  bool refused_first_ = false;      ///< the same for the first edge of the pending touch
   bool restarted_pending_ = false;  ///< to be reported with the next touch
   std::uint32_t number_ = 0;
   protocol::ProbeTrigger touch_;  ///< the latest

@@ -38,7 +38,7 @@ struct TrackerReceiverOptions {
   /// GapBefore. 0: the points have no fixed interval (continuous distance), or it is not known;
   /// gaps are not detected.
   std::chrono::nanoseconds time_separation = std::chrono::milliseconds{2};
-  /// Duration of a stationary measurement; its result contains no time.
+  /// Duration of a stationary measurement. The result of such a measurement contains no time stamp.
   std::chrono::nanoseconds stationary_time = std::chrono::milliseconds{500};
   /// True: the controller reads its weather station. False: it reports the values that were set;
   /// the samples contain these values, and `measured` is 0.

@@ -91,7 +91,7 @@ struct TrackerSessionOptions {
   std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};
   /// Longest time without a packet while streaming.
   std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};
-  /// Pause before repeating a command after "busy" or "not ready".
+  /// Pause before repeating a command that the controller refused with "busy" or "not ready".
   std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};
   /// A controller that reports "busy" for longer is a fault.
   std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};
@@ -175,7 +175,7 @@ class TrackerSession {
     bool optional = false;  ///< a refusal counts as done
     bool of_order = false;  ///< a refusal ends the order, not the session
   };
-  /// The action after the last step of a plan.
+  /// What follows when the last step of a plan (a list of commands to send) is done.
   enum class Goal { SetUp, Stream, Stay, Leave, GiveUp };
   struct Pending {
     Step step;
@@ -188,7 +188,7 @@ class TrackerSession {
     Repeat,   ///< sends the pending command again
     Order,    ///< begins the accepted order
     Restart,  ///< sends StartMeasurement after the beam is back
-    // Of the state: at most one of the following.
+    // Purposes that belong to the state: at most one of the following deadlines is set.
     Connect,
     Connection,  ///< none by then: a fault
     WarmUp,      ///< status query while the laser is heating
@@ -198,7 +198,8 @@ class TrackerSession {
   };
   static constexpr std::array kOfState{Due::Connect, Due::Connection, Due::WarmUp,
                                        Due::Points,  Due::Query,      Due::Leave};
-  /// One command at a time: these send one, after the answer to the pending command.
+  /// Purposes that send a command. One command is sent at a time, so they wait until the pending
+  /// command is answered.
   static constexpr std::array kAfterAnswer{Due::Order, Due::Restart, Due::Query};
 
   TrackerAction take(const TrackerTick&);
@@ -212,7 +213,7 @@ class TrackerSession {
   TrackerAction take(const TrackerStopRequested&);
   TrackerAction take(const TrackerOrder& order);
 
-  /// Sets the deadline of the state; that of the previous state ends.
+  /// Sets the deadline of the present state and cancels that of the previous state.
   void in_state(Due due, std::chrono::nanoseconds within);
   void without_deadline_of_state();
   [[nodiscard]] std::span<const Due> waiting() const noexcept {
@@ -259,7 +260,8 @@ class TrackerSession {
   TrackerAction overdue();
   TrackerAction tick_streaming();
   TrackerAction measure_again();
-  /// The controller reports the beam: StartMeasurement follows, unless a point arrives before.
+  /// To be called when the controller reports that the beam is back: plans StartMeasurement after
+  /// resume_within. A point that arrives before then cancels it.
   void restart_when_beam_is_back();
   TrackerAction start_again();
   TrackerAction query_status();

@@ -29,7 +29,8 @@ std::vector<std::string> lock_now() {
   std::vector<std::string> refusals;
   if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0)
     refusals.push_back(refusal("disabling huge pages"));
-  // Two calls: one call with all three flags would not load the memory that is mapped now.
+  // Two calls: in one call with all three flags, MCL_ONFAULT would apply to the memory that is
+  // mapped now, which would not be loaded.
   if (mlockall(MCL_CURRENT) != 0 || mlockall(MCL_FUTURE | MCL_ONFAULT) != 0)
     refusals.push_back(refusal("mlockall") + " (CAP_IPC_LOCK or LimitMEMLOCK=infinity is needed)");
   return refusals;
@@ -46,7 +47,7 @@ void keep_heap() noexcept {
   (void)mallopt(M_MMAP_THRESHOLD, 32 * kMB);  // the maximum of glibc
   (void)mallopt(M_TRIM_THRESHOLD, 64 * kMB);
   (void)mallopt(M_TOP_PAD, kMB);
-  // Threads beyond this number share heaps and the locks of these heaps. glibc's default of 8 per
+  // Most heaps. Threads beyond this number share a heap and its lock. glibc's default of 8 per
   // processor is less than the number of threads of abbed on a small computer.
   (void)mallopt(M_ARENA_MAX, 64);
 }

@@ -88,8 +88,8 @@ void TcpClient::close() noexcept {
 void TcpClient::finish() noexcept {
   if (!established()) return;
   ::shutdown(fd_, SHUT_WR);
-  // Closing a socket with unread bytes resets the connection, and the peer may lose the bytes just
-  // written.
+  // Unread bytes are read first: closing a socket with unread bytes resets the connection, and the
+  // peer may lose the bytes just written.
   std::array<std::byte, 4096> discarded;  // NOLINT(cppcoreguidelines-pro-type-member-init)
   for (int i = 0; i < 1000 && ::recv(fd_, discarded.data(), discarded.size(), MSG_DONTWAIT) > 0;
        ++i) {

@@ -61,8 +61,8 @@ void EncoderDevice::wait(std::chrono::nanoseconds at_most) {
   if (!ensure_open(at_most)) return;
   follow_bus_off(cycle_end_);
 
-  // After a delay of this thread, read the frames that have arrived before the next SYNC is sent:
-  // heartbeats among them are not late.
+  // If this thread was delayed, the frames that have arrived are read before the next SYNC is sent,
+  // so that their heartbeats do not count as late.
   const bool behind = is_behind(cycle_end_);
   if (sending_ && !behind) send_sync();
   if (sending_ && !bus_off()) send_configuration();
@@ -78,7 +78,8 @@ bool EncoderDevice::is_behind(HostTime now) const {
   return !caught_up_ && next_sync_ && now >= *next_sync_ + options_.receiver.sync_period;
 }
 
-/// Checks all time-outs at `now`, after the frames that arrived before.
+/// Checks all time-outs at `now`. Precondition: the frames that arrived before `now` were handled,
+/// unless all_read_ is false.
 void EncoderDevice::check_timeouts(HostTime now) {
   if (external()) return follow_external_sync(now);
   follow_foreign_sync(now);
@@ -295,7 +296,7 @@ void EncoderDevice::read_batch(HostTime now, std::chrono::nanoseconds at_most) {
   for (const auto& received : std::span{batch_}.first(batch_count_)) dispatch(received);
 }
 
-/// The processing of a frame outside the RT path; receive() passes it to the receiver afterwards.
+/// Handles a frame outside the RT path. receive() later passes the same frame to the receiver.
 void EncoderDevice::dispatch(const ReceivedFrame& received) {
   if (const auto report = can::decode_error_frame(received.frame)) {
     if (has(report->conditions, can::BusCondition::BusOff)) reopened_ = false;

@@ -49,7 +49,8 @@ void EncoderDevice::account(HostTime now) {
   report_late_answers(now);
 }
 
-/// Reports the cause only: a tunnel that bundles frames also causes late and second answers.
+/// Reports bundles of answers, or else late and second answers. A tunnel that bundles frames causes
+/// all three, so only the bundles are reported.
 void EncoderDevice::report_late_answers(HostTime now) {
   report_count(together_.count(), bundled_reported_,
                "bundles of answers to several SYNCs: the tunnel delays frames (cannelloni: set -t, "
@@ -107,7 +108,8 @@ void EncoderDevice::show_state(HostTime now) {
   show_condition(now);
 }
 
-/// Empty while the nodes are not polled: then the state is sufficient.
+/// Shows the condition of the axes. It is empty while the nodes are not polled: the state then
+/// names the reason.
 void EncoderDevice::show_condition(HostTime now) {
   const bool polled =
       !bus_off() && (external() ? foreign_.present() && !no_sync_reported_ : sending_);

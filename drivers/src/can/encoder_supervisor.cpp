@@ -18,15 +18,16 @@ namespace {
 /// A second boot-up message within this time does not restart the configuration: otherwise every
 /// message of a node that boots repeatedly would cause further SDO traffic.
 constexpr std::chrono::milliseconds kBetweenStarts{50};
-/// The first non-operational heartbeat may have been sent before the NMT start: the second counts.
+/// The first heartbeat that is not "operational" may have been sent before the NMT start; the
+/// second one in a row shows that the node is not operational.
 constexpr unsigned kIdleBeats = 2;
 /// A node that has answered for this long has recovered: its next fault is reported again.
 constexpr std::chrono::seconds kSettledAfter{1};
 
 constexpr double kNanometresPerMetre = 1e9;
 
-/// A repeated configuration would fail in the same way: wait for the boot-up message of a replaced
-/// or power-cycled node.
+/// True for an error with which a repeated configuration would fail in the same way. The supervisor
+/// then waits for the boot-up message of a replaced or power-cycled node.
 bool is_final(const can::ConfigurationError& error) {
   switch (error.fault) {
     case ConfigurationFault::WrongStep:

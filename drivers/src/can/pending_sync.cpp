@@ -54,7 +54,8 @@ std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo)
   if (pending()) {
     sync = echo.time_widened ? as_sent() : echo;
   } else if (deadlines_.is_set(Due::Transmission)) {
-    // The SYNC was transmitted after its cycle: its answers must not mix with those of the next.
+    // The SYNC was transmitted after the end of its cycle: the next SYNC waits, so that the answers
+    // to this one do not mix with those to the next.
     deadlines_.set(Due::Answers, echo.time + period_);
   }
 
@@ -65,7 +66,8 @@ std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo)
   return sync;
 }
 
-/// The node has already answered the previous SYNC, so this answer belongs to the pending one.
+/// True if the frame is an answer of a node that has already answered the previous SYNC: it belongs
+/// to the pending SYNC, which therefore was transmitted.
 bool PendingSync::proves_transmission(const ReceivedFrame& received) const {
   return pending() && can::cob::is_tpdo(received.frame) && received.time >= *sent_ &&
          answered_.test(node_of(received.frame));

@@ -25,8 +25,8 @@ namespace {
 constexpr unsigned kSlots = CanBus::kMostRead;
 constexpr std::size_t kControlBytes = 256;
 
-/// Marks a loss that SO_RXQ_OVFL has counted among the frames. A CAN controller reports an overflow
-/// of its receive queue with the same error frame.
+/// Frame that marks a loss, counted by SO_RXQ_OVFL, at its place among the received frames. A CAN
+/// controller reports an overflow of its receive queue with the same error frame.
 can::CanFrame loss_mark() {
   return can::encode_error_frame(
       {.conditions = static_cast<can::BusConditions>(can::BusCondition::ReceiveOverflow)});
@@ -212,7 +212,8 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
     }
   }
 
-  // The end of the queue was reached. Frames that are not delivered count as read.
+  // recvmmsg filled fewer slots than it was given: the end of the queue was reached. A slot counts
+  // as filled also if its frame is not delivered to the caller.
   const bool at_end = static_cast<unsigned>(got) < slots;
   if (at_end) stamps_.nothing_older_than(begun);
   return CanRead{.frames = count, .all = at_end && !held_, .until = until};
@@ -223,7 +224,8 @@ Result<void> SocketCanBus::send(std::span<const can::CanFrame> frames) {
     sent_sync_ = sent_sync_ || can::decode_sync(frame).has_value();
     const auto out = to_linux(frame);
     if (write(fd_, &out.frame, out.size) >= 0) continue;
-    // Not fatal: a full transmit queue empties again; bus-off is reported by an error frame.
+    // These two errors are not fatal: a full transmit queue empties again; bus-off is reported by
+    // an error frame.
     const bool passing = errno == ENOBUFS || errno == EAGAIN;
     return socket_error(passing ? ErrorCode::Unreachable : ErrorCode::SystemRefused, name(), "send",
                         errno);

@@ -150,7 +150,8 @@ void UdpCanBus::count_strangers() {
     socklen_t size = sizeof from;
     auto* any = reinterpret_cast<sockaddr*>(&from);  // NOLINT: the sockets interface
     if (::recvfrom(stranger_fd_, nullptr, 0, MSG_DONTWAIT, any, &size) < 0) return;
-    // A datagram that the peer sent before connect() is lost; it does not count as refused.
+    // A datagram that the peer sent before connect() arrives here and is lost; it does not count as
+    // refused.
     if (!is_peer(from)) count_stranger(from);
   }
 }
@@ -175,7 +176,7 @@ Result<CanRead> UdpCanBus::read(std::span<ReceivedFrame> out, std::chrono::nanos
 }
 
 /// Reads the next datagram into the buffer. A datagram without valid CAN frames is counted and
-/// skipped. Unknown: the limit of skipped datagrams was reached; more datagrams may be queued.
+/// skipped. Returns Next::Unknown at the limit of skipped datagrams: more datagrams may be queued.
 Result<UdpCanBus::Next> UdpCanBus::receive_datagram() {
   for (unsigned skipped = 0; skipped < 64; ++skipped) {  // bounded, also in a flood of them
     iovec io{buffer_.data(), buffer_.size()};

@@ -4,7 +4,8 @@
 namespace abbe::drivers {
 namespace {
 
-// Relative rate error of clock and pacer: two quartzes, each with the limit of the clock model.
+// Relative rate error between the clock and the pacer (the timer of the scans): two quartzes, each
+// with the limit of the clock model.
 constexpr double kQuartzDeviation = 2.0 * ClockModelOptions{}.max_skew;
 constexpr double kReading_counts = 2.0;  // each reading is rounded to whole periods
 
@@ -35,7 +36,8 @@ CounterCardReceiver::CounterCardReceiver(const CounterCardReceiverOptions& optio
   if (options.resume_from) seed(*options.resume_from);
 }
 
-/// A set-up zeroes the counters: a raw reading is the count modulo the counter's range.
+/// Continues from the counts of an earlier run. A set-up zeroed the counters, so each last raw
+/// reading is the stored count modulo the counter's range.
 void CounterCardReceiver::seed(const CounterCardProgress& from) {
   const std::uint64_t round = quad08::modulus_of(width_) - 1;
   quad08::RawScan& last = last_.emplace();

@@ -58,7 +58,8 @@ CardAction CounterCardSession::on(const CardInput& input, HostTime now) {
   return std::visit([&](const auto& i) { return take(i, now); }, input);
 }
 
-/// One request at a time, and no restart of a scan that is being restarted.
+/// Plans that wait although they may be due: a request while another one is pending, and a restart
+/// of the scan outside Streaming, where a restart is already in progress.
 std::span<const CounterCardSession::Plan> CounterCardSession::waiting() const {
   if (asked_ || stopping_bulk_) return kAfterAnswer;
   const bool streaming = state_ == CardState::Streaming && !halt_;
@@ -346,8 +347,9 @@ CardAction CounterCardSession::set_up_again(HostTime now, const std::string& see
   return halt_soon(now);
 }
 
-/// Bytes that are shifted within the stream also look like a stopped clock (another counter is read
-/// in its place). Therefore the scan is restarted once before the counters are set up again.
+/// A stream that is shifted by some bytes also looks like a stopped clock, because another counter
+/// is read in the clock's place. Therefore the scan is restarted once before the counters are set
+/// up again.
 CardAction CounterCardSession::take(const CardOutOfStep& out, HostTime now) {
   if (state_ != CardState::Streaming || halt_) return CardNothing{};
   if (resuming_ && std::exchange(resumed_again_, true)) return set_up_again(now);

@@ -12,9 +12,11 @@
 namespace abbe::drivers {
 namespace {
 
-/// A lost scan must change the clock's count by more than its rounding and its error to the pacer.
+/// Fewer clock counts per scan could hide a lost scan: the counts of one scan must exceed the
+/// rounding of the clock's count and its rate error relative to the pacer (the timer of the scans).
 constexpr double kFewestCountsPerScan = 8.0;
-/// An upward step must be distinguishable from a wrap.
+/// With more clock counts per scan, a step of a 32-bit counter could not be distinguished from a
+/// wrap.
 constexpr double kMostCountsPerScan = 1e9;
 constexpr double kFastestClock_hz = 24e6;  // half of the card's own 48 MHz
 

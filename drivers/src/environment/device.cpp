@@ -171,7 +171,7 @@ void EnvironmentDevice::line_closed() noexcept {
   board_.set_state("closed");
 }
 
-/// True if another device has answered since the latest fault of this one: then the connection
+/// True if another device has answered since the latest fault of this device: then the connection
 /// works.
 bool EnvironmentDevice::others_answered() noexcept {
   const auto others = link_.answers - answers_;

@@ -84,7 +84,8 @@ RegisterMap zt2005_c8(const KnownMapOptions& options) {
                RegisterType::Int16, WordOrder::HighFirst};
     m.scale = 0.1;
     m.offset = kZeroCelsius_K;
-    // End values of the scale: broken wire, short circuit. Not confirmed by the documentation.
+    // End values of the 16-bit range: broken wire, short circuit. The documentation does not
+    // confirm this.
     m.unavailable = {-32768.0, 32767.0};
     map.measured.push_back(std::move(m));
   }

@@ -81,7 +81,7 @@ bool EnvironmentLine::must_be_quiet() {
   return link_.line.is_open() && time_.now() < link_.quiet_until;
 }
 
-/// A late answer would otherwise be taken for the answer to the next request.
+/// Reads and discards a late answer, which would be taken for the answer to the next request.
 void EnvironmentLine::discard_late_answer(EnvironmentDevice& device, nanoseconds at_most) {
   std::array<std::byte, modbus::kMaxAduSize> bytes{};
   const auto budget =

@@ -37,7 +37,8 @@ IppDevice::~IppDevice() {
   }
 }
 
-/// If the connection were closed before AbortE is answered, the machine might not stop.
+/// Waits until AbortE is answered: if the connection were closed before, the machine might not
+/// stop.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto& time_out = options_.session.command_timeout;
@@ -62,7 +63,8 @@ void IppDevice::release() {
 
 void IppDevice::measure(std::span<const ProbePoint> points) {
   asked_.fetch_add(points.size(), std::memory_order_relaxed);
-  // put() also orders the increment of asked_ before the counting of finished points.
+  // put() also orders the increment of asked_ before the device thread counts these points as
+  // finished.
   requests_.put(std::vector<ProbePoint>{points.begin(), points.end()});
 }
 

@@ -96,8 +96,8 @@ void IppSession::write_script() {
   }
 }
 
-/// For a server that refuses OnMoveReportE with severity 2 or more. Otherwise it would refuse it
-/// again after every release.
+/// Gives up move reports, for a server that refuses OnMoveReportE with severity 2 or more: it would
+/// refuse the command again after every release.
 void IppSession::without_move_reports() {
   options_.move_reports = false;
   write_script();
@@ -210,8 +210,8 @@ IppAction IppSession::take(const IppConnectionLost& lost) {
   return IppNothing{};  // the connection is already closed
 }
 
-/// A request while the connection is lost must not move the machine after a reconnection: the
-/// caller planned it from a position that may have changed.
+/// A point requested while the connection is lost is discarded: the caller planned it from a
+/// position that may have changed, so it must not move the machine after a reconnection.
 IppAction IppSession::take(const ProbePoint& point) {
   if (stopped_) return IppNothing{};
   if (state_ != IppState::Ready && state_ != IppState::Measuring) {
@@ -300,7 +300,8 @@ IppAction IppSession::take(const IppError& error) {
   return take_foreign(error);
 }
 
-/// An error that belongs to no pending command, or one that requires to stop the pending motion.
+/// Handles an error that belongs to no pending command, or one after which the pending motion must
+/// be stopped.
 IppAction IppSession::take_foreign(const IppError& error) {
   const std::string what = fmt::format("reports {}", ipp_text::text_of(error));
   const bool held = state_ == IppState::Aborting || state_ == IppState::AwaitingRelease;
@@ -375,8 +376,9 @@ IppAction IppSession::check_homed(const std::string& data) {
   return send({.state = IppState::Configuring, .method = "Home()", .moves = true});
 }
 
-/// StartSession is refused while another client's session, or the previous one of this client, has
-/// not ended. That is a temporary fault; every other refusal holds the machine.
+/// Handles a refused command. StartSession is refused while another client's session, or the
+/// previous one of this client, has not ended: a temporary fault. Every other refusal holds the
+/// machine until a release.
 IppAction IppSession::failed(const Pending& was) {
   const std::string what = fmt::format("{} was refused: {}", ipp_text::method_name(was.step.method),
                                        ipp_text::text_of(*was.error));

@@ -8,7 +8,7 @@
 
 namespace abbe::drivers {
 
-/// A motion is stopped with AbortE: its progress can no longer be monitored.
+/// Stops a motion with AbortE, because its progress can no longer be monitored.
 IppAction IppSession::stop_motion(bool close_then) {
   pending_.reset();
   points_.clear();
@@ -26,9 +26,10 @@ IppAction IppSession::stopped_moving() {
   return close_then_ ? close(IppState::AwaitingRelease) : await_release();
 }
 
-/// The next connection begins with another AbortE. Some servers do not answer AbortE outside a
-/// session. So if AbortE was sent outside a session, the next connection starts a session first,
-/// and the one after that does not. No session is started for a machine that is held.
+/// AbortE was not answered: the next connection begins with another AbortE. Some servers do not
+/// answer AbortE outside a session. So if AbortE was sent outside a session, the next connection
+/// starts a session before it sends AbortE, and the connection after that does not. No session is
+/// started for a machine that is held.
 IppAction IppSession::abort_unanswered() {
   note(fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
                    ipp_text::seconds(options_.command_timeout)));
@@ -36,8 +37,8 @@ IppAction IppSession::abort_unanswered() {
   return stopped_ ? end_session() : close(IppState::Faulted);
 }
 
-/// Some servers refuse AbortE outside a session: a session is started first, once. No session is
-/// started for a machine that is held: an operator must inspect it.
+/// AbortE was refused. Some servers refuse AbortE outside a session: a session is started first,
+/// once. No session is started for a machine that is held: an operator must inspect it.
 IppAction IppSession::abort_refused(const IppError& error) {
   if (!in_session_ && !held_ && !session_first_ && !stopped_) {
     session_first_ = true;
@@ -57,7 +58,7 @@ IppAction IppSession::abort_refused(const IppError& error) {
   return IppClose{};
 }
 
-/// Holds the machine. The first reason is kept until the release.
+/// Holds the machine: it awaits a release. The first reason is kept until the release.
 void IppSession::hold_for(const std::string& reason) {
   if (!std::exchange(held_, true)) hold_reason_ = reason;
 }
@@ -89,7 +90,7 @@ IppAction IppSession::take(const IppAbortRequested&) {
   return close(IppState::AwaitingRelease);
 }
 
-/// Releasable also between the attempts to send AbortE for a motion of an earlier connection.
+/// True also between the attempts to send AbortE for a motion that an earlier connection began.
 bool IppSession::releasable() const noexcept {
   const bool trying =
       state_ == IppState::Connecting || (state_ == IppState::Aborting && !in_session_);

@@ -15,7 +15,7 @@ inline constexpr int kAborted = 6;     ///< code: the command was ended by Abort
 inline constexpr int kProtocolError = 8;
 
 [[nodiscard]] double seconds(std::chrono::nanoseconds d);
-/// Bytes outside of printable ASCII as \\xE4.
+/// Text in which every byte outside of printable ASCII is replaced by its value, as \\xE4.
 [[nodiscard]] std::string escaped(std::string_view text);
 /// "1006 Surface not found (severity 2)"
 [[nodiscard]] std::string text_of(const IppError& error);

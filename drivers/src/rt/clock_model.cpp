@@ -9,9 +9,11 @@ namespace abbe::drivers {
 namespace {
 
 constexpr std::chrono::hours kNothingKnown{1};
-/// Prior of the lateness of an arrival, with the weight of one arrival.
+/// A-priori value of the lateness of an arrival (its delay above the smallest delay), s; it counts
+/// as much as one arrival.
 constexpr double kPriorLateness_s = 0.020;
-/// Lateness for longer than this is a jump: a stalled network recovers within milliseconds.
+/// If arrivals are late for longer than this, the device clock has jumped: a stalled network
+/// recovers within milliseconds.
 constexpr std::chrono::seconds kLateForTooLong{5};
 
 double seconds(std::chrono::nanoseconds d) noexcept {
@@ -76,7 +78,7 @@ void ClockModel::reset() ABBE_RT {
   late_ = false;
 }
 
-/// Keeps the lowest point per slice of the window: the line can touch only such points.
+/// Keeps the lowest point of each slice of the window: the line can touch only such points.
 void ClockModel::keep(const Point& p) ABBE_RT {
   forget_before(p.device_s - seconds(options_.window));
   const double slice_s = seconds(options_.window) / static_cast<double>(kPoints - 1);
@@ -112,9 +114,9 @@ void ClockModel::fit() ABBE_RT {
 }
 
 /// Lower convex hull by monotone chain ([Andrew 1979]). The slope is that of the chord between the
-/// hull's heights at one quarter and at three quarters of the observed time. The alternative, the
-/// hull's edge over the middle, is better for exponential delays only if it is long; the chord
-/// scatters less (by 10 to 20 %) for every delay distribution that was tried.
+/// hull's heights at one quarter and at three quarters of the observed time. The alternative is the
+/// slope of the hull's edge over the middle. It is better only for exponential delays and a long
+/// edge; the chord scatters less (by 10 to 20 %) for every delay distribution that was tried.
 void ClockModel::fit_slope() ABBE_RT {
   const std::size_t size = find_hull();
   const double begin_s = points_[0].device_s;
@@ -150,12 +152,12 @@ double ClockModel::hull_height(std::size_t hull_size, double device_s) const ABB
 }
 
 /// Estimates how far the line lies above the true envelope, from the density of arrivals above it:
-/// q is the lateness of the tenth. If the density increases towards the smallest delay
-/// (exponential), the lowest of many arrivals is late by 0.1 q; if it decreases (a point's age in
-/// its packet plus an exponential), by 0.3 q. The freedom of the slope adds to both.
-/// The line is lowered by q / 2 with u = q / 2. Then the error divided by its uncertainty has a
-/// root mean square of 0.8 to 1.1 for both distributions and mean jitters of 0.5 to 8 ms (400 runs
-/// each). q is an order statistic, so that stalled packets do not affect it.
+/// q is the lateness of the tenth arrival above the lowest. If the density increases towards the
+/// smallest delay (exponential), the lowest of many arrivals is late by 0.1 q; if it decreases (a
+/// point's age in its packet plus an exponential), by 0.3 q. The freedom of the slope adds to both.
+/// The line is lowered by q / 2 with the standard uncertainty u = q / 2. Then the error divided by
+/// its uncertainty has a root mean square of 0.8 to 1.1 for both distributions and mean jitters of
+/// 0.5 to 8 ms (400 runs each). q is an order statistic, so that stalled packets do not affect it.
 void ClockModel::judge_lateness() ABBE_RT {
   std::array<double, kPoints> lateness{};
   for (std::size_t i = 0; i < count_; ++i)
@@ -177,9 +179,10 @@ void ClockModel::judge_lateness() ABBE_RT {
 
 /// Tests whether the unconstrained slope exceeds max_skew. Its standard uncertainty is
 ///     sqrt(2) u / lever
-/// with u as in judge_lateness(), but for the unconstrained line. An excess of more than twice this
-/// is not random: good clocks stay well within the bound. Then the points are off the constrained
-/// line by up to the excess times the window.
+/// u is as in judge_lateness(), but for the unconstrained line; lever is the device time between
+/// the two heights of the chord. An excess of more than twice this uncertainty is not random: good
+/// clocks stay well within the bound. Then the points are off the constrained line by up to the
+/// excess times the window.
 void ClockModel::judge_skew() ABBE_RT {
   constexpr double kNoChance = 2.0;
   const double excess = std::abs(free_slope_) - options_.max_skew;

@@ -10,27 +10,31 @@ namespace {
 
 using protocol::SampleFlag;
 
-/// Longest time from a gap to the detection of the clock's jump: no batch waits longer in the host.
+/// Longest time from a gap in the scans until the clock model detects a jump of the card's clock:
+/// no batch of scans waits longer in the host.
 constexpr double kJumpSeenWithin_s = 1.0;
 
-/// Limits of the difference between the card's clock and the host's, if the clock has continued.
-/// Behind: by the delay of the newest batch (busy host). Ahead: by the error of the clock model. In
-/// addition twice the rate error between the two clocks.
+/// Limits of the difference between the card's clock and the host's after an interruption, if the
+/// card's clock has continued. It may appear behind by the delay of the newest batch of scans (busy
+/// host), and ahead by the error of the clock model. Both limits are extended by twice the rate
+/// error between the two clocks.
 constexpr double kLatest_s = 3.0;
 constexpr double kMostAhead_s = 1.0;
 constexpr double kLargestDrift = 1e-3;
-/// Share of the clock's range: in a wider interval a restarted counter would often be accepted.
+/// Largest interval between the two limits, as a share of the clock counter's range. In a wider
+/// interval a counter that restarted would often be accepted by chance.
 constexpr double kWidestInterval = 0.02;
 
-/// The same limits for counters of an earlier run of the program. Both instants come from arrivals
-/// with little delay: the earlier one from a settled clock model, the present one from the least
-/// delayed of many. The remaining tolerance is the clock model's limit of a jump, and its limit of
-/// the rate error.
+/// The corresponding limits for counters of an earlier run of the program. Both instants come from
+/// arrivals with little delay: the earlier one from a settled clock model, the present one from the
+/// least delayed of many arrivals. The remaining tolerance is the clock model's limit of a jump
+/// plus its limit of the rate error times the time between.
 constexpr double kResumedWithin_s = std::chrono::duration<double>(ClockModelOptions{}.jump).count();
 constexpr double kResumedDrift = ClockModelOptions{}.max_skew;
 constexpr double kResumedShown_s = 0.25;    // enough time to process the backlog of a delayed host
 constexpr double kResumedPatience_s = 3.0;  // as kLatest_s
-/// Narrower than kWidestInterval: this program has not observed a fault of the card.
+/// The corresponding share. It is smaller because no process watched the card between the two runs:
+/// its counters may have been set up again shortly after.
 constexpr double kWidestResumed = 0.005;
 
 std::uint32_t saturated(std::uint64_t n) ABBE_RT {
@@ -99,7 +103,7 @@ void CounterCardReceiver::push(std::span<const std::byte> bytes,
 
 std::span<const CounterScan> CounterCardReceiver::next() ABBE_RT {
   scan_count_ = 0;
-  // One raw scan gives at most two scans: the one held back and itself.
+  // One raw scan gives at most two scans: the one held back before it, and itself.
   while (scan_count_ + 2 <= scans_.size() && !out_of_step_) {
     const auto raw = next_raw();
     if (!raw) break;
@@ -138,7 +142,7 @@ void CounterCardReceiver::seek() ABBE_RT {
       seeking_ = false;
       return;
     }
-    // No scan begins at these offsets: continue after the last one that was tried.
+    // No scan begins at the offsets that were tried: continue after the last of them.
     const std::size_t tried = decoder_.layout().scan_bytes();
     std::copy(window.begin() + static_cast<std::ptrdiff_t>(tried), window.end(), window_.begin());
     window_filled_ -= tried;
@@ -230,9 +234,10 @@ double CounterCardReceiver::seconds_behind(const quad08::RawScan& raw,
   return elapsed_s - (wraps * range + step) / clock_hz_;
 }
 
-/// True once the counters of the earlier run are known to have continued. Arrivals are late, never
-/// early: the least delayed one bounds how far the clock channel is behind. If an arrival shows it
-/// ahead by more than the tolerance, the counters have not continued.
+/// True once the counters of the earlier run are known to have continued. An arrival is never
+/// early, only late: the least delayed arrival bounds how far the clock channel is behind the
+/// host's clock. If an arrival shows the clock channel ahead by more than the tolerance, the
+/// counters have not continued.
 bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   Resumption& r = *resumption_;
   if (r.refused) return false;
@@ -257,7 +262,8 @@ bool CounterCardReceiver::resumed(const quad08::RawScan& raw) ABBE_RT {
   return true;
 }
 
-/// Edge counts of the earlier run are not stored: edges since then are not reported.
+/// Accepts the counters of the earlier run as continued. Their edge count was not stored, so edges
+/// since that run are not reported.
 void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
   if (edge_place_) (*last_)[*edge_place_] = raw[*edge_place_];
   if (latch_place_) latch_.begin_at(raw[*latch_place_]);
@@ -265,7 +271,8 @@ void CounterCardReceiver::take_over(const quad08::RawScan& raw) ABBE_RT {
   reopened_ = false;
 }
 
-/// The counters have restarted: as after a set-up, but with unknown counts.
+/// The counters have restarted without a set-up: all states are reset as after a set-up, but the
+/// present counts are unknown.
 void CounterCardReceiver::restart() ABBE_RT {
   ++counters_.restarted;
   counters_zeroed();
@@ -286,12 +293,13 @@ void CounterCardReceiver::count_lost(std::uint64_t clock_step, CounterScan& scan
   scan.axes.head.lost_before = saturated(lost);
   scan.axes.head.flags |= SampleFlag::GapBefore;
   const double gap_s = static_cast<double>(lost) * metronome_.step / clock_hz_;
-  // Half the jump: the clock model's detection of a jump has a tolerance.
+  // Half of the jump that the clock model detects: that detection has a tolerance.
   if (gap_s >= 0.5 * std::chrono::duration<double>(ClockModelOptions{}.jump).count())
     keep_gap({scan.clock_count + static_cast<std::int64_t>(clock_step), gap_s});
 }
 
-/// Keeps the longest gap: a restart can be followed by a shorter gap before it is detected.
+/// Keeps the longest recent gap: after a restart of the card a shorter gap can follow before the
+/// restart is detected.
 void CounterCardReceiver::keep_gap(const LongGap& gap) ABBE_RT {
   const bool longer_before = long_gap_ && long_gap_->length_s >= gap.length_s &&
                              seconds_since(*long_gap_, gap.clock_count) < kJumpSeenWithin_s;
@@ -354,10 +362,11 @@ void CounterCardReceiver::stamp() ABBE_RT {
   }
 }
 
-/// The clock model has detected a jump of the card's clock. Without a long gap the counters have
-/// continued, and only the clock model restarts. With a gap in this batch, the card was restarted.
-/// A late batch can hide the jump: then the gap was in an earlier batch and is at least as long as
-/// the clock is ahead. If the clock is behind, the batches were late for a long time: no restart.
+/// The clock model has detected a jump of the card's clock. Without a long gap in the scans the
+/// counters have continued, and only the clock model restarts. With a gap in this batch, the card
+/// was restarted. A late batch can hide the jump for a while: then the gap was in an earlier batch
+/// and is at least as long as the clock is ahead. If the clock is behind, the batches before were
+/// late for a long time: no restart.
 void CounterCardReceiver::mark_restart(std::span<CounterScan> scans, double ahead_s) ABBE_RT {
   const auto gap = std::exchange(long_gap_, std::nullopt);
   if (!gap) return;

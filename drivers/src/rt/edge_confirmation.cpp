@@ -19,7 +19,7 @@ EdgeConfirmation::Event EdgeConfirmation::on_time(std::int64_t now) ABBE_RT {
   if (state_ != State::Pending) return Event::Nothing;
   if (!rules_.counter_debounced)
     return now - last_edge_ >= rules_.confirm ? confirm() : Event::Nothing;
-  // 1.5 times the confirmation: tolerance for the coarse steps of the card's debounce times.
+  // The factor 1.5 is a tolerance for the coarse steps of the card's debounce times.
   if (now - last_edge_ <= rules_.confirm + rules_.confirm / 2) return Event::Nothing;
   state_ = State::Armed;
   return Event::Dismissed;

@@ -17,14 +17,16 @@ namespace {
 
 constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
-/// Cycles with one answer in time after which an axis is settled. A row of n late answers gives
-/// n - 2 wrong positions that are not detected. The second answer at its end reveals one more, if
-/// its sample is still held: in a longer row that is below 1 % of them.
+/// Number of cycles with exactly one answer in time after which an axis is settled. If n answers in
+/// a row are late, n - 2 wrong positions are not detected. The second answer in the cycle that ends
+/// the row detects one more only while the samples of the axis are held. After a row of more than
+/// 100 they no longer are, but one position is less than 1 % of that row.
 constexpr std::uint8_t kCyclesToSettle = 100;
-/// After a boot-up or a pause of the SYNC no answer should be outstanding: one cycle confirms it.
+/// The same number after a boot-up or a pause of the SYNC: no answer to an earlier SYNC should be
+/// outstanding then, and one cycle confirms it.
 constexpr std::uint8_t kCyclesToConfirm = 1;
 
-/// [GUM] 4.3.7: the instant is uncertain by +- one period, rectangular.
+/// Widens u, because the instant is uncertain by +- one period, rectangular. [GUM] 4.3.7.
 std::chrono::nanoseconds widened(std::chrono::nanoseconds u,
                                  std::chrono::nanoseconds period) ABBE_RT {
   const double u_ns = std::hypot(static_cast<double>(u.count()),
@@ -294,10 +296,10 @@ void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
     received_mask_ = static_cast<std::uint8_t>(received_mask_ | bit);
 }
 
-/// The cycle has ended with an answer of this axis that may belong to an earlier SYNC. In a held
-/// sample the axis becomes missing. If the sample has left, the axis is missing in the next one. An
-/// answer more than a period after the SYNC belongs to a SYNC that was not recorded; it does not
-/// affect the sample.
+/// The cycle has ended with an answer of axis i that may belong to an earlier SYNC. If the sample
+/// of the cycle is held, the axis becomes missing in it; if it was already output, the axis is
+/// missing in the next sample. An answer more than a period after the SYNC belongs to a SYNC that
+/// was not recorded; it does not affect the sample.
 void EncoderReceiver::on_second_answer(std::size_t i, HostTime time) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   const bool of_this_cycle = sync_time_ && time <= *sync_time_ + period_;
@@ -440,7 +442,8 @@ void EncoderReceiver::read_object(Axis& axis, can::ObjectId object, std::uint32_
   const bool turn =
       !linear && (object == obj::kUnitsPerRevolution || object == obj::kMeasuringStep);
   if (object == obj::kHeartbeatTime) {
-    // The heartbeat period could not be set: time-out after 3.5 periods of the node's own.
+    // The node's heartbeat period could not be set: the time-out is 3.5 times the period it
+    // reports.
     axis.heartbeat_timeout = std::max(
         heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
   } else if (step || turn) {

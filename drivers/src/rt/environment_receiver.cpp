@@ -162,7 +162,8 @@ bool EnvironmentReceiver::on_raw(const protocol::RawBlock& block) ABBE_RT {
   return push(bytes, block.time) == Progress::Sample;
 }
 
-/// Starts in the middle of a recording, or after missing blocks, at the beginning of a round.
+/// Begins decoding in the middle of a recording, or after missing blocks, as at the start of a
+/// round.
 void EnvironmentReceiver::join() ABBE_RT {
   begin();
   proven_ = true;

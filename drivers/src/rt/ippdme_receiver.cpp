@@ -63,7 +63,8 @@ void IppReceiver::sent(std::span<const std::byte> bytes, HostTime time) ABBE_RT 
     asked.touch = ++touches_;
   }
 
-  // The move report lasts as long as the connection: it has the reserved first entry.
+  // Entry 0 is reserved for the move report (OnMoveReportE), which stays active until the
+  // connection ends.
   if (asked.purpose == Purpose::MoveReport) {
     asked_[0] = asked;
     return;
@@ -117,7 +118,7 @@ IppError IppReceiver::refusal_of(const ippdme::Response& response) ABBE_RT {
   return {response.tag, response.error.severity, response.error.code, text_of(response.error.text)};
 }
 
-/// After a malformed line only the answer to the abort is accepted from this server.
+/// After a malformed line only the answer to AbortE is accepted from this server.
 std::optional<IppMessage> IppReceiver::of_the_abort(std::string_view line) ABBE_RT {
   const auto response = ippdme::parse_response(line);
   if (!response || response->tag != ippdme::kAbort) return std::nullopt;
@@ -227,7 +228,7 @@ ProbeTrigger IppReceiver::touch(const ippdme::PointReport& at, const SampleHead&
   return t;
 }
 
-/// A failed touch is also reported as a touch, without a position, to the caller that requested it.
+/// A failed touch also gives a touch without a position, for the caller that requested it.
 IppMessage IppReceiver::error(const ippdme::Response& response) ABBE_RT {
   const IppError report{response.tag, response.error.severity, response.error.code,
                         text_of(response.error.text)};

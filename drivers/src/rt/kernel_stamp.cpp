@@ -9,8 +9,8 @@ Arrival KernelStampMap::arrival(std::optional<std::chrono::nanoseconds> stamp, c
                                 protocol::HostTime host_now) ABBE_RT {
   if (!stamp || !believable(now.realtime - *stamp, now)) {
     ++widened_;
-    // The frame arrived after the queue was empty: this bounds its age if the queue was empty more
-    // recently than the wake-up bound.
+    // The bytes arrived after the queue was known to be empty, so they are not older than that
+    // moment. Their uncertainty is this age, or u_user_space if it is smaller.
     const auto possible = empty_at_ ? now.monotonic - empty_at_->monotonic : options_.u_user_space;
     return {host_now, std::min(options_.u_user_space, possible), true};
   }

@@ -81,7 +81,8 @@ EdgeConfirmation::Event TouchDetector::detect_edge(const CounterScan& before,
   const bool moved = latch_moved(before, scan);
   if (counted <= 0 && !moved) return edges_.on_time(scan.clock_count);
   EdgeInterval edge = moved ? latched_edge(before, scan) : between(before, scan);
-  // The latch holds the last edge, the touch is the first: it lies anywhere before it.
+  // The latch holds the last edge of this scan, but the touch is the first: it may lie anywhere
+  // between the previous scan and the last edge.
   if (counted > 1) edge = {before.clock_count, std::max(before.clock_count, edge.to), false};
   return edges_.on_edge(edge, counted > 1);
 }
@@ -128,7 +129,8 @@ void TouchDetector::touched() ABBE_RT {
 }
 
 bool TouchDetector::retracted(const CounterScan& scan) const ABBE_RT {
-  // Without positions or approach direction only the time without edges is used.
+  // Without positions or an approach direction the retraction is unknown: only the time without
+  // edges decides.
   if (touch_.missing_mask != 0 || scan.axes.missing_mask != 0 || touch_.speed_m_s == 0.0)
     return true;
   double back_m = 0.0;

@@ -139,7 +139,7 @@ ProbeTrigger locate_touch(const EdgeInterval& edge, const ScanHistory& scans,
   const auto u_contact = std::llround(1e9 * std::hypot(u.half_width_s / std::sqrt(3.0), u.u_s));
   trigger.head.u_time = nanoseconds{std::llround(
       std::hypot(static_cast<double>(at->u_host_time.count()), static_cast<double>(u_contact)))};
-  // A gap or restart between scans is not a gap between touches.
+  // The flags of the scans about a gap or restart do not apply to the sequence of touches.
   trigger.head.flags = at->axes.flags & ~(SampleFlag::GapBefore | SampleFlag::Restarted);
   trigger.axis_count = at->axes.axis_count;
   trigger.missing_mask = at->axes.missing_mask;

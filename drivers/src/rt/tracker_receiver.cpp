@@ -136,8 +136,8 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::StatusChange& 
   return change;
 }
 
-/// The error code of a broken beam is not published: any unsolicited error while points arrive
-/// counts as a beam loss.
+/// Called for an unsolicited error. The manual does not state the error code of a broken beam, so
+/// any unsolicited error while points arrive counts as a beam loss.
 void TrackerReceiver::beam_lost() ABBE_RT {
   if (!last_.known || beam_lost_) return;
   beam_lost_ = true;
@@ -149,8 +149,9 @@ TrackerMessage TrackerReceiver::burst(std::size_t count) ABBE_RT {
   return TrackerBurst{std::span{points_}.first(count)};
 }
 
-/// A mean over [arrival - delay - T, arrival - delay]. The time is the middle; delay and T each
-/// contribute a rectangular distribution ([GUM] 4.3.7).
+/// The result is a mean over [arrival - delay - T, arrival - delay], with the duration T of the
+/// measurement. Its time is the middle of this interval; delay and T each contribute a rectangular
+/// distribution ([GUM] 4.3.7).
 std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& result) ABBE_RT {
   if (!accepting_) {
     ++counters_.points_refused;

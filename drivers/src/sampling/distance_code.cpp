@@ -8,7 +8,8 @@
 namespace abbe::drivers {
 namespace {
 
-// Marks of one scale lie on whole periods; a larger distance from one, periods, is not noise.
+// Two marks of a scale are a whole number of signal periods apart. A larger deviation from a whole
+// number, in periods, is not noise.
 constexpr double kMostFraction = 0.25;
 
 tl::unexpected<Error> bad(std::string what) {
@@ -45,8 +46,8 @@ Result<void> check(const DistanceCode& code) {
     return bad("the scale is shorter than two increments: it has fewer than four marks");
   if (code.rotary && code.length % code.increment != 0)
     return bad("a revolution is not a whole number of increments");
-  // Beyond this length the distances of a coded mark to its neighbours are not between 0 and the
-  // increment.
+  // On a longer scale the distances of a coded mark to its neighbours would not lie between 0 and
+  // the increment.
   if (coded_marks(code) >= code.increment / 2)
     return bad("the scale is longer than its code allows");
   return {};
@@ -96,7 +97,8 @@ tl::expected<MarkDatum, MarkFault> datum_of(
     const auto P = first_mark(code, M, datum.direction);
     if (!P) return tl::unexpected(MarkFault::NotOfCode);
     if (expected && on_circle(code, *expected) != *P) return tl::unexpected(MarkFault::Disagree);
-    // Not reduced modulo the circle: the four offsets must be comparable.
+    // The position is not reduced modulo the circle, because the offsets of the four marks must be
+    // comparable.
     position[i] = expected ? *expected : *P;
     expected = position[i] + datum.direction * M;
   }

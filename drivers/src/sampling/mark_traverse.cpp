@@ -17,8 +17,8 @@ void MarkTraverse::on_position(std::int64_t count) noexcept {
   follow(static_cast<double>(count) / options_.counts_per_period);
 }
 
-/// The direction changes only after travel of reversal_periods back from the farthest point, so
-/// that noise does not change it.
+/// Updates the direction of travel. It changes only after travel of reversal_periods back from the
+/// farthest point, so that noise does not change it.
 void MarkTraverse::follow(double position) noexcept {
   if (!moving_) {
     moving_ = true;

@@ -7,7 +7,8 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// Limits the heap memory of the scan history: ten seconds at 33 kHz would be 80 MB.
+// Largest sum of the times that the scan history covers. It limits heap memory: ten seconds at 33
+// kHz would be 80 MB.
 constexpr auto kLongestPast = std::chrono::seconds{1};
 
 tl::unexpected<Error> bad(const TouchOptions& options, std::string_view what) {

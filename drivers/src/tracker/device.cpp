@@ -61,8 +61,8 @@ void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
   show();
 }
 
-/// The steady clock limits the whole: a SteppedTime does not advance here, so the session's own
-/// time-outs would never end the loop.
+/// Stops the session within leave_within, measured by the steady clock: a SteppedTime does not
+/// advance here, so the session's own time-outs would never end the loop.
 void TrackerDevice::restore_settings() {
   constexpr auto kLook = std::chrono::milliseconds{20};
   const auto until = std::chrono::steady_clock::now() + time_.wall(options_.session.leave_within);
@@ -97,7 +97,7 @@ void TrackerDevice::report_clock() {
                   kPpm * options_.clock.max_skew));
 }
 
-/// Reports the cause of a state without points that is no fault. show() reports faults.
+/// Reports why there are no points, if that is no fault. show() reports faults.
 void TrackerDevice::report_cause() {
   const std::string& cause = session().cause();
   if (cause == cause_reported_) return;

@@ -19,8 +19,9 @@ std::string no_beam(const std::string& why) {
 
 }  // namespace
 
-/// In mode ContinuousDistance the points have no fixed interval: none come while the machine stands
-/// still. Only a status query shows that the controller still answers.
+/// Longest time without points that is no fault. In mode ContinuousDistance the points have no
+/// fixed interval: none come while the machine stands still, and only a status query shows that the
+/// controller still answers.
 std::chrono::nanoseconds TrackerSession::silence_allowed() const noexcept {
   switch (options_.mode) {
     case TrackerMode::ContinuousTime:
@@ -77,7 +78,7 @@ TrackerAction TrackerSession::take(const TrackerPointsArrived&) {
   return result_came_ && !pending_ && !order_ ? measure_again() : TrackerAction{TrackerNothing{}};
 }
 
-/// Mode Stationary: each StartMeasurement gives one result.
+/// Starts the next measurement of mode Stationary: each StartMeasurement gives one result.
 TrackerAction TrackerSession::measure_again() {
   state_ = TrackerState::Ready;
   without_deadline_of_state();
@@ -96,8 +97,8 @@ TrackerAction TrackerSession::beam_lost(const std::string& why) {
 }
 
 /// StartMeasurement was refused because there is no beam. The controller reports when the beam is
-/// back; in case that report is missed, it is queried too. Meanwhile no command is sent that could
-/// disturb the operator with the reflector.
+/// back; in case that report is missed, the session also queries the status. Meanwhile no command
+/// is sent that could disturb the operator with the reflector.
 TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
   end_pending();
   if (!without_beam()) {
@@ -111,8 +112,8 @@ TrackerAction TrackerSession::wait_for_beam(const std::string& why) {
 }
 
 /// StartMeasurement may be refused after a beam loss because the previous measurement is still
-/// running. Then StopMeasurement is necessary; otherwise it has no effect. If points arrive
-/// meanwhile, the previous measurement is running and the session streams.
+/// running. Then StopMeasurement is necessary; in every other case it has no effect. If points
+/// arrive meanwhile, the previous measurement is running and the session streams.
 TrackerAction TrackerSession::start_refused() {
   const TrackerState state = state_;
   end_pending();

@@ -14,10 +14,10 @@ namespace abbe::drivers {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000.0;
-// Reading the list ends here, so that a faulty controller cannot extend it without limit.
+// Limit of the list of reflectors, so that a faulty controller cannot extend it without end.
 constexpr std::int32_t kMostReflectors = 256;
 
-/// Control characters are replaced: a terminal would execute them.
+/// True for control characters. They are replaced in names, because a terminal would execute them.
 bool is_control(char32_t c) {
   return c < 0x20 || (c >= 0x7F && c < 0xA0);
 }
@@ -86,8 +86,8 @@ const char* name_of(TrackerOrder::What what) noexcept {
 
 // --- reflectors
 
-/// Plans GetReflector (the one in use), then GetReflectors (one answer per reflector). SetReflector
-/// is planned when the list is complete.
+/// Plans GetReflector (the reflector in use), then GetReflectors (one answer per reflector of the
+/// list). SetReflector is planned when the list is complete.
 void TrackerSession::plan_reflector(TrackerState state, bool of_order) {
   plan(state, emscon::GetReflector{}, true, of_order);
   plan(state, emscon::GetReflectors{}, as_id(wanted_reflector()).has_value(), of_order);

@@ -47,9 +47,9 @@ bool same(const Request& a, const Request& b) {
 
 }  // namespace
 
-/// Settings in the order of restoring. Units are first, because each previous value is in the
-/// previous units. The system settings are last, because they may disable messages that the session
-/// needs.
+/// Adds the settings in the order of restoring. Units are first, because each previous value is in
+/// the previous units. The system settings are last, because they may disable messages that the
+/// session needs.
 TrackerSettings::TrackerSettings(const TrackerSessionOptions& options) {
   using emscon::MeasurementMode;
   const auto add = [this](const Request& question, const Request& wanted) {

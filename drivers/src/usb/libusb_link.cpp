@@ -17,7 +17,8 @@ namespace {
 constexpr int kInterface = 0;
 constexpr std::size_t kLargestAnswer = usb::kMaxDescriptor;
 /// Cancelled transfers normally end immediately, but not if the host controller hangs. close()
-/// waits for them this many cycles; each later open() waits one cycle more.
+/// waits for them for at most this many cycles of kCloseCycle; each later open() waits one cycle
+/// more.
 constexpr int kMostCloseCycles = 20;
 constexpr timeval kCloseCycle{0, 50'000};
 
@@ -117,8 +118,9 @@ struct LibusbLink::State {
     events.emplace_back(UsbOpened{serial});
   }
 
-  /// Opens the device with the configured serial number. Another device may be streaming to another
-  /// program: it is opened only once, to read its serial number, while it stays connected.
+  /// Opens the device with the configured serial number. A device of the same kind may be in use by
+  /// another program; so each one is opened only once to read its serial number, which is kept
+  /// while the device stays connected.
   bool find() {
     const DeviceList list{context};
     std::vector<Seen> there;
@@ -256,7 +258,8 @@ struct LibusbLink::State {
     control_under_way = true;
   }
 
-  /// Also resets the data toggle in the host; a plain control request does not.
+  /// Clears the halt by libusb, which also resets the data toggle in the host; a plain control
+  /// request does not.
   void clear_halt() {
     const int error = libusb_clear_halt(handle, identity.bulk_endpoint);
     if (error == LIBUSB_ERROR_NO_DEVICE) return lose(ErrorCode::Unreachable, usb_error_text(error));

@@ -45,7 +45,8 @@ void UsbipLink::close() noexcept {
   pending_events_.clear();
 }
 
-/// The bytes of delivered events stay valid: the buffer is not changed before the next wait().
+/// Closes the connection. The buffer is not changed before the next wait(), so the bytes of
+/// delivered events stay valid.
 void UsbipLink::disconnect() noexcept {
   tcp_.close();
   state_ = State::Closed;
@@ -155,7 +156,8 @@ std::span<const UsbEvent> UsbipLink::wait(std::chrono::nanoseconds wall) {
   return events_;
 }
 
-/// Bytes of delivered events become invalid; only the beginning of an incomplete message is kept.
+/// Moves the incomplete message to the beginning of the buffer. The bytes of delivered events
+/// become invalid.
 void UsbipLink::make_room() {
   std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
             buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
@@ -245,7 +247,8 @@ bool UsbipLink::take(const usbip::SubmitReply& reply) {
   return true;
 }
 
-/// A request that was answered before its cancellation is no longer in pending_.
+/// The reply to a cancellation. If the request was answered before its cancellation, it is no
+/// longer in pending_.
 bool UsbipLink::take(const usbip::UnlinkReply& reply) {
   begin_ += usbip::kUrbHeaderSize;
   std::erase_if(pending_,

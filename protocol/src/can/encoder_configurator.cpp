@@ -186,8 +186,8 @@ void EncoderConfigurator::advance(HostTime now) noexcept {
   next_step(now);
 }
 
-/// True if the refusal is "object does not exist" for an object that is not required. In 1018h only
-/// sub-index 01 is mandatory.
+/// True if the node refused the step with "object does not exist" and the object is not required.
+/// In 1018h only sub-index 01 is mandatory.
 bool EncoderConfigurator::tolerated() const noexcept {
   if (!sdo_.aborted_by_server()) return false;
   switch (step_) {

@@ -59,8 +59,8 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
   return f;
 }
 
-/// Expedited initiate frame, which contains the data. The low bits `nnes` are the same in both
-/// directions.
+/// Expedited initiate frame, which contains the data. The low four bits of the command (unused
+/// bytes, expedited, size given) are the same in both directions.
 [[nodiscard]] inline CanFrame expedited(std::uint32_t cob_id, unsigned command, ObjectId object,
                                         std::span<const std::byte> value) noexcept {
   const auto unused = static_cast<unsigned>(kExpeditedBytes - value.size());
@@ -74,8 +74,8 @@ inline constexpr std::uint8_t kLastSegment = 0x01;
                                        : kExpeditedBytes;
 }
 
-/// The segment of `value` that begins at byte `done`. The low bits `tnnnc` are the same in both
-/// directions.
+/// The next segment of a value; `rest` is the part of the value that was not sent yet. The low five
+/// bits of the first byte (toggle, unused bytes, last segment) are the same in both directions.
 [[nodiscard]] inline CanFrame segment(std::uint32_t cob_id, bool toggle_bit,
                                       std::span<const std::byte> rest) noexcept {
   const auto n = std::min(rest.size(), kSegmentBytes);

@@ -21,7 +21,7 @@ inline constexpr bool kIsSetting = false;
 template <class Set, Command kId>
 inline constexpr bool kIsSetting<SettingAnswer<Set, kId>> = true;
 
-/// `T` is the packet or the part of a packet `P`, const when it is written.
+/// True if T is P, a packet or a part of one. T is const P when the fields are written to the wire.
 template <class T, class P>
 concept Is = std::is_same_v<std::remove_const_t<T>, P>;
 template <class T>

@@ -249,7 +249,8 @@ std::optional<tl::expected<std::string_view, LineError>> LineFramer::next() ABBE
       continue;
     }
     if (c == '"') quoted_ = !quoted_;
-    // Servers write their texts in the user's language and character set.
+    // Between quotes any byte is accepted: servers write texts in the user's language and character
+    // set.
     if (!printable(c) && !quoted_) return Line{refuse(LineError::IllegalCharacter)};
     if (looked_ - begin_ >= kMaxLine) return Line{refuse(LineError::TooLong)};
   }

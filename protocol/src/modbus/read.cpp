@@ -7,7 +7,8 @@ namespace {
 
 using Outcome = std::optional<tl::expected<Answer, DecodeError>>;
 
-// transaction, protocol, length; `length` includes the unit
+// MBAP header up to the unit: transaction, protocol, length. The field `length` counts the unit,
+// too.
 constexpr std::size_t kMbapSize = 6;
 constexpr std::size_t kCrcSize = 2;
 constexpr std::size_t kRequestSize = 6;     // unit, function, address, count

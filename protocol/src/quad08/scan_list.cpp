@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint16_t kCounterWord = 0x3;  // digital, internal
 constexpr std::uint16_t kLastOfScan = 0x4;
-// read at the instant of the first word ("sample and hold")
+// The word is sampled at the instant of the scan's first word ("sample and hold").
 constexpr std::uint16_t kNotFirstOfScan = 0x8;
 constexpr unsigned kChannelShift = 4;
 constexpr std::uint16_t kFirstWord = 2 * static_cast<std::uint16_t>(Register::CounterWord0);

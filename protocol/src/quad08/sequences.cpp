@@ -7,7 +7,7 @@ constexpr std::uint16_t kDacPacerOff = 0x10;
 constexpr std::uint16_t kDacResetFifo = 0x04;
 constexpr int kMarkBits = 8;
 
-/// The first pass writes 0 instead of the numbers of the analog outputs.
+/// Disarms the analog outputs. The first pass writes 0 instead of their numbers.
 void disarm_dac(Sequence& out, bool first_pass) ABBE_RT {
   out.add(Register::DacControl, kDacPacerOff);
   out.add(Register::DmaControl, dma::kChannel0Off);
@@ -25,7 +25,8 @@ void disarm(Sequence& out) ABBE_RT {
   out.add(Register::DmaControl, dma::kChannel1Off);
 }
 
-/// A walking bit; every second value is inverted.
+/// Writes values to the mark register and reads them back: one bit set, a different one each time;
+/// every second value is inverted.
 void test_registers(Sequence& out) ABBE_RT {
   for (int i = 0; i < kMarkBits; ++i) {
     const unsigned bit = 1u << i;
@@ -51,7 +52,7 @@ bool fulfilled(const Step& step, std::uint16_t answer) ABBE_RT {
 
 Sequence open_sequence() ABBE_RT {
   Sequence out;
-  // Twice, because the manufacturer's library does it on loading and on opening.
+  // The steps run twice, because the manufacturer's library runs them on loading and on opening.
   for (const bool first_pass : {true, false}) {
     out.add(Step{read_firmware_version(), Expect::AtLeast, kOldestFirmware});
     test_registers(out);
@@ -91,7 +92,7 @@ Sequence stop_sequence() ABBE_RT {
 Sequence load_sequence(const ScanLayout& layout, std::uint64_t divisor) ABBE_RT {
   Sequence out;
   const auto list = encode(layout);
-  // Twice, as in the manufacturer's library.
+  // The list is loaded twice, as in the manufacturer's library.
   for (int pass = 0; pass < 2; ++pass) {
     out.add(Register::Acquisition, acquisition::kResetScanList);
     for (const auto& entry : list.used()) {

@@ -51,7 +51,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// "0,5", not "0,": that is a value before a comma and a space.
+/// True for "0,5". False for "0,": that is a value followed by a comma and a space.
 bool has_decimal_comma(std::string_view cell) {
   const auto comma = cell.find(',');
   if (comma == 0 || comma >= cell.size() - 1 || cell.find('.') != std::string_view::npos)
@@ -81,7 +81,8 @@ bool is_value(std::string_view cell, const std::vector<TableForm>& forms) {
                      [&](const TableForm& form) { return is_word(cell, form); });
 }
 
-/// Spaces may be repeated.
+/// Cells of a line, without their quotation marks. If the separator is a space, several spaces
+/// count as one separator.
 std::vector<Cell> unquoted_cells(std::string_view line, char separator) {
   auto cells = all_cells(line, separator);
   if (separator == ' ') std::erase_if(cells, [](const Cell& cell) { return cell.text.empty(); });
@@ -89,7 +90,8 @@ std::vector<Cell> unquoted_cells(std::string_view line, char separator) {
   return cells;
 }
 
-/// True if the line has column names or values with this separator, and not with commas.
+/// True if the line consists of column names or values that are separated by `separator`, and not
+/// by commas.
 bool is_separated_by(char separator, std::string_view line, const std::vector<TableForm>& forms) {
   const auto cells = unquoted_cells(trimmed(line), separator);
   if (cells.size() < 2) return false;
@@ -109,8 +111,8 @@ std::optional<Separator> separator_of(std::string_view line, const std::vector<T
   return std::nullopt;
 }
 
-/// "x_mm,y_mm,z_mm": the first `columns` columns of the form; all if that is no valid number of
-/// columns.
+/// Text of a header line, "x_mm,y_mm,z_mm": the names of the first `columns` columns of the form,
+/// and of the required columns that follow them.
 std::string header_of(const TableForm& form, std::size_t columns) {
   std::string header;
   for (std::size_t i = 0; i < form.size(); ++i) {

@@ -142,8 +142,9 @@ struct TouchScan {
   std::array<double, kMaxAxes> position{};  ///< m or rad
 };
 
-/// Quantities that a device measures; a bit set. Bit set and NaN: measured, but not available now.
-/// Bit not set and a number: an assumed value that was set in the device.
+/// Quantities of an EnvironmentSample; a set of bits. Bit set and value NaN: the device measures
+/// the quantity, but has no value now. Bit not set and a number: an assumed value that was set in
+/// the device.
 using EnvironmentMask = std::uint16_t;
 inline constexpr EnvironmentMask kAirTemperature = 1u << 0;
 inline constexpr EnvironmentMask kAirPressure = 1u << 1;

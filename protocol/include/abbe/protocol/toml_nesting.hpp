@@ -12,7 +12,7 @@ namespace abbe::protocol {
 
 struct TomlBounds {
   std::size_t bytes = 1u << 20;
-  /// sum of parts of keys and table names, nested arrays and inline tables
+  /// largest nesting depth: parts of keys and table names, nested arrays and inline tables, summed
   std::size_t depth = 64;
 };
 

@@ -20,7 +20,8 @@ inline constexpr ObjectId kProduct{0x1018, 2};
 inline constexpr ObjectId kRevision{0x1018, 3};
 inline constexpr ObjectId kSerial{0x1018, 4};
 inline constexpr std::uint16_t kSdoServer = 0x1200;
-/// + TPDO number - 1; :01 COB-ID :02 type :03 inhibit :05 event timer
+/// Communication parameters of a TPDO, index 1800h + TPDO number - 1; sub-indices: :01 COB-ID, :02
+/// transmission type, :03 inhibit time, :05 event timer.
 inline constexpr std::uint16_t kTpdoParameters = 0x1800;
 inline constexpr std::uint16_t kTpdoMapping = 0x1A00;  ///< + TPDO number - 1
 

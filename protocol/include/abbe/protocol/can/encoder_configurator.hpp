@@ -56,7 +56,8 @@ struct SdoWrite {
   std::uint8_t size = 0;
   bool optional = false;  ///< a node without this object is accepted
 };
-/// All writes of the procedure, from disabling the TPDO to disabling the other one.
+/// All SDO writes of the procedure: from disabling the TPDO in use to disabling the other default
+/// TPDO.
 using PdoConfiguration = std::array<SdoWrite, 10>;
 [[nodiscard]] PdoConfiguration pdo_configuration(const EncoderPlan& plan) noexcept;
 
@@ -110,7 +111,7 @@ class EncoderConfigurator {
   void start(HostTime now) noexcept;
   void on_frame(const CanFrame& frame, HostTime now) noexcept;
   void on_time(HostTime now) noexcept;
-  /// The next frame to send, until nullopt.
+  /// The next frame to send. To be called until it returns nullopt.
   [[nodiscard]] std::optional<CanFrame> take_frame() noexcept;
 
   [[nodiscard]] State state() const noexcept { return state_; }

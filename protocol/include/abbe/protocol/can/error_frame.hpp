@@ -10,7 +10,7 @@
 
 namespace abbe::protocol::can {
 
-/// One condition; a bit set.
+/// A condition of the bus. BusConditions combines these bits.
 enum class BusCondition : std::uint32_t {
   TransmitTimeout = 1u << 0,
   LostArbitration = 1u << 1,

@@ -14,7 +14,7 @@
 
 namespace abbe::protocol::can {
 
-/// Properties of a frame; a bit set.
+/// Properties of a frame. Each is a bit, so that a frame can have several.
 enum class FrameFlag : std::uint8_t {
   Extended = 1u << 0,  ///< 29-bit identifier
   Remote = 1u << 1,    ///< remote request: `length` is the requested length, there are no data

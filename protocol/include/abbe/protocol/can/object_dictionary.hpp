@@ -58,12 +58,13 @@ class ObjectDictionary {
 
   explicit ObjectDictionary(const EncoderIdentity& identity) noexcept;
 
-  // Access by SDO, with all rules. None: accepted.
+  // Access by SDO, under all rules. AbortCode::None: the access is accepted.
   [[nodiscard]] AbortCode write(ObjectId object, std::span<const std::byte> value) noexcept;
   /// Copies the value into `out` (kMaxSdoBytes are sufficient) and sets `size`.
   [[nodiscard]] AbortCode read(ObjectId object, std::span<std::byte> out,
                                std::size_t& size) const noexcept;
-  /// None if the object may be read, or written. The value is not checked.
+  /// AbortCode::None if the access rights permit reading (writing) the object. may_write() does not
+  /// check the value.
   [[nodiscard]] AbortCode may_read(ObjectId object) const noexcept;
   [[nodiscard]] AbortCode may_write(ObjectId object) const noexcept;
 

@@ -33,8 +33,8 @@ struct MappedObject {
 enum class PositionType : std::uint8_t {
   Signed32,    ///< 6004h of linear encoders
   Unsigned32,  ///< 6004h of rotary encoders
-  /// 6008h; CiA 406 v3.1 does not define the signedness; a scale with negative positions needs a
-  /// sign
+  /// 6008h. CiA 406 v3.1 does not define whether it is signed; it is decoded as signed, because a
+  /// scale with negative positions needs a sign.
   Signed64,
 };
 [[nodiscard]] constexpr std::size_t size_of(PositionType type) noexcept {

@@ -15,8 +15,8 @@ struct ObjectId {
   friend constexpr auto operator<=>(const ObjectId&, const ObjectId&) = default;
 };
 
-/// Size limit of an object; longer ones are refused with OutOfMemory. Objects of encoders are
-/// numbers and names.
+/// Size limit of an object's value, bytes; a longer value is refused with OutOfMemory. Values of
+/// encoders are numbers and names.
 inline constexpr std::size_t kMaxSdoBytes = 128;
 
 enum class AbortCode : std::uint32_t {

@@ -38,10 +38,10 @@ class SdoClient {
   /// Writes an object of 1 to kMaxSdoBytes bytes; other sizes fail at once with LengthMismatch.
   void start_download(ObjectId object, std::span<const std::byte> value, HostTime now) noexcept;
 
-  /// Any frame of the bus; all but the answers of this transfer are ignored.
+  /// Takes any frame of the bus; ignores all but the answers to this transfer.
   void on_frame(const CanFrame& frame, HostTime now) noexcept;
   void on_time(HostTime now) noexcept;
-  /// The next frame to send, until nullopt.
+  /// The next frame to send. To be called until it returns nullopt.
   [[nodiscard]] std::optional<CanFrame> take_frame() noexcept;
 
   [[nodiscard]] State state() const noexcept { return state_; }

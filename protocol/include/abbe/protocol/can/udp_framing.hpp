@@ -22,8 +22,8 @@ inline constexpr std::size_t kDatagramHeader = 5;
 /// Bytes of an encoded frame.
 [[nodiscard]] std::size_t encoded_size(const CanFrame& frame) ABBE_RT;
 
-/// Writes frames into the caller's buffer. add() returns false if the frame does not fit: send
-/// finish() and use a new writer.
+/// Writes frames into the caller's buffer. add() returns false if the frame does not fit: then send
+/// the bytes of finish() and use a new writer.
 class DatagramWriter {
  public:
   /// `buffer` holds at least kDatagramHeader bytes and outlives the writer.

@@ -16,7 +16,7 @@
 
 namespace abbe::protocol::emscon {
 
-/// Type 1. The status for a broken beam is not given by any public source.
+/// Packet type 1: an error. No public source gives the status for a broken beam.
 struct ErrorResponse {
   Command command{};
   Status status = Status::Unknown;
@@ -27,7 +27,7 @@ struct StatusChange {
   Event event{};
 };
 
-/// Type 2: the mean of a stationary measurement. It contains no time.
+/// Packet type 2: the mean of a stationary measurement. It contains no time stamp.
 struct SingleResult {
   Status status = Status::Ok;
   MeasurementMode mode = MeasurementMode::Stationary;
@@ -41,7 +41,7 @@ struct SingleResult {
   Environment environment;
 };
 
-/// Type 7: position of the reflector, at most 10 times a second while the beam is locked.
+/// Packet type 7: position of the reflector, at most 10 times a second while the beam is locked.
 struct ReflectorPosition {
   Status status = Status::Ok;
   std::array<double, 3> value{};
@@ -58,7 +58,7 @@ struct MultiPoint {
   TrackerClockReading time;
   std::array<double, 3> value{};
 };
-/// Additional data of a point of type 10.
+/// Additional data of a point in a packet of type 10.
 struct MultiPointStatistics {
   std::array<double, 3> apriori_std{};
   double apriori_total = 0.0;
@@ -76,8 +76,8 @@ inline constexpr std::size_t kMaxMultiPoints = (kMaxPacketSize - kMultiHeadSize)
 inline constexpr std::size_t kMaxExtendedMultiPoints =
     (kMaxPacketSize - kMultiHeadSize) / kExtendedMultiPointSize;
 
-/// Types 3 and 10: a burst of points of a continuous measurement. A view of the packet's bytes,
-/// which must outlive it; each call of point() decodes one point.
+/// Packet types 3 and 10: a burst of points of a continuous measurement. A MultiResult is a view of
+/// the packet's bytes, which must outlive it; each call of point() decodes one point.
 class MultiResult {
  public:
   /// Any bytes in `packet` give a result or an error.
@@ -115,8 +115,8 @@ using ControllerPacket = std::variant<Answer, ErrorResponse, StatusChange, Singl
 [[nodiscard]] tl::expected<ControllerPacket, DecodeError> decode(
     std::span<const std::byte> packet) ABBE_RT;
 
-/// Each returns the number of bytes written to `out`, 0 if it is too small or if the points do not
-/// fit into one packet.
+/// Each encode() returns the number of bytes written to `out`, 0 if `out` is too small or if the
+/// points do not fit into one packet.
 [[nodiscard]] std::size_t encode(const ErrorResponse&, std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] std::size_t encode(const StatusChange&, std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] std::size_t encode(const SingleResult&, std::span<std::byte> out) ABBE_RT;

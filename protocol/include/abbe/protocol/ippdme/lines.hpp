@@ -117,8 +117,8 @@ class LineFramer {
   /// The next line without CR LF, valid until the next push() or reset(). An error is returned
   /// once, then nullopt until reset() or resume(): the peer violates the protocol.
   [[nodiscard]] std::optional<tl::expected<std::string_view, LineError>> next() ABBE_RT;
-  /// After an error: continues after the next end of a line. If called before the next call of
-  /// next(), no later line of the same bytes is lost.
+  /// After an error: skips the rest of the refused line and continues after its end. If resume() is
+  /// called before the next call of next(), no later line of the bytes already pushed is lost.
   void resume() ABBE_RT;
   void reset() ABBE_RT;
 

@@ -162,7 +162,7 @@ struct Chunk {
 
 struct MessageIndex {
   std::uint16_t channel_id = 0;
-  /// Log time, offset in the uncompressed records.
+  /// Pairs of log time (ns) and offset in the uncompressed records.
   PackedPairs<std::uint64_t, std::uint64_t> entries;
 };
 
@@ -171,7 +171,7 @@ struct ChunkIndex {
   std::uint64_t last_time_ns = 0;
   std::uint64_t chunk_start = 0;   ///< offset of the Chunk's opcode in the file
   std::uint64_t chunk_length = 0;  ///< of the whole Chunk record
-  /// Channel, offset of its MessageIndex in the file.
+  /// Pairs of channel id and offset of the channel's MessageIndex record in the file.
   PackedPairs<std::uint16_t, std::uint64_t> index_offsets;
   std::uint64_t index_length = 0;  ///< total length of the MessageIndex records
   std::string_view compression;
@@ -276,7 +276,8 @@ void append(Buffer& buffer, const Footer& record);
 void append(Buffer& buffer, const Schema& record);
 void append(Buffer& buffer, const Channel& record);
 void append(Buffer& buffer, const Message& record);
-/// The size of the records is taken from `records`, the checksum from the head.
+/// Appends a Chunk record. Its records_size is the size of `records`; its checksum is taken from
+/// the head.
 void append(Buffer& buffer, const Chunk& record);
 void append(Buffer& buffer, const MessageIndex& record);
 void append(Buffer& buffer, const ChunkIndex& record);

@@ -40,7 +40,7 @@ struct Debounce {
   bool enabled = false;
   std::uint8_t time_code = 0;
   bool falling = false;
-  /// true: the first edge counts, then further edges are ignored for the time
+  /// true: the first edge counts, then further edges are ignored for the time of `time_code`
   bool trigger_before_stable = false;
   friend bool operator==(const Debounce&, const Debounce&) = default;
 };

@@ -18,7 +18,7 @@ namespace abbe::protocol::quad08 {
 /// The counts of one scan as sent by the card: 32 bits, or 48 bits without sign extension.
 using RawScan = std::array<std::uint64_t, kChannels>;
 
-/// Modulus 2^32 or 2^48.
+/// Number of counts after which a counter of this width wraps.
 [[nodiscard]] constexpr std::uint64_t modulus_of(CountWidth width) noexcept {
   return std::uint64_t{1} << (width == CountWidth::Bits32 ? 32 : 48);
 }
@@ -40,7 +40,7 @@ class ScanDecoder {
  public:
   explicit ScanDecoder(const ScanLayout& layout) ABBE_RT : layout_(layout) {}
 
-  /// The next pushed byte is the first byte of a scan.
+  /// Discards an incomplete scan: the next pushed byte is the first byte of a scan.
   void reset() ABBE_RT {
     carried_ = 0;
     bytes_ = {};

@@ -9,10 +9,10 @@
 
 namespace abbe::protocol {
 
-/// Collects lines of the form "file:line:column: key: what is wrong". Shows the `most_shown` that
-/// come first in the file and counts the others. A fault that is added several times is one fault
-/// with a count. More than `kEach` faults of one kind are one line: the first of them, "and 411
-/// more like this".
+/// Collects lines of the form "file:line:column: key: what is wrong". Shows the first `most_shown`
+/// faults in the order of the file and counts the others. A fault that is added several times is
+/// one fault with a count. If there are more than `kEach` faults of one kind, one line stands for
+/// all of them: the first fault, then "and 411 more like this".
 class Faults {
  public:
   static constexpr std::size_t kShown = 20;
@@ -23,7 +23,8 @@ class Faults {
   /// Faults with equal key and `what` are of one kind; an index in the key ("ball[3]") makes no
   /// difference.
   void add(std::size_t line, std::size_t column, std::string_view key, std::string_view what);
-  /// For a `what` with a value that differs from line to line: equal key and `kind`.
+  /// As add(), for a `what` that contains a value that differs from line to line: faults with equal
+  /// key and equal `kind` are of one kind.
   void add_kind(std::string_view kind, std::size_t line, std::size_t column, std::string_view key,
                 std::string_view what);
   [[nodiscard]] bool any() const noexcept { return count_ > 0; }

@@ -146,7 +146,7 @@ class DeviceListWriter {
 /// Reads the devices of a complete device list one by one. The bytes must outlive the view.
 class DeviceListView {
  public:
-  /// Truncated until all announced devices have arrived.
+  /// Error Truncated until all announced devices have arrived.
   [[nodiscard]] static tl::expected<DeviceListView, OpError> parse(
       std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] std::uint32_t count() const ABBE_RT { return count_; }

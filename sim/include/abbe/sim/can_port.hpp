@@ -21,7 +21,8 @@ struct CanPortOptions {
   std::uint16_t peer_port = 0;  ///< UDP on 127.0.0.1; 0: the sender of the latest datagram
   std::string interface {};     ///< SocketCAN instead of UDP: "vcan0"
   /// Simulated seconds per wall-clock second. A frame is dated by its kernel timestamp, not by the
-  /// time at which this process woke up. 0 for a stepped clock: the age of every frame is then 0.
+  /// time at which this process woke up. 0 for a clock that a test advances in steps: the age of
+  /// every frame is then 0.
   double speed = 0.0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 /// A device controller behind a TCP port. It serves one client at a time; the connection of a
-/// second client is closed, a tracker sends it an error packet first. Steppable: poll(now) never
+/// second client is closed (a tracker sends it an error packet before). Steppable: poll(now) never
 /// blocks and reads no clock. Not thread-safe. Controllers: TrackerDevice (simulated),
 /// RecordedTracker and RecordedDialogue (replayed), IppDmeDevice (a measuring machine).
 

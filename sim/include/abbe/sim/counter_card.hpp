@@ -46,7 +46,7 @@ struct ClockSignal {
 };
 /// The card's own timer output 0: runs after the command to start it.
 struct TimerSignal {};
-/// Each trigger of the probe is one edge.
+/// A counter of probe edges: each trigger of the probe is one edge.
 struct ProbeSignal {};
 using PhaseSignal =
     std::variant<std::monostate, ScaleSignal, ClockSignal, TimerSignal, ProbeSignal>;
@@ -76,8 +76,8 @@ class CounterCard final : public ExportedCard {
                                                               HostTime now);
   [[nodiscard]] ControlAnswer answer(const usb::Setup& setup, HostTime now) override;
   [[nodiscard]] UsbIds ids() const override { return {options_.vendor, options_.product}; }
-  /// Makes the scans due until `now`. Overrun if they exceed the FIFO plus the `wanted` bytes that
-  /// the host has requested.
+  /// Makes the scans due until `now`. The card overruns if these scans have more bytes than the
+  /// free FIFO plus the `wanted` bytes that the host has requested.
   void advance(HostTime now, std::size_t wanted) override;
   [[nodiscard]] std::vector<std::byte> take(std::size_t most) override;
   [[nodiscard]] std::size_t available() const override { return fifo_.size(); }

@@ -48,12 +48,12 @@ class EncoderNode {
   /// Does what is due until `now`: heartbeats, event timers, the end of a restart.
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
-  /// Frames made since the last call.
+  /// Frames that the node has made since the last call.
   [[nodiscard]] std::vector<TimedFrame> take_frames();
 
   // Fault injection.
   void mute_until(HostTime until) { mute_until_ = until; }
-  /// Every frame is sent `delay` late.
+  /// Until the instant `until`, every frame is sent later than normal by `delay`.
   void delay_until(HostTime until, std::chrono::nanoseconds delay);
   void restart(HostTime now);  ///< as after a power cut
   void emergency(std::uint16_t code, std::uint8_t error_register, HostTime now);

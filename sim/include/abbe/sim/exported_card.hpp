@@ -37,11 +37,12 @@ class ExportedCard {
   [[nodiscard]] virtual std::size_t available() const = 0;
   /// When `bytes` bytes will be available; HostTime::max() if no scan runs.
   [[nodiscard]] virtual HostTime available_at(std::size_t bytes) const = 0;
-  /// True while more bytes will follow: a request then waits until it can be filled.
+  /// True while the card will make more bytes: a request of the host then waits until it can be
+  /// filled.
   [[nodiscard]] virtual bool scanning() const = 0;
-  /// The host's connection has ended.
+  /// To be called when the host's connection has ended.
   virtual void host_disconnected() {}
-  /// When the connection breaks without a request of the host; HostTime::max(): never.
+  /// When the connection breaks although the host did not request it; HostTime::max(): never.
   [[nodiscard]] virtual HostTime breaks_at() const { return HostTime::max(); }
 };
 

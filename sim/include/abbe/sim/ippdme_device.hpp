@@ -46,7 +46,7 @@ struct IppDmeOptions {
 
 class IppDmeDevice {
  public:
-  /// Switched on at `now`.
+  /// The server is switched on at `now`.
   IppDmeDevice(const IppDmeOptions& options, HostTime now);
 
   void connected(HostTime now);
@@ -56,7 +56,7 @@ class IppDmeDevice {
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
 
-  /// Bytes for the client, made since the last call.
+  /// Bytes for the client that were made since the last call.
   [[nodiscard]] std::vector<std::byte> take_output();
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }

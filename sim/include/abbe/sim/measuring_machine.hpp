@@ -43,8 +43,8 @@ struct Probing {
   Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
 };
 
-/// Moves from place_m + approach_m x normal in the direction -normal (`normal` is a unit vector).
-/// `number` is the index of the noise.
+/// One touch: moves from place_m + approach_m x normal in the direction -normal (`normal` is a unit
+/// vector). `number`: index of the random numbers for the noise of this touch (noise.hpp).
 [[nodiscard]] Probing probe(const MeasuringMachine& machine, const Eigen::Vector3d& place_m,
                             const Eigen::Vector3d& normal, std::uint64_t number);
 

@@ -40,7 +40,8 @@ class PathMotion {
   [[nodiscard]] AxisMotion at(double time_s) const;
   [[nodiscard]] double duration_s() const { return end_s_; }
   [[nodiscard]] std::size_t legs() const { return legs_.size(); }
-  /// When the machine leaves the first vertex of leg i, and when it stops at the last.
+  /// Time at which the machine leaves the first vertex of leg i. leg_end_s(): at which it stops at
+  /// the last vertex of leg i.
   [[nodiscard]] double leg_begin_s(std::size_t i) const { return legs_[i].begin_s; }
   [[nodiscard]] double leg_end_s(std::size_t i) const;
 

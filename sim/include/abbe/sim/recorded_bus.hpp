@@ -6,9 +6,10 @@
 ///   - All other frames (heartbeats, EMCY, error frames, the SYNC of another producer and the
 ///     positions that answered it) are sent with their original timing.
 ///
-/// Until the replay starts, heartbeats and the first positions keep the nodes alive. If the
-/// recording has no tracker, the replay starts with the first SYNC; if it has no SYNC to the nodes
-/// either, it starts as soon as there is a listener. Steppable, not thread-safe.
+/// Before the replay starts, heartbeats are sent and every SYNC is answered with the first recorded
+/// positions, so that the nodes appear alive. If the recording has no tracker, the replay starts
+/// with the first SYNC; if it has no SYNC to the nodes either, it starts as soon as there is a
+/// listener. Steppable, not thread-safe.
 
 #include <map>
 #include <memory>
@@ -25,8 +26,8 @@ namespace abbe::sim {
 
 class RecordedBus {
  public:
-  /// `timeline` must outlive it. `leads`: this device starts the timeline, because the recording
-  /// has no tracker.
+  /// `timeline` must outlive the bus. `leads`: this device starts the timeline, because the
+  /// recording has no tracker.
   [[nodiscard]] static Result<RecordedBus> open(const EncoderBusOptions& options,
                                                 const RecordedDevice& device,
                                                 ReplayTimeline& timeline, bool leads);
@@ -69,7 +70,7 @@ class RecordedBus {
   void send_late(HostTime now);
   void on_sdo(const can::CanFrame& frame);
   void keep_alive(HostTime now);
-  /// The recording has only SYNCs of another producer.
+  /// True if all SYNCs of the recording came from another producer.
   [[nodiscard]] bool external() const { return cycles_.empty() && foreign_syncs_ > 0; }
   [[nodiscard]] std::size_t cycle_at(HostTime recorded) const;
 
@@ -79,12 +80,12 @@ class RecordedBus {
   std::set<can::NodeId> nodes_;
   std::vector<Cycle> cycles_;
   std::size_t foreign_syncs_ = 0;
-  /// while the recording is read: the latest SYNC came from another producer
+  /// used while the recording is read: the latest SYNC came from another producer
   bool foreign_sync_ = false;
   std::vector<Unsolicited> unsolicited_;
   std::vector<Unsolicited> late_;  ///< delayed answers of current cycles, by send time
   std::map<SdoRequest, SdoResponses> sdo_;
-  /// while the recording is read: requests without a response yet
+  /// used while the recording is read: requests without a response yet
   std::map<can::NodeId, SdoRequest> asked_;
   std::optional<std::size_t> next_cycle_;
   std::size_t next_unsolicited_ = 0;

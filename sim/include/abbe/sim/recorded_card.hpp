@@ -2,8 +2,8 @@
 /// Replays a counter card from a recording.
 ///   - While no scan runs, a request gets the answer to the next equal request of the recorded
 ///     connection. If the recorded card did not answer, the replay does not answer either.
-///   - A scan has its original timing, counted from the start of the pacer. During a scan the
-///     status is the recorded status of that time.
+///   - A scan has its original timing, counted from the start of the pacer (scan timer).
+///     During a scan the status is the recorded status of that time.
 ///   - A connection that broke in the recording breaks again. The next connection replays the next
 ///     recorded one; after the last one the replay begins again with the first.
 ///   - A host that halts a scan earlier than in the recording and restarts it gets the rest of the
@@ -27,8 +27,8 @@ namespace abbe::sim {
 
 class RecordedCard final : public ExportedCard {
  public:
-  /// `timeline` must outlive it. `leads`: this device starts the timeline, because the recording
-  /// has no tracker.
+  /// `timeline` must outlive the card. `leads`: this device starts the timeline, because the
+  /// recording has no tracker.
   RecordedCard(const RecordedDevice& device, const std::string& serial, ReplayTimeline& timeline,
                bool leads);
 
@@ -56,7 +56,7 @@ class RecordedCard final : public ExportedCard {
     HostTime time{};
     std::vector<std::byte> bytes;
   };
-  /// From one start of the pacer to the next.
+  /// The scans from one start of the pacer to the next.
   struct Scan {
     std::size_t begins = 0;  ///< the exchange that started it
     std::size_t halts = 0;   ///< the first exchange after it that is not a status request

@@ -1,10 +1,11 @@
 #pragma once
 /// Replays a device that only answers requests: Modbus over TCP or RTU, I++ DME. The n-th of
-/// several equal requests on a connection is answered like the n-th in the recording: after the
-/// same time, in the same pieces, or not at all. When the recording has no more, the last answer is
-/// repeated. A request that is not in the recording is refused. A connection that broke in the
-/// recording breaks again. The next connection replays the next recorded one; after the last one
-/// the replay begins again with the first. Interface as TrackerDevice; steppable, not thread-safe.
+/// several equal requests on a connection is answered like the n-th such request in the recording:
+/// after the same time, in the same pieces, or not at all. When the recording has no further such
+/// request, the last answer is repeated. A request that is not in the recording is refused. A
+/// connection that broke in the recording breaks again. The next connection replays the next
+/// recorded one; after the last one the replay begins again with the first. Interface as
+/// TrackerDevice; steppable, not thread-safe.
 
 #include <deque>
 #include <map>
@@ -16,13 +17,14 @@
 
 namespace abbe::sim {
 
-/// How one protocol splits a stream of bytes into requests, and which part of a request identifies
-/// it.
+/// How one protocol splits a stream of bytes into requests, and how requests are compared. The
+/// number of a request is its transaction number or tag, which its answer repeats.
 struct DialogueWire {
   using Bytes = std::span<const std::byte>;
   /// Size of the first request in `bytes`; 0: the request is incomplete.
   std::size_t (*request_size)(Bytes bytes) = nullptr;
-  /// The part that two requests must have in common to get the same answer: all but their number.
+  /// The part of a request that must be equal for two requests to get the same answer: all but the
+  /// number.
   Bytes (*meaning)(Bytes request) = nullptr;
   /// Replaces the number of the `recorded` request in its answer by the number of `request`.
   void (*renumber)(std::span<std::byte> answer, Bytes recorded, Bytes request) = nullptr;
@@ -45,7 +47,7 @@ class RecordedDialogue {
   [[nodiscard]] bool wants_close() const { return wants_close_; }
   [[nodiscard]] bool accepts() const { return true; }
 
-  /// The last request of the recording has been received and answered.
+  /// True once the last request of the recording has been received and answered.
   [[nodiscard]] bool finished() const { return finished_; }
   [[nodiscard]] std::size_t requests() const;
 

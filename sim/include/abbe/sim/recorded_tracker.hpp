@@ -1,11 +1,12 @@
 #pragma once
 /// Replays a tracker controller from a recording. The n-th of several equal commands on a
-/// connection is answered like the n-th in the recording: after the same time or not at all. When
-/// the recording has no more, the last answer is repeated. A command that is not in the recording
-/// is answered with NotImplemented. All other packets (bursts, errors, events, bytes that are not a
-/// packet) are sent with their original timing from the start of measuring. A connection that broke
-/// in the recording breaks again. The next connection replays the next recorded one; after the last
-/// one the replay begins again with the first. Interface as TrackerDevice.
+/// connection is answered like the n-th such command in the recording: after the same time or not
+/// at all. When the recording has no further such command, the last answer is repeated. A command
+/// that is not in the recording is answered with NotImplemented. All other packets (bursts, errors,
+/// events, bytes that are not a packet) are sent with their original timing from the start of
+/// measuring. A connection that broke in the recording breaks again. The next connection replays
+/// the next recorded one; after the last one the replay begins again with the first. Interface as
+/// TrackerDevice.
 
 #include <deque>
 #include <map>

@@ -22,7 +22,8 @@ struct RecordedBlock {
   bool hole_before = false;      ///< the recording lost blocks before this one
   std::vector<std::byte> bytes;  ///< of one read or one write; continued blocks are joined
 
-  /// An empty block from a device: a connection begins (with encoders: time has passed).
+  /// An empty block from a device: a connection begins (of encoders: no frame arrived until this
+  /// time).
   [[nodiscard]] bool connects() const { return !to_device && bytes.empty(); }
   /// An empty block to a device: the connection was lost; the daemon did not close it.
   [[nodiscard]] bool lost() const { return to_device && bytes.empty(); }
@@ -58,7 +59,7 @@ struct RecordedDevice {
 /// resynchronised with the timeline.
 inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
-/// Maps recorded time to replay time. All devices of a recording share it, so that they stay
+/// Maps recorded time to replay time. All devices of a replay share one timeline, so that they stay
 /// synchronised. The first device that starts sets it.
 class ReplayTimeline {
  public:
@@ -66,8 +67,8 @@ class ReplayTimeline {
     if (!shift_) shift_ = now - recorded;
   }
   void rewind() { shift_.reset(); }
-  /// Sets the map again, also while it runs: a device that reconnects continues at its recorded
-  /// time.
+  /// Sets the map again, also while the timeline runs: a device that reconnects continues at its
+  /// recorded time.
   void restart(HostTime recorded, HostTime now) { shift_ = now - recorded; }
   [[nodiscard]] bool running() const { return shift_.has_value(); }
   [[nodiscard]] HostTime due(HostTime recorded) const {

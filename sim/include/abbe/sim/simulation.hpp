@@ -1,8 +1,8 @@
 #pragma once
 /// The complete simulation: machine, tracker, encoder bus, counter cards, measuring machine and
 /// scheduled faults, stepped together. poll(now) does what is due, never blocks and reads no clock;
-/// a program passes real time, a test any time. Not thread-safe, except for the bus with
-/// `bus_apart`.
+/// a program passes real time, a test any time. Not thread-safe. Exception: with `bus_apart`
+/// another thread may poll the encoder bus.
 
 #include <poll.h>
 
@@ -25,11 +25,11 @@ namespace abbe::sim {
 struct SimulationSetup {
   TruthMachine truth;
   PathPlan path;
-  /// The motion starts when the tracker streams (without a tracker: when the first counter card
-  /// scans); false: it starts by itself.
+  /// true: the motion starts when the tracker streams (without a tracker: when the first counter
+  /// card scans). false: the motion starts by itself.
   bool start_when_streaming = true;
   bool held = false;  ///< the motion starts only after release()
-  /// before the motion, counted from the first point or from the start
+  /// Time at standstill before the motion. It begins with the first point or scan, or at the start.
   std::chrono::nanoseconds standstill = std::chrono::seconds{2};
   std::optional<TrackerOptions> tracker;
   std::uint16_t tracker_port = 0;

@@ -16,7 +16,7 @@
 namespace abbe::sim {
 
 struct TouchingOptions {
-  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< in the order they are touched
+  std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< array positions, in order
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
   double approach_m = 1e-3;  ///< at probing speed before the surface ...
@@ -61,8 +61,8 @@ struct TouchingProgram {
                                                const TruthMachine& truth, const PathMotion& path,
                                                double tip_radius_m, const TouchingOptions& options);
 
-/// The scale reading at which the true position of the tip's centre is `place_m` (machine without
-/// target offset).
+/// The scale reading at which the centre of the tip is truly at `place_m` (machine without target
+/// offset).
 [[nodiscard]] Eigen::Vector3d reading_at_m(const TruthMachine& truth,
                                            const Eigen::Vector3d& place_m);
 

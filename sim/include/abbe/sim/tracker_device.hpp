@@ -45,7 +45,7 @@ struct TrackerOptions {
 
 class TrackerDevice {
  public:
-  /// Switched on at `now`. `machine` must outlive it.
+  /// The controller is switched on at `now`. `machine` must outlive it.
   TrackerDevice(const TrackerOptions& options, const VirtualMachine& machine, HostTime now);
 
   void connected(HostTime now);
@@ -55,7 +55,7 @@ class TrackerDevice {
   void advance(HostTime now);
   [[nodiscard]] HostTime next_due() const;
 
-  /// Bytes for the client, made since the last call.
+  /// Bytes for the client that were made since the last call.
   [[nodiscard]] std::vector<std::byte> take_output();
   /// The connection is to be closed after the output has been sent.
   [[nodiscard]] bool wants_close() const { return wants_close_; }
@@ -84,7 +84,8 @@ class TrackerDevice {
     std::uint64_t points_left;
   };
 
-  /// An interval of measurement times of points, not of the times at which they are sent.
+  /// An interval of the times at which points are measured, not of the times at which they are
+  /// sent.
   struct Window {
     HostTime from = HostTime::max();
     HostTime until = HostTime::max();

@@ -74,7 +74,7 @@ std::string error_row(const TruthMachine& truth, const Eigen::Vector3d& q_m,
                      q_mm.z(), V_um.x(), V_um.y(), V_um.z());
 }
 
-/// Readings at the balls of all positions.
+/// Scale readings at the centres of the balls, for all positions of the array.
 std::vector<Eigen::Vector3d> ball_readings_m(const TruthMachine& truth, const BallArray& array) {
   std::vector<Eigen::Vector3d> readings;
   for (const auto& T_machine_array : reference_positions()) {
@@ -84,7 +84,7 @@ std::vector<Eigen::Vector3d> ball_readings_m(const TruthMachine& truth, const Ba
   return readings;
 }
 
-/// V relative to that at ball 1, over the box of all balls.
+/// V minus V at ball 1, as CSV, on a grid over the smallest box that contains all balls.
 std::string truth_csv(const TruthMachine& truth, const BallArray& array) {
   const Eigen::Vector3d step_m = Eigen::Vector3d(0.1, 0.05, 0.01) / 3.0;
   const auto readings = ball_readings_m(truth, array);

@@ -21,13 +21,15 @@ EventLoop::EventLoop(double speed) : clock_(speed) {
   action.sa_handler = request_stop;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // Unblocked only while waiting, so that no signal is lost between stopped() and the wait.
+  // SIGINT and SIGTERM are unblocked only while waiting, so that none of them is lost between
+  // stopped() and the wait.
   sigset_t blocked;
   sigemptyset(&blocked);
   sigaddset(&blocked, SIGINT);
   sigaddset(&blocked, SIGTERM);
   sigprocmask(SIG_BLOCK, &blocked, &mask_while_waiting_);
-  // ns; at 20 times real time the default of 50 us would be 1 ms of simulated time
+  // Timer slack of 1 ns. With the default of 50 us, a wait at 20 times real time could end 1 ms of
+  // simulated time too late.
   prctl(PR_SET_TIMERSLACK, 1);
 }
 

@@ -35,7 +35,7 @@ struct Ports {
 /// Where the devices of a simulation listen; encoders on `can_interface` if it is not empty.
 [[nodiscard]] Ports ports_of(Simulation& simulation, const std::string& can_interface = {});
 
-/// Writes the file first, then prints. Empty path: no file.
+/// Writes the ports to the file `path` (empty: no file), then prints them.
 [[nodiscard]] Result<void> announce_ports(const Ports& ports, const std::string& path);
 
 }  // namespace abbe::sim

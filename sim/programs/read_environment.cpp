@@ -8,7 +8,8 @@
 namespace abbe::sim {
 namespace {
 
-/// The mean from NAME_UNIT; NAME_drift_per_hour, NAME_swing and NAME_swing_period_s.
+/// Reads the keys of one quantity: its mean from NAME_UNIT; NAME_drift_per_hour, NAME_swing and
+/// NAME_swing_period_s.
 void read_course(TomlSection& section, std::string_view name, std::string_view unit,
                  Course& course) {
   section.number(fmt::format("{}_{}", name, unit), course.mean);

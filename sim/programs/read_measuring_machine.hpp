@@ -6,12 +6,13 @@
 
 namespace abbe::sim {
 
-/// The daemon's [cmm]: there is a measuring machine; its port and tool.
+/// Reads the daemon's table [cmm]: if it exists, there is a measuring machine, with this port and
+/// tool.
 void read_cmm(TomlSection section, SimulationSetup& simulation);
 /// `artefact_file`: the value of the key `artefact`; unchanged without the key.
 void read_sim_cmm(TomlSection section, SimulationSetup& simulation, std::string& artefact_file);
-/// A calibrator.toml whose blocks contain the positions of their faces. Io, or BadInput with every
-/// fault at once.
+/// Reads a calibrator.toml whose blocks contain the positions of their faces. Io, or BadInput with
+/// every fault at once.
 [[nodiscard]] Result<void> read_artefact(const std::string& file, MeasuringMachine& machine);
 
 }  // namespace abbe::sim

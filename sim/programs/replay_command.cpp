@@ -50,7 +50,8 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
 /// The serial numbers that the daemon expected of its cards when it recorded them.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
   const auto root = parse_toml(configuration, "recorded configuration");
-  // The configuration of another daemon version: the bytes are replayed nevertheless.
+  // The configuration may be of a daemon version that abbe-sim cannot read: the bytes are replayed
+  // nevertheless.
   if (!root) return;
   for (const auto& [table, usual] :
        {std::pair{"counter_card", "counter_card"}, std::pair{"reference", "reference_card"}}) {

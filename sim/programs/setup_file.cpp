@@ -11,7 +11,7 @@
 namespace abbe::sim {
 namespace {
 
-/// A tracker, and an encoder on each axis: they exist without an entry in the files.
+/// Adds a tracker, and an encoder on each axis: these devices exist without an entry in the files.
 void add_usual_devices(SimulationSetup& simulation) {
   simulation.tracker.emplace();
   simulation.bus.emplace();

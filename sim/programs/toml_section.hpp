@@ -42,7 +42,7 @@ inline constexpr double kMicro = 1e-6;
 
 class TomlSection {
  public:
-  /// `table` may be null: then no function changes its value.
+  /// `table` may be null: then the functions do not change their `value` argument.
   TomlSection(const toml::table* table, std::string name, TomlFaults& faults)
       : table_(table), name_(std::move(name)), faults_(faults) {}
 
@@ -50,8 +50,8 @@ class TomlSection {
   [[nodiscard]] TomlSection child(std::string_view key);
   [[nodiscard]] std::vector<TomlSection> children(std::string_view key);  ///< of an array of tables
 
-  /// Each sets `value` and returns true if the key is present and valid; else `value` is unchanged.
-  /// `scale` converts the file's unit to SI.
+  /// Each function below sets `value` and returns true if the key is present and valid; else
+  /// `value` is unchanged. `scale` converts the file's unit to SI.
   bool number(std::string_view key, double& value, double scale = 1.0,
               NumberRange range = kAnyNumber);
   bool integer(std::string_view key, std::int64_t& value, std::int64_t least, std::int64_t most);
@@ -61,7 +61,8 @@ class TomlSection {
   bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
 
   void fault(std::string_view key, std::string_view what);
-  /// Adds a fault for every key that has not been read; it names a similar key, or all.
+  /// Adds a fault for every key that has not been read. The fault names a similar known key or,
+  /// without one, all known keys.
   void refuse_unknown_keys();
 
  private:
@@ -75,8 +76,8 @@ class TomlSection {
   std::set<std::string, std::less<>> known_;
 };
 
-/// BadInput ("FILE:LINE: ..."), also for a text that exceeds protocol::TomlBounds; it is not
-/// parsed.
+/// BadInput ("FILE:LINE: ..."). A text that exceeds protocol::TomlBounds is BadInput, too, and is
+/// not parsed.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file);
 
 /// Reads the parts of one file that `reader` knows. Io, or BadInput with every fault at once.

@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr double kUmPerM = 1e6;
 constexpr double kReference_C = 20.0;
 
-/// Draws the errors of one array; the calls are numbered.
+/// Draws the errors of one array. Each call takes the next random number of the seed.
 class ArrayErrors {
  public:
   explicit ArrayErrors(std::uint64_t seed) : seed_(seed) {}
@@ -85,7 +85,7 @@ BallArray true_array(const BallArray& stated, const ArrayState& state) {
   for (ArrayBall& ball : array.balls) ball.centre_m += errors.vector(state.u_ball_m);
 
   for (ArrayFace& face : array.faces) {
-    // The component about the normal has no effect on the plane of the face.
+    // The component of this rotation about the normal has no effect on the plane of the face.
     const Vector3d turn = errors.vector(state.u_block_rad);
     for (Vector3d* direction : {&face.normal, &face.half_1_m, &face.half_2_m})
       *direction = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * *direction;

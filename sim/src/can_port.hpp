@@ -18,7 +18,8 @@ class MessageAge {
  public:
   /// Switches timestamps on unless `speed` is 0.
   MessageAge(const Socket& socket, double speed);
-  /// In simulated time; 0 if there is no timestamp or the system clock was stepped in between.
+  /// The age in simulated time; 0 if there is no timestamp or the system clock was stepped in
+  /// between.
   [[nodiscard]] std::chrono::nanoseconds of(const msghdr& message) const;
 
  private:

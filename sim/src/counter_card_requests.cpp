@@ -18,7 +18,8 @@ constexpr std::uint8_t kManufacturerString = 1;
 constexpr std::uint8_t kProductString = 2;
 constexpr std::uint8_t kSerialString = 3;
 constexpr std::uint16_t kCounterBits = 0x07;
-// and above: words of the modulus; ignored, the counters use their whole range
+// Banks from this number on hold the words of the modulus. They are ignored: the counters use their
+// whole range.
 constexpr std::uint16_t kModulusBanks = 0x10;
 
 constexpr std::uint16_t number(Register where) {

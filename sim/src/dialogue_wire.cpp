@@ -42,7 +42,7 @@ Bytes tcp_meaning(Bytes request) {
   return request.subspan(std::min(kUnit, request.size()));
 }
 void tcp_renumber(std::span<std::byte> answer, Bytes, Bytes request) {
-  // Bytes that are not Modbus have no transaction number.
+  // Recorded bytes that are not a Modbus answer have no transaction number to replace.
   const bool numbered =
       answer.size() < kBeforeLength ||
       (answer[kTransactionSize] == std::byte{0} && answer[kTransactionSize + 1] == std::byte{0});

@@ -10,12 +10,13 @@
 namespace abbe::sim {
 namespace {
 
-// much smaller than any sphere and tip: no contact is skipped
+// Step of the search for the contact. It is much smaller than any sphere and tip, so that no
+// contact is skipped.
 constexpr double kStep_m = 50e-6;
 constexpr int kHalvings = 45;  // 50 um / 2^45 is below a femtometre
 
-/// Distance to the nearest point of the square. The direction of its edges in the plane is
-/// arbitrary: the files do not state it.
+/// Distance from a point to the nearest point of the square. The direction of the square's edges in
+/// its plane is arbitrary: the files do not state it.
 double distance_m(const Face& face, const Eigen::Vector3d& p_m) {
   const Eigen::Vector3d z = face.normal.normalized();
   const Eigen::Vector3d x = z.unitOrthogonal();

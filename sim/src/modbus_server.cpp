@@ -24,7 +24,7 @@ constexpr std::uint8_t kBusy = 6;
 constexpr std::uint8_t kGatewayTargetSilent = 11;
 constexpr std::string_view kGarbage = "no answer of any Modbus device";
 
-/// Does not close the sockets: objects of Socket own them.
+/// Frees a libmodbus context without closing its sockets: objects of Socket own them.
 struct FreeContext {
   void operator()(modbus_t* context) const { modbus_free(context); }
 };
@@ -133,7 +133,8 @@ void ModbusServer::State::receive(HostTime now) {
   if (terminal.fd() >= 0 && readable(terminal.fd())) (void)receive_from(terminal.fd(), now);
 }
 
-/// false: the client has disconnected, or its bytes are not Modbus.
+/// Receives one request from a client and answers it. false: the client has disconnected, or its
+/// bytes are not Modbus.
 bool ModbusServer::State::receive_from(int fd, HostTime now) {
   std::array<std::uint8_t, MODBUS_MAX_ADU_LENGTH> bytes{};
   modbus_set_socket(context.get(), fd);

@@ -88,7 +88,7 @@ void RecordedBus::poll(HostTime now) {
   for (; next_unsolicited_ < unsolicited_.size() &&
          timeline_.due(unsolicited_[next_unsolicited_].time) <= now;
        ++next_unsolicited_) {
-    // Frames from before the start are skipped: keep_alive() has sent heartbeats instead.
+    // Frames whose time was before the start are skipped: keep_alive() has sent heartbeats instead.
     if (now - timeline_.due(unsolicited_[next_unsolicited_].time) < kOutOfStep)
       port_->send(std::span(&unsolicited_[next_unsolicited_].frame, 1));
   }
@@ -160,8 +160,8 @@ void RecordedBus::on_sync(HostTime now) {
   answer(cycles_[cycle], now);
 }
 
-/// Answers recorded within 2 ms are sent at once: this response time is normal. Later answers keep
-/// their delay, which is part of a recorded fault.
+/// Answers that came within 2 ms in the recording are sent at once: this response time is normal.
+/// Later answers keep their delay, which is part of a recorded fault.
 void RecordedBus::answer(const Cycle& cycle, HostTime now) {
   constexpr auto kAtOnce = 2ms;
   std::vector<can::CanFrame> at_once;

@@ -115,7 +115,7 @@ void RecordedCard::open() {
   resuming_ = false;
 }
 
-/// The answer to the latest status request at this recorded time.
+/// The answer to the latest status request that was recorded before this recorded time.
 ControlAnswer RecordedCard::status_at(HostTime recorded) const {
   constexpr std::byte kListRuns{quad08::Status::kPipeFull};
   const Scan& scan = scans_[*scan_];
@@ -143,9 +143,9 @@ ControlAnswer RecordedCard::next_answer(const usb::Setup& setup, HostTime now) {
   return *recorded;
 }
 
-/// The answer to a request that is not in the recording. There is none if the recorded card left a
-/// later request of this connection unanswered (the last connection excepted), else the card
-/// accepts the request.
+/// The answer to a request that is not in the recording. If the recorded card left a later request
+/// of this connection unanswered, there is no answer either (the last connection excepted); else
+/// the card accepts the request.
 ControlAnswer RecordedCard::unrecorded(const usb::Setup& setup, HostTime now) {
   const auto end = exchanges_.begin() + static_cast<std::ptrdiff_t>(end_of_connection());
   const auto from = std::min(exchanges_.begin() + static_cast<std::ptrdiff_t>(next_), end);
@@ -189,7 +189,8 @@ bool RecordedCard::has_rest() const {
   return scan_ && next_transfer_ < scans_[*scan_].transfers.size();
 }
 
-/// The host halts the scan more than kOutOfStep earlier than in the recording: it will restart it.
+/// True if the host halts the scan more than kOutOfStep earlier than in the recording: it will then
+/// start it again.
 bool RecordedCard::halts_early(HostTime now) const {
   if (!has_rest()) return false;
   const Scan& scan = scans_[*scan_];

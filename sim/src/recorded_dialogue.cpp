@@ -9,8 +9,7 @@ RecordedDialogue::RecordedDialogue(const RecordedDevice& device, const DialogueW
     : wire_(wire), serial_(device.kind == RecordedKind::ModbusRtu) {
   for (const RecordedBlock& block : device.blocks) take(block);
   if (connections_.empty()) connections_.emplace_back();
-  // A request without an answer at the end of the recording is dropped: the recording may have
-  // ended before the answer.
+  // A last request without an answer is removed: the recording may have ended before the answer.
   auto& last = connections_.back().exchanges;
   if (!last.empty() && last.back().answer.empty()) last.pop_back();
   index();
@@ -88,7 +87,8 @@ void RecordedDialogue::answer(std::span<const std::byte> request, HostTime now) 
            request, now);
 }
 
-/// The pieces of an answer are renumbered as a whole: a number may be split between two pieces.
+/// Schedules the pieces of a recorded answer. They are renumbered as a whole, because a number may
+/// be split between two pieces.
 void RecordedDialogue::schedule(const Exchange& exchange, std::span<const std::byte> request,
                                 HostTime now) {
   std::vector<std::byte> whole;

@@ -106,7 +106,8 @@ void Simulation::release(HostTime now) {
   machine_.start(now + standstill_);
 }
 
-/// Passes the edges of the next second to the card: it needs an edge before the scan that shows it.
+/// Passes the probe edges of the next second to the card, which must know an edge before it makes
+/// the scan that shows the edge.
 void Simulation::touch(HostTime now) {
   constexpr auto kAhead = std::chrono::seconds{1};
   if (!machine_.started() || counter_cards_.empty()) return;

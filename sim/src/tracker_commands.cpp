@@ -120,7 +120,7 @@ emscon::Status TrackerDevice::outcome(const emscon::Request& request, HostTime a
   return Status::Ok;
 }
 
-/// The head moves: the beam is lost, and a running measurement ends.
+/// Initialize moves the head: the beam is lost, and a running measurement ends.
 void TrackerDevice::initialise(HostTime at) {
   initialised_ = true;
   ++initializations_;

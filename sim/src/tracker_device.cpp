@@ -9,7 +9,8 @@ namespace abbe::sim {
 namespace {
 
 constexpr double kWeatherThreshold_K = 0.2;  // smallest change that causes an event
-// both kinds of burst stay below the largest packet size
+// With this many points a packet of type 3 stays below the largest packet size. A packet of type 10
+// is limited to kMaxExtendedMultiPoints as well.
 constexpr std::size_t kPointsPerPacket = 1500;
 
 double length_per_metre(emscon::LengthUnit unit) {
@@ -201,7 +202,8 @@ emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
   noise_next_ = std::max(noise_next_, noise_base_ + index + 1);
   const TrackerView view = observe(options_.model, machine_, at, noise_base_ + index);
   Eigen::Vector3d p = length_per_metre(units_.length) * view.p_tracker_m;
-  // Only the translation of a transformation is applied: enough to detect one left switched on.
+  // Only the translation of a transformation is simulated: enough to detect a transformation that
+  // was left switched on.
   if (settings_.apply_transformation) p += Eigen::Vector3d::Map(transformation_.translation.data());
   if (coordinates_ == emscon::CoordinateSystem::LeftHandedX) p.x() = -p.x();
   return {status_of(view.speed, at), emscon::TrackerClockReading::from(t), {p.x(), p.y(), p.z()}};
@@ -256,7 +258,7 @@ void TrackerDevice::emit_points(std::span<const emscon::MultiPoint> points) {
 
 void TrackerDevice::emit_single(HostTime at) {
   single_due_.reset();
-  // The mean of the points in the measurement time at 1 kHz.
+  // The result is the mean of the points that a rate of 1 kHz gives in the measurement time.
   const auto n =
       static_cast<std::uint64_t>(std::max<std::int32_t>(stationary_.measurement_time_ms, 1));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -58,8 +58,8 @@ double* squareness_of(Squareness& s, std::string_view name) {
   return nullptr;
 }
 
-/// Collects the rows, then builds the functions: the nodes are complete only at the end of the
-/// file.
+/// Collects the rows of all errors first and then builds their functions, because the rows of an
+/// error may be anywhere in the file.
 class TruthReader {
  public:
   TruthReader(const protocol::NumberTable& table, std::span<const std::string> names,

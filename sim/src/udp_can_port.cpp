@@ -10,7 +10,7 @@ namespace abbe::sim {
 namespace {
 
 constexpr std::size_t kLargestDatagram = 65536;
-// below every Ethernet MTU; the default of cannelloni
+// Largest datagram sent, bytes: below every Ethernet MTU; the default of cannelloni.
 constexpr std::size_t kOutgoingDatagram = 1400;
 constexpr int kMostDatagrams = 256;
 

@@ -192,7 +192,8 @@ void UsbipServer::on_unlink(const usbip::Unlink& unlink) {
   send_bytes(usbip::encode(usbip::Urb{answer}));
 }
 
-/// Fills whole requests only, except with the rest of a scan that has ended.
+/// Answers waiting requests for scan data with as many bytes as they asked for. Only the rest of a
+/// scan that has ended is sent as a shorter answer.
 void UsbipServer::fill_requests(HostTime now) {
   if (unresponsive_) return;
   card_->advance(now, wanted_bytes(requests_));

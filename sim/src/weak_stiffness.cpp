@@ -9,8 +9,9 @@ namespace {
 
 constexpr double kBall1_mm[3] = {-90.0, 140.0, 30.0};
 
-/// c0 + c1 p + c2 p^2 + c3 p^3, coefficients for p and value in mm (translations) or p in mm
-/// (rotations).
+/// Error motion as a polynomial of the scale reading p in mm:
+///   c0 + c1 p + c2 p^2 + c3 p^3
+/// The value is in mm for translations, in rad for rotations.
 struct Cubic {
   double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0;
   [[nodiscard]] double at(double p_mm) const { return c0 + p_mm * (c1 + p_mm * (c2 + p_mm * c3)); }
@@ -38,13 +39,15 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
   truth.axis(Axis::Y).range = {-0.15, 0.40, 0.0};
   truth.axis(Axis::Z).range = {-0.05, 0.15, 0.0};
 
-  // Caused by X. The linear terms of straightness along x are Table 3's k_eqy1, k_eqz1.
+  // Error motions of axis X as functions of x. The linear terms of its straightness are k_eqy1 and
+  // k_eqz1 of Table 3.
   const Cubic dxx{0, 0.00295049, 3.813183e-06, -2.775042e-09};
   const Cubic dyx{0, 0.002007601, 1.167908e-06, 1.848295e-10};
   const Cubic dzx{0, 0.00251692, -1.747859e-06, -9.975762e-10};
   const Cubic exx{0, 6.939124e-06, 6.795187e-09, -2.011528e-11};
   const Cubic ezx{0, 2.169027e-06, 0, -3.121463e-12};
-  // Caused by Y. Linear terms: k_eqx1, k_eqz2.
+  // Error motions of axis Y as functions of y. The linear terms of its straightness are k_eqx1 and
+  // k_eqz2.
   const Cubic dxy{0, 0.0004290736, -1.785525e-05, 5.11703e-08};
   const Cubic dyy{0, 0.0002017827, 0, -1.832424e-08};
   const Cubic dzy{0, -0.001512266, 1.548582e-05, -7.038459e-08};
@@ -69,7 +72,8 @@ TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options) {
   motion(truth, Motion::EB, Axis::Z) = rotation(eyz);
   motion(truth, Motion::EC, Axis::Z) = rotation(ezz);
 
-  // With the constants of Table 3, V(Ball1) is about 0.05 mm: they are adjusted to V(Ball1) = 0.
+  // With the constants of Table 3, V at ball 1 is about 0.05 mm. The constant terms of axis Z are
+  // adjusted so that V at ball 1 is 0.
   const auto set_z = [&] {
     motion(truth, Motion::EX, Axis::Z) = translation(dxz);
     motion(truth, Motion::EY, Axis::Z) = translation(dyz);

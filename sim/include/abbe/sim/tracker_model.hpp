@@ -6,9 +6,9 @@
 ///   p_machine = R p_tracker + P,  R = Rz Ry Rx
 ///   p_tracker = r (cos el cos az, cos el sin az, sin el)
 ///
-/// Standard deviations of the noise: sigma_r of r, sigma_a of el, sigma_a / cos el of az. Across
-/// the
-/// beam the noise is therefore sigma_a r in both directions.
+/// P is the position of the tracker, R its rotation; r, az, el are range, azimuth and elevation of
+/// the target. Standard deviations of the noise: sigma_r of r, sigma_a of el, sigma_a / cos el of
+/// az. Across the beam the noise is therefore sigma_a r in both directions.
 
 #include <Eigen/Core>
 #include <chrono>
@@ -42,7 +42,8 @@ struct TrackerView {
 
 [[nodiscard]] Eigen::Matrix3d R_machine_tracker(const TrackerModel& model);
 
-/// The measured position of the target at time `at`; `index` is the index of the noise.
+/// The measured position of the target at time `at`; `index` selects the random numbers of the
+/// noise.
 [[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,
                                   HostTime at, std::uint64_t index);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// A truth machine that moves along its path: the scale readings and the target position at any
-/// host time. It stands at the first vertex until the time set by start(). Thread-safe.
+/// A TruthMachine that moves along its path: the scale readings and the target position at any host
+/// time. Until the time set by start() it stands at the first vertex of the path. Thread-safe.
 
 #include <atomic>
 #include <cstdint>

@@ -17,8 +17,8 @@ struct WeakStiffnessOptions {
   double period_m = 20e-3;  ///< of the screw
 };
 
-/// V(Ball1 of the reference layout) is 0 without sag and periodic error. Ranges, order and target
-/// are those of the machine.
+/// V is 0 at ball 1 of the reference ball array, without sag and periodic error. Ranges, order and
+/// target are those of the machine.
 [[nodiscard]] TruthMachine weak_stiffness_machine(const WeakStiffnessOptions& options = {});
 
 }  // namespace abbe::sim

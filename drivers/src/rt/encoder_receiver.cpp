@@ -18,9 +18,10 @@ namespace {
 constexpr std::uint64_t kModulus32 = std::uint64_t{1} << 32;
 constexpr double kMetresPerNanometre = 1e-9;
 /// Number of cycles with exactly one answer in time after which an axis is settled. If n answers in
-/// a row are late, n - 2 wrong positions are not detected. The second answer in the cycle that ends
-/// the row detects one more only while the samples of the axis are held. After a row of more than
-/// 100 they no longer are, but one position is less than 1 % of that row.
+/// a row are late, n - 2 wrong positions are not detected. The row ends with a cycle that has two
+/// answers. While the samples of the axis are held, the second answer detects one more wrong
+/// position. After a row of more than 100 they are no longer held, but one position is less than 1
+/// % of that row.
 constexpr std::uint8_t kCyclesToSettle = 100;
 /// The same number after a boot-up or a pause of the SYNC: no answer to an earlier SYNC should be
 /// outstanding then, and one cycle confirms it.

@@ -47,7 +47,7 @@ std::size_t PendingSync::settle(std::span<const ReceivedFrame> came, std::span<R
   return n;
 }
 
-/// The frame for the receiver; nullopt if the receiver must not see this echo.
+/// Converts the echo to the frame for the receiver; nullopt if the receiver must not see the echo.
 std::optional<ReceivedFrame> PendingSync::settle_echo(const ReceivedFrame& echo) {
   if (!sent_ || echo.time + stamp_slack(period_) < *sent_) return std::nullopt;  // earlier SYNC
   std::optional<ReceivedFrame> sync;
@@ -79,7 +79,7 @@ ReceivedFrame PendingSync::substitute() {
   return as_sent();
 }
 
-/// The SYNC as an echo with the time of send().
+/// The pending SYNC as an echo with the time of send(), marked as widened.
 ReceivedFrame PendingSync::as_sent() const {
   return {.frame = can::encode_sync(), .time = *sent_, .time_widened = true, .echo = true};
 }

@@ -101,7 +101,7 @@ Result<void> SocketCanBus::configure(std::span<const std::uint32_t> ids) {
   }
 
   const int on = 1;
-  // The result is not used: find_interface() checks for CAN FD.
+  // The result of this call is not used: find_interface() checks whether the interface has CAN FD.
   setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
 
   if (setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) != 0) {
@@ -196,7 +196,8 @@ Result<CanRead> SocketCanBus::read(std::span<ReceivedFrame> out, std::chrono::na
     }
     const auto frame = from_linux(batch_->frames[i], message.msg_len);
     if (!frame) continue;
-    // MSG_CONFIRM: sent by this socket; MSG_DONTROUTE: by this computer [Linux, networking/can].
+    // The kernel sets MSG_CONFIRM if this socket sent the frame, MSG_DONTROUTE if this computer did
+    // [Linux, networking/can].
     const bool by_us = (message.msg_hdr.msg_flags & MSG_CONFIRM) != 0;
     const bool from_here = (message.msg_hdr.msg_flags & MSG_DONTROUTE) != 0;
     const bool by_the_kernel = kernel_sent_ && from_here;

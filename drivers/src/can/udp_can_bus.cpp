@@ -19,7 +19,8 @@ namespace {
 /// which can be lost.
 constexpr std::size_t kDatagramBytes = 1472;
 
-/// An address literal needs no look-up; the look-up of a name can block for seconds.
+/// Address and port of the peer. An address literal needs no look-up; the look-up of a name can
+/// block for seconds.
 Result<sockaddr_in> resolve(const std::string& host, std::uint16_t port) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
@@ -118,7 +119,8 @@ Result<void> UdpCanBus::bind_and_connect(const sockaddr_in& local, const sockadd
   return {};
 }
 
-/// If this fails, datagrams of other senders are still refused, but not counted.
+/// Opens the second socket, which counts the datagrams of senders other than the peer. If this
+/// fails, these datagrams are still refused, but not counted.
 void UdpCanBus::listen_for_strangers(sockaddr_in local) {
   const int on = 1;
   setsockopt(fd_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof on);

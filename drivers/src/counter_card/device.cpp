@@ -174,7 +174,8 @@ void CounterCardDevice::hand_over_events() {
 }
 
 void CounterCardDevice::step_session(const CardInput& input) {
-  // An action without a pending answer (start of the bulk transfers) is followed by the next one.
+  // If the card does not answer an action (start of the bulk transfers), the session gives the next
+  // action at once.
   for (bool again = act(session_.on(input, time_.now())); again;)
     again = act(session_.on(CardTick{read_until_}, time_.now()));
 }

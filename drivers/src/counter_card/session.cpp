@@ -213,8 +213,8 @@ CardAction CounterCardSession::stage_done(HostTime now) {
   return CardNothing{};
 }
 
-/// With the card's own timer as the clock, the counters are set up while the timer is stopped: they
-/// start with it, from a common zero.
+/// Begins the set-up of the counters. With the card's own timer as the clock, the timer is stopped
+/// meanwhile: all counters then start with it, from a common zero.
 void CounterCardSession::enter_setting_up() {
   enter(CardState::SettingUp);
   const auto& wiring = options_.wiring;
@@ -338,7 +338,8 @@ CardAction CounterCardSession::take(const CardRestarted& restarted, HostTime now
                                                   : CardAction{CardNothing{}};
 }
 
-/// The counters have not continued: the card lost its power, or another program has used it.
+/// Sets the counters up, because they have not continued: the card lost its power, or another
+/// program has used it.
 CardAction CounterCardSession::set_up_again(HostTime now, const std::string& seen) {
   report(fmt::format("{}: its counters did not continue{}{}: they are set up and restart at 0",
                      options_.peer, seen.empty() ? "" : ", ", seen));
@@ -383,7 +384,8 @@ CardAction CounterCardSession::fail(HostTime now, std::string text) {
   return CardClose{};
 }
 
-/// The same text again without a scan in between is not a new fault: the card is still missing.
+/// Reports a fault. The same text again without a scan in between is not a new fault: the card is
+/// still missing.
 void CounterCardSession::report(std::string text) {
   if (!std::exchange(scans_since_fault_, false) && text == fault_.text) return;
   ++fault_.count;

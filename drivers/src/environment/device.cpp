@@ -100,7 +100,8 @@ void EnvironmentDevice::handle_progress(HostTime now) {
                                   options_.name, text_of(options_.address)));
 }
 
-/// The next multiple of the period; rounds that are already late are omitted.
+/// Sets the next round to the next multiple of the period; rounds that are already late are
+/// omitted.
 void EnvironmentDevice::plan_next_round(HostTime now) {
   const auto late = std::max(now - next_round_, nanoseconds{0});
   next_round_ += options_.period * (late / options_.period + 1);
@@ -110,7 +111,7 @@ bool EnvironmentDevice::ensure_open(nanoseconds at_most) {
   if (on_line()) return true;
   const auto now = time_.now();
   if (const auto from = due(); now < from) {
-    // On a shared line do not sleep: other devices use it meanwhile.
+    // A device of a shared line does not sleep: other devices use the line meanwhile.
     if (own_link_)
       std::this_thread::sleep_for(time_.wall(std::min(at_most, nanoseconds{from - now})));
     return false;
@@ -158,7 +159,7 @@ void EnvironmentDevice::read_answer(nanoseconds at_most) {
          "closed", options_.answer_timeout);
 }
 
-/// A lost connection is recorded as an empty block ToDevice.
+/// Handles a lost connection. A recording shows it as an empty block ToDevice.
 void EnvironmentDevice::lose(std::string_view what) {
   raw_.push_bytes(time_.now(), RawBlock::Direction::ToDevice, {});
   link_.line.close();
@@ -178,9 +179,10 @@ bool EnvironmentDevice::others_answered() noexcept {
   return std::exchange(others_at_fault_, others) != others;
 }
 
-/// If other devices answer, the line stays open: it is not used while a late answer may still
-/// arrive, and this device waits at least one period, so that the others complete their rounds.
-/// Otherwise the line is closed, and all devices restart on the next connection.
+/// Leaves the line after a fault. If other devices answer, the line stays open: it is not used
+/// while a late answer may still arrive, and this device waits at least one period, so that the
+/// others complete their rounds. Otherwise the line is closed, and all devices restart on the next
+/// connection.
 void EnvironmentDevice::leave_line(nanoseconds retry, nanoseconds quiet) {
   const auto now = time_.now();
   opening_ = 0;

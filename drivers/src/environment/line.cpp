@@ -59,8 +59,9 @@ void EnvironmentLine::wait(nanoseconds at_most) {
     if (other.get() != &device) other->line_closed();
 }
 
-/// The device with an outstanding or unhandled answer; else the device that has waited longest.
-/// Among equals it is the next one after the device chosen last.
+/// The device to serve next: the one with an outstanding or unhandled answer, else the one that has
+/// waited longest. If several have waited equally long, it is the next one after the device chosen
+/// last.
 EnvironmentDevice& EnvironmentLine::next() {
   for (const auto& device : devices_)
     if (device->busy()) return *device;

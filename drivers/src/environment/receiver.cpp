@@ -39,7 +39,8 @@ std::vector<EnvironmentReceiver::Spot> EnvironmentReceiver::spots_in(
 }
 
 bool is_refusal(const EnvironmentFailure& failure) noexcept {
-  // Exceptions 1 to 3: function, address or value unknown to the device. Others may be temporary.
+  // Modbus exceptions 1 to 3: the device does not know the function, address or value. Other
+  // exceptions may be temporary.
   return failure.kind == Kind::Unproven || failure.kind == Kind::Implausible ||
          (failure.kind == Kind::Exception && failure.exception <= 3);
 }

@@ -121,7 +121,7 @@ void IppDevice::read_requests() {
   }
 }
 
-/// A fault while the points are passed to the session discards the remaining ones.
+/// Passes points to the session. If one of them causes a fault, the remaining ones are discarded.
 void IppDevice::request_points(const std::vector<ProbePoint>& points) {
   const auto faults_before = session().fault().count;
   for (const ProbePoint& point : points)

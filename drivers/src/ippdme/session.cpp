@@ -141,7 +141,7 @@ IppAction IppSession::close(IppState into) {
   deadlines_.cancel_all();
   open_ = in_session_ = false;
   state_ = held_ && !stopped_ ? IppState::AwaitingRelease : into;
-  // An unfinished motion is aborted on the next connection, held or not.
+  // An unfinished motion is aborted on the next connection, whether or not the machine is held.
   if (!stopped_ && (!held_ || moving_)) deadlines_.set(Due::Connect, now_ + pause_);
   pause_ = std::min(2 * pause_, options_.longest_pause);
   return IppClose{};

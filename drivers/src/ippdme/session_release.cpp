@@ -97,7 +97,8 @@ bool IppSession::releasable() const noexcept {
   return !stopped_ && (state_ == IppState::AwaitingRelease || (held_ && trying));
 }
 
-/// The only place where errors of the machine are cleared.
+/// An operator has released the machine. This is the only place where errors of the machine are
+/// cleared.
 IppAction IppSession::take(const IppReleaseRequested&) {
   if (!releasable()) return IppNothing{};
   held_ = moving_ = session_first_ = false;  // an operator has inspected the machine

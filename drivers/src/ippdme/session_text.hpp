@@ -11,13 +11,13 @@ namespace abbe::drivers::ipp_text {
 inline constexpr int kRepairable = 2;  ///< severity: from this value on the command has failed
 inline constexpr int kUserNeeded = 3;  ///< severity: from this value on a motion is aborted
 inline constexpr int kAborted = 6;     ///< code: the command was ended by AbortE
-/// Code of StartSession while another session has not ended.
+/// Error code with which StartSession is refused while another session has not ended.
 inline constexpr int kProtocolError = 8;
 
 [[nodiscard]] double seconds(std::chrono::nanoseconds d);
 /// Text in which every byte outside of printable ASCII is replaced by its value, as \\xE4.
 [[nodiscard]] std::string escaped(std::string_view text);
-/// "1006 Surface not found (severity 2)"
+/// Text such as "1006 Surface not found (severity 2)".
 [[nodiscard]] std::string text_of(const IppError& error);
 [[nodiscard]] std::string_view method_name(std::string_view method);
 [[nodiscard]] std::string go_to(const ProbePoint& point);

@@ -124,7 +124,7 @@ std::optional<quad08::RawScan> CounterCardReceiver::next_raw() ABBE_RT {
   return decoder_.next();
 }
 
-/// Returns when all bytes are in the window, or when the decoder is at the beginning of a scan.
+/// Moves bytes into window_ until they show the beginning of a scan, or all bytes are moved.
 void CounterCardReceiver::seek() ABBE_RT {
   const std::size_t needed = quad08::seek_window(decoder_.layout());
   while (!pending_.empty()) {
@@ -344,7 +344,8 @@ void CounterCardReceiver::follow_latch(const quad08::RawScan& raw, std::int64_t 
   scan.latch_half_width = latch_.latest()->half_width;
 }
 
-/// The last scan of a batch has the smallest delay to the arrival: it updates the clock model.
+/// Dates the scans of a batch. The last scan has the smallest delay to the arrival of the batch: it
+/// updates the clock model.
 void CounterCardReceiver::stamp() ABBE_RT {
   if (scan_count_ == 0) return;
   const auto youngest = device_time(scans_[scan_count_ - 1].clock_count);

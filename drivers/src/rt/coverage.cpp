@@ -16,7 +16,7 @@ double integral_of_phi(double x) noexcept {
   return x * 0.5 * std::erfc(-x / std::numbers::sqrt2) + phi;
 }
 
-/// P(|R + N| <= U), all in units of the standard deviation of N.
+/// P(|R + N| <= U) of expanded_95(), with all arguments in units of the standard deviation of N.
 double probability_within(double U, double half_width) noexcept {
   const double one_side = integral_of_phi(U + half_width) - integral_of_phi(U - half_width);
   const double other = integral_of_phi(half_width - U) - integral_of_phi(-half_width - U);

@@ -35,14 +35,14 @@ std::chrono::nanoseconds widened(std::chrono::nanoseconds u,
   return std::chrono::nanoseconds{std::llround(u_ns)};
 }
 
-/// `count` on a circle of `modulus` counts; 0 stands for 2^64.
+/// `count` modulo `modulus`, from 0 to modulus - 1; a modulus of 0 stands for 2^64.
 std::uint64_t on_circle(std::int64_t count, std::uint64_t modulus) ABBE_RT {
   if (modulus == 0) return static_cast<std::uint64_t>(count);
   const auto m = static_cast<std::int64_t>(modulus);  // check() keeps it below 2^63
   return static_cast<std::uint64_t>((count % m + m) % m);
 }
 
-/// The step of smallest magnitude from `from` to `to`, both on the circle.
+/// The step of smallest magnitude from `from` to `to`, for counts that wrap at `modulus` (0: 2^64).
 std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, std::uint64_t modulus) ABBE_RT {
   if (modulus == 0) return static_cast<std::int64_t>(to - from);
   const std::uint64_t ahead = to >= from ? to - from : to + modulus - from;
@@ -177,8 +177,8 @@ void EncoderReceiver::begin_cycle(HostTime time, bool time_widened) ABBE_RT {
   check_heartbeats(time);
 }
 
-/// Called after a cycle, before the next one begins. `paused`: the SYNC paused, so that answers to
-/// earlier SYNCs have arrived or are lost.
+/// Judges the answers of a cycle that has ended, before the next one begins. `paused`: the SYNC
+/// paused, so that answers to earlier SYNCs have arrived or are lost.
 void EncoderReceiver::judge_answers(bool paused) ABBE_RT {
   if (!sync_time_) return;
   for (std::size_t i = 0; i < axis_count_; ++i) {
@@ -288,7 +288,7 @@ void EncoderReceiver::on_position(std::size_t i, const can::CanFrame& frame, Hos
   if (received_mask_ == all_mask_) close_cycle();
 }
 
-/// A reply after the deadline is discarded and no longer awaited.
+/// Counts an answer that arrived after the deadline. It is discarded and no longer awaited.
 void EncoderReceiver::count_late(std::size_t i) ABBE_RT {
   const auto bit = static_cast<std::uint8_t>(1u << i);
   ++counters_.late_frames;

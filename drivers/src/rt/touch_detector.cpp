@@ -12,7 +12,7 @@ namespace {
 using protocol::SampleFlag;
 using protocol::TouchFlag;
 
-// Most scans of a window that are output per new scan: limits the work of one call.
+// Limits the work of one call: with each new scan, at most this many scans of a window are output.
 constexpr int kWindowScansPerScan = 4;
 
 EdgeInterval between(const CounterScan& before, const CounterScan& scan) noexcept {
@@ -38,7 +38,8 @@ protocol::TouchScan window_scan(const CounterScan& scan, std::uint32_t touch) no
 void TouchDetector::on_scan(const CounterScan& scan) ABBE_RT {
   if (has(scan.axes.head.flags, SampleFlag::Restarted)) restart();
   const bool first = history_.empty();
-  // A clock that does not advance is reported by the card's receiver; edges cannot be located.
+  // If the clock does not advance, edges cannot be located, and detection restarts. The card's
+  // receiver reports the fault.
   if (!first && scan.clock_count <= history_.newest().clock_count) return restart();
   history_.push(scan);
   if (!first) detect(history_.scan(history_.end_number() - 2), scan);

@@ -139,7 +139,7 @@ ProbeTrigger locate_touch(const EdgeInterval& edge, const ScanHistory& scans,
   const auto u_contact = std::llround(1e9 * std::hypot(u.half_width_s / std::sqrt(3.0), u.u_s));
   trigger.head.u_time = nanoseconds{std::llround(
       std::hypot(static_cast<double>(at->u_host_time.count()), static_cast<double>(u_contact)))};
-  // The flags of the scans about a gap or restart do not apply to the sequence of touches.
+  // A gap or restart between two scans is not one between two touches: its flags are removed.
   trigger.head.flags = at->axes.flags & ~(SampleFlag::GapBefore | SampleFlag::Restarted);
   trigger.axis_count = at->axes.axis_count;
   trigger.missing_mask = at->axes.missing_mask;

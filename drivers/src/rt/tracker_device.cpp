@@ -36,7 +36,7 @@ void TrackerDevice::take(const TrackerBurst& burst) ABBE_RT {
   take(TrackerPointsArrived{burst.points.size()});
 }
 
-/// Posts one message for all bursts of a cycle.
+/// Posts the points of all bursts of a cycle as one message.
 void TrackerDevice::take(const TrackerPointsArrived& arrived) ABBE_RT {
   auto* last = last_posted();
   if (auto* points = last == nullptr ? nullptr : std::get_if<TrackerPointsArrived>(last)) {

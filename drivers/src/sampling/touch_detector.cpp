@@ -22,8 +22,8 @@ EdgeRules rules_of(const TouchOptions& options) {
           debounced(options)};
 }
 
-/// Number of scans to keep: from the earliest one needed to the confirmation, with a factor of two
-/// as reserve.
+/// Number of scans to keep: from the earliest scan that a touch needs to the scan of its
+/// confirmation, with a factor of two as reserve.
 std::size_t past_of(const TouchOptions& o) {
   const nanoseconds past = o.delay.delay + 2 * (o.switching.confirm + o.wiring.counter_debounce) +
                            o.approach.speed_window + o.window_before;

@@ -98,7 +98,7 @@ void TrackerSession::in_state(Due due, std::chrono::nanoseconds within) {
   deadlines_.set(due, now_ + within);
 }
 
-/// A stopped session does not connect again.
+/// Connects again after `pause`, unless the session was stopped.
 void TrackerSession::connect_after(std::chrono::nanoseconds pause) {
   stopped_ ? without_deadline_of_state() : in_state(Due::Connect, pause);
 }

@@ -111,7 +111,7 @@ nanoseconds time_for_search(const TrackerSessionOptions& options) {
 }  // namespace
 
 nanoseconds longest_order(const TrackerSessionOptions& options) noexcept {
-  // the pending command, StopMeasurement, GetReflector, and SetReflector or GetReflectors
+  // commands before an order: the pending one, StopMeasurement, GetReflector, Set- or GetReflectors
   constexpr int kShort = 4;
   constexpr int kLong = 2;  // Initialize and GoBirdBath
   return kShort * options.command_timeout +

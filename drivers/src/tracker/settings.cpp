@@ -13,7 +13,8 @@ namespace {
 
 using emscon::Request;
 
-/// The request that sets the reported value; nullopt for an answer that reports no setting.
+/// Converts an answer that reports a setting to the request that sets the reported value; any other
+/// answer gives nullopt.
 struct SetterOf {
   std::optional<Request> operator()(const emscon::UnitsAnswer& a) const {
     return emscon::SetUnits{a.units};

@@ -23,7 +23,8 @@
 namespace abbe::drivers {
 
 struct ClockModelOptions {
-  /// Long enough to resolve a skew of 1 ppm, short enough to follow changes of temperature.
+  /// Time for which arrivals are kept: long enough to resolve a skew of 1 ppm, short enough to
+  /// follow a skew that changes with temperature.
   std::chrono::nanoseconds window = std::chrono::seconds{60};
   /// Largest rate error of a quartz clock in a control cabinet. A larger slope is normally caused
   /// by late arrivals. If further arrivals confirm the larger slope, skew_beyond_limit() returns
@@ -31,13 +32,14 @@ struct ClockModelOptions {
   double max_skew = 200e-6;
   /// Upper bound of the smallest delay (device + wire + kernel).
   std::chrono::nanoseconds max_constant_delay = std::chrono::milliseconds{2};
-  /// An arrival further than this from the line is not explained by a delay: the device clock
-  /// jumped.
+  /// Largest distance of an arrival from the line that a delay can explain. An arrival further
+  /// below the line means that the device clock jumped, and so do arrivals that stay further above
+  /// it.
   std::chrono::nanoseconds jump = std::chrono::milliseconds{50};
   std::size_t settled_after = 30;  ///< observations; 10 s with a packet every 332 ms
 };
 
-/// An instant of the device clock, in host time. `u_time` is a standard uncertainty (k = 1).
+/// An instant of the device clock, converted to host time. `u_time`: standard uncertainty (k = 1).
 struct HostInstant {
   protocol::HostTime time{};
   std::chrono::nanoseconds u_time{};
@@ -54,8 +56,8 @@ class ClockModel {
 
   explicit ClockModel(const ClockModelOptions& options = {}) noexcept : options_(options) {}
 
-  /// Adds an observation: the last instant that a packet reports, and when the packet arrived.
-  /// Call once per packet, before mapping its points.
+  /// Adds an observation: `last_point` is the last instant that a packet reports. Call once per
+  /// packet, before mapping its points with to_host().
   Observed observe(protocol::DeviceTime last_point, protocol::HostTime arrival) ABBE_RT;
 
   /// Host time of an instant of the device clock. Meant for instants within the window or shortly

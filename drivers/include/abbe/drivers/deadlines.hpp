@@ -25,7 +25,7 @@ class Deadlines {
 
   Deadlines() ABBE_RT { cancel_all(); }
 
-  /// Replaces an earlier instant of this purpose.
+  /// Sets the deadline of `purpose`; it replaces an earlier one.
   void set(Purpose purpose, HostTime at) ABBE_RT { at_[index(purpose)] = at; }
   void cancel(Purpose purpose) ABBE_RT { at_[index(purpose)] = kNever; }
   void cancel_all() ABBE_RT { at_.fill(kNever); }
@@ -38,8 +38,8 @@ class Deadlines {
     return is_set(purpose) && now < at(purpose);
   }
 
-  /// The earliest instant; kNever if there is none. Deadlines in `waiting` stay set, but do not
-  /// count: something else must happen first.
+  /// The earliest deadline; kNever if there is none. Deadlines of the purposes in `waiting` stay
+  /// set, but are not considered: another event must happen before they can be acted on.
   [[nodiscard]] HostTime next(std::span<const Purpose> waiting = {}) const ABBE_RT {
     HostTime earliest = kNever;
     for (std::size_t i = 0; i < at_.size(); ++i) {

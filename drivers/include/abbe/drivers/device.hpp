@@ -32,7 +32,7 @@ struct DeviceStatus {
   std::uint64_t dropped = 0;      ///< samples lost because the sample ring was full
   std::uint64_t raw_dropped = 0;  ///< blocks lost because the raw ring was full
   std::uint64_t gaps = 0;         ///< places where the device or the transport lost data
-  /// incomplete or malformed input, refusals, time-outs, disconnections: each counts once
+  /// number of faults: incomplete or malformed input, refusals, time-outs, disconnections
   std::uint64_t faults = 0;
   std::uint64_t time_widened = 0;  ///< receives whose kernel stamp could not be used
   ClockStatus clock;

@@ -24,7 +24,8 @@ struct DeviceThreadOptions {
   bool lock_memory = false;  ///< call lock_memory() of real_time_memory.hpp (whole process)
   int priority = 0;          ///< SCHED_FIFO 1..99; 0 keeps the ordinary scheduler
   std::optional<int> cpu;    ///< the only processor to run on; nullopt: any
-  /// Host time. Also the longest time until the loop reacts to stop().
+  /// Longest time of one wait() of the device, host time. It is also the longest time until the
+  /// loop reacts to stop().
   std::chrono::nanoseconds wait_at_most = std::chrono::milliseconds{50};
   /// Pause after an exception (wall time). It doubles with each exception up to longest_back_off.
   /// It returns to first_back_off once the loop has run for longest_back_off.
@@ -32,11 +33,11 @@ struct DeviceThreadOptions {
   std::chrono::nanoseconds longest_back_off = std::chrono::seconds{30};
 };
 
-/// Owns the thread, not the device: the device must outlive it. The functions may be called from
-/// one other thread; latency() and failure() from any thread.
+/// Runs the loop of a device on a thread. Owns the thread, not the device: the device must outlive
+/// it. The functions may be called from one other thread; latency() and failure() from any thread.
 class DeviceThread {
  public:
-  /// Starts the loop. SystemRefused: the system refused the thread or, in mode Enforce, a
+  /// Starts the loop. Error SystemRefused: the system refused the thread or, in mode Enforce, a
   /// setting; no function of the device has then been called.
   [[nodiscard]] static Result<std::unique_ptr<DeviceThread>> start(Device& device,
                                                                    DeviceThreadOptions options);

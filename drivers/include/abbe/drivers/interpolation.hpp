@@ -28,10 +28,11 @@
 namespace abbe::drivers {
 
 struct InterpolationOptions {
-  /// Largest distance of the two enclosing samples; beyond it the result is Gap. The default is
-  /// 2.5 periods of 1 kHz: one sample may be lost.
+  /// Largest time between the two enclosing samples; beyond it the result is the error Gap. The
+  /// default, 2.5 periods at 1 kHz, permits one lost sample.
   std::chrono::nanoseconds max_span = std::chrono::microseconds{2500};
-  /// Bound of each axis' acceleration, m/s^2 or rad/s^2. 5 is a fast machining centre.
+  /// Bound of each axis' acceleration, m/s^2 or rad/s^2. 5 m/s^2 is that of a fast machining
+  /// centre.
   std::array<double, protocol::kMaxAxes> max_acceleration = {5, 5, 5, 5, 5, 5, 5, 5};
 };
 
@@ -41,7 +42,7 @@ enum class InterpolationError {
   Gap,       ///< the enclosing samples are further apart than max_span
 };
 
-/// The axes at `time`; arrays beyond `axis_count` are zero.
+/// The axes at `time`. Elements of the arrays from `axis_count` on are zero.
 struct AxesAt {
   protocol::HostTime time{};
   std::uint8_t axis_count = 0;

@@ -26,7 +26,7 @@ class Mailbox {
     }
   }
 
-  /// Any thread: all values put in since the last call, the oldest first.
+  /// Any thread: takes all values that were put in since the last call, the oldest first.
   [[nodiscard]] std::vector<T> take() {
     std::vector<T> values;
     if (newest_.load(std::memory_order_relaxed) == nullptr) return values;

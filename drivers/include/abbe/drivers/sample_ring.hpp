@@ -90,8 +90,8 @@ class SampleRing {
     return true;
   }
 
-  /// Aligned to cache lines: a sample of 64 bytes that crosses two lines halves the throughput of
-  /// the ring.
+  /// Memory of the queue, aligned to cache lines: a sample of 64 bytes that crosses two lines
+  /// halves the throughput of the ring.
   using Memory = boost::lockfree::allocator<boost::alignment::aligned_allocator<T, kNoSharing>>;
 
   std::size_t capacity_;

@@ -34,7 +34,7 @@ struct TcpPeer {
 };
 [[nodiscard]] TcpPeer tcp_peer(const std::string& device, const std::string& host,
                                std::uint16_t port);
-/// BadConfiguration: host or port is missing.
+/// Error BadConfiguration: host or port is missing.
 [[nodiscard]] Result<void> check(const TcpPeer& peer);
 
 template <class Driver, class Words>
@@ -133,7 +133,8 @@ class SessionOverTcp {
   /// connection.
   static constexpr std::size_t kMostLateReads = 128;
 
-  /// False if nothing happened on the connection within `wall`.
+  /// Waits at most `wall` until the connection is established, has bytes, or is lost, and handles
+  /// this event. False: none of them happened.
   [[nodiscard]] bool take_ready(std::chrono::nanoseconds wall) {
     const auto ready = tcp_.wait(wall);
     if (!ready) {

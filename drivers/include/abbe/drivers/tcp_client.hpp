@@ -22,8 +22,8 @@ class TcpClient {
   ~TcpClient() { close(); }
 
   /// Begins to connect; wait() returns Established when the connection exists. Resolves the host
-  /// name, which may block. If the name has several addresses, each call tries the next one.
-  /// Unreachable, SystemRefused.
+  /// name, which may block. If the name has several addresses, each call tries the next one. Error
+  /// Unreachable or SystemRefused.
   [[nodiscard]] Result<void> open(const std::string& host, std::uint16_t port);
   void close() noexcept;
 
@@ -32,10 +32,11 @@ class TcpClient {
 
   enum class Ready { Nothing, Established, Readable };
   /// Waits for at most `wall` of the operating system's time, also when closed. Sends bytes that
-  /// write() could not send. Unreachable: refused, no route, reset.
+  /// write() could not send. Error Unreachable: refused, no route, reset.
   [[nodiscard]] Result<Ready> wait(std::chrono::nanoseconds wall);
 
-  /// Number of bytes read, 0 if there are none yet. Unreachable: closed by the peer, reset.
+  /// Returns the number of bytes read, 0 if there are none yet. Error Unreachable: closed by the
+  /// peer, or reset.
   [[nodiscard]] Result<std::size_t> read(std::span<std::byte> into);
   /// Bytes that do not fit into the socket's buffer now are sent by later calls of wait().
   [[nodiscard]] Result<void> write(std::span<const std::byte> bytes);

@@ -26,7 +26,7 @@ class TimeSource {
       std::chrono::nanoseconds wall) const noexcept = 0;
 };
 
-/// speed x CLOCK_MONOTONIC. Real devices: speed 1.
+/// Host time = speed x CLOCK_MONOTONIC. With real devices the speed is 1.
 class MonotonicTime final : public TimeSource {
  public:
   explicit MonotonicTime(double speed = 1.0) noexcept : speed_(speed) {}
@@ -41,9 +41,9 @@ class MonotonicTime final : public TimeSource {
   double speed_;
 };
 
-/// Advances only by advance(), independently of the operating system's time: host() is zero, and
-/// wall() is `poll_wait`. `poll_wait` is zero unless the peer runs in another thread and needs
-/// processor time.
+/// Host time that advances only by advance(), independently of the operating system's time: so
+/// host() is zero, and wall() is `poll_wait`. `poll_wait` is zero unless the peer runs in another
+/// thread and needs processor time.
 class SteppedTime final : public TimeSource {
  public:
   explicit SteppedTime(protocol::HostTime start = protocol::HostTime{std::chrono::hours{1}},

@@ -20,7 +20,8 @@ namespace can = protocol::can;
 struct ReceivedFrame {
   can::CanFrame frame;
   protocol::HostTime time{};  ///< arrival; of an echo: transmission
-  /// There is no usable kernel timestamp: `time` was read when the frame reached user space.
+  /// true: there is no usable kernel timestamp, and `time` was read when the frame reached user
+  /// space.
   bool time_widened = false;
   /// The frame is our own SYNC (sent by start_sync() or, with echoes_sync(), by send()), received
   /// back when it was transmitted.
@@ -72,13 +73,13 @@ class CanBus {
   [[nodiscard]] virtual Result<void> start_sync(std::chrono::nanoseconds period);
   virtual void stop_sync() noexcept {}
   [[nodiscard]] virtual bool has_sync() const noexcept { return false; }
-  /// read() delivers a SYNC of send() as an echo after its transmission, if its identifier was
-  /// passed to open().
+  /// True if read() delivers a SYNC of send() as an echo after its transmission (provided that its
+  /// identifier was passed to open()).
   [[nodiscard]] virtual bool echoes_sync() const noexcept { return false; }
   [[nodiscard]] virtual CanBusCounters counters() const noexcept = 0;
   /// Sender of the latest datagram that did not come from the peer, "127.0.0.1:4711"; empty: none.
   [[nodiscard]] virtual std::string foreign_sender() const { return {}; }
-  /// For messages: "can0", "udp 127.0.0.1:20000".
+  /// Name of the bus for messages: "can0", "udp 127.0.0.1:20000".
   [[nodiscard]] virtual std::string name() const = 0;
 };
 

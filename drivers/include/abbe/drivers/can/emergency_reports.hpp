@@ -20,8 +20,9 @@ class EmergencyReports {
   explicit EmergencyReports(std::span<const EncoderAxis> axes);
 
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
-  /// The next fault that was not returned yet: per node the latest emergency, at most one a second,
-  /// with the number of other emergencies since the previous report.
+  /// Text of the next fault that was not returned yet; nullopt: none. A fault is the latest
+  /// emergency of a node, at most once a second for each node, with the number of other emergencies
+  /// of this node since its previous fault.
   [[nodiscard]] std::optional<std::string> take_fault(protocol::HostTime now);
   /// Text that names the axes that are absent, each with the latest emergency of its node, and the
   /// axes whose emergency is not reset; empty if there are none. The latest emergency of a node is

@@ -63,7 +63,7 @@ struct EncoderDeviceOptions {
   EncoderReceiverOptions receiver;
   SupervisorOptions supervisor;
   SyncSource sync = SyncSource::Thread;
-  /// wait after a failure of the transport
+  /// wait before the bus is opened again after a failure of the transport
   std::chrono::nanoseconds reopen_after = std::chrono::milliseconds{250};
   std::size_t sample_capacity = 8192;  ///< 8 s at 1 kHz
   std::size_t raw_capacity_blocks = 8192;

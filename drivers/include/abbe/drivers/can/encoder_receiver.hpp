@@ -73,7 +73,8 @@ struct EncoderAxis {
   std::uint8_t position_byte = 0;  ///< where in the TPDO the position begins
   std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: read by SDO
   double offset = 0.0;             ///< m or rad: the reading at count 0
-  /// The count wraps to 0 after this many; 0: range read from the encoder, else 2^32 (2^64).
+  /// Number of counts after which the position wraps to 0. 0: the range that the encoder reports;
+  /// if it reports none, 2^32 (2^64 for a position of 64 bits).
   std::uint64_t wrap_counts = 0;
   std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };
@@ -82,16 +83,18 @@ struct EncoderReceiverOptions {
   std::vector<EncoderAxis> axes;  ///< 1 to protocol::kMaxAxes, in the order of the sample
   std::chrono::nanoseconds sync_period = std::chrono::milliseconds{1};
   std::chrono::nanoseconds answer_within{};  ///< after the SYNC; 0: 0.8 of the period
-  /// From the time of the SYNC to the sampling of the position; device specific, to be calibrated.
+  /// Delay from the time of the SYNC to the sampling of the position in the encoder. It depends on
+  /// the device and must be calibrated.
   std::chrono::nanoseconds sampling_delay{};
   /// standard uncertainty of sampling_delay
   std::chrono::nanoseconds u_sampling_delay = std::chrono::microseconds{50};
   std::chrono::nanoseconds heartbeat_timeout = std::chrono::milliseconds{350};
   bool external_sync = false;  ///< a cycle begins when the machine's SYNC arrives
 };
-/// BadConfiguration names the axis and what is wrong with it.
+/// Error BadConfiguration names the axis and what is wrong with it.
 [[nodiscard]] Result<void> check(const EncoderReceiverOptions& options);
-/// `options.answer_within`, or 0.8 of the period.
+/// Time for the answers to a SYNC: `options.answer_within` or, if that is 0, 0.8 of the SYNC
+/// period.
 [[nodiscard]] std::chrono::nanoseconds answer_within(const EncoderReceiverOptions& options);
 /// Tolerance when times of two clocks are compared: an answer earlier than the SYNC by less than
 /// this counts as simultaneous with it.
@@ -117,7 +120,7 @@ struct EncoderCounters {
 
 class EncoderReceiver {
  public:
-  /// `options` have passed check(). Allocates.
+  /// Precondition: `options` have passed check(). Allocates.
   explicit EncoderReceiver(const EncoderReceiverOptions& options);
 
   // Events, in the order in which they happened. Each returns the samples it completes (at most
@@ -133,7 +136,8 @@ class EncoderReceiver {
   [[nodiscard]] std::span<const protocol::AxisSample> on_frame(const can::CanFrame& frame,
                                                                protocol::HostTime time,
                                                                bool time_widened = false) ABBE_RT;
-  /// No further frame arrived before `now`.
+  /// No further frame arrived before `now`: a cycle whose deadline has passed ends, and a sample
+  /// whose time to be held has passed is output.
   [[nodiscard]] std::span<const protocol::AxisSample> on_time(protocol::HostTime now) ABBE_RT;
   /// Frames were lost at this point. The open cycle ends, because the next answer may belong to a
   /// SYNC that was lost; the next sample is flagged GapBefore.
@@ -166,7 +170,7 @@ class EncoderReceiver {
 
   [[nodiscard]] const EncoderCounters& counters() const ABBE_RT { return counters_; }
   [[nodiscard]] bool bus_off() const ABBE_RT { return bus_off_; }
-  /// m or rad per count; nullopt while unknown.
+  /// Scale of the axis, m or rad per count; nullopt while it is unknown.
   [[nodiscard]] std::optional<double> scale(std::size_t axis) const ABBE_RT;
 
  private:
@@ -237,10 +241,12 @@ class EncoderReceiver {
   std::optional<protocol::HostTime> sync_time_;  ///< of the latest SYNC
   std::uint32_t cycle_ = 0;
   std::uint8_t received_mask_ = 0;  ///< answered in the latest cycle, also too late
-  /// Answered in the latest cycle, but the answer may belong to another SYNC, or came too late.
+  /// Axes that have answered in the latest cycle, but too late or with an answer that may belong to
+  /// another SYNC.
   std::uint8_t doubtful_mask_ = 0;
   std::uint8_t mark_next_mask_ = 0;  ///< axes doubtful in the next cycle, whatever they answer
-  /// Unsettled axes with an answer in current_, which waits for second answers; 0: it does not wait.
+  /// Unsettled axes that have answered in current_. While there are any, current_ is held for their
+  /// second answers; 0: it is not held.
   std::uint8_t held_for_ = 0;
   bool bus_off_ = false;
   bool bus_error_pending_ = false;  ///< an error frame arrived since the previous sample

@@ -37,7 +37,7 @@ class EncoderSupervisor {
   /// supervisor by its own node ID (node ID 0 would address every drive on the bus), then
   /// configures the nodes.
   void bus_recovered(protocol::HostTime now);
-  /// A SYNC was sent: configured nodes must answer.
+  /// A SYNC was sent at `now`: configured nodes must answer it.
   void on_sync(protocol::HostTime now);
   void on_frame(const can::CanFrame& frame, protocol::HostTime now);
   /// Precondition: all frames that arrived before `now` were passed to on_frame().

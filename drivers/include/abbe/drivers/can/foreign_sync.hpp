@@ -19,8 +19,9 @@ namespace abbe::drivers {
 
 class ForeignSync {
  public:
-  /// The slowest producers send a SYNC every second: older positions are useless to a control. The
-  /// additional 0.5 s cover a tunnel that delays frames (cannelloni: 0.1 s) and a late SYNC.
+  /// Listening time after the bus was opened. The slowest producers send a SYNC every second,
+  /// because older positions are useless to a control (CNC). The additional 0.5 s cover a tunnel
+  /// that delays frames (cannelloni: 0.1 s) and a late SYNC.
   static constexpr std::chrono::nanoseconds kListenFor = std::chrono::milliseconds{1500};
   /// A control (CNC) that restarts within this time finds its nodes unchanged.
   static constexpr std::chrono::nanoseconds kQuietFor = std::chrono::seconds{60};

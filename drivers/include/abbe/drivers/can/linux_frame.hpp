@@ -16,8 +16,8 @@ namespace abbe::drivers {
 
 namespace can = protocol::can;
 
-/// `size`: bytes that read() returned. CAN_MTU: a classic frame; CANFD_MTU: a CAN FD frame; any
-/// other size gives nullopt.
+/// Converts a received frame. `size` is the number of bytes that read() returned: CAN_MTU for a
+/// classic frame, CANFD_MTU for a CAN FD frame; any other size gives nullopt.
 [[nodiscard]] std::optional<can::CanFrame> from_linux(const canfd_frame& frame,
                                                       std::size_t size) noexcept;
 

@@ -36,7 +36,7 @@ class PendingSync {
   void sent(protocol::HostTime at);
   /// The bus was closed or is off: no echo is expected.
   void forget();
-  /// True: no further SYNC may be sent yet. The latest SYNC may still be queued, or it was
+  /// True if no further SYNC may be sent yet: the latest SYNC may still be queued, or it was
   /// transmitted late and its answers are arriving. A missing echo blocks for at most kPatience.
   [[nodiscard]] bool waits(protocol::HostTime now) const;
   /// When settle() must be called even without new frames; HostTime::max(): not needed.

@@ -17,11 +17,11 @@ namespace abbe::drivers {
 
 struct SocketCanOptions {
   std::string interface = "can0";
-  /// Requested size; without CAP_NET_ADMIN the kernel limits it to net.core.rmem_max (by default
-  /// about 500 frames).
+  /// Requested size of the socket's receive queue; without CAP_NET_ADMIN the kernel limits it to
+  /// net.core.rmem_max (by default about 500 frames).
   int receive_buffer_bytes = 1 << 20;
-  /// Refuse an interface without CAN FD. On an interface with CAN FD, FD frames are read in either
-  /// case.
+  /// true: an interface without CAN FD is refused. On an interface with CAN FD, FD frames are read
+  /// with either value.
   bool require_fd = false;
   double speed = 1.0;  ///< as UdpCanOptions::speed
 };
@@ -56,8 +56,8 @@ class SocketCanBus final : public CanBus {
   int sync_fd_ = -1;          ///< CAN_BCM socket; closing it ends the SYNC
   bool kernel_sent_ = false;  ///< since open(), start_sync() was called: its SYNCs may arrive late
   bool sent_sync_ = false;    ///< send() has sent a SYNC since open()
-  /// An earlier socket of ours sent a SYNC that may still arrive: a SYNC from this computer that is
-  /// not an echo of the open socket is ignored.
+  /// true: an earlier socket of this object has sent a SYNC that may still arrive. Therefore a SYNC
+  /// from this computer that is not an echo of the open socket is ignored.
   bool left_over_ = false;
   KernelStampMap stamps_;
   std::unique_ptr<Batch> batch_;

@@ -19,8 +19,8 @@
 namespace abbe::drivers {
 
 struct UdpCanOptions {
-  /// The default receives on every network interface. Only datagrams from the peer's address and
-  /// port are accepted.
+  /// The default address receives on every network interface. Whatever the address, only datagrams
+  /// from the peer's address and port are accepted.
   std::string local_address = "0.0.0.0";
   std::uint16_t local_port = 0;            ///< 0: the kernel chooses, see local_port()
   std::string peer_address = "127.0.0.1";  ///< IPv4 address, or a name that open() resolves
@@ -62,8 +62,8 @@ class UdpCanBus final : public CanBus {
   UdpCanOptions options_;
   const TimeSource& time_;
   int fd_ = -1;
-  /// Bound to the same port but not connected: receives the datagrams of senders other than the
-  /// peer.
+  /// Second socket, bound to the same port but not connected: it receives the datagrams of all
+  /// senders other than the peer.
   int stranger_fd_ = -1;
   sockaddr_in peer_{};
   std::uint64_t strangers_ = 0;

@@ -16,7 +16,8 @@ class ScanDecimation {
  public:
   explicit ScanDecimation(std::size_t every) noexcept : every_(every) {}
 
-  /// Returns every n-th scan, with the flags and the lost scans of those skipped before it.
+  /// Returns every n-th scan, with the flags and the lost scans of those skipped before it; nullopt
+  /// for a scan that is skipped.
   [[nodiscard]] std::optional<protocol::AxisSample> take(const protocol::AxisSample& scan) ABBE_RT {
     if (++skipped_ < every_) {
       flags_ |= scan.head.flags;

@@ -31,8 +31,8 @@ struct CounterCardOptions {
   std::string serial;  ///< empty: exactly one card must be connected
   CounterCardReceiverOptions receiver;
   CounterCardSessionOptions session;  ///< `peer`, `wiring` and `stream` are set by create()
-  /// Duration of the scans in one transfer: the resolution of arrival times, and the loss if a
-  /// transfer fails.
+  /// Duration of the scans in one transfer. It is the resolution of arrival times, and the time
+  /// that is lost if a transfer fails.
   std::chrono::nanoseconds transfer_time = std::chrono::microseconds{1500};
   std::size_t transfers_in_flight = 32;
   /// Decimation: every n-th scan becomes a sample in the ring; the sink receives every scan.

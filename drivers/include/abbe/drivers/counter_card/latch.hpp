@@ -25,7 +25,7 @@ class LatchTracker {
 
   /// The counters were zeroed.
   void reset() ABBE_RT;
-  /// Starts in the middle of a stream: the present reading is not a new edge.
+  /// Begins in the middle of a stream: `latch_raw` is the present reading, which is not a new edge.
   void begin_at(std::uint64_t latch_raw) ABBE_RT { last_raw_ = latch_raw; }
 
   struct Latch {
@@ -44,7 +44,7 @@ class LatchTracker {
   [[nodiscard]] std::uint64_t disagreements() const ABBE_RT { return disagreements_; }
 
  private:
-  /// Bounds of latch - clock at one instant, counts.
+  /// Bounds of the difference latch count - clock count at one instant.
   struct Offset {
     std::int64_t low = 0;
     std::int64_t high = 0;

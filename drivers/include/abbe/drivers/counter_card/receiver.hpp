@@ -81,16 +81,17 @@ class CounterCardReceiver {
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   /// The next scans in order, valid until the next call; empty: all pushed bytes are processed.
   [[nodiscard]] std::span<const CounterScan> next() ABBE_RT;
-  /// Bytes of a recording are missing: searches for the next scan.
+  /// To be called where bytes of a recording are missing: searches for the beginning of the next
+  /// scan.
   void bytes_lost() ABBE_RT;
 
-  /// The bytes received are not scans; further bytes are ignored until the stream restarts.
+  /// True if the received bytes are not scans. Further bytes are ignored until the stream restarts.
   [[nodiscard]] bool out_of_step() const ABBE_RT { return out_of_step_; }
   /// Clock counts per scan: as observed in the latest refused scan, and as expected.
   [[nodiscard]] std::uint64_t refused_step() const ABBE_RT { return refused_step_; }
   [[nodiscard]] double expected_step() const ABBE_RT { return metronome_.step; }
-  /// Delay of the clock channel relative to its expected count, s, when the counters were last
-  /// found not to have continued; negative: ahead.
+  /// Delay of the clock channel relative to its expected count, s, when it was last found that the
+  /// counters had not continued; negative: the clock channel was ahead.
   [[nodiscard]] double behind_s() const ABBE_RT { return behind_s_; }
 
   /// Replay: processes one raw block and passes every scan to sink(const CounterScan&). Accepts
@@ -126,7 +127,8 @@ class CounterCardReceiver {
     double length_s = 0.0;
   };
 
-  /// True: the block completed a message with scans, which was passed to push().
+  /// Adds a recorded block to raw_. True: the block completed a message with scans, which was
+  /// passed to push().
   [[nodiscard]] bool join(const protocol::RawBlock& block) ABBE_RT;
   [[nodiscard]] bool on_raw_message(protocol::RawBlock::Direction direction,
                                     protocol::HostTime time) ABBE_RT;

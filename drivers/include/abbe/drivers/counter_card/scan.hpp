@@ -23,8 +23,8 @@ struct CounterScan {
   /// clock_count at the latest probe edge. ASSUMPTION, to be verified on hardware: in a scan, a
   /// counter with latch-on-index delivers its count at the latest index edge.
   std::int64_t latch_count = 0;
-  /// h: the true latch lies in [latch_count - h, latch_count + h]; 0 if latch and clock channel
-  /// have the same zero.
+  /// Half-width h of the interval [latch_count - h, latch_count + h] that contains the true latch;
+  /// 0 if latch and clock channel have the same zero.
   std::int64_t latch_half_width = 0;
   /// Number of probe edges. If there are several edges since the previous scan, latch_count is that
   /// of the last one.

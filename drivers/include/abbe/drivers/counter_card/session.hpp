@@ -55,7 +55,8 @@ struct CardScans {
 struct CardOutOfStep {
   std::string seen;
 };
-/// The clock count has not continued: the card was restarted or set up by another program.
+/// Input: the clock count has not continued, so the card was restarted or set up by another
+/// program.
 struct CardRestarted {
   std::string seen;  ///< text with the observed clock error; may be empty
 };
@@ -150,7 +151,7 @@ class CounterCardSession {
   CardAction set_up_again(Now now, const std::string& seen = {});
   CardAction refused_step(const quad08::Step& step, const UsbControlDone& done, Now now);
   CardAction on_status(quad08::Status status, Now now);
-  /// No scans have arrived since the latest restart.
+  /// True if no scans have arrived since the latest restart of the scan.
   [[nodiscard]] bool recovering() const { return planned_.is_set(Plan::Retry); }
   CardAction open(Now now);
   CardAction halt_soon(Now now);

@@ -30,13 +30,15 @@ struct CounterAxis {
   double scale = 0.0;  ///< m or rad per count, four counts per signal period; negative reverses
   /// m or rad: the reading at count 0, the axis position at the set-up of the counter
   double offset = 0.0;
-  /// For reference marks: the counter delivers its count at the latest index pulse, not live.
+  /// true: the counter delivers its count at the latest index pulse instead of its live count. For
+  /// reference marks.
   bool latch_on_index = false;
   quad08::Debounce debounce{};  ///< of phases and index
 };
 
 enum class ClockSource : std::uint8_t {
-  /// A separate clock. The offset of the latch channel's count is estimated from probe edges.
+  /// A clock outside the card. The offset between the counts of latch channel and clock channel is
+  /// estimated from probe edges.
   External,
   /// The card's timer output 0, wired to both clock inputs: both counters start with it, from a
   /// common zero.
@@ -45,7 +47,7 @@ enum class ClockSource : std::uint8_t {
 };
 
 struct CounterCardWiring {
-  /// In the order of the sample; 1 to 7, at most as many as a sample holds.
+  /// Axes in the order of the sample: 1 to 7, and at most as many as a sample holds.
   std::vector<CounterAxis> axes;
   std::uint8_t clock_channel = 5;
   ClockSource clock_source = ClockSource::External;
@@ -68,7 +70,7 @@ struct CounterCardWiring {
 /// Channels in use, ascending.
 [[nodiscard]] quad08::ScanLayout layout_of(const CounterCardWiring& wiring);
 [[nodiscard]] std::uint64_t divisor_of(const CounterCardWiring& wiring);
-/// Actual scans per second of the pacer.
+/// Scans per second that the pacer (the timer of the scans) actually gives.
 [[nodiscard]] double scan_rate_hz(const CounterCardWiring& wiring);
 [[nodiscard]] double clock_counts_per_scan(const CounterCardWiring& wiring);
 /// Periods of the card's 48 MHz oscillator in one period of the counted clock. Precondition: the

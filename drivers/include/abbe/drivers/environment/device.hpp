@@ -41,25 +41,27 @@ struct EnvironmentDeviceOptions {
 
 class EnvironmentDevice final : public Device {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(RegisterMap), for a missing host or
-  /// path, or for a period not above 0. The first wait() opens the line.
+  /// `time` must outlive the device. Error BadConfiguration as check(RegisterMap), for a missing
+  /// host or path, or for a period not above 0. The first wait() opens the line.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time);
-  /// As above, over a connection shared with other devices; `link` must outlive the device.
+  /// As the create() above, but over a connection shared with other devices; `link` must outlive
+  /// the device.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentDevice>> create(
       const EnvironmentDeviceOptions& options, const TimeSource& time, EnvironmentLink& link);
 
-  /// Device thread: an answer is outstanding, or has arrived and is not yet handled.
+  /// Device thread: true if an answer is outstanding, or has arrived and is not yet handled.
   [[nodiscard]] bool busy() const noexcept;
   /// Device thread: the line is open, and this device has sent requests on the present connection.
   [[nodiscard]] bool on_line() const noexcept {
     return link_.line.is_open() && opening_ == link_.openings;
   }
-  /// Device thread: handles a connection that was lost; `what` is the reason.
+  /// Device thread: to be called when the connection was lost; `what` is the reason.
   void lose(std::string_view what);
-  /// Device thread: another device of the line closed the connection and reports the fault.
+  /// Device thread: to be called when another device of the line has closed the connection, which
+  /// also reports the fault.
   void line_closed() noexcept;
-  /// Device thread: when this device next sends a request or opens the line.
+  /// Device thread: the time at which this device next sends a request or opens the line.
   [[nodiscard]] protocol::HostTime due() const noexcept;
 
   void wait(std::chrono::nanoseconds at_most) override;

@@ -24,9 +24,10 @@ struct KnownMapOptions {
   std::uint8_t unit = 1;
 };
 
-/// "vaisala-indigo520-hmp": probe on port 1, barometer module; "comet-t7510"; "icpdas-zt2005-c8".
+/// Names of the built-in maps: "vaisala-indigo520-hmp" (probe on port 1, barometer module),
+/// "comet-t7510", "icpdas-zt2005-c8".
 [[nodiscard]] const std::vector<std::string_view>& known_map_names();
-/// BadConfiguration: unknown name, or options that the map does not have.
+/// Error BadConfiguration: unknown name, or options that the map does not have.
 [[nodiscard]] Result<RegisterMap> known_map(std::string_view name, const KnownMapOptions& options);
 
 }  // namespace abbe::drivers

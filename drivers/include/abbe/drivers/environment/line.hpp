@@ -16,8 +16,8 @@ namespace abbe::drivers {
 
 class EnvironmentLine final : public Device {
  public:
-  /// `time` must outlive the line. BadConfiguration as EnvironmentDevice::create(), if `options` is
-  /// empty, and if the devices have different addresses or line settings.
+  /// `time` must outlive the line. Error BadConfiguration as EnvironmentDevice::create(), if
+  /// `options` is empty, and if the devices have different addresses or line settings.
   [[nodiscard]] static Result<std::unique_ptr<EnvironmentLine>> create(
       const std::vector<EnvironmentDeviceOptions>& options, const TimeSource& time);
 

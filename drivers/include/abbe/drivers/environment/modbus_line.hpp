@@ -28,7 +28,8 @@ struct ModbusTcp {
 
 enum class Parity : char { None = 'N', Even = 'E', Odd = 'O' };
 
-/// Use a path that does not change when the adapter is plugged in again: /dev/serial/by-id/...
+/// A serial line. Use a path that does not change when the adapter is plugged in again:
+/// /dev/serial/by-id/...
 struct ModbusSerial {
   std::string path;
   int baud = 19200;
@@ -38,7 +39,7 @@ struct ModbusSerial {
 
 using ModbusAddress = std::variant<ModbusTcp, ModbusSerial>;
 [[nodiscard]] modbus::Transport transport_of(const ModbusAddress& address) noexcept;
-/// "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1"
+/// Text of an address: "10.0.0.7:502", "/dev/ttyUSB0 19200 8E1".
 [[nodiscard]] std::string text_of(const ModbusAddress& address);
 
 /// Exclusive lock of a serial line (flock). If the adapter is not plugged in at the start, abbe
@@ -53,7 +54,8 @@ class SerialLock {
   SerialLock& operator=(SerialLock&& other) noexcept;
   ~SerialLock();  ///< releases the lock
 
-  /// Unreachable: no such path, or the line is locked. Call once.
+  /// Locks the line at `path`. Error Unreachable: no such path, or the line is already locked. Call
+  /// once.
   [[nodiscard]] Result<void> take(const std::string& path);
 
  private:
@@ -67,16 +69,16 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Blocks for at most `wall`, plus the time of name resolution. Unreachable: refused, no route,
-  /// no such path, serial line in use; Timeout.
+  /// Blocks for at most `wall`, plus the time of name resolution. Error Unreachable (refused, no
+  /// route, no such path, serial line in use) or Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
   void close() noexcept;
 
-  /// Unreachable: closed by the device, cable unplugged.
+  /// Error Unreachable: the device closed the connection, or the cable is unplugged.
   [[nodiscard]] Result<void> send(const modbus::ReadRequest& request);
-  /// Waits for at most `wall`. Returns the number of bytes read, 0 if none arrived. Unreachable:
-  /// closed by the device, cable unplugged.
+  /// Waits for at most `wall`. Returns the number of bytes read, 0 if none arrived. Error
+  /// Unreachable: the device closed the connection, or the cable is unplugged.
   [[nodiscard]] Result<std::size_t> read(std::span<std::byte> into, std::chrono::nanoseconds wall);
 
  private:

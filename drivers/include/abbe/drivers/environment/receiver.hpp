@@ -60,7 +60,7 @@ class EnvironmentReceiver {
     Failed,    ///< see failure(); no further request or sample until begin()
   };
 
-  /// The map must satisfy check(). Allocates.
+  /// Precondition: the map has passed check(). Allocates.
   EnvironmentReceiver(RegisterMap map, modbus::Transport transport);
 
   /// Call for each new connection, and to restart on an existing one: begins with the proving
@@ -80,7 +80,7 @@ class EnvironmentReceiver {
   [[nodiscard]] const EnvironmentCounters& counters() const ABBE_RT { return counters_; }
   [[nodiscard]] const RegisterMap& map() const noexcept { return map_; }
 
-  /// Replay: one recorded block. True if sample() is new.
+  /// Replay: processes one recorded block. Returns true if sample() is new.
   bool on_raw(const protocol::RawBlock& block) ABBE_RT;
 
  private:

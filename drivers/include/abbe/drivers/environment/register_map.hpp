@@ -38,7 +38,7 @@ struct PlausibleRange {
 /// parts: -50 to 200 C.
 [[nodiscard]] PlausibleRange plausible_range(Quantity quantity) noexcept;
 
-/// value [SI] = register * scale + offset.
+/// A register with a measured quantity: value [SI] = register * scale + offset.
 struct MeasuredRegister {
   std::string name;  ///< "air temperature", "scale X"
   Quantity quantity = Quantity::Temperature;
@@ -64,8 +64,8 @@ struct RegisterMap {
   std::vector<ProvingRegister> proving;
 };
 
-/// BadConfiguration: no measured register, a quantity twice, a channel not below kMaxTemperatures,
-/// a scale of 0, an address outside 0 to FFFFh, more reads than kMaxReads.
+/// Error BadConfiguration: no measured register, a quantity twice, a channel not below
+/// kMaxTemperatures, a scale of 0, an address outside 0 to FFFFh, more reads than kMaxReads.
 [[nodiscard]] Result<void> check(const RegisterMap& map);
 
 /// The smallest number of reads that cover all `places`: one read covers adjacent registers of the

@@ -64,7 +64,7 @@ struct IppWords {
 
 class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The first wait() opens the
+  /// `time` must outlive the device. Error BadConfiguration as check(). The first wait() opens the
   /// connection.
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);

@@ -57,8 +57,8 @@ struct IppError {
   int code = 0;
   IppText text;
 };
-/// A line that violates I++ DME. After it only the answers to AbortE are evaluated, until a new
-/// connection.
+/// A line that violates I++ DME. After such a line only the answers to AbortE are evaluated, until
+/// a new connection.
 struct IppProtocolError {
   ippdme::LineError error{};
   IppText line;
@@ -73,7 +73,7 @@ class IppReceiver {
   IppReceiver(const IppReceiver&) = delete;
   IppReceiver& operator=(const IppReceiver&) = delete;
 
-  /// Registers a command line that was sent, with its CR LF.
+  /// Registers a command line, including its CR LF, that was sent at `time`.
   void sent(std::span<const std::byte> line, protocol::HostTime time) ABBE_RT;
   /// Adds the bytes of one read and their arrival time; a call without bytes marks a new
   /// connection. Call next() until it returns nullopt before the next push().

@@ -87,7 +87,7 @@ struct IppSessionOptions {
   std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
 };
-/// BadConfiguration; the text names the option that is out of range.
+/// Error BadConfiguration; the text names the option that is out of range.
 [[nodiscard]] Result<void> check(const IppSessionOptions& options);
 
 struct IppTick {};
@@ -96,7 +96,7 @@ struct IppConnectionLost {
   std::string what;
 };
 struct IppStopRequested {};  ///< ends the session
-/// Stops a motion, discards all points, and awaits a release whether or not the machine moved.
+/// Input: stop a motion, discard all points, and await a release whether or not the machine moved.
 struct IppAbortRequested {};
 struct IppReleaseRequested {};  ///< an operator has inspected the machine
 using IppInput = std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested,
@@ -113,7 +113,7 @@ using IppAction = std::variant<IppNothing, IppOpen, IppClose, IppSend>;
 
 class IppSession {
  public:
-  /// `options` have passed check().
+  /// Precondition: `options` have passed check().
   explicit IppSession(IppSessionOptions options);
 
   [[nodiscard]] IppAction on(const IppInput& input, protocol::HostTime now);
@@ -225,7 +225,7 @@ class IppSession {
   bool stopped_ = false;
   bool open_ = false;        ///< the connection is established
   bool in_session_ = false;  ///< StartSession was accepted on this connection
-  /// A motion was sent, also on a lost connection, and its end was not reported.
+  /// true: a motion was sent, on this connection or one that is lost, and its end was not reported.
   bool moving_ = false;
   /// Close the connection when the motion has stopped. Set after a malformed, unexpected or missing
   /// response: the further content of the connection is not reliable.

@@ -13,17 +13,17 @@ namespace abbe::drivers {
 
 class CounterAlignment {
  public:
-  /// `latched`: count of the latching card at the mark. `before`, `after`: live counts of the scans
-  /// before and after it. False: no difference satisfies this and all earlier marks; one of the
-  /// cards has miscounted.
+  /// Adds a mark. `latched`: count of the latching card at the mark. `before`, `after`: live counts
+  /// of the scans before and after the mark. False: no difference satisfies this and all earlier
+  /// marks; one of the cards has miscounted.
   [[nodiscard]] bool add(std::int64_t latched, std::int64_t before, std::int64_t after) noexcept {
     low_ = std::max(low_, latched - std::max(before, after));
     high_ = std::min(high_, latched - std::min(before, after));
     known_ = true;
     return low_ <= high_;
   }
-  /// latched - live, the middle of the possible interval; nullopt before the first mark and after a
-  /// contradiction.
+  /// Difference latched count - live count: the middle of the interval in which it must lie;
+  /// nullopt before the first mark, and after marks that contradict each other.
   [[nodiscard]] std::optional<double> difference() const noexcept {
     if (!known_ || low_ > high_) return std::nullopt;
     return 0.5 * static_cast<double>(low_) + 0.5 * static_cast<double>(high_);

@@ -7,7 +7,7 @@
 
 namespace abbe::drivers {
 
-/// U with
+/// Returns the U for which
 ///     P(|R + N| <= U) = 0.95
 /// where R is uniform in [-half_width, half_width] and N is normal with standard deviation
 /// `u_normal`. Both arguments >= 0, in the unit of the result. Exact convolution, solved to a

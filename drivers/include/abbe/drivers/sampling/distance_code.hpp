@@ -61,8 +61,8 @@ struct MarkDatum {
   double spread_periods = 0.0;  ///< largest minus smallest of the four offsets
 };
 
-/// `marks`: counts at four consecutive marks, in periods, in the order of crossing; all crossed in
-/// the same direction.
+/// The datum that four consecutive marks give. `marks`: counts at the marks, in periods, in the
+/// order of crossing; all crossed in the same direction.
 [[nodiscard]] tl::expected<MarkDatum, MarkFault> datum_of(
     const DistanceCode& code, std::span<const double, kMarksForDatum> marks) noexcept;
 

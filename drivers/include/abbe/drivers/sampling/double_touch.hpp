@@ -62,8 +62,8 @@ class DoubleTouch {
 
   explicit DoubleTouch(const DoubleTouchRules& rules) noexcept : rules_(rules) {}
 
-  /// Returns the point after its last touch; a rejection if the point was abandoned (the next point
-  /// begins with a fast touch); nullopt otherwise.
+  /// Returns the measured point after its last touch; a rejection if the point was abandoned (the
+  /// next point begins with a fast touch); nullopt if the point needs further touches.
   [[nodiscard]] std::optional<tl::expected<MeasuredTouch, TouchRejection>> on_touch(
       const protocol::ProbeTrigger& touch) noexcept;
   void reset() noexcept;

@@ -16,7 +16,7 @@ namespace abbe::drivers {
 struct MarkTraverseOptions {
   DistanceCode code;
   double counts_per_period = 4.0;  ///< negative: the counter counts against the scale
-  /// Motion back by this much is a change of direction; less is noise.
+  /// Least motion back that is a change of direction; a smaller one is noise.
   double reversal_periods = 0.5;
   std::size_t most_refusals = 4;  ///< consecutive, reversals not counted
 };

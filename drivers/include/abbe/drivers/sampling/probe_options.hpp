@@ -26,8 +26,8 @@ struct ProbeDelay {
 struct ProbeApproach {
   double min_speed_m_s = 0.0;
   double max_speed_m_s = 0.010;  ///< 600 mm/min
-  /// Largest change of speed within `speed_window`, relative to the speed: pre-travel is calibrated
-  /// at one speed.
+  /// Largest change of speed within `speed_window`, relative to the speed. The speed must be
+  /// constant, because pre-travel is calibrated at one speed.
   double max_speed_change = 0.10;
   std::chrono::nanoseconds speed_window = std::chrono::milliseconds{5};
 };
@@ -72,7 +72,7 @@ struct TouchOptions {
   std::size_t window_capacity = 8192;  ///< scans; a window of 20 ms at 33 kHz has 667
 };
 
-/// BadConfiguration names the option that is out of its range.
+/// Error BadConfiguration names the option that is out of its range.
 [[nodiscard]] Result<void> check(const TouchOptions& options);
 
 }  // namespace abbe::drivers

@@ -30,7 +30,7 @@ struct TouchCounters {
 
 class TouchDetector final : public CounterScanSink {
  public:
-  /// `options` have passed check(). Allocates.
+  /// Precondition: `options` have passed check(). Allocates.
   explicit TouchDetector(const TouchOptions& options);
 
   void on_scan(const CounterScan& scan) ABBE_RT override;

@@ -19,8 +19,8 @@
 
 namespace abbe::drivers {
 
-/// Sets all members except the number of the touch. Without scans on both sides of the contact:
-/// TouchFlag::NoPosition, every axis missing and NaN.
+/// Returns a touch with all members set except its number. If there are no scans on one side of the
+/// contact, it has TouchFlag::NoPosition, and every axis is missing and NaN.
 [[nodiscard]] protocol::ProbeTrigger locate_touch(const EdgeInterval& edge,
                                                   const ScanHistory& scans,
                                                   const TouchOptions& options) ABBE_RT;

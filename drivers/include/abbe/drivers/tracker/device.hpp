@@ -57,7 +57,7 @@ struct TrackerWords {
 
 class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice, TrackerWords> {
  public:
-  /// `time` must outlive the device. BadConfiguration as check(). The first wait() opens the
+  /// `time` must outlive the device. Error BadConfiguration as check(). The first wait() opens the
   /// connection.
   [[nodiscard]] static Result<std::unique_ptr<TrackerDevice>> create(
       const TrackerDeviceOptions& options, const TimeSource& time);
@@ -72,9 +72,11 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   /// that is complete; until then call wait(), receive() and finish() again.
   [[nodiscard]] bool finish();
 
-  /// Any thread. One order at a time; an order that cannot be carried out gets the report Refused.
+  /// Any thread. Requests an order. One order is carried out at a time; an order that cannot be
+  /// carried out gets the report Refused.
   void order(TrackerOrder order) { orders_.put(std::move(order)); }
-  /// Any thread. One report per order, when the order has ended.
+  /// Any thread. The reports of the orders that have ended since the last call; one report per
+  /// order.
   [[nodiscard]] std::vector<TrackerOrderReport> reports() { return reports_.take(); }
 
   /// One reader thread for each ring.

@@ -10,9 +10,10 @@
 
 namespace abbe::drivers {
 
-/// An emScon name has at most 32 UTF-16 code units, each at most 3 bytes in UTF-8.
+/// In bytes: an emScon name has at most 32 UTF-16 code units, each at most 3 bytes in UTF-8.
 inline constexpr std::size_t kLongestReflectorName = 96;
-/// Above the range of every tracker. A larger distance is refused: its unit is probably wrong.
+/// Largest search distance, above the range of every tracker. A larger one is refused: its unit is
+/// probably wrong.
 inline constexpr double kLongestSearch_m = 200.0;
 
 struct TrackerOrder {

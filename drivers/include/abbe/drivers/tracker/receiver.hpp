@@ -50,15 +50,15 @@ struct TrackerBurst {
   std::span<const protocol::TrackerPoint> points;
 };
 
-/// Bytes that violate the emScon protocol. After it the receiver ignores all bytes until a new
-/// connection.
+/// Bytes that violate the emScon protocol. After such bytes the receiver ignores everything until a
+/// new connection.
 struct TrackerProtocolError {
   std::optional<emscon::DecodeError> error;  ///< nullopt: invalid packet size
   std::array<std::byte, 24> first_bytes{};
   std::size_t length = 0;
 };
 
-/// Result of decoding, in the order of the bytes.
+/// What next() returns. The messages are in the order of their bytes.
 using TrackerMessage =
     std::variant<TrackerBurst, protocol::EnvironmentSample, emscon::Answer, emscon::ErrorResponse,
                  emscon::StatusChange, TrackerProtocolError>;
@@ -83,7 +83,8 @@ class TrackerReceiver {
   /// Adds the bytes of one read, at most kMaxPacketSize, and their arrival time; no bytes: a new
   /// connection. Call next() until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
-  /// Call for a gap in a recording: searches for the next packet and marks the next sample.
+  /// To be called where bytes of a recording are missing: searches for the next packet, and marks
+  /// the next sample GapBefore.
   void bytes_lost() ABBE_RT;
 
   /// The next message; nullopt if more bytes are needed.

@@ -76,10 +76,10 @@ struct TrackerSessionOptions {
   std::int32_t packets_per_second = 10;  ///< 3 to 10; a refusal by the controller is no fault
   std::string reflector;               ///< name or id; empty: the one that is set in the controller
   bool home_after_initialize = false;  ///< send GoBirdBath after Initialize
-  /// Search radius in mm and time-out; nullopt: as set in the controller.
+  /// Search radius in mm and time-out of FindReflector; nullopt: the values set in the controller.
   std::optional<emscon::SetSearchParams> search;
   emscon::WeatherMonitor weather = emscon::WeatherMonitor::ReadAndCompute;
-  /// Celsius, mbar, percent; sent to the controller if `weather` is None.
+  /// State of the air in Celsius, mbar, percent; sent to the controller if `weather` is None.
   emscon::Environment environment;
 
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
@@ -89,11 +89,11 @@ struct TrackerSessionOptions {
   std::chrono::nanoseconds ask_again = std::chrono::milliseconds{250};
   /// Time-out of Initialize and GoBirdBath, and of FindReflector without `search`.
   std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};
-  /// Longest time without a packet while streaming.
+  /// While streaming, no packet for this long is a fault.
   std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};
   /// Pause before repeating a command that the controller refused with "busy" or "not ready".
   std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};
-  /// A controller that reports "busy" for longer is a fault.
+  /// A controller that reports "busy" for longer than this is a fault.
   std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};
   /// Interval of status queries while the laser is heating.
   std::chrono::nanoseconds warm_poll = std::chrono::seconds{5};
@@ -103,14 +103,15 @@ struct TrackerSessionOptions {
   std::chrono::nanoseconds keep_alive = std::chrono::seconds{5};
   /// Pause before connecting again; it doubles with each attempt up to longest_pause.
   std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
-  /// Short enough that a tracker that is reachable again streams within a second.
+  /// Longest pause between two attempts to connect: a tracker that is reachable again then streams
+  /// within a second.
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
   /// Pause before connecting again after a refused command.
   std::chrono::nanoseconds refused_pause = std::chrono::seconds{5};
   /// Longest time for stopping the measurement and restoring the settings.
   std::chrono::nanoseconds leave_within = std::chrono::seconds{5};
 };
-/// BadConfiguration; the text names the option that is out of range.
+/// Error BadConfiguration; the text names the option that is out of range.
 [[nodiscard]] Result<void> check(const TrackerSessionOptions& options);
 /// Time within which an order is reported. It may take longer only if the controller is busy before
 /// several commands.
@@ -133,9 +134,9 @@ using TrackerInput =
 
 // Actions.
 struct TrackerNothing {};
-/// Open a connection; the input TrackerConnected or TrackerConnectionLost follows.
+/// Action: open a connection; the input TrackerConnected or TrackerConnectionLost follows.
 struct TrackerOpen {};
-/// Close the connection; no TrackerConnectionLost follows.
+/// Action: close the connection; no TrackerConnectionLost follows.
 struct TrackerClose {};
 struct TrackerSend {
   emscon::Request request;
@@ -144,7 +145,7 @@ using TrackerAction = std::variant<TrackerNothing, TrackerOpen, TrackerClose, Tr
 
 class TrackerSession {
  public:
-  /// `options` have passed check().
+  /// Precondition: `options` have passed check().
   explicit TrackerSession(TrackerSessionOptions options);
 
   [[nodiscard]] TrackerAction on(const TrackerInput& input, protocol::HostTime now);
@@ -296,7 +297,7 @@ class TrackerSession {
   std::optional<TrackerOrderReport> report_;
 };
 
-/// "expected emScon answer, got 48 54 54 50 \"HTTP...\"".
+/// Text such as "expected emScon answer, got 48 54 54 50 \"HTTP...\"".
 [[nodiscard]] std::string describe(const TrackerProtocolError& malformed);
 
 }  // namespace abbe::drivers

@@ -41,7 +41,7 @@ enum class UsbOutcome : std::uint8_t {
   Failed,   ///< any other failure with the device still connected
 };
 
-/// The device is open: its identity matches and its configuration is selected.
+/// Event: the device is open, its identity matches, and its configuration is selected.
 struct UsbOpened {
   std::string serial;  ///< empty: the device has none
 };
@@ -55,16 +55,17 @@ struct UsbControlDone {
     return std::span{data}.first(length);
   }
 };
-/// A bulk-in transfer has ended; its request is submitted again automatically. `bytes` are valid
-/// until the next wait().
+/// Event: a bulk-in transfer has ended; its request is submitted again automatically. `bytes` are
+/// valid until the next wait().
 struct UsbBulkIn {
   std::span<const std::byte> bytes;
   protocol::HostTime arrival{};
   UsbOutcome outcome = UsbOutcome::Done;
 };
-/// After stop_bulk_in(): no transfer is in flight.
+/// Event after stop_bulk_in(): no transfer is in flight any more.
 struct UsbBulkStopped {};
-/// The link is closed: the device was removed, was refused, or was not found. open() tries again.
+/// Event: the link is closed, because the device was removed, was refused, or was not found. open()
+/// tries again.
 struct UsbLost {
   Error error;
 };
@@ -85,21 +86,23 @@ class UsbLink {
   /// device does not answer. Writes have no data stage. usb::clear_halt() also clears the halt
   /// state in the host.
   virtual void control(const usb::Setup& setup) = 0;
-  /// Keeps `in_flight` requests to the bulk endpoint of the identity pending.
+  /// Submits `in_flight` requests to the bulk endpoint of the identity and keeps this number
+  /// pending.
   virtual void start_bulk_in(const UsbBulkStream& stream) = 0;
   /// Cancels all bulk requests; UsbBulkStopped follows.
   virtual void stop_bulk_in() = 0;
   /// Waits for at most `wall` of the operating system's time. The events are valid until the next
   /// call.
   [[nodiscard]] virtual std::span<const UsbEvent> wait(std::chrono::nanoseconds wall) = 0;
-  /// For messages: "USB 09DB:00CA", "USB/IP 127.0.0.1:3240 1-1".
+  /// Name of the device for messages: "USB 09DB:00CA", "USB/IP 127.0.0.1:3240 1-1".
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
-/// "it is 1209:0001, configured is 09DB:00CA"; empty if the IDs match.
+/// Text such as "it is 1209:0001, configured is 09DB:00CA"; empty if the IDs match.
 [[nodiscard]] std::string wrong_ids(const UsbIdentity& wanted, std::uint16_t vendor,
                                     std::uint16_t product);
-/// "its serial number is A, configured is B"; empty if they match or none is configured.
+/// Text such as "its serial number is A, configured is B"; empty if the numbers match or none is
+/// configured.
 [[nodiscard]] std::string wrong_serial(const UsbIdentity& wanted, std::string_view serial);
 
 }  // namespace abbe::drivers

@@ -19,8 +19,8 @@ constexpr std::size_t padding(std::size_t position, std::size_t alignment) noexc
   return (alignment - position % alignment) % alignment;
 }
 
-/// Reads fields of the CDR body, aligned from its first byte. After the first failure all values
-/// are zero or empty.
+/// Reads fields of the CDR body; alignment counts from its first byte. After the first failure all
+/// values are zero or empty.
 class BodyReader {
  public:
   explicit BodyReader(std::span<const std::byte> body) noexcept : body_(body) {}
@@ -77,8 +77,8 @@ class BodyReader {
   CdrError error_ = CdrError::Truncated;
 };
 
-/// Writes fields, aligned from the first byte of the body. Precondition: the buffer is large
-/// enough.
+/// Writes fields of the CDR body; alignment counts from its first byte. Precondition: the buffer is
+/// large enough for all fields.
 class BodyWriter {
  public:
   explicit BodyWriter(std::byte* body) noexcept : body_(body) {}

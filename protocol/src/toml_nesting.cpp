@@ -12,7 +12,7 @@ class TomlNesting {
  public:
   explicit TomlNesting(std::string_view text) : text_(text) {}
 
-  /// Offset at which the depth first exceeds `most`.
+  /// Offset of the byte at which the nesting depth first exceeds `most`.
   std::optional<std::size_t> exceeds(std::size_t most) {
     while (at_ < text_.size()) {
       step();
@@ -107,7 +107,7 @@ class TomlNesting {
   bool line_begins_ = true;
   bool in_header_ = false;
   std::size_t header_ = 0;  // levels of the present table name
-  // Dots of the current key, for each open array or inline table.
+  // One entry for each open array or inline table: the number of dots in its current key.
   std::vector<std::size_t> open_ = {0};
   std::size_t dots_in_all_ = 0;
 };

@@ -13,7 +13,7 @@ constexpr std::size_t kMaxPdoBits = 64;
 constexpr std::uint8_t kErrorsKept = 4;
 constexpr std::uint16_t kDefaultTimerMs = 100;
 
-/// 0 (TPDO 1) or 1 (TPDO 2) if `index` is base or base + 1; nullopt otherwise.
+/// Number of the TPDO: 1 if `index` is `base`, 2 if it is base + 1; nullopt for any other index.
 std::optional<unsigned> pdo_of(std::uint16_t index, std::uint16_t base) noexcept {
   if (index < base || index > base + 1) return std::nullopt;
   return static_cast<unsigned>(index - base + 1);

@@ -105,7 +105,7 @@ tl::expected<double, LineError> Scanner::number() ABBE_RT {
   double value = 0.0;
   const char* const end = rest_.data() + *length;
   const auto read = std::from_chars(rest_.data() + sign, end, value);
-  // Out of range: the exponent is too large for a double.
+  // read.ec is also set if the exponent is too large for a double.
   if (read.ec != std::errc{} || read.ptr != end) return tl::unexpected(LineError::BadNumber);
   rest_.remove_prefix(*length);
   return value;

@@ -1,6 +1,6 @@
 #pragma once
-/// Reads a line of I++ DME from the left. Each function consumes the element in its name, or
-/// nothing.
+/// Reads a line of I++ DME from the left. Each function is named after an element: it consumes this
+/// element if the rest of the line begins with it, and nothing if not.
 
 #include <optional>
 #include <string_view>

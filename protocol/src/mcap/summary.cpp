@@ -15,7 +15,8 @@ bool keep(std::vector<T>& kept, Bytes content) {
   return record.has_value();
 }
 
-/// False if the record cannot be decoded. Opcodes that the summary does not need are ignored.
+/// Adds the record to the summary. False if the record cannot be decoded. Opcodes that the summary
+/// does not need are ignored.
 bool keep(Summary& summary, const Record& record) {
   switch (record.opcode) {
     case Opcode::Schema:

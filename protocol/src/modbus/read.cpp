@@ -33,7 +33,8 @@ bool crc_agrees(std::span<const std::byte> frame) ABBE_RT {
   return ByteReader{frame.last(kCrcSize)}.little<std::uint16_t>() == crc16(body);
 }
 
-/// Unit, function and the data after them, for either transport. nullopt: more bytes are needed.
+/// Decodes the part of an answer that is the same over TCP and RTU: unit, function and data.
+/// nullopt: more bytes are needed.
 Outcome decode_body(std::span<const std::byte> body, const ReadRequest& request) ABBE_RT {
   if (!body.empty() && u8(body[0]) != request.unit) return fail(DecodeError::Unit);
   if (body.size() < 2) return std::nullopt;

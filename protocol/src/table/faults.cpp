@@ -7,7 +7,7 @@ namespace abbe::protocol {
 
 namespace {
 
-/// "ball[].radius_mm" of "ball[3].radius_mm"
+/// The key without the numbers of its elements: "ball[].radius_mm" for "ball[3].radius_mm".
 std::string without_indices(std::string_view key) {
   std::string result;
   for (const char c : key) {
@@ -121,7 +121,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-/// "min" or "min_m" for "min_mm": the word is right, the unit is not.
+/// True if only the unit differs, such as "min" or "min_m" for "min_mm".
 bool differs_in_unit(std::string_view word, std::string_view known) {
   const auto stem = known.substr(0, known.rfind('_'));
   return stem.size() < known.size() && (word == stem || word.substr(0, word.rfind('_')) == stem);

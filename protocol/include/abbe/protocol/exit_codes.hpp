@@ -23,7 +23,7 @@ enum class ExitCode : int {
   return static_cast<int>(code);
 }
 
-/// An exit code of one program. `meaning` empty: the meaning that all programs share.
+/// An exit code of one program. An empty `meaning` stands for the meaning that all programs share.
 struct ExitCodeLine {
   ExitCode code = ExitCode::Done;
   std::string_view meaning = {};

@@ -46,7 +46,7 @@ enum class CdrError : std::uint8_t {
 /// sufficient.
 [[nodiscard]] tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value,
                                                              std::span<std::byte> out) noexcept;
-/// Bytes after the last field are ignored (CDR pads payloads to four bytes).
+/// Decodes a RawBytes. Bytes after the last field are ignored (CDR pads payloads to four bytes).
 [[nodiscard]] tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(
     std::span<const std::byte> cdr) noexcept;
 

@@ -66,7 +66,7 @@ struct TrackerPoint {
   std::int32_t device_status = 0;       ///< the point status as the device sent it
 };
 
-/// All axes of one encoder bus at one SYNC (or one scan).
+/// All axes of one encoder bus at one SYNC, or of one counter card at one scan.
 struct AxisSample {
   SampleHead head;
   std::uint32_t cycle = 0;  ///< SYNC or scan number since start, wraps
@@ -83,7 +83,7 @@ enum class TouchLatch : std::uint8_t {
   Reported = 2,  ///< the measuring machine latched and reports the position
 };
 
-/// Quality of a touch; a bit set. None: a valid touch without restrictions.
+/// Quality of a touch; a set of bits. None: a valid touch without restrictions.
 enum class TouchFlag : std::uint32_t {
   None = 0,
   Chattered = 1u << 0,     ///< more edges followed within the chatter limit; the first one is used

@@ -26,7 +26,8 @@ inline constexpr std::uint16_t kTpdoParameters = 0x1800;
 inline constexpr std::uint16_t kTpdoMapping = 0x1A00;  ///< + TPDO number - 1
 
 inline constexpr ObjectId kOperatingParameters{0x6000, 0};  ///< u16
-/// Bit of 6000h, rotary. Set: 6001h and 6002h apply; else 6501h and 6502h.
+/// Bit of 6000h of rotary encoders. Set: 6001h and 6002h determine resolution and range; not set:
+/// 6501h and 6502h do.
 inline constexpr std::uint16_t kScalingOn = 0x0004;
 inline constexpr ObjectId kUnitsPerRevolution{0x6001, 0};  ///< u32, rotary
 inline constexpr ObjectId kTotalRange{0x6002, 0};          ///< u32, measuring units

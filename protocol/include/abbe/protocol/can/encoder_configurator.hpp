@@ -99,7 +99,7 @@ struct ConfigurationError {
   AbortCode abort_code = AbortCode::None;
   std::uint32_t seen = 0;
 };
-/// "does not answer", "refused", ... Static storage.
+/// Text of a fault: "does not answer", "refused", ... Static storage.
 [[nodiscard]] const char* to_text(ConfigurationFault fault) noexcept;
 
 class EncoderConfigurator {

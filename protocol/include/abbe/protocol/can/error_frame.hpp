@@ -37,7 +37,7 @@ struct BusReport {
   std::uint8_t transmit_errors = 0;  ///< valid with has_counters
   std::uint8_t receive_errors = 0;
 };
-/// nullopt when it is not an error frame.
+/// The report in an error frame; nullopt for any other frame.
 [[nodiscard]] std::optional<BusReport> decode_error_frame(const CanFrame& frame) ABBE_RT;
 /// An error frame with these conditions, for simulators; data[6..7] hold the counters.
 [[nodiscard]] CanFrame encode_error_frame(const BusReport& report) ABBE_RT;

@@ -60,7 +60,7 @@ class ObjectDictionary {
 
   // Access by SDO, under all rules. AbortCode::None: the access is accepted.
   [[nodiscard]] AbortCode write(ObjectId object, std::span<const std::byte> value) noexcept;
-  /// Copies the value into `out` (kMaxSdoBytes are sufficient) and sets `size`.
+  /// Reads an object: copies its value into `out` (kMaxSdoBytes are sufficient) and sets `size`.
   [[nodiscard]] AbortCode read(ObjectId object, std::span<std::byte> out,
                                std::size_t& size) const noexcept;
   /// AbortCode::None if the access rights permit reading (writing) the object. may_write() does not

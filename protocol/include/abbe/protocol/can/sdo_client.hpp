@@ -50,7 +50,7 @@ class SdoClient {
   [[nodiscard]] HostTime deadline() const noexcept {
     return state_ == State::Busy ? deadline_ : HostTime::max();
   }
-  /// The reason in state Failed; None otherwise.
+  /// Why the transfer failed, in state Failed; AbortCode::None in other states.
   [[nodiscard]] AbortCode abort_code() const noexcept { return abort_code_; }
   /// True if the server sent the abort, false if this client did.
   [[nodiscard]] bool aborted_by_server() const noexcept { return aborted_by_server_; }

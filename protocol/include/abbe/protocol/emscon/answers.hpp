@@ -101,7 +101,7 @@ struct TriggerBoardInfoAnswer {
   std::int32_t max_trigger_frequency_hz = 0;
   std::int32_t error = 0;
 };
-/// 164 bytes. Only the named fields are used; `other` and `more` are raw bytes.
+/// An answer of 164 bytes. Only the named fields are used; `other` and `more` are raw bytes.
 struct TrackerInfoAnswer {
   static constexpr Command kCommand = Command::GetTrackerInfo;
   Status status = Status::Ok;

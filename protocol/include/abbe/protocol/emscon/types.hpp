@@ -228,7 +228,7 @@ enum class PointStatus : std::int32_t {
 };
 enum class RegionType : std::int32_t { Sphere = 0, Box = 1 };
 enum class TargetType : std::int32_t { CornerCube = 1, CatEye = 2, GlassPrism = 3, Rfi = 4 };
-/// Standard: results of type 2 and 3. Extended: results of type 9 and 10.
+/// Standard: results are packets of type 2 and 3. Extended: of type 9 and 10.
 enum class StatisticMode : std::int32_t { Standard = 0, Extended = 1 };
 enum class TriggerSource : std::int32_t { Internal = 1, External = 2, ExternalEventMessage = 3 };
 enum class ClockTransition : std::int32_t { Negative = 0, Positive = 1 };

@@ -86,7 +86,7 @@ struct Argument {
 class ArgumentReader {
  public:
   explicit ArgumentReader(std::string_view text) ABBE_RT : rest_(text) {}
-  /// nullopt at the end, and after an error was returned.
+  /// The next argument; nullopt at the end, and after an error was returned.
   [[nodiscard]] std::optional<tl::expected<Argument, LineError>> next() ABBE_RT;
 
  private:
@@ -101,7 +101,7 @@ struct PointReport {
   std::array<double, 3> ijk{};
   bool has_ijk = false;
 };
-/// Ignores properties other than X, Y, Z and IJK.
+/// Parses the data of a PointReport. Properties other than X, Y, Z and IJK are ignored.
 [[nodiscard]] tl::expected<PointReport, LineError> parse_point(std::string_view data) ABBE_RT;
 
 /// A number in the grammar of I++ DME, with at most 16 digits. NaN and infinity become 0.

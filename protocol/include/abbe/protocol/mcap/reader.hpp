@@ -22,8 +22,8 @@ struct Record {
   }
 };
 
-/// Returns the records one by one until the bytes end. For a data section, the records of a chunk,
-/// or a summary.
+/// Returns the records one by one until the bytes end. The bytes may be a data section, the records
+/// of a chunk, or a summary.
 class RecordReader {
  public:
   enum class State : std::uint8_t {
@@ -65,8 +65,8 @@ class MessageReader {
 struct ScannedChunk {
   enum class State : std::uint8_t {
     Whole,  ///< complete; the checksum is correct or absent
-    /// the file ends in the chunk: `chunk.records` has the existing bytes, its last record may be
-    /// cut
+    /// the file ends within the chunk: `chunk.records` has the bytes that exist, and its last
+    /// record may be incomplete
     Cut,
     BadCrc,      ///< complete in length, but the checksum is wrong
     Compressed,  ///< compressed chunks are not supported
@@ -128,7 +128,7 @@ struct Summary {
 /// The record at the offset of an index; nullopt if no record with opcode `expected` starts there.
 [[nodiscard]] std::optional<Record> record_at(Bytes file, std::uint64_t offset,
                                               Opcode expected) noexcept;
-/// The chunk at `offset` of a file, checked as by a scan.
+/// The chunk at `offset` of a file, checked as LinearScan does.
 [[nodiscard]] std::optional<ScannedChunk> chunk_at(Bytes file, std::uint64_t offset) noexcept;
 
 }  // namespace abbe::protocol::mcap

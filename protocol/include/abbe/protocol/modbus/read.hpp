@@ -47,17 +47,19 @@ struct Answer {
   std::span<const std::byte> registers;  ///< 2 * count bytes; empty with an exception
   std::optional<std::uint8_t> exception;
 };
-/// "illegal data address" and so on; "exception" for a code that is not in the standard.
+/// Text of an exception code, such as "illegal data address"; "exception" for a code that is not in
+/// the standard.
 [[nodiscard]] std::string_view name_of_exception(std::uint8_t code) noexcept;
 
-/// Returns the number of bytes written, 0 if `out` is too small. [Modbus V1.1b3] 6.3
+/// Writes the request to `out`. Returns the number of bytes, 0 if `out` is too small. [Modbus
+/// V1.1b3] 6.3
 std::size_t encode(const ReadRequest& request, Transport transport,
                    std::span<std::byte> out) ABBE_RT;
 /// Decodes a complete request frame, as recorded or as received by a server.
 [[nodiscard]] tl::expected<ReadRequest, DecodeError> decode_request(
     std::span<const std::byte> frame, Transport transport) ABBE_RT;
-/// nullopt: `bytes` are the beginning of a valid answer, more bytes are needed. An error is
-/// returned as soon as it is detected.
+/// Decodes the answer to `request`. nullopt: `bytes` are the beginning of a valid answer, and more
+/// bytes are needed. An error is returned as soon as it is detected.
 [[nodiscard]] std::optional<tl::expected<Answer, DecodeError>> decode_answer(
     std::span<const std::byte> bytes, Transport transport, const ReadRequest& request) ABBE_RT;
 [[nodiscard]] std::uint16_t crc16(std::span<const std::byte> bytes) ABBE_RT;

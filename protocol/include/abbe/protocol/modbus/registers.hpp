@@ -19,8 +19,8 @@ enum class WordOrder : std::uint8_t { HighFirst, LowFirst };
              : 2;
 }
 
-/// `bytes` has 2 * register_count(type) bytes. NaN for a Float32 that is not finite and for BCD
-/// digits above 9.
+/// The value in `bytes`, which has 2 * register_count(type) bytes. NaN for a Float32 that is not
+/// finite and for BCD digits above 9.
 [[nodiscard]] double decode_register(std::span<const std::byte> bytes, RegisterType type,
                                      WordOrder order) ABBE_RT;
 

@@ -125,7 +125,7 @@ struct Status {
          setup.index == static_cast<std::uint16_t>(where);
 }
 
-/// The answer to a read; nullopt unless it has two bytes.
+/// The word in the answer to a read; nullopt unless the answer has two bytes.
 [[nodiscard]] std::optional<std::uint16_t> decode_word(std::span<const std::byte> bytes) ABBE_RT;
 
 }  // namespace abbe::protocol::quad08

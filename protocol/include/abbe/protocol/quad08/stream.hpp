@@ -45,9 +45,10 @@ class ScanDecoder {
     carried_ = 0;
     bytes_ = {};
   }
-  /// The bytes must remain valid until next() returns nullopt.
+  /// Takes bytes of the stream, which must remain valid until next() returns nullopt.
   void push(std::span<const std::byte> bytes) ABBE_RT { bytes_ = bytes; }
-  /// The next complete scan; nullopt if more bytes are needed. An incomplete scan is stored.
+  /// The next complete scan; nullopt if more bytes are needed. Bytes of an incomplete scan are
+  /// kept.
   [[nodiscard]] std::optional<RawScan> next() ABBE_RT;
 
   [[nodiscard]] const ScanLayout& layout() const ABBE_RT { return layout_; }

@@ -30,7 +30,7 @@ class Faults {
   [[nodiscard]] bool any() const noexcept { return count_ > 0; }
   [[nodiscard]] std::size_t count() const noexcept { return count_; }  ///< of the calls of add()
   [[nodiscard]] std::string heading() const;                           ///< "t.csv: 3 faults"
-  /// The lines that are shown, and one that counts the others.
+  /// The lines for the user: the faults that are shown, and a last line that counts the others.
   [[nodiscard]] std::vector<std::string> lines() const;
 
  private:

@@ -56,7 +56,8 @@ class NumberTable {
   std::vector<bool> sound_;
 };
 
-/// Called while a text is read, with ascending 0 <= fraction <= 1. May be empty.
+/// Called repeatedly while a text is read; `fraction` ascends from 0 to 1. The function object may
+/// be empty.
 using ReadProgress = std::function<void(double fraction)>;
 
 /// Adds one fault to `faults` for each error in the text. nullopt if the header is invalid.

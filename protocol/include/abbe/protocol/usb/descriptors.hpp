@@ -31,7 +31,7 @@ struct DeviceDescriptor {
 inline constexpr std::size_t kDeviceDescriptorSize = 18;
 [[nodiscard]] std::array<std::byte, kDeviceDescriptorSize> encode(
     const DeviceDescriptor& descriptor) ABBE_RT;
-/// nullopt if too short or not a device descriptor.
+/// nullopt if `bytes` are too few or not a device descriptor.
 [[nodiscard]] std::optional<DeviceDescriptor> decode_device_descriptor(
     std::span<const std::byte> bytes) ABBE_RT;
 

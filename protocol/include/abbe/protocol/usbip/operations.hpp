@@ -116,7 +116,7 @@ inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSiz
 // Each encoder returns the number of bytes written, 0 if `out` is too small.
 std::size_t encode_device_list_request(std::span<std::byte> out) ABBE_RT;
 std::size_t encode_import_request(const BusId& bus_id, std::span<std::byte> out) ABBE_RT;
-/// A refusal (`device` null) consists of the head only.
+/// Encodes the reply to an import request. A refusal (`device` null) consists of the head only.
 std::size_t encode_import_reply(OpStatus status, const ExportedDevice* device,
                                 std::span<std::byte> out) ABBE_RT;
 [[nodiscard]] tl::expected<BusId, OpError> decode_import_request(

@@ -25,7 +25,7 @@ CardAxis read_card_axis(TomlSection& section) {
   return axis;
 }
 
-/// The keys of every card: its address, its clock and its probe channels.
+/// Reads the keys that every card has: its address, its clock and its probe channels.
 CounterCardSetup read_card(TomlSection& section) {
   CounterCardSetup card;
   section.port("port", card.port);
@@ -40,7 +40,7 @@ CounterCardSetup read_card(TomlSection& section) {
   return card;
 }
 
-/// A scale of [counter_card] with its reference marks.
+/// Reads an axis of [reference]: a scale of [counter_card] with its reference marks.
 CardAxis read_marked_axis(TomlSection& section, const CounterCardSetup& live) {
   CardAxis axis;
   std::string name;

@@ -7,11 +7,12 @@
 
 namespace abbe::sim {
 
-/// The daemon's [counter_card]: the wiring of the card.
+/// Reads the daemon's [counter_card]: the wiring of the card.
 void read_counter_card(TomlSection section, SimulationSetup& simulation);
-/// The daemon's [reference]: a second card on the same scales, with their marks.
+/// Reads the daemon's [reference]: adds a second card that counts the same scales and has their
+/// reference marks.
 void read_reference(TomlSection section, SimulationSetup& simulation);
-/// [sim.counter_card]: properties of the simulation that [counter_card] does not contain.
+/// Reads [sim.counter_card]: properties of the simulation that [counter_card] does not contain.
 void read_sim_counter_card(TomlSection section, SimulationSetup& simulation);
 
 }  // namespace abbe::sim

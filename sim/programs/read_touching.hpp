@@ -8,7 +8,7 @@ namespace abbe::sim {
 
 /// [sim.evemu].
 void read_sim_evemu(TomlSection section, LoadedSetup& setup);
-/// [sim.ball_array]: how the true array differs from its calibrator.toml.
+/// Reads [sim.ball_array]: how the true array differs from its calibrator.toml.
 void read_ball_array(TomlSection section, ArrayState& array);
 
 }  // namespace abbe::sim

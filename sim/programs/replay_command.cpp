@@ -47,7 +47,7 @@ Result<void> read_places(const ReplayOptions& options, ReplaySetup& setup) {
   return {};
 }
 
-/// The serial numbers that the daemon expected of its cards when it recorded them.
+/// Reads from the recorded configuration the serial numbers that the daemon expected of its cards.
 void read_serials(const std::string& configuration, std::map<std::string, std::string>& serials) {
   const auto root = parse_toml(configuration, "recorded configuration");
   // The configuration may be of a daemon version that abbe-sim cannot read: the bytes are replayed

@@ -45,10 +45,10 @@ struct LoadedSetup {
   double speed = 1.0;
 };
 
-/// --config, --machine, --seed, --truth.
+/// Adds the options --config, --machine, --seed and --truth.
 void add_machine_options(CLI::App& app, SetupChoices& choices);
 
-/// BadInput with every fault of a file at once, Io for a file that cannot be read.
+/// Error BadInput with every fault of a file at once, Io for a file that cannot be read.
 [[nodiscard]] Result<LoadedSetup> load_setup(const SetupChoices& choices);
 
 }  // namespace abbe::sim

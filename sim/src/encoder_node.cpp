@@ -104,7 +104,8 @@ void EncoderNode::on_nmt(const can::NmtMessage& message, HostTime at) {
     case can::NmtCommand::PreOperational:
       state_ = can::NodeState::PreOperational;
       break;
-    // Both reset the PDO configuration: this encoder does not store it in non-volatile memory.
+    // Both commands reset the PDO configuration: this encoder does not store it in non-volatile
+    // memory.
     case can::NmtCommand::ResetNode:
     case can::NmtCommand::ResetCommunication:
       boot(at, true);

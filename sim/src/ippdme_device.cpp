@@ -9,7 +9,7 @@ namespace abbe::sim {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1e3;
-// the specification allows at most 10 reports per second
+// shortest interval of reports: the specification allows at most 10 per second
 constexpr auto kFastestReport = std::chrono::milliseconds{100};
 
 using ippdme::Argument;

@@ -93,7 +93,7 @@ void RecordedTracker::take_answer(std::int32_t command, std::span<const std::byt
   auto exchange = std::ranges::find_if(
       exchanges, [](const Exchange& e) { return e.answers.size() < e.wanted; });
 
-  // A recording that began during a session contains answers without commands.
+  // A recording that began during a session may contain an answer, but not its command.
   if (exchange == exchanges.end()) exchange = exchanges.insert(exchange, {.asked = time});
   if (command == kReflectors) {  // the only command with several answers: one per reflector
     const auto first = emscon::decode_answer(packet);

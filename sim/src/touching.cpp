@@ -105,7 +105,7 @@ class Planner {
     drive_to(before_m, options_.retract_m_per_s);
   }
 
-  /// Feed 0: the travel feed. Adds no leg if the machine is already there.
+  /// Adds a leg to `place_m`; no leg if the machine is already there. Feed 0: the travel feed.
   void drive_to(const Vector3d& place_m, double feed_m_per_s = 0.0) {
     const Vector3d q_m = reading_at_m(truth_, place_m);
     auto& vertices = program_.path.vertices;
@@ -140,7 +140,7 @@ double contact_s(const ProbingMove& move, const TruthMachine& truth, const PathM
 
 Vector3d reading_at_m(const TruthMachine& truth, const Vector3d& place_m) {
   constexpr int kMostSteps = 200;  // twenty suffice for slopes of V near 0.2
-  // exact equality is rarely reached: the last bit alternates
+  // A step below this ends the iteration. A step of 0 is rarely reached: the last bit alternates.
   constexpr double kNothing_m = 1e-14;
   Vector3d q_m = place_m;
   for (int i = 0; i < kMostSteps; ++i) {

@@ -33,7 +33,7 @@ struct ArrivedFrame {
 
 class CanPort {
  public:
-  /// Io when the port is taken, or there is no such interface.
+  /// Error Io if the port is in use, or if there is no such interface.
   [[nodiscard]] static Result<std::unique_ptr<CanPort>> open(const CanPortOptions& options);
 
   CanPort() = default;

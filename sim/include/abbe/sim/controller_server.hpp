@@ -21,7 +21,7 @@ namespace abbe::sim {
 template <class Controller>
 class ControllerServer {
  public:
-  /// On 127.0.0.1; port 0: the kernel chooses.
+  /// Listens on 127.0.0.1; port 0: the kernel chooses the port.
   [[nodiscard]] static Result<ControllerServer> open(std::uint16_t port,
                                                      std::unique_ptr<Controller> controller) {
     auto listener = listen_tcp(port);
@@ -35,9 +35,9 @@ class ControllerServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }
   [[nodiscard]] int client_fd() const { return client_.get(); }  ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
-  /// From now on each poll() sends at most `bytes`, to simulate segments that arrive one by one.
-  /// The caller decides when the next poll() sends more; a loop that waits with add_poll_fds()
-  /// sends it at once.
+  /// From now on each poll() sends at most `bytes`, to simulate segments that arrive one by one. A
+  /// caller that decides itself when to poll can delay the next segment; a loop that waits with
+  /// add_poll_fds() sends it at once.
   void send_per_poll(std::size_t bytes) { most_per_poll_ = bytes; }
   /// Adds the sockets to wait for, in addition to next_due().
   void add_poll_fds(std::vector<pollfd>& fds) const {

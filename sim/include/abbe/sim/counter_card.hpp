@@ -44,7 +44,7 @@ struct ClockSignal {
   double hz = 10e6;
   double deviation_ppm = 0.0;  ///< against the host's clock
 };
-/// The card's own timer output 0: runs after the command to start it.
+/// The card's own timer output 0, which runs after the command that starts it.
 struct TimerSignal {};
 /// A counter of probe edges: each trigger of the probe is one edge.
 struct ProbeSignal {};
@@ -87,7 +87,7 @@ class CounterCard final : public ExportedCard {
   /// Adds an edge of the probe at `at`: not earlier than the previous edges nor than the scans
   /// already made.
   void add_probe_edge(HostTime at);
-  /// Power off and on: registers, counters and FIFO as new.
+  /// Switches the power off and on: registers, counters and FIFO are as in a new card.
   void restart();
 
   // Fault injection.

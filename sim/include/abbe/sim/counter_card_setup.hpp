@@ -12,7 +12,7 @@
 namespace abbe::sim {
 
 struct CardAxis {
-  /// X, Y, Z follow the path; any other: a rotary axis with sinusoidal motion
+  /// name of the axis: X, Y, Z follow the path; any other is a rotary axis with sinusoidal motion
   std::string name = "X";
   std::uint8_t channel = 0;
   double step = 10e-9;  ///< m or rad per count; negative: counts fall as the reading rises

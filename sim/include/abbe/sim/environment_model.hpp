@@ -12,7 +12,8 @@ namespace abbe::sim {
 
 inline constexpr std::size_t kSimulatedInputs = 8;
 
-/// mean + drift * t + swing * sin(2 pi t / period), in the unit of the quantity.
+/// Course of a quantity over the time t, in the unit of the quantity:
+///   mean + drift * t + swing * sin(2 pi t / period)
 struct Course {
   double mean = 0.0;
   double drift_per_hour = 0.0;

@@ -15,12 +15,12 @@ class ErrorFunction {
  public:
   /// The function that is 0 everywhere.
   ErrorFunction() = default;
-  /// `nodes_m` ascending, at least two, one value each (m for translations, rad for rotations);
-  /// asserted.
+  /// Precondition (asserted): `nodes_m` ascending, at least two, one value for each (m for
+  /// translations, rad for rotations).
   ErrorFunction(std::vector<double> nodes_m, std::vector<double> values,
                 Shape shape = Shape::Linear);
 
-  /// sum of coefficient[k] position^k, SI. A polynomial has no nodes of a table.
+  /// The polynomial sum of coefficient[k] position^k, SI. It has no nodes of a table.
   [[nodiscard]] static ErrorFunction polynomial(std::vector<double> coefficients);
   /// This function plus amplitude sin(2 pi position / period).
   [[nodiscard]] ErrorFunction with_wave(double amplitude, double period_m) const;

@@ -29,12 +29,13 @@ enum class FaultKind {
   Bundled,     ///< frames are held back and sent together every `value` s, as by a tunnel
   Overflow,    ///< error frame: receive overflow of the CAN controller
   BusOff,      ///< error frame bus-off, silence, then the error frame restarted
-  // environment; also Mute, Late and Disconnect (port or terminal closed for `duration_s`)
+  // Environment devices; they also have Mute, Late and Disconnect (port or terminal closed for
+  // `duration_s`).
   ModbusException,  ///< every request is answered with exception `value` (0: 6, busy)
   ModbusGarbage,    ///< bytes instead of answers
   WrongMap,         ///< every register is one address higher
   SensorsGone,      ///< the probe is unplugged, the sensor wires are broken
-  // counter card; also Mute, Stall and Disconnect
+  // Counter cards; they also have Mute, Stall and Disconnect.
   Unplug,       ///< removed from the bus; back after `duration_s` with all counters at zero
   CardRestart,  ///< power off and on
   Overrun,      ///< the FIFO is full: no more scans until it is reset
@@ -42,7 +43,7 @@ enum class FaultKind {
   ClockJump,    ///< the counted clock jumps by `value` counts
   UsbGarbage,   ///< bytes that are not USB/IP
   FailRequest,  ///< the next `value` control transfers fail (0: one)
-  // measuring machine; also Mute and Disconnect
+  // Measuring machines; they also have Mute and Disconnect.
   EmergencyStop,  ///< the button is pressed; it is released after `duration_s`
   ErrorReport,    ///< an error of severity `value` that belongs to no command
   OddTag,         ///< an answer with the tag of a command that was not sent
@@ -68,7 +69,8 @@ struct ScheduledFault {
   Fault fault;
 };
 
-/// The kind by its name in a configuration ("beam_break", "late", ...), for this device only.
+/// The kind with this name in a configuration ("beam_break", "late", ...), among the kinds of
+/// `target`.
 [[nodiscard]] std::optional<FaultKind> fault_kind(FaultTarget target, std::string_view name);
 
 }  // namespace abbe::sim

@@ -13,7 +13,8 @@ class FaultTimetable {
  public:
   void add(const ScheduledFault& fault);  ///< in any order; only before the first take_due()
 
-  /// HostTime::max(): no fault is left, or the machine has not started to move.
+  /// Time of the next fault; HostTime::max(): no fault is left, or the machine has not started to
+  /// move.
   [[nodiscard]] HostTime next_due(const VirtualMachine& machine) const;
   /// The next fault if it is due, else nullptr. Valid until add().
   [[nodiscard]] const ScheduledFault* take_due(const VirtualMachine& machine, HostTime now);

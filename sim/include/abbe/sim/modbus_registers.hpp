@@ -17,7 +17,7 @@ enum class ModbusModel {
   CometT7510,    ///< any unit; read-only
   Zt2005C8,      ///< eight inputs, engineering units
 };
-/// "indigo520_hmp", "comet_t7510", "zt2005_c8".
+/// The model of the name "indigo520_hmp", "comet_t7510" or "zt2005_c8"; nullopt for any other name.
 [[nodiscard]] std::optional<ModbusModel> modbus_model(std::string_view name);
 
 enum class RegisterSpace { Holding, Input };

@@ -35,7 +35,7 @@ struct ModbusServerOptions {
 
 class ModbusServer {
  public:
-  /// Io: the port is in use, there is no pseudo terminal or the link cannot be created.
+  /// Error Io: the port is in use, there is no pseudo terminal or the link cannot be created.
   [[nodiscard]] static Result<ModbusServer> open(const ModbusServerOptions& options, HostTime now);
   ModbusServer(ModbusServer&&) noexcept;
   ModbusServer& operator=(ModbusServer&&) noexcept;
@@ -49,7 +49,7 @@ class ModbusServer {
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::uint16_t port() const;  ///< 0 on a pseudo terminal
   [[nodiscard]] std::string path() const;    ///< of the pseudo terminal's link, empty with TCP
-  /// "Modbus TCP on 127.0.0.1:40001", "Modbus RTU on /tmp/rtd"
+  /// Text such as "Modbus TCP on 127.0.0.1:40001" or "Modbus RTU on /tmp/rtd".
   [[nodiscard]] std::string where() const;
 
  private:

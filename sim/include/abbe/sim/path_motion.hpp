@@ -33,8 +33,8 @@ struct AxisMotion {
 
 class PathMotion {
  public:
-  /// BadInput unless there is a vertex and feed and acceleration are positive. Legs of length zero
-  /// are skipped.
+  /// Error BadInput unless there is a vertex and feed and acceleration are positive. Legs of length
+  /// zero are skipped.
   [[nodiscard]] static Result<PathMotion> plan(const PathPlan& plan);
 
   [[nodiscard]] AxisMotion at(double time_s) const;
@@ -60,9 +60,9 @@ class PathMotion {
   std::vector<Leg> legs_;
 };
 
-/// The text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` is the
-/// file name in the error text, which lists every bad line (at most 20). An empty feed cell means
-/// the plan's feed.
+/// Parses the text of path.csv: header `x_mm,y_mm,z_mm[,feed_mm_per_min]`, `#` comments. `name` is
+/// the file name in the error text, which lists every bad line (at most 20). An empty feed cell
+/// means the plan's feed.
 [[nodiscard]] Result<std::vector<PathVertex>> parse_path_csv(std::string_view text,
                                                              std::string_view name);
 

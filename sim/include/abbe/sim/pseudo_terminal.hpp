@@ -13,8 +13,8 @@ namespace abbe::sim {
 class PseudoTerminal {
  public:
   PseudoTerminal() = default;  ///< closed
-  /// Creates the symbolic link `link` to the client's end; an existing link is replaced. Io: there
-  /// is no pseudo terminal or the link cannot be created.
+  /// Creates the symbolic link `link` to the client's end; an existing link is replaced. Error Io:
+  /// there is no pseudo terminal or the link cannot be created.
   [[nodiscard]] static Result<PseudoTerminal> open(const std::string& link);
   PseudoTerminal(PseudoTerminal&& other) noexcept = default;
   PseudoTerminal& operator=(PseudoTerminal&& other) noexcept = default;

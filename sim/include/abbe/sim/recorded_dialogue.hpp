@@ -31,7 +31,7 @@ struct DialogueWire {
   /// The answer to a request that is not in the recording.
   std::vector<std::byte> (*refusal)(Bytes request) = nullptr;
 };
-/// For ModbusTcp, ModbusRtu and MeasuringMachine.
+/// How requests of ModbusTcp, ModbusRtu or MeasuringMachine are split and compared.
 [[nodiscard]] const DialogueWire& dialogue_wire(RecordedKind kind);
 
 class RecordedDialogue {
@@ -84,7 +84,7 @@ class RecordedDialogue {
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
   bool played_ = false;  ///< a client has connected before
-  /// number of answers on the present connection, by meaning
+  /// number of answers given on the present connection, by the meaning() of their requests
   std::map<std::string, std::size_t> answered_;
   std::vector<std::byte> incoming_;
   std::deque<Due> due_;

@@ -82,7 +82,7 @@ class RecordedTracker {
   std::size_t connection_ = 0;
   bool played_ = false;                   ///< a client has connected before
   std::optional<HostTime> connected_at_;  ///< nullopt: no client
-  /// number of answers on the present connection, by command
+  /// number of answers given on the present connection, by command
   std::map<std::int32_t, std::size_t> answered_;
   std::deque<Due> due_;
   std::size_t next_ = 0;   ///< index of the next unsolicited packet

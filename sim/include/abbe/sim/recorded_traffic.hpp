@@ -25,7 +25,7 @@ struct RecordedBlock {
   /// An empty block from a device: a connection begins (of encoders: no frame arrived until this
   /// time).
   [[nodiscard]] bool connects() const { return !to_device && bytes.empty(); }
-  /// An empty block to a device: the connection was lost; the daemon did not close it.
+  /// An empty block to a device: the connection was lost, and it was not the daemon that closed it.
   [[nodiscard]] bool lost() const { return to_device && bytes.empty(); }
 };
 
@@ -51,12 +51,13 @@ struct RecordedDevice {
 /// The text of the configuration a recording was made with; empty if there is none.
 [[nodiscard]] std::string recorded_configuration(std::span<const std::byte> file);
 
-/// `name` is the file name in error texts. BadInput: not an MCAP file, or no raw bytes in it.
+/// Reads the raw bytes of all devices. `name` is the file name in error texts. Error BadInput: not
+/// an MCAP file, or no raw bytes in it.
 [[nodiscard]] Result<std::vector<RecordedDevice>> read_traffic(std::span<const std::byte> file,
                                                                std::string_view name);
 
-/// Largest difference between the replay and the recorded time; a replay that is further off is
-/// resynchronised with the timeline.
+/// Largest permitted difference between the time of an event in the replay and the time at which
+/// the timeline maps it. A replay that is further off is synchronised with the timeline again.
 inline constexpr std::chrono::milliseconds kOutOfStep{50};
 
 /// Maps recorded time to replay time. All devices of a replay share one timeline, so that they stay

@@ -54,7 +54,7 @@ struct SimulationSetup {
 
 class Simulation {
  public:
-  /// Opens the sockets. BadInput for an impossible path, Io if a port is in use.
+  /// Opens the sockets. Error BadInput for an impossible path, Io if a port is in use.
   [[nodiscard]] static Result<std::unique_ptr<Simulation>> open(const SimulationSetup& setup,
                                                                 HostTime now);
 

@@ -36,7 +36,8 @@ class Socket {
   int fd_ = -1;
 };
 
-/// Bound to 127.0.0.1; port 0: the kernel chooses. Io if the port is in use; the text names it.
+/// Sockets bound to 127.0.0.1; port 0: the kernel chooses. Error Io if the port is in use; the text
+/// names it.
 [[nodiscard]] Result<Socket> listen_tcp(std::uint16_t port);
 [[nodiscard]] Result<Socket> bind_udp(std::uint16_t port);
 [[nodiscard]] std::uint16_t port_of(const Socket& socket);

@@ -59,7 +59,7 @@ class TrackerDevice {
   [[nodiscard]] std::vector<std::byte> take_output();
   /// The connection is to be closed after the output has been sent.
   [[nodiscard]] bool wants_close() const { return wants_close_; }
-  /// False while the controller restarts: connections are closed at once.
+  /// False while the controller restarts: new connections are then closed at once.
   [[nodiscard]] bool accepts() const { return !booting_until_; }
 
   void inject(const Fault& fault, HostTime now);

@@ -25,7 +25,7 @@ namespace usbip = protocol::usbip;
 
 class UsbipServer {
  public:
-  /// On 127.0.0.1; port 0: the kernel chooses.
+  /// Listens on 127.0.0.1; port 0: the kernel chooses the port.
   [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port, const CounterCardOptions& card);
   [[nodiscard]] static Result<UsbipServer> open(std::uint16_t port,
                                                 std::unique_ptr<ExportedCard> card);

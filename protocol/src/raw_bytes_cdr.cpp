@@ -142,7 +142,7 @@ tl::expected<std::size_t, CdrError> encode_cdr(const RawBytes& value,
 
 tl::expected<RawBytes, CdrError> decode_raw_bytes_cdr(std::span<const std::byte> cdr) noexcept {
   if (cdr.size() < kPlainCdrLe.size()) return unexpected(CdrError::Truncated);
-  // The last two of the four bytes are options, which a reader must ignore.
+  // The last two bytes of the encapsulation header are options, which a reader must ignore.
   if (cdr[0] != kPlainCdrLe[0] || cdr[1] != kPlainCdrLe[1]) return unexpected(CdrError::NotCdrLe);
   BodyReader body{cdr.subspan(kPlainCdrLe.size())};
   RawBytes value;

@@ -85,7 +85,7 @@ class TomlNesting {
       } else if (!multi_line && text_[at_] == '\n') {
         return;  // not closed: the parser reports the error
       } else if (text_[at_] == quote && (!multi_line || closes(quote))) {
-        // Up to two quotes may precede the closing three.
+        // In a multi-line string up to two quotes may precede the closing three.
         return pass_quotes(quote, multi_line ? 5 : 1);
       }
     }

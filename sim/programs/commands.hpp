@@ -27,7 +27,7 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_replay(CLI::App& app);
 [[nodiscard]] Subcommand add_evemu(CLI::App& app);
 
-/// Prints "abbe-sim: " and the text of the error to stderr; returns its exit code.
+/// Prints "abbe-sim: " and the text of the error to stderr; returns the exit code of the error.
 int report(const Error& error);
 
 }  // namespace abbe::sim

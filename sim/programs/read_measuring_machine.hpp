@@ -9,7 +9,8 @@ namespace abbe::sim {
 /// Reads the daemon's table [cmm]: if it exists, there is a measuring machine, with this port and
 /// tool.
 void read_cmm(TomlSection section, SimulationSetup& simulation);
-/// `artefact_file`: the value of the key `artefact`; unchanged without the key.
+/// Reads [sim.cmm]. `artefact_file` becomes the value of the key `artefact`; unchanged without the
+/// key.
 void read_sim_cmm(TomlSection section, SimulationSetup& simulation, std::string& artefact_file);
 /// Reads a calibrator.toml whose blocks contain the positions of their faces. Io, or BadInput with
 /// every fault at once.

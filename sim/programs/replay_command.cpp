@@ -130,7 +130,7 @@ int replay(const ReplayOptions& options) {
 }  // namespace
 
 Subcommand add_replay(CLI::App& app) {
-  // lives as long as the command line's callbacks
+  // `options` lives as long as the callbacks of the command line, which share it
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* sub = app.add_subcommand(
       "replay", "send the raw bytes of a recording again, with their original timing");

@@ -71,7 +71,7 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
   decltype(context_) fresh{make_context(address)};
   if (!fresh) return failed("configure", errno);
 
-  // libmodbus also limits connecting by the response time-out; it rejects values below 1 us.
+  // The response time-out of libmodbus also limits connecting. It must not be below 1 us.
   const auto us = std::max<std::int64_t>(
       std::chrono::duration_cast<std::chrono::microseconds>(wall).count(), 1);
   constexpr std::int64_t kSecond = 1'000'000;

@@ -23,8 +23,8 @@ constexpr double kMetresPerNanometre = 1e-9;
 /// position. After a row of more than 100 they are no longer held, but one position is less than 1
 /// % of that row.
 constexpr std::uint8_t kCyclesToSettle = 100;
-/// The same number after a boot-up or a pause of the SYNC: no answer to an earlier SYNC should be
-/// outstanding then, and one cycle confirms it.
+/// Number of such cycles for an axis that has booted, or after a pause of the SYNC: no answer to an
+/// earlier SYNC should be outstanding then, and one cycle confirms it.
 constexpr std::uint8_t kCyclesToConfirm = 1;
 
 /// Widens u, because the instant is uncertain by +- one period, rectangular. [GUM] 4.3.7.

@@ -85,7 +85,8 @@ tl::expected<Around, InterpolationError> find_around(std::span<const AxisSample>
 
   const auto useful = [span](const AxisSample& left, const AxisSample& right) {
     const auto step = right.head.time - left.head.time;
-    // The bound in u_of_curve() is valid for a ratio up to 1.2.
+    // The neighbouring interval may be at most 1.2 times as long as the enclosing one: the bound in
+    // u_of_curve() is valid up to this ratio.
     return step.count() > 0 && 5 * step <= 6 * span;
   };
 

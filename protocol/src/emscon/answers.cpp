@@ -18,7 +18,8 @@ constexpr std::size_t largest_answer(std::index_sequence<I...>) {
 static_assert(largest_answer(std::make_index_sequence<std::variant_size_v<Answer>>{}) ==
               kMaxAnswerSize);
 
-// The first alternative, Acknowledge, is valid for every command; the others have a kCommand.
+// The first alternative of Answer is Acknowledge, which is valid for every command; each of the
+// others belongs to its kCommand.
 using OwnAnswers = std::make_index_sequence<std::variant_size_v<Answer> - 1>;
 template <std::size_t I>
 using OwnAnswer = std::variant_alternative_t<I + 1, Answer>;

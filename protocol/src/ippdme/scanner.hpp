@@ -21,7 +21,7 @@ class Scanner {
   /// A comma or parenthesis, with optional spaces before and after it.
   bool separator(char c) ABBE_RT;
   [[nodiscard]] std::optional<Tag> tag() ABBE_RT;
-  /// BasicName {"." BasicName}; empty if there is none.
+  /// A name, BasicName {"." BasicName}; empty if there is none.
   [[nodiscard]] std::string_view name() ABBE_RT;
   [[nodiscard]] tl::expected<double, LineError> number() ABBE_RT;
   /// "text" without the quotes.

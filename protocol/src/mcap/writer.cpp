@@ -19,8 +19,8 @@ static_assert(sizeof(IndexEntry) == 16, "index entries are written without paddi
 }  // namespace
 
 ChunkBuilder::ChunkBuilder(std::size_t capacity_bytes) {
-  // The smallest recorded message has about 100 bytes and its index entry 16: one quarter more is
-  // sufficient.
+  // The buffer also holds the indexes. The smallest recorded message has about 100 bytes and its
+  // index entry 16, so one quarter more is sufficient.
   buffer_.reserve(kChunkHeadSize + capacity_bytes + capacity_bytes / 4);
   clear();
 }

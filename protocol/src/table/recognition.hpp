@@ -23,7 +23,8 @@ namespace abbe::protocol {
 /// parsed.
 [[nodiscard]] bool recognised_row(std::string_view line, std::size_t number, Faults& faults);
 
-/// True if decimal commas explain why a row has more cells than columns: no cell has a point.
+/// True if decimal commas explain why a row has more cells than columns: the commas of "0,5" split
+/// its values, and no cell has a decimal point.
 [[nodiscard]] bool has_decimal_commas(std::string_view line, const TableForm& form,
                                       std::size_t columns);
 

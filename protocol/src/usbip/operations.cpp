@@ -184,7 +184,8 @@ tl::expected<DeviceListView, OpError> DeviceListView::parse(
   const auto count = in.big<std::uint32_t>();
   if (!in.ok()) return tl::unexpected{OpError::Truncated};
   const auto devices = bytes.subspan(in.position());
-  // Each device has 312 bytes. If the count exceeds the bytes, the loop ends early.
+  // A device has 312 bytes, followed by its interfaces. If the bytes end before `count` devices
+  // were read, the loop ends early.
   for (std::uint32_t i = 0; i < count && in.ok(); ++i)
     in.skip(kExportedInterfaceSize * take_device(in).interfaces);
   if (!in.ok()) return tl::unexpected{OpError::Truncated};

@@ -32,9 +32,9 @@ struct ClockModelOptions {
   double max_skew = 200e-6;
   /// Upper bound of the smallest delay (device + wire + kernel).
   std::chrono::nanoseconds max_constant_delay = std::chrono::milliseconds{2};
-  /// Largest distance of an arrival from the line that a delay can explain. An arrival further
-  /// below the line means that the device clock jumped, and so do arrivals that stay further above
-  /// it.
+  /// Largest distance of an arrival from the line that a delay can explain. The device clock has
+  /// jumped if an arrival is further below the line, or if arrivals are further above it for
+  /// several seconds.
   std::chrono::nanoseconds jump = std::chrono::milliseconds{50};
   std::size_t settled_after = 30;  ///< observations; 10 s with a packet every 332 ms
 };

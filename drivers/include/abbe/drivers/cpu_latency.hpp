@@ -18,7 +18,8 @@ inline constexpr const char* kCpuLatencyFile = "/dev/cpu_dma_latency";
 /// The limit applies during the lifetime of this object. Child processes do not inherit it.
 class CpuLatencyBound {
  public:
-  /// With 0, idle processors spin instead of sleeping. The error names the file and the reason.
+  /// `at_most`: limit of the wake-up time; 0 makes idle processors spin instead of sleeping. The
+  /// error names the file and the reason.
   [[nodiscard]] static Result<CpuLatencyBound> request(
       std::chrono::microseconds at_most, const std::filesystem::path& file = kCpuLatencyFile);
 

@@ -31,7 +31,7 @@ struct Arrival {
   bool widened = false;  ///< larger u_time: the kernel stamp was missing or rejected
 };
 
-/// Both clocks, read one right after the other around a receive.
+/// Readings of both clocks, taken one right after the other, just before or after a receive.
 struct ClockPair {
   std::chrono::nanoseconds monotonic{};  ///< CLOCK_MONOTONIC, as the system gives it
   std::chrono::nanoseconds realtime{};   ///< CLOCK_REALTIME

@@ -129,7 +129,7 @@ class SessionOverTcp {
   protocol::HostTime arrival_{};  ///< of received(), or of the connection
 
  private:
-  /// With kMostRead = 64 kB these reads are 8 MB: more than the kernel buffers by default for one
+  /// This many reads of kMostRead = 64 kB are 8 MB: more than the kernel buffers by default for one
   /// connection.
   static constexpr std::size_t kMostLateReads = 128;
 

@@ -103,7 +103,7 @@ class ByteWriter {
     if (claim(count) && count != 0) std::memset(end() - count, 0, count);
   }
 
-  /// False once a value did not fit. The values before it are written.
+  /// False once a value did not fit into the buffer. The values before it are written.
   [[nodiscard]] bool ok() const ABBE_RT { return ok_; }
   [[nodiscard]] std::size_t size() const ABBE_RT { return position_; }
   [[nodiscard]] std::span<const std::byte> written() const ABBE_RT {

@@ -39,7 +39,7 @@ class ControllerServer {
   /// caller that decides itself when to poll can delay the next segment; a loop that waits with
   /// add_poll_fds() sends it at once.
   void send_per_poll(std::size_t bytes) { most_per_poll_ = bytes; }
-  /// Adds the sockets to wait for, in addition to next_due().
+  /// Adds to `fds` the sockets that the caller must wait for, until next_due() at the latest.
   void add_poll_fds(std::vector<pollfd>& fds) const {
     add_server_fds(listener_, client_, wants_write(), fds);
   }

@@ -32,7 +32,7 @@ class ExportedCard {
   [[nodiscard]] virtual ControlAnswer answer(const protocol::usb::Setup& setup, HostTime now) = 0;
   /// Makes the scans due until `now`; the host has requested `wanted` bytes.
   virtual void advance(HostTime now, std::size_t wanted) = 0;
-  /// Bytes for the host, oldest first; at most `most`.
+  /// Removes and returns bytes for the host: at most `most`, oldest first.
   [[nodiscard]] virtual std::vector<std::byte> take(std::size_t most) = 0;
   [[nodiscard]] virtual std::size_t available() const = 0;
   /// When `bytes` bytes will be available; HostTime::max() if no scan runs.

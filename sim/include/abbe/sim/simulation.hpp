@@ -29,7 +29,8 @@ struct SimulationSetup {
   /// card scans). false: the motion starts by itself.
   bool start_when_streaming = true;
   bool held = false;  ///< the motion starts only after release()
-  /// Time at standstill before the motion. It begins with the first point or scan, or at the start.
+  /// Time at standstill before the motion. It begins with the first point or scan or, if the motion
+  /// starts by itself, with the simulation.
   std::chrono::nanoseconds standstill = std::chrono::seconds{2};
   std::optional<TrackerOptions> tracker;
   std::uint16_t tracker_port = 0;
@@ -47,7 +48,8 @@ struct SimulationSetup {
   std::optional<IppDmeOptions> measuring_machine;
   std::uint16_t measuring_machine_port = 0;
   std::optional<TouchedSurface> surface;  ///< touched by the probe on the first counter card
-  /// further edges of that probe, s from the start of the motion, ascending
+  /// further edges of the probe on the first counter card, s from the start of the motion,
+  /// ascending
   std::vector<double> edges_s;
   std::vector<ScheduledFault> faults;
 };
@@ -66,7 +68,7 @@ class Simulation {
   /// Ends `held`: the motion starts after the standstill.
   void release(HostTime now);
   [[nodiscard]] HostTime next_due() const;
-  /// Adds the sockets to wait for, in addition to next_due().
+  /// Adds to `fds` the sockets that the caller must wait for, until next_due() at the latest.
   void add_poll_fds(std::vector<pollfd>& fds) const;
 
   [[nodiscard]] VirtualMachine& machine() { return machine_; }

@@ -64,8 +64,8 @@ struct Squareness {
   double C0Y_rad = 0.0;
 };
 
-/// Thermal drift of the machine. At heat 1 (final temperature, see MachineCondition) axis a is
-/// longer by expansion_per_m[a] and its zero point is shifted by shift_m[a].
+/// Thermal drift of the machine. At heat 1 (final temperature, see MachineCondition) axis a has
+/// expanded by expansion_per_m[a] per metre, and its zero point is shifted by shift_m[a].
 struct ThermalDrift {
   Eigen::Vector3d expansion_per_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();

@@ -36,7 +36,7 @@ class UsbipServer {
   [[nodiscard]] int listener_fd() const { return listener_.get(); }  ///< -1 while unplugged
   [[nodiscard]] int client_fd() const { return client_.get(); }      ///< -1 without a client
   [[nodiscard]] bool wants_write() const { return !unsent_.empty(); }
-  /// Adds the sockets to wait for, in addition to next_due().
+  /// Adds to `fds` the sockets that the caller must wait for, until next_due() at the latest.
   void add_poll_fds(std::vector<pollfd>& fds) const {
     add_server_fds(listener_, client_, wants_write(), fds);
   }

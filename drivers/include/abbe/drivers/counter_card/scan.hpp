@@ -31,7 +31,7 @@ struct CounterScan {
   std::int64_t edge_count = 0;
   /// false: no probe edge since the set-up of the counters, latch_count is invalid
   bool latched = false;
-  /// bit i: axes.count[i] is the count of axis i at its latest index pulse
+  /// bit i: axes.count[i] is not the live count of axis i, but its count at the latest index pulse
   std::uint8_t index_latched_mask = 0;
 };
 static_assert(std::is_trivially_copyable_v<CounterScan>);

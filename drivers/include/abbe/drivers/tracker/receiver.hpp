@@ -80,8 +80,8 @@ class TrackerReceiver {
   TrackerReceiver(const TrackerReceiver&) = delete;
   TrackerReceiver& operator=(const TrackerReceiver&) = delete;
 
-  /// Adds the bytes of one read, at most kMaxPacketSize, and their arrival time; no bytes: a new
-  /// connection. Call next() until it returns nullopt before the next push().
+  /// Adds the bytes of one read, at most kMaxPacketSize, and their arrival time; a call without
+  /// bytes marks a new connection. Call next() until it returns nullopt before the next push().
   void push(std::span<const std::byte> bytes, protocol::HostTime arrival) ABBE_RT;
   /// To be called where bytes of a recording are missing: searches for the next packet, and marks
   /// the next sample GapBefore.

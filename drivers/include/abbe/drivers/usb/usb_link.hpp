@@ -21,7 +21,8 @@ namespace abbe::drivers {
 
 namespace usb = protocol::usb;
 
-/// Identifies the device. A different device is refused; the error names both.
+/// Identity of the device that a link must open. A different device is refused; the error names
+/// both.
 struct UsbIdentity {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;

@@ -43,9 +43,11 @@ struct EncoderPlan {
   std::optional<std::uint32_t> serial{};
   std::optional<bool> linear{};  ///< checked against 1000h if given
   bool needs_scale = false;      ///< a node that reports no step, or 0, is refused
-  /// Linear: required step, within 0.5 nm; checked if the node reports its step.
+  /// Linear encoders: required step, with a tolerance of 0.5 nm; checked if the node reports its
+  /// step.
   std::optional<double> step_nm{};
-  /// Rotary: required units per revolution, within 1e-5; checked if the node reports them.
+  /// Rotary encoders: required units per revolution, with a relative tolerance of 1e-5; checked if
+  /// the node reports them.
   std::optional<double> units_per_revolution{};
 };
 

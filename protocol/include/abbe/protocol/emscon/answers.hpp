@@ -150,8 +150,8 @@ inline constexpr std::size_t kMaxAnswerSize = 164;
 [[nodiscard]] Command command_of(const Answer&) ABBE_RT;
 [[nodiscard]] Status status_of(const Answer&) ABBE_RT;
 
-/// Returns the number of bytes written to `out`, 0 if it is too small; kMaxAnswerSize is always
-/// sufficient.
+/// Writes an answer to `out` and returns its number of bytes, 0 if `out` is too small;
+/// kMaxAnswerSize is always sufficient.
 [[nodiscard]] std::size_t encode(const Answer&, std::span<std::byte> out) ABBE_RT;
 
 /// `packet` is one complete packet. A packet of 16 bytes is an Acknowledge for every command (a

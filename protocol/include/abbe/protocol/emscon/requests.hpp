@@ -190,8 +190,8 @@ inline constexpr std::size_t kMaxRequestSize = 68;
 
 [[nodiscard]] Command command_of(const Request&) ABBE_RT;
 
-/// Returns the number of bytes written to `out`, 0 if it is too small; kMaxRequestSize is always
-/// sufficient.
+/// Writes a request to `out` and returns its number of bytes, 0 if `out` is too small;
+/// kMaxRequestSize is always sufficient.
 [[nodiscard]] std::size_t encode(const Request&, std::span<std::byte> out) ABBE_RT;
 
 /// `packet` is one complete packet from the framer. Its size must be exactly that of the layout.

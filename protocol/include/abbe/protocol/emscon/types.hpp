@@ -15,7 +15,7 @@ namespace abbe::protocol::emscon {
 
 inline constexpr std::uint16_t kPort = 700;
 inline constexpr std::size_t kHeaderSize = 8;  ///< int32 size (of the whole packet), int32 type
-/// Buffer size of public clients; a larger packet is refused.
+/// Largest packet, which is the buffer size of public clients. A larger packet is refused.
 inline constexpr std::size_t kMaxPacketSize = 65536;
 
 enum class PacketType : std::int32_t {

@@ -15,7 +15,7 @@ namespace abbe::protocol::quad08 {
 
 enum class CountWidth : std::uint8_t { Bits32, Bits48 };
 
-/// 48 bits are transferred as 64: the fourth word of a counter is read, too.
+/// A count of 48 bits is transferred as 64 bits: the fourth word of the counter is read, too.
 [[nodiscard]] constexpr std::size_t words_of(CountWidth width) noexcept {
   return width == CountWidth::Bits32 ? 2 : 4;
 }

@@ -109,7 +109,7 @@ inline constexpr std::size_t kExportedInterfaceSize = 4;
 inline constexpr std::size_t kImportRequestSize = kOpHeadSize + 32;
 inline constexpr std::size_t kImportReplySize = kOpHeadSize + kExportedDeviceSize;
 
-/// The head of any operation; UnknownCode for a code that is not in OpCode.
+/// Decodes the head of any operation; error UnknownCode for a code that is not in OpCode.
 [[nodiscard]] tl::expected<OpHead, OpError> decode_op_head(
     std::span<const std::byte> bytes) ABBE_RT;
 

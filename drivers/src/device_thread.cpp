@@ -69,7 +69,7 @@ struct DeviceThread::State {
   LatencyHistogram latency;
   std::atomic<bool> stop{false};
   FaultText failure;               ///< the latest exception that ended the loop
-  std::atomic<bool> ended{false};  ///< from the exception until a wait() returns again
+  std::atomic<bool> ended{false};  ///< true from an exception until a wait() returns again
   std::atomic<std::uint64_t> failures{0};
   std::thread thread;
 

@@ -75,7 +75,7 @@ Result<void> TcpClient::open(const std::string& host, std::uint16_t port) {
     return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", error_text(error)));
   }
 
-  opening_ = true;  // also if already connected: wait() reports Established
+  opening_ = true;  // also if connect() is already complete: wait() then reports Established
   return {};
 }
 

@@ -174,7 +174,7 @@ void UsbipServer::on_submit(const usbip::Submit& submit, HostTime now) {
 
   if (submit.head.endpoint != 0)
     return reply(submit.head.sequence, usbip::UrbStatus::Stalled, 0, {});
-  fill_requests(now);  // scans made before the request are sent before its answer
+  fill_requests(now);  // earlier scans are sent before the answer to this request
   const auto answer = card_->answer(usb::decode_setup(submit.setup), now);
   if (answer.outcome == ControlAnswer::Outcome::Silent) return;
   if (answer.outcome == ControlAnswer::Outcome::Stalled)

@@ -89,7 +89,7 @@ void EncoderDevice::check_timeouts(HostTime now) {
 }
 
 void EncoderDevice::follow_foreign_sync(HostTime now) {
-  if (bus_off()) return;                // no SYNC can be received: silence proves nothing
+  if (bus_off()) return;                // silence proves nothing: no SYNC can be received
   if (!all_read_ && !sending_) return;  // unread frames may contain a SYNC
   const bool may_send = foreign_.may_send(now);
 
@@ -247,7 +247,7 @@ void EncoderDevice::send_configuration() {
 }
 
 bool EncoderDevice::send(const can::CanFrame& frame) {
-  const auto at = time_.now();  // before send(): no answer can have an earlier time
+  const auto at = time_.now();  // read before send(): no answer can be earlier
   if (const auto sent = bus_->send({&frame, 1}); !sent) {
     if (sent.error().code != ErrorCode::Unreachable) {
       close_bus(sent.error());

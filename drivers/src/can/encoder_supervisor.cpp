@@ -133,7 +133,7 @@ void EncoderSupervisor::stop() {
 void EncoderSupervisor::bus_recovered(HostTime now) {
   for (auto& node : nodes_) {
     resets_.push_back(can::encode_nmt(can::NmtCommand::ResetCommunication, node.axis.node));
-    node.state = State::Waiting;  // until the boot-up message or this time-out
+    node.state = State::Waiting;  // until the boot-up message, or until retry_at
     node.retry_at = now + options_.sdo.timeout;
   }
 }

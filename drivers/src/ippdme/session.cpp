@@ -230,7 +230,7 @@ IppAction IppSession::send(const Step& step) {
   if (!step.event) tag_ = tag_ % kLastTag + 1;
   const ippdme::Tag tag = step.event.value_or(ippdme::Tag{false, tag_});
   const auto patience = step.moves ? options_.motion_timeout : options_.command_timeout;
-  wait_only_for(Due::Answer, now_ + patience);  // no other command until this one is complete
+  wait_only_for(Due::Answer, now_ + patience);  // no other command until this one is answered
   pending_ = Pending{.step = step, .tag = tag, .sent = now_};
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
 }

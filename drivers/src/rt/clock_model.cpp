@@ -219,7 +219,7 @@ HostInstant ClockModel::to_host(protocol::DeviceTime t) const ABBE_RT {
   const double bound_s = seconds(options_.max_constant_delay);
   const double outside_s = std::max({0.0, quarter_s_ - device_s, device_s - three_quarters_s_});
   const double u_constant_s =
-      bound_s / std::sqrt(12.0);  // rectangular over [0, bound], estimate in its middle
+      bound_s / std::sqrt(12.0);  // standard uncertainty of a rectangle over [0, bound]
   const double u_s =
       std::hypot(std::hypot(u_constant_s, u_touch_s_, u_slope_ * outside_s), u_beyond_s_);
   return {origin_host_ + (t - origin_device_) +

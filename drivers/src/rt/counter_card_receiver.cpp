@@ -216,7 +216,7 @@ bool CounterCardReceiver::goes_on(const quad08::RawScan& raw) ABBE_RT {
   const double most_ahead_s =
       (before.settled ? kMostAhead_s : kLatest_s) + kLargestDrift * elapsed_s;
   const double range_s = static_cast<double>(quad08::modulus_of(width_)) / clock_hz_;
-  behind_s_ = std::remainder(behind_s, range_s);  // for messages; the number of wraps is unknown
+  behind_s_ = std::remainder(behind_s, range_s);  // for messages; the wraps are not known
   if (most_behind_s + most_ahead_s > kWidestInterval * range_s) return false;
   return behind_s <= most_behind_s && -behind_s <= most_ahead_s;
 }

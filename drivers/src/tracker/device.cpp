@@ -73,7 +73,7 @@ void TrackerDevice::restore_settings() {
 }
 
 void TrackerDevice::handle_orders() {
-  keep_report();  // of an order that ended in handle_posted_messages(): the session stores only one
+  keep_report();  // the session stores only one: keep that of an order that has just ended
   for (TrackerOrder& order : orders_.take()) {
     handle(std::move(order));
     keep_report();

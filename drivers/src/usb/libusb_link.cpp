@@ -60,7 +60,7 @@ struct LibusbLink::State {
     State* state = nullptr;
     libusb_transfer* transfer = nullptr;
     std::vector<unsigned char> buffer;
-    bool resubmit = false;  ///< in the next wait(); until then the caller may read its bytes
+    bool resubmit = false;  ///< in the next wait(), because the caller may still read `bytes`
   };
 
   /// A connected device with matching vendor and product, and its bus address.
@@ -83,7 +83,7 @@ struct LibusbLink::State {
   ~State() {
     if (context == nullptr) return;
     close();
-    if (handle != nullptr) return;  // libusb still owns transfers: they are not freed
+    if (handle != nullptr) return;  // transfers that libusb still owns are not freed
     free_bulk();
     libusb_free_transfer(control_transfer);
     libusb_exit(context);

@@ -76,7 +76,7 @@ ClosedChunk ChunkBuilder::close() {
                closed.records_size};
   Buffer front;
   front.reserve(kChunkHeadSize);
-  append(front, head);  // with 0 bytes of records; the two lengths are corrected below
+  append(front, head);  // with 0 bytes of records; its two length fields are corrected below
   const std::uint64_t content_size = closed.chunk_length - kRecordHeadSize;
   std::memcpy(&front[1], &content_size, sizeof content_size);
   std::memcpy(&front[kChunkHeadSize - 8], &closed.records_size, sizeof closed.records_size);

@@ -119,7 +119,7 @@ class ClockModel {
   double lowered_s_ = 0.0;  ///< estimated height of the line above the true envelope
   double u_touch_s_ = 0.0;  ///< standard uncertainty of the line at the point it touches
   double u_slope_ = 0.0;
-  bool late_ = false;  ///< since late_since_ arrivals are later than `jump` above the line
+  bool late_ = false;  ///< since late_since_ every arrival is more than `jump` above the line
   protocol::HostTime late_since_{};
 };
 

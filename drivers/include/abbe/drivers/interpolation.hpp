@@ -38,7 +38,7 @@ struct InterpolationOptions {
 
 enum class InterpolationError {
   TooEarly,  ///< the first sample is later than the instant
-  TooLate,   ///< no sample is later than the instant yet: try again when more have arrived
+  TooLate,   ///< no sample is later than the instant: try again with more samples
   Gap,       ///< the enclosing samples are further apart than max_span
 };
 

@@ -28,7 +28,7 @@
 namespace abbe::drivers {
 
 struct TcpPeer {
-  std::string name;  ///< its name in messages: "tracker 10.0.0.7:700"
+  std::string name;  ///< name in messages: "tracker 10.0.0.7:700"
   std::string host;
   std::uint16_t port = 0;
 };

@@ -93,7 +93,7 @@ enum class TouchFlag : std::uint32_t {
   SpeedUnsteady = 1u << 3,
   LatchRefused = 1u << 4,  ///< the latched clock contradicts the scans; the scans were used
   NoPosition = 1u << 5,    ///< scans around the touch were lost: there is no position
-  Refused = 1u << 6,       ///< the measuring machine reported a warning with it
+  Refused = 1u << 6,       ///< the measuring machine reported a warning with the touch
 };
 using TouchFlags = std::uint32_t;
 

@@ -23,7 +23,7 @@ struct ArrayFace {
 };
 struct BallArray {
   std::string name = "L array";
-  std::vector<ArrayBall> balls;  ///< in its own frame: the first at the origin
+  std::vector<ArrayBall> balls;  ///< in the frame of the array: the first ball is at the origin
   std::array<ArrayFace, 2> faces;
   double tip_radius_m = 1e-3;
 };
@@ -39,7 +39,7 @@ struct ArrayState {
   double alpha_per_K = 0.0;  ///< thermal expansion; 0: calibrator.toml has no alpha keys
   double u_alpha_per_K = 0.0;
   double u_ball_m = 0.0;     ///< standard uncertainty of a ball centre, per coordinate
-  double u_block_rad = 0.0;  ///< of the direction of a face, about each axis in its plane
+  double u_block_rad = 0.0;  ///< of a face's direction, about each axis in its plane
   std::uint64_t seed = 1;
 };
 /// The true array: `stated` plus errors drawn with the uncertainties in `state`, expanded to the

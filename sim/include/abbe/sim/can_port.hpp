@@ -28,7 +28,7 @@ struct CanPortOptions {
 
 struct ArrivedFrame {
   can::CanFrame frame;
-  std::chrono::nanoseconds age{};  ///< since the kernel received it, in simulated time
+  std::chrono::nanoseconds age{};  ///< simulated time since the kernel received the frame
 };
 
 class CanPort {

@@ -107,7 +107,7 @@ class CounterCard final : public ExportedCard {
  private:
   struct Counter {
     quad08::CounterSetup setup{.register_reading = true};
-    bool set_up = false;    ///< since power-on; until then the counter reads 0
+    bool set_up = false;    ///< set up since power-on; else the counter reads 0
     std::int64_t zero = 0;  ///< count of the signal when the counter was set up
     HostTime set_up_at{};
     std::optional<double> last_reading;  ///< of a scale, at the previous scan

@@ -30,8 +30,8 @@ struct MeasuringMachine {
   std::vector<Sphere> spheres;
   std::vector<Face> faces;
   double tip_radius_m = 2e-3;
-  double approach_m = 2e-3;  ///< probing begins this far before the nominal point ...
-  double search_m = 5e-3;    ///< ... and ends this far behind it
+  double approach_m = 2e-3;  ///< probing begins this far before the nominal point
+  double search_m = 5e-3;    ///< probing ends this far behind the nominal point
   double noise_m = 0.0;      ///< standard deviation of a reading along the approach
   std::uint64_t seed = 1;
 };

@@ -15,7 +15,7 @@ namespace abbe::sim {
 
 struct PathVertex {
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
-  double feed_m_per_s = 0.0;  ///< of the leg that ends here; 0 = the plan's feed
+  double feed_m_per_s = 0.0;  ///< of the leg that ends at this vertex; 0: the plan's feed
 };
 
 struct PathPlan {
@@ -28,7 +28,7 @@ struct PathPlan {
 struct AxisMotion {
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();
-  std::array<int, 3> direction{};  ///< per axis: sign of its last motion, 0 before its first
+  std::array<int, 3> direction{};  ///< per axis: sign of the last motion, 0 before the first
 };
 
 class PathMotion {

@@ -59,7 +59,7 @@ class RecordedCard final : public ExportedCard {
   /// The scans from one start of the pacer to the next.
   struct Scan {
     std::size_t begins = 0;  ///< the exchange that started it
-    std::size_t halts = 0;   ///< the first exchange after it that is not a status request
+    std::size_t halts = 0;   ///< the next exchange that is not a status request
     std::vector<Transfer> transfers;
   };
   struct Connection {
@@ -89,7 +89,7 @@ class RecordedCard final : public ExportedCard {
   std::vector<Exchange> exchanges_;
   std::vector<Scan> scans_;
   std::vector<Connection> connections_;
-  unsigned versions_ = 0;  ///< while it is read: firmware version requests on this connection
+  unsigned versions_ = 0;  ///< while the recording is read: version requests on this connection
 
   bool opened_ = false;   ///< by this host
   std::size_t next_ = 0;  ///< exchange

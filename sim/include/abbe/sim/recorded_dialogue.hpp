@@ -80,7 +80,7 @@ class RecordedDialogue {
   void schedule(const Exchange& exchange, std::span<const std::byte> request, HostTime now);
 
   const DialogueWire& wire_;
-  bool serial_;  ///< a serial line: opening it is not visible, so all is one connection
+  bool serial_;  ///< a serial line: its opening is not visible, so there is one connection
   std::vector<Connection> connections_;
   std::size_t connection_ = 0;
   bool played_ = false;  ///< a client has connected before

@@ -56,7 +56,7 @@ class RecordedTracker {
     std::map<std::int32_t, std::vector<Exchange>> exchanges;  ///< by command
     std::vector<Unsolicited> unsolicited;
     std::optional<HostTime> first_start;
-    bool garbled = false;  ///< while it is read: bytes that are not packets
+    bool garbled = false;  ///< while the recording is read: bytes that are not packets
   };
   struct Due {
     HostTime time;

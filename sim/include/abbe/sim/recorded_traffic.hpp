@@ -20,7 +20,7 @@ struct RecordedBlock {
   HostTime time{};
   bool to_device = false;
   bool hole_before = false;      ///< the recording lost blocks before this one
-  std::vector<std::byte> bytes;  ///< of one read or one write; continued blocks are joined
+  std::vector<std::byte> bytes;  ///< bytes of one read or write; continued blocks are joined
 
   /// An empty block from a device: a connection begins (of encoders: no frame arrived until this
   /// time).

@@ -19,8 +19,8 @@ struct TouchingOptions {
   std::vector<int> positions{4, 8, 3, 7, 2, 6, 1, 5};  ///< array positions, in order
   std::size_t points_per_ball = 25;
   std::size_t points_per_block = 25;
-  double approach_m = 1e-3;  ///< at probing speed before the surface ...
-  double beyond_m = 0.3e-3;  ///< ... and behind it
+  double approach_m = 1e-3;  ///< probing begins this far before the surface
+  double beyond_m = 0.3e-3;  ///< probing ends this far behind the surface
   double probing_m_per_s = 5e-3;
   double retract_m_per_s = 20e-3;
   double travel_m_per_s = 0.2;

@@ -28,8 +28,8 @@ struct TrackerModel {
   double sigma_angle_rad = 3e-6;
   double max_radial_speed_m_per_s = 4.0;  ///< SpeedExceeded above, SpeedWarning above 80 %
   double max_lateral_speed_m_per_s = 4.0;
-  double clock_offset_s = 12345.0;  ///< reading of its clock at power-on
-  double clock_drift_ppm = 15.0;    ///< rate error of its clock; positive: too fast
+  double clock_offset_s = 12345.0;  ///< reading of the tracker's clock at power-on
+  double clock_drift_ppm = 15.0;    ///< rate error of the tracker's clock; positive: too fast
   std::uint64_t seed = 1;
 };
 

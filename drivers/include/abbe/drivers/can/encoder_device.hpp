@@ -171,7 +171,7 @@ class EncoderDevice final : public Device {
   std::array<ReceivedFrame, CanBus::kMostRead + 1> batch_{};  ///< for the receiver
   std::size_t batch_count_ = 0;
   bool all_read_ = true;            ///< CanRead::all
-  protocol::HostTime cycle_end_{};  ///< frames that arrived before this are read, if all_read_
+  protocol::HostTime cycle_end_{};  ///< if all_read_: earlier frames were read
   std::uint8_t raw_sequence_ = 0;
   std::array<std::byte, protocol::RawBlock::kCapacity> datagram_{};
 };

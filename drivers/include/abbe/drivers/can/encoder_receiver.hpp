@@ -190,9 +190,9 @@ class EncoderReceiver {
     double offset = 0.0;        ///< reading at count 0
     std::uint64_t modulus = 0;  ///< 0: 2^64
     bool seen = false;
-    bool answers = false;             ///< has answered since its boot-up or the last SYNC pause
+    bool answers = false;             ///< node has answered since boot-up or the last SYNC pause
     bool reply_outstanding = false;   ///< the answer to an earlier SYNC may still arrive
-    std::uint8_t cycles_to_hold = 0;  ///< regular cycles until it is settled; 0: it is
+    std::uint8_t cycles_to_hold = 0;  ///< regular cycles until the axis is settled; 0: it is
     std::uint64_t raw = 0;            ///< the latest count as sent, modulo `modulus`
     std::uint16_t emergency = 0;      ///< the latest code; 0: none
     bool heartbeat_lost = false;
@@ -252,7 +252,7 @@ class EncoderReceiver {
   bool bus_error_pending_ = false;  ///< an error frame arrived since the previous sample
   bool restarted_pending_ = false;
   bool gap_pending_ = false;
-  bool time_widened_ = false;       ///< for the SYNC or an answer of the open cycle
+  bool time_widened_ = false;       ///< of the SYNC or of an answer of the open cycle
   std::uint32_t lost_pending_ = 0;  ///< SYNCs not sent; the next sample reports them as lost
   protocol::AxisSample current_;    ///< counts and positions are kept between cycles
   std::array<protocol::AxisSample, 4> out_{};

@@ -64,7 +64,7 @@ class EncoderSupervisor {
     protocol::HostTime retry_at{};
     protocol::HostTime ready_at{};
     std::optional<protocol::HostTime> unanswered_sync;  ///< the first one
-    unsigned idle_beats = 0;  ///< heartbeats in a row that were not "operational"
+    unsigned idle_beats = 0;  ///< consecutive heartbeats other than "operational"
     can::ConfigurationFault reported = can::ConfigurationFault::None;
   };
 

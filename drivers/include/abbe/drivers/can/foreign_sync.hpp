@@ -56,7 +56,7 @@ class ForeignSync {
   bool may_send_ = false;
   bool restarts_measuring_ = false;  ///< the next SYNC starts a new measurement of the period
   protocol::HostTime heard_until_{};
-  std::uint64_t count_ = 0;  ///< since the foreign SYNC was first detected
+  std::uint64_t count_ = 0;  ///< foreign SYNCs since the first one
   protocol::HostTime first_{}, last_{};
   std::uint64_t intervals_ = 0;  ///< since first_
   std::chrono::nanoseconds longest_{};

@@ -110,9 +110,9 @@ class CounterCardDevice final : public Device {
   CounterCardReceiver receiver_;
   CounterCardSession session_;
 
-  std::span<const UsbEvent> events_;  ///< of the latest wait(); the session gets them in the next
+  std::span<const UsbEvent> events_;  ///< of the latest wait(), for the session in the next wait()
   protocol::HostTime cycle_end_{};
-  protocol::HostTime read_until_{};  ///< events before this were read by the latest wait()
+  protocol::HostTime read_until_{};  ///< the latest wait() read all earlier events
   std::size_t scans_ = 0;            ///< of the latest receive()
   bool out_of_step_reported_ = false;
   std::uint64_t faults_seen_ = 0;

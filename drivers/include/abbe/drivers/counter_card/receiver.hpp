@@ -57,8 +57,8 @@ struct CounterCardCounters {
   std::uint64_t edges = 0;                ///< changes of the latch
   std::uint64_t latch_disagreements = 0;  ///< latches outside their scan interval
   std::uint64_t clock_jumps = 0;          ///< the card's clock jumped relative to the host's
-  std::uint64_t restarted = 0;            ///< after opening, the clock's count had not continued
-  std::uint64_t withheld_scans = 0;       ///< before the counters were known to have continued
+  std::uint64_t restarted = 0;            ///< times that counters had not continued after opening
+  std::uint64_t withheld_scans = 0;       ///< scans before it was known that counters continued
 };
 
 class CounterCardReceiver {

@@ -56,7 +56,7 @@ struct CounterCardWiring {
   std::optional<std::uint8_t> edge_channel;
   quad08::Debounce latch_debounce{};  ///< of the index input of the latch channel
   quad08::Debounce edge_debounce{};
-  bool latch_verified = false;  ///< the assumption above was verified on this card
+  bool latch_verified = false;  ///< the ASSUMPTION at the top was verified on this card
   quad08::CountWidth width = quad08::CountWidth::Bits32;
   double scan_rate_hz = 100e3 / 3.0;  ///< requested; the actual rate is scan_rate_hz()
 };

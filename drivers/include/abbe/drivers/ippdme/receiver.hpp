@@ -28,7 +28,7 @@ namespace ippdme = protocol::ippdme;
 
 struct IppReceiverOptions {
   std::uint32_t probe = 1;
-  double u_position_m = 1e-6;  ///< of the machine, from its acceptance test (MPE / 2)
+  double u_position_m = 1e-6;  ///< uncertainty of the machine's positions, from its MPE / 2
   /// Largest delay from a position to the unsolicited line that reports it (OnMoveReportE).
   std::chrono::nanoseconds max_report_delay = std::chrono::milliseconds{100};
 };
@@ -119,7 +119,7 @@ class IppReceiver {
   std::uint32_t touches_ = 0;
   std::array<Asked, kMostAsked> asked_{};
   std::size_t next_asked_ = 0;
-  std::optional<IppError> error_due_;  ///< returned by next() after its failed touch
+  std::optional<IppError> error_due_;  ///< next() returns it after the failed touch
   ippdme::LineFramer framer_;
 };
 

@@ -72,9 +72,9 @@ struct ProbePoint {
 };
 
 struct IppSessionOptions {
-  std::string peer = "measuring machine";  ///< its name in messages: "cmm 10.0.0.9:1294"
-  bool home = false;    ///< true: Home is sent to a machine that is not homed; false: a fault
-  std::string held;     ///< not empty: awaits a release from the start, for this reason
+  std::string peer = "measuring machine";  ///< name in messages: "cmm 10.0.0.9:1294"
+  bool home = false;    ///< true: Home is sent if the machine is not homed; false: that is a fault
+  std::string held;     ///< reason to await a release from the start; empty: none is awaited
   bool moving = false;  ///< with held: the machine may be moving; its motion is aborted first
   std::string tool;     ///< tool to set before measuring; empty: keep the current tool
   /// Request positions during motions. A refusal of this request with severity 1 is no fault.
@@ -161,11 +161,11 @@ class IppSession {
 
   enum class Due {
     Abort,   ///< answer to AbortE; none by then: the machine may still be moving
-    Answer,  ///< to the pending command; none by then: a fault
+    Answer,  ///< no answer to the pending command by then: a fault
     // Purposes that belong to the state: at most one of the following deadlines is set, and none
     // while a command is pending.
     Connect,
-    Connection,  ///< none by then: a fault
+    Connection,  ///< no connection by then: a fault
     Poll,        ///< requests the position
     Watch,       ///< checks during a hold that the server still answers
   };

@@ -43,7 +43,7 @@ enum class MarkFault : std::uint8_t {
   NotOfCode,
   Disagree,    ///< the decodings of neighbouring pairs contradict each other: a miscount
   Reversed,    ///< the direction changed between marks
-  WrongScale,  ///< repeated refusals: this is not the configured scale
+  WrongScale,  ///< refused repeatedly: this is not the configured scale
 };
 [[nodiscard]] std::string_view name(MarkFault fault) noexcept;
 

@@ -28,7 +28,7 @@ struct DoubleTouchRules {
   std::size_t slow_touches = 2;        ///< 2 to DoubleTouch::kMostTouches
   double same_place_m = 0.5e-3;        ///< distance of fast and slow touch, over the linear axes
   double agree_sigmas = 4.0;           ///< 3 would refuse one of 370 good pairs
-  double u_repeatability_m = 0.25e-6;  ///< of the probe, without that of the edge's instant
+  double u_repeatability_m = 0.25e-6;  ///< of the probe, without that of the instant of the edge
   std::chrono::nanoseconds u_delay{};  ///< ProbeDelay::u_delay
   std::uint8_t linear_axes = 0b111;
 };

@@ -25,7 +25,7 @@ struct TouchCounters {
   Counter touches;
   Counter dismissed;      ///< edges whose signal was not stable
   Counter latch_refused;  ///< latched clock counts outside their scan interval
-  Counter windows_cut;    ///< windows that ended early because of the next touch
+  Counter windows_cut;    ///< windows that the next touch ended early
 };
 
 class TouchDetector final : public CounterScanSink {

@@ -119,7 +119,7 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   bool clock_reported_ = false;
   std::string cause_reported_;
   std::uint64_t gaps_seen_ = 0;
-  bool began_ = false;  ///< new connection; the receiver is not yet reset for it
+  bool began_ = false;  ///< there is a new connection for which the receiver is not yet reset
   std::array<std::byte, emscon::kMaxRequestSize> command_{};
 };
 

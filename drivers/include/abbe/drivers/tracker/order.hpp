@@ -43,7 +43,7 @@ struct TrackerReflector {
 struct TrackerOrderReport {
   enum class Outcome {
     Done,
-    Refused,  ///< by the controller, or because of the session's state
+    Refused,  ///< the controller, or the state of the session, does not permit it
     Failed,   ///< no answer, or the connection was lost: the result is unknown
   };
   std::uint64_t number = 0;

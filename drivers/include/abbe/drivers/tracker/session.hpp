@@ -68,7 +68,7 @@ enum class TrackerMode {
 };
 
 struct TrackerSessionOptions {
-  std::string peer = "tracker";  ///< its name in messages: "tracker 10.0.0.7:700"
+  std::string peer = "tracker";  ///< name in messages: "tracker 10.0.0.7:700"
   TrackerMode mode = TrackerMode::ContinuousTime;
   std::int32_t time_separation_ms = 2;  ///< 500 points per second
   double spatial_distance_mm = 1.0;
@@ -171,7 +171,7 @@ class TrackerSession {
  private:
   using Outcome = TrackerOrderReport::Outcome;
   struct Step {
-    std::optional<TrackerState> state;  ///< of the session from this step on; none: it stays
+    std::optional<TrackerState> state;  ///< session's state from this step on; none: unchanged
     emscon::Request request;
     bool optional = false;  ///< a refusal counts as done
     bool of_order = false;  ///< a refusal ends the order, not the session
@@ -185,17 +185,17 @@ class TrackerSession {
     protocol::HostTime patience{};  ///< "busy" is tolerated until then
   };
   enum class Due {
-    Answer,   ///< to the pending command; none by then: a fault
+    Answer,   ///< no answer to the pending command by then: a fault
     Repeat,   ///< sends the pending command again
     Order,    ///< begins the accepted order
     Restart,  ///< sends StartMeasurement after the beam is back
     // Purposes that belong to the state: at most one of the following deadlines is set.
     Connect,
-    Connection,  ///< none by then: a fault
+    Connection,  ///< no connection by then: a fault
     WarmUp,      ///< status query while the laser is heating
-    Points,      ///< none by then: a fault, or a status query
+    Points,      ///< no point by then: a fault, or a status query
     Query,       ///< status query while there is no beam
-    Leave,       ///< the settings are restored by then, or it is given up
+    Leave,       ///< if the settings are not restored by then, restoring is given up
   };
   static constexpr std::array kOfState{Due::Connect, Due::Connection, Due::WarmUp,
                                        Due::Points,  Due::Query,      Due::Leave};
@@ -285,7 +285,7 @@ class TrackerSession {
   Deadlines<Due::Leave> deadlines_;
   std::chrono::nanoseconds pause_{};
   protocol::HostTime beam_lost_at_{};
-  bool result_came_ = false;  ///< Stationary: the latest StartMeasurement gave its result
+  bool result_came_ = false;  ///< Stationary: the result of the latest StartMeasurement arrived
   bool stopped_ = false;
   Fault fault_;
   std::string cause_;

@@ -45,7 +45,7 @@ class UsbipLink final : public UsbLink {
     std::uint32_t sequence;
     bool bulk;
     std::uint32_t length;  ///< maximum length of the answer, bytes
-    std::uint32_t unlink;  ///< sequence number of the request that cancels it; 0: none
+    std::uint32_t unlink;  ///< sequence number of the request that cancels this one; 0: none
   };
 
   void disconnect() noexcept;

@@ -92,7 +92,7 @@ enum class ConfigurationFault : std::uint8_t {
   WrongStep,       ///< differs from the configured step: `seen`
   FixedMapping,    ///< the mapping is fixed and does not contain the position
   FixedType,       ///< the transmission type is fixed and not at every SYNC: `seen`
-  NotOperational,  ///< left the state Operational after it was configured
+  NotOperational,  ///< the node left Operational after its configuration
   BadAnswer,       ///< an answer that is not a number, or a protocol error
 };
 struct ConfigurationError {
@@ -135,7 +135,7 @@ class EncoderConfigurator {
     Range,
     Revolutions,
     Write,
-    MappingCount,  ///< this and the following: read an object whose write was refused
+    MappingCount,  ///< this step and the following read an object whose write was refused
     MappingEntry,
     FirstEntry,
     Type,

@@ -127,7 +127,7 @@ class LineFramer {
 
   std::array<char, kCapacity> buffer_{};
   std::size_t begin_ = 0;
-  std::size_t looked_ = 0;  ///< bytes before it contain no end of line and no illegal character
+  std::size_t looked_ = 0;  ///< bytes before this index have no end of line, no illegal character
   std::size_t end_ = 0;
   bool broken_ = false;
   bool skipping_ = false;  ///< skips bytes up to the next end of a line

@@ -106,7 +106,7 @@ class LinearScan {
 };
 
 enum class SummaryError : std::uint8_t {
-  NoMagic,    ///< the file does not begin and end with the magic bytes: it was not closed
+  NoMagic,    ///< no magic bytes at the beginning or the end: the file was not closed
   NoFooter,   ///< no Footer before the last magic, or a Footer that points outside the file
   NoSummary,  ///< closed, but without a summary
   BadCrc,     ///< the checksum of the summary is wrong

@@ -18,14 +18,14 @@ namespace abbe::protocol::mcap {
 
 struct IndexEntry {
   std::uint64_t log_time_ns = 0;
-  std::uint64_t offset = 0;  ///< of the Message record in the chunk's records
+  std::uint64_t offset = 0;  ///< of the Message record within the chunk's records
 };
 
 /// The messages of one channel in a closed chunk.
 struct ChannelShare {
   std::uint16_t channel_id = 0;
   std::uint64_t messages = 0;
-  std::uint64_t index_offset = 0;  ///< of its MessageIndex record, relative to the Chunk's opcode
+  std::uint64_t index_offset = 0;  ///< of the channel's MessageIndex, from the Chunk's opcode
 };
 
 /// A chunk with its indexes, to be written in one piece. Views into the builder, valid until its

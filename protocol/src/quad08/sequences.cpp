@@ -7,7 +7,7 @@ constexpr std::uint16_t kDacPacerOff = 0x10;
 constexpr std::uint16_t kDacResetFifo = 0x04;
 constexpr int kMarkBits = 8;
 
-/// Disarms the analog outputs. The first pass writes 0 instead of their numbers.
+/// Disarms the analog outputs. The first pass writes 0 instead of the numbers of the outputs.
 void disarm_dac(Sequence& out, bool first_pass) ABBE_RT {
   out.add(Register::DacControl, kDacPacerOff);
   out.add(Register::DmaControl, dma::kChannel0Off);

@@ -43,7 +43,7 @@ std::string quoted(std::string_view text) {
   return '"' + std::string(text) + '"';
 }
 
-/// What a cell with this text should hold instead.
+/// Says what a cell with the content `text` should hold instead.
 std::string expected(std::string_view text, const std::vector<std::string_view>& words) {
   constexpr std::size_t kFew = 6;
   return words.size() <= kFew ? "must be " + joined(words, " or ")

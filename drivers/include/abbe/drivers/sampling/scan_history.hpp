@@ -36,7 +36,7 @@ class ScanHistory {
   /// Number of the first kept scan later than `instant`; end_number() if there is none.
   [[nodiscard]] std::uint64_t first_after(protocol::DeviceTime instant) const ABBE_RT;
 
-  /// Middle of the clock period with this count.
+  /// Instant of a clock count: the middle of the clock period with this count.
   [[nodiscard]] protocol::DeviceTime instant(std::int64_t clock_count) const ABBE_RT;
   [[nodiscard]] std::chrono::nanoseconds clock_period() const ABBE_RT;
   [[nodiscard]] double clock_period_s() const ABBE_RT { return period_s_; }

@@ -89,11 +89,11 @@ struct TrackerSessionOptions {
   std::chrono::nanoseconds ask_again = std::chrono::milliseconds{250};
   /// Time-out of Initialize and GoBirdBath, and of FindReflector without `search`.
   std::chrono::nanoseconds initialize_timeout = std::chrono::seconds{120};
-  /// While streaming, no packet for this long is a fault.
+  /// While streaming, it is a fault if no packet arrives for this long.
   std::chrono::nanoseconds silence_timeout = std::chrono::milliseconds{1500};
   /// Pause before repeating a command that the controller refused with "busy" or "not ready".
   std::chrono::nanoseconds busy_retry = std::chrono::milliseconds{250};
-  /// A controller that reports "busy" for longer than this is a fault.
+  /// It is a fault if the controller reports "busy" for longer than this.
   std::chrono::nanoseconds busy_patience = std::chrono::seconds{120};
   /// Interval of status queries while the laser is heating.
   std::chrono::nanoseconds warm_poll = std::chrono::seconds{5};

@@ -18,7 +18,8 @@ namespace abbe::protocol::can {
 enum class FrameFlag : std::uint8_t {
   Extended = 1u << 0,  ///< 29-bit identifier
   Remote = 1u << 1,    ///< remote request: `length` is the requested length, there are no data
-  /// from the local controller; `id` contains Linux error class bits (see error_frame.hpp)
+  /// error frame of the local controller; `id` contains Linux error class bits (see
+  /// error_frame.hpp)
   Error = 1u << 2,
   Fd = 1u << 3,  ///< CAN FD format: up to 64 bytes, `fd_flags` contains BRS (1) and ESI (2)
 };

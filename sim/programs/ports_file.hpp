@@ -1,7 +1,7 @@
 #pragma once
 /// Where the devices listen: printed to standard output, and written to a file for scripts when all
-/// devices listen. Its lines can be read by a shell and by a TOML reader; a device that does not
-/// exist has no line:
+/// devices listen. The lines of the file can be read by a shell and by a TOML reader; a device that
+/// does not exist has no line:
 ///
 ///   tracker_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N
 

@@ -1,8 +1,8 @@
 #pragma once
 /// Limits the time that an idle processor needs to wake up. The kernel keeps the limit for all
-/// processors while a file is open (Linux PM QoS). Without it a processor in deep sleep delays a
-/// device's interrupt, and so its kernel time stamp, by hundreds of microseconds. Not for the
-/// real-time path.
+/// processors while the file /dev/cpu_dma_latency is open (Linux PM QoS). Without a limit, a
+/// processor in deep sleep delays a device's interrupt, and so its kernel time stamp, by hundreds
+/// of microseconds. Not for the real-time path.
 
 #include <chrono>
 #include <cstdio>

@@ -1,10 +1,11 @@
 #pragma once
-/// The deadlines of one state machine: for each purpose one instant at most, after which something
-/// happens unless it is set again or cancelled. One rule decides when the machine acts next, and on
-/// what: next() and passed(). Time is handed in. No allocation; usable in real time. One thread.
+/// The deadlines of one state machine: for each purpose at most one instant, at which the machine
+/// must act unless this deadline is set again or cancelled before. next() states when the machine
+/// acts next, passed() for which purpose. Time is handed in. No allocation; usable in real time.
+/// One thread.
 ///
-/// `kLast` is the last enumerator of the purposes, whose values are 0, 1, 2 ... If several deadlines
-/// have passed, the purpose that is declared first comes first, whichever passed earlier.
+/// `kLast` is the last enumerator of the purposes, whose values are 0, 1, 2 ... If several
+/// deadlines have passed, the purpose that is declared first comes first, whichever passed earlier.
 
 #include <algorithm>
 #include <array>

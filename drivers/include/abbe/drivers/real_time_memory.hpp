@@ -28,8 +28,9 @@ void keep_heap() noexcept;
 /// there.
 void touch_stack() noexcept;
 
-/// For a thread without real-time priority that must not wait for other threads (the hub): loads
-/// 16 MB of its heap and its stack. Call keep_heap() before. Allocates.
+/// For a thread without real-time priority that must not wait for other threads (the hub of abbed,
+/// which reads the rings of all devices): loads 16 MB of its heap and its stack. Call keep_heap()
+/// before. Allocates.
 void prepare_heap_of_this_thread();
 
 }  // namespace abbe::drivers

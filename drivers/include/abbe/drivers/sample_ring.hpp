@@ -1,8 +1,9 @@
 #pragma once
-/// Ring of decoded samples from the real-time device thread to the hub. One writer, one reader,
-/// wait-free on both sides (boost::lockfree::spsc_queue). If the ring is full, a new sample is
-/// dropped and counted, and the next sample that fits carries GapBefore and `lost_before`. The
-/// constructor allocates and touches all memory.
+/// Ring of decoded samples from the real-time device thread to the hub (the thread of abbed that
+/// reads the rings of all devices). One writer, one reader, wait-free on both sides
+/// (boost::lockfree::spsc_queue). If the ring is full, a new sample is dropped and counted, and the
+/// next sample that fits carries GapBefore and `lost_before`. The constructor allocates and touches
+/// all memory.
 
 #include <algorithm>
 #include <atomic>

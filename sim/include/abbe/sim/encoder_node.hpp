@@ -1,8 +1,8 @@
 #pragma once
 /// One CANopen encoder: the server side of CiA 301 and CiA 406 around an object dictionary,
 /// measuring one axis of the virtual machine. Sans-I/O: frames and a time in, frames with their
-/// send time out. Its position is the *scale reading* at the instant a SYNC arrives. Faults can
-/// be injected. Not thread-safe.
+/// send time out. The node sends the *scale reading* at the instant a SYNC arrives. Faults can be
+/// injected. Not thread-safe.
 
 #include <cstdint>
 #include <optional>

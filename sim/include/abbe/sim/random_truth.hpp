@@ -1,9 +1,10 @@
 #pragma once
 /// A machine with smooth random errors, drawn from a seed and scaled to the requested mean |V| over
-/// the working volume. The errors contain no rigid-body motion of the target: positioning and
-/// rotations are 0 at the reference position, and the straightness at the target is 0 at both ends
-/// of the axis. V is therefore what a calibration with the usual conventions reports, except for
-/// the second order of the transforms (0.05 um at 100 um).
+/// the working volume; V is the error of the target, actual - nominal. The errors contain no
+/// rigid-body motion of the target: positioning and rotations are 0 at the reference position, and
+/// the straightness at the target is 0 at both ends of the axis. V is therefore what a calibration
+/// with the usual conventions reports, except for the second order of the transforms (0.05 um at
+/// 100 um).
 
 #include <cstdint>
 

@@ -1,7 +1,7 @@
 #pragma once
-/// A recorded device behind a pseudo terminal, as ControllerServer does for TCP. Where the
-/// connection broke in the recording, the terminal is closed and opened again. Steppable: poll(now)
-/// never blocks and reads no clock. Not thread-safe.
+/// Serves a recorded device behind a pseudo terminal, as ControllerServer does behind a TCP port.
+/// Where the connection broke in the recording, the terminal is closed and opened again. Steppable:
+/// poll(now) never blocks and reads no clock. Not thread-safe.
 
 #include <memory>
 #include <string>

@@ -1,7 +1,7 @@
 #pragma once
 /// A laser tracker controller with the emScon TPI protocol, without its socket: bytes and a time
-/// in, bytes out. It has the preconditions of a real one (warm-up, Initialize, a reflector, a
-/// measurement mode) and refuses with the same status. Not thread-safe.
+/// in, bytes out. It has the preconditions of a real controller (warm-up, Initialize, a reflector,
+/// a measurement mode) and refuses commands with the same status. Not thread-safe.
 ///
 /// Our choices where no public source describes the behaviour:
 ///   - A broken beam: an error packet with status Unknown for StartMeasurement, then event

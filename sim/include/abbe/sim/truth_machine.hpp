@@ -4,8 +4,9 @@
 ///
 ///   p(q) = T_1 T_2 T_3 t,   T_a(q) = Trans(q_a e'_a) Trans(EXa, EYa, EZa) Rz(ECa) Ry(EBa) Rx(EAa)
 ///
-/// The axes are ordered from workpiece to tool; t = target offset from the tool reference point;
-/// e'_a = direction of travel, tilted by the squareness errors alone and normalised:
+/// q = scale readings; the axes a are ordered from workpiece to tool; EXa to ECa = error motions of
+/// axis a; t = target offset from the tool reference point; e'_a = direction of travel, tilted by
+/// the squareness errors alone and normalised (~: before normalisation):
 ///
 ///   e'_X = (1, 0, 0),  e'_Y ~ (-C0Y, 1, 0),  e'_Z ~ (B0Z, -A0Z, 1)
 ///   V = actual - nominal = p(q) - (q + t)

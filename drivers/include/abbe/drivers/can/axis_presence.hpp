@@ -1,5 +1,5 @@
 #pragma once
-/// Which axes deliver current positions. An axis is absent
+/// Tracks which axes deliver current positions. An axis is absent
 ///  - before the first sample that contains it, and
 ///  - while it is missing in all samples of the last 150 ms, and in at least the last three.
 /// The 150 ms are counted in samples: while the device thread is delayed there are no samples, and

@@ -1,7 +1,7 @@
 #pragma once
 /// All encoders of one CAN bus as a Device: configures the nodes, produces the SYNC, and converts
 /// the answers to one AxisSample per SYNC. The sample is output as soon as the last axis has
-/// answered; EncoderReceiver describes the exception.
+/// answered, or later if EncoderReceiver holds it because an axis may answer a second time.
 ///
 /// The device listens before it sends (ForeignSync): on a bus with another SYNC producer it sends
 /// nothing. With SyncSource::External it never sends: the machine produces the SYNC and configures

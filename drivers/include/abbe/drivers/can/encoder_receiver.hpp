@@ -15,18 +15,19 @@
 ///  - the first answer after cycles without an answer, unless the node booted or the SYNC paused
 ///    for a period in between, and
 ///  - all answers of a cycle in which the node answers twice.
-/// A sample is output once and not changed afterwards. Therefore it is held until the next SYNC, at
-/// most for a period after its SYNC, while an axis in it is unsettled: a second answer then marks
-/// the axis missing. An axis is unsettled after a cycle that it did not answer exactly once and in
-/// time, for 100 cycles that it does, and in the first cycle after its boot-up or a pause of the
-/// SYNC. The samples of settled axes are output at once. If a settled axis answers twice all the
-/// same, and its sample has left, the axis is missing in the next sample.
+/// A sample is output once and not changed afterwards. Therefore a sample that contains an answer
+/// of an unsettled axis is held until the next SYNC, but at most for a period after its own SYNC:
+/// if the axis answers a second time, it is marked missing. A cycle that an axis does not answer
+/// exactly once and in time makes it unsettled, until it has answered 100 cycles exactly once and
+/// in time. An axis is also unsettled in the first cycle after its boot-up or a pause of the SYNC.
+/// All other samples are output at once. If a settled axis nevertheless answers twice, its sample
+/// was already output, and the axis is missing in the next sample.
 ///
-/// What this does not detect: if a node answers late in more than two consecutive cycles, its first
-/// and its last late answers are doubtful, those in between are not. If a node is late from its
-/// first answer on, or still late after a pause, its first late answers are not doubtful either.
-/// Therefore the period must be longer than the slowest answer. The first of two answers of a
-/// settled axis is used; encoder.md weighs this.
+/// What this class does not detect: if a node answers late in more than two consecutive cycles, its
+/// first and its last late answers are doubtful, those in between are not. If a node is late from
+/// its first answer on, or still late after a pause, its first late answers are not doubtful
+/// either. Therefore the period must be longer than the slowest answer. The first of two answers of
+/// a settled axis is used; drivers/docs/encoder.md gives the reasons.
 ///
 /// The scale is configured, or read from SDO answers on the bus (6005h:01, else 6501h; rotary:
 /// 6001h, else 6501h), so that a recording contains it. A scale of 0 is refused: the axis stays

@@ -2,10 +2,10 @@
 /// A Modbus device that measures the environment, as a Device: EnvironmentReceiver and one
 /// ModbusLine. wait() opens the connection, sends one request and blocks for its answer. receive()
 /// converts bytes to samples and raw blocks.
-/// Every fault closes the connection. A connection shared with other devices (see EnvironmentLine)
-/// is closed only if none of the others has answered since this device's previous fault. After a
-/// fault the device reads the proving registers (register_map.hpp) again, so that an exchanged
-/// device is detected.
+/// A fault closes the connection. Exception: a connection shared with other devices (see
+/// EnvironmentLine) stays open if one of the others has answered since this device's previous
+/// fault. After a fault the device reads the proving registers (register_map.hpp) again, so that an
+/// exchanged device is detected.
 /// States: "closed", "proving", "reading", "refused" (wrong device or map; retried every
 /// `refused_retry`).
 

@@ -3,8 +3,8 @@
 /// Requests are sent one at a time over one connection; the device that has waited longest is next.
 /// Each device has its own rounds, time-outs, faults and status.
 /// A device that does not answer delays the others once per period: by its answer_timeout, and by
-/// the same time again, in which a late answer is discarded. Its fault closes the connection only
-/// if no other device has answered on it since its previous fault.
+/// the same time again, in which a late answer is discarded. The fault of a device closes the
+/// connection only if no other device has answered since the previous fault of that device.
 
 #include <memory>
 #include <vector>

@@ -1,8 +1,8 @@
 #pragma once
 /// Detects touches in the scans of a counter card: first edge, confirmation, position at the
-/// contact, re-arming on retraction. It also outputs the scans around every touch (the window). A
-/// CounterScanSink: the same scans give the same touches, live and in a replay. A touch is output
-/// when it is confirmed, its window as the scans arrive.
+/// contact, re-arming on retraction. It also outputs the scans around every touch (the window). It
+/// is a CounterScanSink; the same scans give the same touches, live and in a replay. A touch is
+/// output when it is confirmed, its window as the scans arrive.
 ///
 /// Real time: on_scan() allocates no memory and does a bounded amount of work. One thread; any
 /// thread may read the counters.

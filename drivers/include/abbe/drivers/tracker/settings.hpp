@@ -4,8 +4,8 @@
 /// real-time.
 ///
 /// abbe does not change the values of the transformation and the station orientation. It disables
-/// their use in the system settings and restores that at the end. The settings of Nivel and camera
-/// are not changed.
+/// their use in the system settings, and restores the system settings at the end. The settings of
+/// Nivel and camera are not changed.
 
 #include <optional>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
-/// Interpolation of an error table between its nodes. It is linear. Another
-/// basis (natural cubic) would have to reproduce constants and straight lines exactly, too: the
-/// gauge conditions depend on it.
+/// Linear interpolation of an error table between its nodes. Any other interpolation (natural
+/// cubic) would also have to reproduce constants and straight lines exactly, because the gauge
+/// conditions (gauge.hpp) rely on this property.
 
 #include <cstddef>
 #include <span>
@@ -13,7 +13,8 @@ namespace abbe::calib {
 
 inline constexpr std::string_view kLinearBasis = "linear";  ///< in files and messages
 
-/// f(q) = weight[0] U[first] + weight[1] U[first + 1].
+/// Value f of a table at position q, U: values of the table at its nodes,
+///     f(q) = weight[0] U[first] + weight[1] U[first + 1].
 struct BasisRow {
   std::size_t first = 0;
   double weight[2] = {1.0, 0.0};

@@ -24,7 +24,7 @@ inline constexpr std::array<Motion, 6> kAllMotions{Motion::X, Motion::Y, Motion:
 [[nodiscard]] constexpr bool is_rotation(Motion m) {
   return static_cast<std::size_t>(m) >= 3;
 }
-/// 0, 1, 2 for x, y, z: the direction of the translation or of the rotation vector.
+/// Direction of the translation, or of the rotation vector: 0, 1, 2 for x, y, z.
 [[nodiscard]] constexpr std::size_t direction(Motion m) {
   return static_cast<std::size_t>(m) % 3;
 }

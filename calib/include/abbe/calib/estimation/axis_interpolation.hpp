@@ -1,7 +1,8 @@
 #pragma once
-/// Interpolation of a function between its values U at the nodes of an axis. All of them are
-/// linear in U and reproduce constants and straight lines exactly; the gauge conditions depend on
-/// it. In the cell from x_k to x_k+1, of length h:
+/// Interpolation of a function f(q) between its values U at the nodes x of an axis. Linear and
+/// cubic interpolation are both linear in U and reproduce constants and straight lines exactly; the
+/// gauge conditions (gauge.hpp) rely on these two properties. In the cell from x_k to x_k+1, of
+/// length h:
 ///     u = (q - x_k) / h,  b = u,  a = 1 - u
 ///     linear:  f = a U_k + b U_k+1
 ///     cubic:   f = a U_k + b U_k+1 + ((a^3 - a) U''_k + (b^3 - b) U''_k+1) h^2 / 6,   U'' = M U
@@ -12,7 +13,7 @@
 /// and an end condition:
 /// - natural: U'' = 0 at both ends,
 /// - not-a-knot: the third derivative is continuous at the second and at the last but one node.
-///   With three nodes this is one parabola, with two a straight line.
+///   With three nodes the function is one parabola, with two nodes a straight line.
 /// Outside the nodes, the formula of the nearest cell is extrapolated.
 
 #include <cstddef>
@@ -27,7 +28,8 @@ namespace abbe::calib::estimation {
 enum class Interpolation { Linear, NaturalCubic, NotAKnotCubic };
 [[nodiscard]] std::string_view name(Interpolation);
 
-/// Weights of the nodes at one position. Refers to the AxisInterpolation from which it comes.
+/// Weights of the nodes at one position. Points into the AxisInterpolation that returned it and
+/// must not outlive that object.
 class NodeWeights {
  public:
   [[nodiscard]] std::size_t first() const { return first_; }
@@ -48,10 +50,11 @@ class NodeWeights {
 /// Immutable value.
 class AxisInterpolation {
  public:
-  /// A cubic has a weight for every node: 500 nodes are 2 MB.
+  /// Largest number of nodes of a cubic. Its matrix M is dense: 500 x 500 numbers take 2 MB.
   static constexpr std::size_t kMostCubicNodes = 500;
 
-  /// BadInput or NotFinite for nodes that check_nodes() refuses, or for too many of a cubic.
+  /// BadInput or NotFinite for nodes that check_nodes() refuses, BadInput for a cubic with more
+  /// than kMostCubicNodes nodes.
   [[nodiscard]] static Result<AxisInterpolation> of(std::span<const double> nodes_m, Interpolation);
 
   [[nodiscard]] Interpolation kind() const { return kind_; }

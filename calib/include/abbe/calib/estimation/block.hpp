@@ -22,7 +22,8 @@ struct Block {
   Eigen::VectorXd y;
   /// of y: rows x rows, or one column with the variances of independent rows
   Eigen::MatrixXd covariance;
-  /// what is left out together in cross-validation; noise is independent between groups
+  /// blocks with the same number are left out together in cross-validation; the noise of different
+  /// groups is independent
   std::size_t group = 0;
 };
 

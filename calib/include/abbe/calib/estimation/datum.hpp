@@ -1,16 +1,20 @@
 #pragma once
 /// The datum of an adjustment: conditions
 ///     K U = 0
-/// that select one of the solutions which describe the data equally well ([Baarda 1973]). With as
-/// many conditions as the datum defect (minimal constraints) they do not change the fit:
-///     minimise |R U - z|^2 + mu |K U|^2
-/// meets them exactly for every mu > 0, because a combination that no observation sees can meet
-/// them at no cost. With Q = (H + mu K^T K)^-1 and H = R^T R,
+/// that select one of the solutions U which describe the data equally well ([Baarda 1973]). The
+/// data are given as R and z (information.hpp). If there are as many conditions as undetermined
+/// combinations of U (datum defect; minimal constraints), the conditions do not change the fit: the
+/// minimum of
+///     |R U - z|^2 + mu |K U|^2
+/// satisfies K U = 0 exactly for every mu > 0, because undetermined combinations of U can be
+/// changed until K U = 0 without changing R U. With Q = (H + mu K^T K)^-1 and H = R^T R,
 ///     Cov(U) = Q H Q
-/// Q alone contains the part of the datum. With T the triangle of [R; sqrt(mu) K] this is
+/// (Q itself is too large: it also contains a variance for the conditions, which are exact.) With T
+/// the triangular factor of [R; sqrt(mu) K] the covariance is computed without forming H:
 ///     Cov(U) = G G^T,   G = T^-1 (R T^-1)^T
-/// which is never formed from H. If the rows were weighted otherwise than with 1/sigma, the factor
-/// of the noise replaces R in G: W^2 C W^2 = R_n^T R_n.
+/// If the weights W of the rows A are not 1/sigma, C being the covariance of the observations, R_n
+/// replaces R in G:
+///     A^T W^2 C W^2 A = R_n^T R_n
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -26,17 +30,18 @@ namespace abbe::calib::estimation {
 struct DatumSolution {
   Eigen::VectorXd U;           ///< meets K U = 0
   Eigen::MatrixXd covariance;  ///< Q H Q; singular
-  Eigen::MatrixXd cofactor_Q;  ///< dU/dg for g = A^T W^2 y
+  Eigen::MatrixXd cofactor_Q;  ///< Q above: dU/dg for g = A^T W^2 y
   std::size_t rank = 0;        ///< of the data
   std::size_t datum_defect = 0;
-  /// of the column-scaled data within their rank
+  /// condition number of R with columns of unit length, without singular values that count as zero
   double condition = 0.0;
 };
 
 struct DatumOptions {
-  /// factor of mu, which is 1 over the squared length of each scaled condition
+  /// mu of each condition is this weight divided by the squared length of the condition's row of K,
+  /// whose columns are scaled as those of R to unit length
   double weight = 1.0;
-  /// root of the noise: A^T W^2 C W^2 A = R_n^T R_n; null: the weights are 1/sigma^2
+  /// its R is R_n above: A^T W^2 C W^2 A = R_n^T R_n; null: the weights W are 1/sigma
   const Information* noise = nullptr;
   /// name of an unknown in messages
   std::function<std::string(std::size_t)> label;
@@ -57,7 +62,8 @@ class Datum {
   [[nodiscard]] Result<Eigen::VectorXd> estimate(const Information&,
                                                  const DatumOptions& = {}) const;
 
-  /// The S-transformation to this datum, S = I - N (K N)^-1 K, N: basis of the null space:
+  /// The matrix S of the S-transformation of a solution with another datum to this datum. N: the
+  /// given basis of the combinations that the data leave undetermined, S = I - N (K N)^-1 K,
   ///     U' = S U,   Cov' = S Cov S^T
   /// DegenerateGeometry if the conditions do not fix all combinations of N.
   [[nodiscard]] Result<Eigen::MatrixXd> transformation(const Eigen::MatrixXd& null_space) const;

@@ -1,12 +1,12 @@
 #pragma once
-/// All that observations state about the unknowns U of a linear problem, in square-root form
-/// ([Bierman 1977]): R upper triangular, z and a rest with
+/// All that observations y = A U + noise state about the unknowns U, in square-root form ([Bierman
+/// 1977]): an upper triangular matrix R, a vector z and a number `rest` with
 ///     |R U - z|^2 + rest = |W (A U - y)|^2   for every U,   W^T W = Cov(y)^-1
-/// The information matrix is H = R^T R, but H is never formed: its condition is the square of that
-/// of W A, so that half of the digits would be lost. Rows are added by Householder reflections
-/// ([Golub 2013] section 5.2), each over one column of R and of a batch of rows. R is unique (its
-/// diagonal is not negative), except for rounding it does not depend on the order of the rows. The
-/// same rows in the same order give the same bits on every processor.
+/// The information matrix is H = R^T R. H is never formed: its condition number is the square of
+/// that of W A, so that half of the digits would be lost. Rows are added by Householder reflections
+/// ([Golub 2013] section 5.2), each over one column of R and of a batch of rows. The diagonal of R
+/// is not negative, which makes R unique: except for rounding R does not depend on the order of the
+/// rows. The same rows in the same order give the same bits on every processor.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -32,7 +32,7 @@ class Information {
   [[nodiscard]] Eigen::MatrixXd R() const;
   [[nodiscard]] Eigen::VectorXd z() const;
   [[nodiscard]] double rest() const { return rest_; }
-  /// Squared length of the column of an unknown; zero: nothing observes it.
+  /// Squared length of the column of R of an unknown; zero if no row contains the unknown.
   [[nodiscard]] double squared_length(std::size_t unknown) const;
 
   /// Adds the rows of the batch and clears it.
@@ -46,14 +46,15 @@ class Information {
   void add_prior(std::size_t unknown, double value, double u);
   /// Adds independent observations of the same unknowns.
   Information& operator+=(const Information&);
-  /// The same for information about some of the unknowns: `at`: index here of each unknown of
-  /// `part`, ascending.
+  /// Adds independent observations of some of the unknowns. Unknown k of `part` is unknown at[k] of
+  /// this object; `at` ascends.
   void add(const Information& part, std::span<const std::size_t> at);
-  /// Multiplies all weights by `factor`, 0 to 1: older observations count less.
+  /// Multiplies the information H of all observations added so far by `factor`, 0 to 1, so that
+  /// later observations have more weight.
   void forget(double factor);
 
-  /// Information about the other unknowns, in their order, when the given ones are unknown
-  /// (marginalisation). `eliminated` must not repeat an unknown.
+  /// Information about the unknowns that are not in `eliminated`, in their order, if those in
+  /// `eliminated` may have any value (marginalisation). `eliminated` must not repeat an unknown.
   [[nodiscard]] Information without_unknowns(std::span<const std::size_t> eliminated) const;
 
  private:
@@ -69,15 +70,15 @@ class Information {
   double rest_ = 0.0;
 };
 
-/// Information of each group of blocks. Whitening never crosses a group, so that a group can be
-/// left out without reading observations again.
+/// Information of each group of blocks (Block::group). Noise is independent between groups, so the
+/// information of all groups but one is a sum, and no observation is read again.
 class InformationByGroup {
  public:
   explicit InformationByGroup(std::size_t unknowns) : unknowns_(unknowns) {}
 
   [[nodiscard]] Result<void> add(const Block&);
   [[nodiscard]] std::vector<std::size_t> groups() const;
-  /// Of no observations if there is no such group.
+  /// Information without observations if no block of this group was added.
   [[nodiscard]] Information of(std::size_t group) const;
   [[nodiscard]] Information all() const;
   [[nodiscard]] Information without(std::size_t group) const;

@@ -1,7 +1,7 @@
 #pragma once
 /// The form of a model: which functions of the machine's state its parameters multiply,
 ///     V(state) = B(state) U
-/// A method asks for columns and does not know the form.
+/// An identification method uses only the columns of B, so it works with every form of model.
 
 #include <string>
 #include <utility>

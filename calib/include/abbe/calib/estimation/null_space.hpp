@@ -1,6 +1,6 @@
 #pragma once
-/// Rank and condition of the data alone, without any datum. Columns are scaled to unit length
-/// first, so that neither depends on the units of the unknowns.
+/// Rank and condition of the data alone, without any datum (datum.hpp). Columns are scaled to unit
+/// length first, so that rank and condition do not depend on the units of the unknowns.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -13,9 +13,10 @@ namespace abbe::calib::estimation {
 struct Spectrum {
   Eigen::VectorXd singular_values;  ///< descending
   std::size_t rank = 0;             ///< number of singular values above the threshold
-  /// Rounding of n columns of unit length changes a singular value by
-  ///     n sqrt(rows) eps times the largest
-  /// at most: every column has an error of sqrt(rows n) eps, with the sign of the errors at random.
+  /// Smaller singular values count as zero. Rounding changes a singular value by at most
+  ///     n sqrt(rows) eps times the largest singular value,
+  /// n: number of columns, eps: machine precision. Each of the n columns of unit length has an
+  /// error of sqrt(rows n) eps, because rounding errors have random signs.
   double threshold = 0.0;
   /// largest singular value divided by the smallest one above the threshold; 0 for rank 0
   double condition = 0.0;
@@ -23,15 +24,15 @@ struct Spectrum {
 [[nodiscard]] Spectrum spectrum(const Information&);
 
 /// Rank of the column-scaled R from a QR decomposition with column pivoting, with the threshold of
-/// Spectrum. Its diagonal reveals the rank except for constructed matrices ([Golub 2013] section
-/// 5.4). Takes less time than singular values.
+/// Spectrum. The diagonal of the triangular factor shows the rank, except for specially constructed
+/// matrices ([Golub 2013] section 5.4). Takes less time than singular values.
 [[nodiscard]] std::size_t pivoted_rank(const Information&);
 
 /// Combinations of the unknowns that the data do not determine.
 struct NullSpace {
   std::size_t rank = 0;   ///< pivoted_rank()
   Eigen::MatrixXd basis;  ///< unknowns() x datum defect, in the units of the unknowns
-  /// of each scaled unknown in the combinations, 0 to 1
+  /// for each column-scaled unknown: 0 if the data determine it, 1 if they state nothing about it
   Eigen::VectorXd share;
 };
 [[nodiscard]] NullSpace null_space(const Information&);

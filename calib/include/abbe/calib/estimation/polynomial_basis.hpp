@@ -1,6 +1,6 @@
 #pragma once
-/// The scaled design of a ball array (evemu/scaled_design.hpp) as columns: polynomials without
-/// tables, in the reading alone. They hold for one tool offset.
+/// The scaled design of a ball array (evemu/scaled_design.hpp) as columns: V is a polynomial in the
+/// scale readings, without tables. The polynomials are valid for one tool offset.
 
 #include <string>
 

@@ -4,7 +4,8 @@
 /// 1. those of ParameterLayout: nodes of the tables, then squareness,
 /// 2. for TravelDependence::Backlash one value b per table, for Tables one difference D per node,
 ///    in the order of the tables.
-/// The value of a table, with s = 1 forward, -1 backward and 0 before the first motion of its axis:
+/// The value of a table at position q, with s = 1 while its axis travels forward, -1 backward, and
+/// 0 before the first motion of the axis:
 ///     U(q) + s b / 2    or    U(q) + s D(q) / 2
 
 #include <array>

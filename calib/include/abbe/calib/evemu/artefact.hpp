@@ -56,7 +56,8 @@ struct ArtefactTemperature {
 /// expansion factor; directions do not change.
 [[nodiscard]] Calibrator at_temperature(const Calibrator&, const Expansion&);
 
-/// Uncertainty of the array itself. Its errors are the same at all positions.
+/// Uncertainties of the calibrated dimensions of the array. An error of the array is the same at
+/// all positions to which the array is turned on the machine.
 struct ArtefactUncertainty {
   std::vector<double> u_ball_m;          ///< of the centre of each ball, per coordinate
   std::array<double, 2> u_block_rad{};   ///< as Calibrator::Block::u_rad
@@ -80,8 +81,10 @@ struct Touch {
   Vector3 p_m = Vector3::Zero();
 };
 
-/// Transforms uniform into measuring coordinates. The columns of the rotation are x, y, z: z along
-/// n1, x along n2 x z; the origin is Ball1. DegenerateGeometry for parallel normals.
+/// Transforms from the uniform coordinate system to the system in which the arguments were
+/// measured. The columns of the rotation are the unit vectors x, y, z of the uniform system: z
+/// along n1, x along n2 x z (n1, n2: normals of the blocks); the origin is Ball1.
+/// DegenerateGeometry for parallel normals.
 [[nodiscard]] Result<RigidTransform> uniform_frame(const Vector3& ball1_m, const Vector3& n1,
                                                    const Vector3& n2);
 
@@ -97,7 +100,7 @@ struct TouchedArtefact {
   /// Time of each ball: mean index of its touches among all touches of the run, in the order in
   /// which they were given.
   std::vector<double> ball_index;
-  std::array<double, 2> block_index{};  ///< the same for the blocks
+  std::array<double, 2> block_index{};  ///< time of each block, as `ball_index`
 };
 
 /// A calibrator from touches of the artefact at one position on an accurate machine. `outward`:

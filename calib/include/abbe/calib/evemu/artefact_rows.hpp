@@ -1,11 +1,13 @@
 #pragma once
 /// Effect of errors of the array itself on the errors observed at its balls. In the array's own
-/// frame these errors are the same at every position: delta_i of the centre of ball i, a small
-/// rotation d of the uniform frame (from errors of the block directions), a relative length error
-/// k. At position p they change the observed error of ball i ([Li OMM] eq. (12): ideal - actual) by
+/// frame the errors of the array are the same at every position: delta_i of the centre of ball i, a
+/// small rotation d of the uniform frame (from errors of the block directions), a relative length
+/// error k. At position p they change the observed error of ball i ([Li OMM] eq. (12): ideal -
+/// actual) by
 ///     R_p [ (delta_i - delta_1) - d x (a_i - a_1) + k (a_i - a_1) ]
-/// R_p: rotation of T_self_uni; a: ball centres in the uniform frame. The uncertainty of d about x
-/// and y is u1, that of block 1. About z both blocks contribute:
+/// R_p: rotation from the uniform frame (artefact.hpp) to machine coordinates; a: ball centres in
+/// the uniform frame. n1, n2: normals of the blocks; u1, u2: standard uncertainties of their
+/// directions. The uncertainty of d about x and y is u1. About z both blocks contribute:
 ///     u^2 = (u2^2 + (n1 . n2)^2 u1^2) / |n2 x n1|^2
 /// Where n1 . n2 != 0, the rotations about z and y are correlated.
 

@@ -5,7 +5,7 @@
 /// centre as in contact: a straight path of up to 60 degrees around the ball is then free of
 /// collision. Between two features the tip moves up, then across above all features, then down. The
 /// path from the initial tip position begins in the same way, and the last path ends above all
-/// features. Other objects on the table are not taken into account. m; pure.
+/// features. Other objects on the table are not taken into account. Lengths in m. Pure.
 
 #include <array>
 #include <optional>

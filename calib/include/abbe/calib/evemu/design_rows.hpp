@@ -8,15 +8,18 @@
 
 namespace abbe::calib::evemu {
 
-/// Theta_p (observe.hpp) of every function of the design, 3 x design.size(), to first order.
+/// Column j: the rotation Theta_p [rad] by which a volumetric error equal to function j of the
+/// design rotates the measured artefact (observe.hpp), to first order. 3 x design.size().
 [[nodiscard]] Eigen::Matrix3Xd block_rotation(const TouchedArtefact&, const ScaledDesign&);
-/// D (observe.hpp) of every function at a ball (index from 0), 3 x design.size(), to first order.
+/// Column j: the displacement D by which a volumetric error equal to function j of the design
+/// displaces the fitted centre of a ball (index from 0; observe.hpp), to first order. 3 x
+/// design.size().
 [[nodiscard]] Eigen::Matrix3Xd ball_displacement(const TouchedArtefact&, std::size_t ball,
                                                  const ScaledDesign&);
 
-/// Source of the design rows. Centres: B at the ball centre, as in [Li OMM]. Touches: D and Theta
-/// from the touched points; requires Observations::seen; the three rotations about Ball1 are then
-/// not observable.
+/// Source of the design rows. Centres: values of the design functions at the ball centre, as in [Li
+/// OMM]. Touches: displacement D and rotation Theta from the touched points; requires
+/// Observations::seen. With Touches the three rotations of V about Ball1 are not observable.
 enum class RowsFrom { Centres, Touches };
 
 /// Design rows of the observations, 3 rows.size() x design.size(). The rows of Ball1 state that V

@@ -1,15 +1,16 @@
 #pragma once
-/// The equivalent volumetric error model: the combinations of error coefficients that measurements
-/// of E can distinguish. Algorithm 1 of [Li OMM] combines like terms: for every monomial of every
-/// component of A it takes the row of that monomial's factors over all coefficients. The row is
-/// added to W unless W already contains it or its negative. Then
+/// The equivalent volumetric error model: the combinations of the error coefficients K that
+/// measurements of the volumetric error E = A(x, y, z) K (error_polynomials.hpp) can distinguish.
+/// Algorithm 1 of [Li OMM] combines like terms: for every monomial of every component of A it takes
+/// the row of that monomial's factors over all coefficients. The row is added to the matrix W
+/// unless W already contains this row or its negative. Then, with beta the combinations,
 ///     beta = W K,  X = A W^+,  E = X beta.
 /// With one tool offset W has full row rank, so X is the only solution of A = X W. The columns of X
 /// are single monomials (for a rotation with two arms: one in each of two components). Names as in
 /// [Li OMM] Table 3: a row with one coefficient has the name of that coefficient; a merged row is
 /// k_eq<component><n>, numbered within the component by decreasing x > y > z > 1. Sign: a single
 /// coefficient has the factor +1; in a merged row the translations have the factor +1. Rows are in
-/// alphabetical order. mm.
+/// alphabetical order. Lengths in mm.
 
 #include <Eigen/Core>
 #include <span>
@@ -20,7 +21,7 @@
 
 namespace abbe::calib::evemu {
 
-/// One nonzero term of a column of X: factor * monomial in a component.
+/// One nonzero term of a column of X: `component` of the column contains factor * monomial.
 struct Share {
   std::size_t component = 0;
   Monomial monomial;

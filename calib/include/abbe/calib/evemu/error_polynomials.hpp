@@ -1,14 +1,16 @@
 #pragma once
 /// The 18 position-dependent errors of three linear axes as polynomials, and their effect on the
 /// functional point. [Li OMM] eq. (3): every error function is
-///     sum_k K_k q^k,    k = 0 .. order.
-/// With the 3 squareness errors the volumetric error is E = A(x, y, z) K. In the chain w a1 a2 a3 t
-/// the error of an axis acts after the axis's own motion. To first order
+///     sum_k K_k q^k,    k = 0 .. order,   q: reading of the axis, K_k: coefficients.
+/// With the 3 squareness errors the volumetric error is E = A(x, y, z) K. The axes are a1, a2, a3
+/// from the workpiece to the tool. The error of an axis acts after the axis's own motion. To first
+/// order
 ///     E = sum_i ( d_i(q_i) + e_i(q_i) x r_i ) + squareness,
+///     d_i, e_i: translation and rotation error of axis i,
 ///     r_i = travels of the axes nearer to the tool + tool offset,
-/// with one squareness rotation about e_a3 before the travel of a2, and two, about e_a1 and e_a2,
-/// before the travel of a3. E = true - reading, evaluated at the reading. Lengths in mm: the units
-/// of the coefficients are mm^(1-k) and rad mm^-k.
+/// with one squareness rotation about the direction of a3 before the travel of a2, and two, about
+/// the directions of a1 and a2, before the travel of a3. E = true - reading, evaluated at the
+/// reading. Lengths in mm: the units of the coefficients are mm^(1-k) and rad mm^-k.
 
 #include <Eigen/Core>
 #include <array>
@@ -29,7 +31,8 @@ inline constexpr int kMostOrder = 5;
 struct Monomial {
   std::array<int, 3> exponent{};
   [[nodiscard]] double at(const Vector3& p_mm) const;
-  // clang-tidy 14 takes the 0 that a defaulted <=> compares with for a pointer.
+  // A defaulted <=> compares with a literal 0, which clang-tidy 14 wrongly reports as a null
+  // pointer.
   friend auto operator<=>(const Monomial&,
                           const Monomial&) = default;  // NOLINT(modernize-use-nullptr)
 };

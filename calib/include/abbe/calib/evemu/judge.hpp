@@ -5,8 +5,9 @@
 /// through its blocks. Therefore every compared model gets its own best-fit rotation about Ball1 at
 /// the position left out, the same three degrees of freedom from the same rows. The models are
 /// compared by the residuals that remain, whitened with the covariance of noise.hpp. This test
-/// cannot detect a rotation common to all positions (observe.hpp). A model with an unreferenced
-/// rotation is correct in shape only: it is refused unless the configuration accepts that by name.
+/// cannot detect a rotation common to all positions (observe.hpp). If no other measurement
+/// determines this rotation, the model is correct in shape only. Such a model is refused unless the
+/// configuration accepts "evemu-shape-only".
 
 #include "abbe/calib/evemu/lack_of_fit.hpp"
 #include "abbe/calib/evemu/solve.hpp"
@@ -14,19 +15,20 @@
 
 namespace abbe::calib::evemu {
 
-/// The name by which a configuration accepts a model with an unreferenced rotation.
+/// Entry in the configuration that permits a model whose rotation about Ball1 was not measured.
 inline constexpr std::string_view kShapeOnly = "evemu-shape-only";
 
 struct JudgeOptions {
   GateLimits limits{};
   bool accept_shape_only = false;
   SolveOptions solve{};
-  Watch watch{};  ///< progress: the first half for lack of fit, the second for the held-out test
+  Watch watch{};  ///< progress 0 to 0.5: test for lack of fit, 0.5 to 1: held-out test
 };
 
-/// `active` may be null. It is compared at the balls inside its validity volume, at positions whose
-/// Ball1 is inside it too; it is not compared if it is not valid for the tool. Needs 3 positions,
-/// else TooFewObservations; RankDeficient if the remaining positions do not determine the model.
+/// `active`, the model in use, may be null. The active model is compared at the balls inside its
+/// validity volume, at positions whose Ball1 is inside this volume too; it is not compared if it is
+/// not valid for the tool. Needs 3 positions, else TooFewObservations; RankDeficient if the
+/// positions that remain when one is left out do not determine the model.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, double s_m,
                                               const VolumetricModel* active,
                                               const SolveOptions& = {}, const Watch& = {});

@@ -1,7 +1,8 @@
 #pragma once
 /// What the residuals of a ball array show beyond noise. The estimate is compared with
 /// alternatives. Most alternatives add a few columns C:
-///     y = X c + S omega + C d + noise,    d ~ N(0, t^2),  t from 10 to 300 um.
+///     y = X c + S omega + C d + noise,    d ~ N(0, t^2),  t from 10 to 300 um,
+/// y: observed errors, X c: the model, S omega: random rotations of the array at each position.
 /// Such an alternative is a ball displaced at one position or wrong in the calibrator file, an
 /// array that moved, creeps or is bent, or a machine that drifts. Other alternatives replace X
 /// (another order of the axes, polynomials of one order more) or the noise (slow noise, noise.hpp).
@@ -23,8 +24,8 @@
 namespace abbe::calib::evemu {
 
 enum class Cause {
-  Touch,  ///< one touch lies off the surface of the others of its ball or face
-  Form,   ///< touches of a ball or face scatter more than others: moved during touching, or dirty
+  Touch,  ///< one touch lies off the surface through the other touches of its ball or face
+  Form,   ///< touches of one ball or face scatter more than those of others: it moved, or is dirty
   Backlash,    ///< touches depend on the direction of approach
   Ball,        ///< a ball is displaced at one position
   ArrayFile,   ///< the position of a ball in the calibrator file is wrong
@@ -39,16 +40,19 @@ enum class Cause {
 };
 [[nodiscard]] std::string_view name(Cause);
 
-/// Fraction of the model's uncertainty. An alternative that changes the model by less is minor.
+/// An alternative is minor if it changes the model by less than this fraction of the model's
+/// uncertainty.
 inline constexpr double kMatters = 0.1;
 
-/// Largest accepted scatter of touches or ball centres in units of u, as a length in space (root of
-/// the trace). Touches cannot distinguish noise of the probe, which averages out in the model, from
-/// short-wave errors of the machine, which the model does not follow. The latter remain in addition
-/// to u: u and 1.5 u together are 1.8 u.
+/// Largest accepted scatter of touches or ball centres, in units of the model's standard
+/// uncertainty u; both are lengths in space (root of the trace). Touches cannot distinguish noise
+/// of the probe, which averages out in the model, from short-wave errors of the machine, which the
+/// model does not follow. If all of the scatter is short-wave errors, they remain in addition to u:
+/// the root sum of squares of u and 1.5 u is 1.8 u.
 inline constexpr double kScatterBesideU = 1.5;
-/// Scatter that is attributed to the probe whatever u is: standard deviation of one touch along the
-/// normal, or of a ball centre per coordinate. A touch-trigger probe with lobing has as much.
+/// Scatter up to this value is attributed to the probe, whatever the model's uncertainty is:
+/// standard deviation of one touch along the normal, or of a ball centre per coordinate. A
+/// touch-trigger probe with lobing scatters this much.
 inline constexpr double kScatterOfProbes_m = 3e-6;
 
 /// Failed: the comparison could not be computed; the alternative may be true. Impossible: the
@@ -81,12 +85,12 @@ struct Watch {
   std::function<bool()> stopped;
 };
 
-/// The significant alternatives, the most likely first: family-wise error probability 1e-4, and 1e-2
-/// for those that change the model by more than twice its uncertainty. Those that change the model
-/// by less than a tenth of its uncertainty come after the others. At most one
-/// alternative of each cause; of Scatter up to two, after the others. Then the comparisons that
-/// were not made. Only the columns of one alternative at a time are in memory. NotConverged if the
-/// estimate itself has no likelihood, or when stopped.
+/// The significant alternatives, the most likely first: family-wise error probability 1e-4, and
+/// 1e-2 for alternatives that change the model by more than twice its uncertainty. Alternatives
+/// that change the model by less than a tenth of its uncertainty come after the others. At most one
+/// alternative of each cause is returned; of Scatter up to two, after the others. The comparisons
+/// that were not made come last. Only the columns of one alternative at a time are in memory.
+/// NotConverged if the likelihood of the estimate itself cannot be computed, or when stopped.
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
                                                             const Watch& = {});
 

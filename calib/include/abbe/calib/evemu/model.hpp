@@ -47,7 +47,7 @@ class EvemuModel {
  private:
   explicit EvemuModel(ScaledDesign design) : design_(std::move(design)) {}
 
-  /// One product of polynomials in one component, in the order of the components.
+  /// One product of polynomials in one component of V. The entries are sorted by component.
   struct Entry {
     DesignFunction::Part part;
     std::size_t axis = 0, order = 0;
@@ -62,7 +62,8 @@ class EvemuModel {
   Eigen::MatrixXd entry_covariance_;    ///< between entries: blocks by component are contiguous
 };
 
-/// Matrix T such that V of T c is zero at the place: T subtracts B(place) c from the constants.
+/// Matrix T such that the model with the coefficients T c has V = 0 at the place: T subtracts the
+/// original V(place) = B(place) c from the constants.
 [[nodiscard]] Eigen::MatrixXd zero_at(const ScaledDesign&, const Vector3& place_m);
 
 }  // namespace abbe::calib::evemu

@@ -1,9 +1,10 @@
 #pragma once
-/// Noise model of the ball errors at one position. Every ball has noise s, and all balls share the
-/// noise of Ball1, to which their errors are relative: covariance s^2 (I + 1 1^T) per component.
-/// The error of Ball1 is exactly 0; its rows are not observations. A ten thousandth of the variance
-/// is used for them, so that the covariance is not singular. In addition every position is rotated
-/// about Ball1 by a small random rotation of standard deviation w per axis.
+/// Noise model of the ball errors at one position. Every ball centre has noise of standard
+/// deviation s per coordinate, and all balls share the noise of Ball1, to which their errors are
+/// relative: covariance s^2 (I + 1 1^T) per component. The error of Ball1 is exactly 0; its rows
+/// are not observations. A ten thousandth of the variance is used for them, so that the covariance
+/// is not singular. In addition every position is rotated about Ball1 by a small random rotation of
+/// standard deviation w per axis.
 ///
 /// Slow noise is common to touches that follow each other. Its standard deviation is r s per
 /// coordinate (r: Observations::slow_noise); its correlation decays over a quarter of the touches
@@ -33,18 +34,21 @@ struct PositionRows {
 /// Covariance C0 of one position, count x count, in units of s^2. Slow noise requires
 /// Observations::seen.
 [[nodiscard]] Eigen::MatrixXd ball_covariance(const Observations&, const PositionRows&);
-/// Natural logarithm of |det L|, C0 = L L^T, over the components of all balls except Ball1.
+/// Natural logarithm of |det L|, C0 = L L^T, C0: ball_covariance() of all positions, over the
+/// components of all balls except Ball1.
 [[nodiscard]] double log_det_of_noise(const Observations&);
 
-/// L^-1 M with C0 = L L^T, position by position: the noise of the result is white, s^2.
+/// L^-1 M for M = `rows` and ball_covariance() = C0 = L L^T, position by position: the noise of the
+/// result is white, with variance s^2.
 [[nodiscard]] Eigen::MatrixXd whitened(const Observations&, const Eigen::MatrixXd& rows);
 /// C0 M.
 [[nodiscard]] Eigen::MatrixXd times_ball_covariance(const Observations&,
                                                     const Eigen::MatrixXd& rows);
-/// L M: gives white noise the covariance C0.
+/// L M, the inverse of whitened(): gives white noise M the covariance C0.
 [[nodiscard]] Eigen::MatrixXd coloured(const Observations&, const Eigen::MatrixXd& rows);
 
-/// 3 rows.size() x 3 positions: effect of rotations theta_p of the blocks, -theta_p x (P - P_1).
+/// 3 rows.size() x 3 positions: effect of a rotation theta_p of the whole artefact at position p on
+/// the observed errors, -theta_p x (P - P_1), P: reading of the ball, P_1: reading of Ball1.
 [[nodiscard]] Eigen::MatrixXd pose_rotation_rows(const Observations&);
 
 }  // namespace abbe::calib::evemu

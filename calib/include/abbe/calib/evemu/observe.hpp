@@ -1,9 +1,10 @@
 #pragma once
 /// Stage one: from touches of the ball array at several positions to errors of the ball centres. V
-/// at a ball = ideal centre - measured centre, relative to Ball1; evaluated at the reading. The
-/// machine touches blocks and balls with its own errors. These errors rotate the whole artefact at
-/// position p by Theta_p, and displace the centre of a fitted sphere by D, which differs from V at
-/// the centre (a curved V deforms the sphere):
+/// at a ball = ideal centre (artefact.hpp) - measured centre, minus the same difference of Ball1;
+/// it belongs to the scale reading at the measured centre. The machine touches blocks and balls
+/// with its own errors. These errors rotate the whole artefact at position p by Theta_p, and
+/// displace the centre of a fitted sphere by D, which differs from V at the centre (a curved V
+/// deforms the sphere):
 ///     V_seen(ball i) = D_i(V) - D_1(V) - Theta_p(V) x (P_i - P_1)
 /// D and Theta are linear in V at the touched points. A rotation common to all positions cancels:
 /// touches cannot detect it ([Li OMM] does not mention this). If the touched points are available,
@@ -39,7 +40,8 @@ struct Machine {
 
 struct ObserveOptions {
   int order = 3;
-  /// Touches are required at positions 1 to this number; [Li OMM] section 3 uses eight.
+  /// Number of positions of the array. Touches are required at all positions 1 to this number; [Li
+  /// OMM] section 3 uses eight.
   int positions = 8;
   /// A sphere has 4 unknowns; a fifth point is redundant and reveals a wrong touch.
   std::size_t least_points_per_ball = 5;
@@ -71,9 +73,9 @@ struct ObserveOptions {
   std::optional<ArtefactTemperature> artefact_temperature{};
 };
 
-/// Source of the artefact's direction. Blocks: the machine itself measured it; V may then contain a
-/// rotation common to all positions that cannot be detected. Independent: another instrument
-/// measured it, such as a tracker.
+/// How the orientation of the artefact at each position was measured. Blocks: by the machine
+/// itself, on the blocks; V may then contain a rotation common to all positions that cannot be
+/// detected. Independent: by another instrument, such as a tracker.
 enum class RotationOrigin { Blocks, Independent };
 
 struct Observations {
@@ -100,20 +102,22 @@ struct Observations {
 /// temperature and expansivity the array is taken as it is at that temperature.
 [[nodiscard]] Result<Observations> observe(std::span<const Touch>, const Calibrator&,
                                            const Machine&, const ObserveOptions& = {});
-/// One position alone, by the same rules. Without a temperature the array is taken as at 20 C, even
-/// if the calibrator states an expansivity.
+/// Evaluates the touches of one position by the rules of observe(). Without a temperature the array
+/// is taken as at 20 C, even if the calibrator states an expansivity.
 [[nodiscard]] Result<TouchedArtefact> see_artefact(int position,
                                                    std::span<const Touch> touches_of_it,
                                                    const Calibrator&, const ObserveOptions& = {});
-/// Index in `before` of the first orientation from which `R_self_uni` differs by less than
-/// `least_turn_rad`; nullopt if there is none.
+/// Index in `before` of the first orientation from which `R_self_uni` differs by a rotation of less
+/// than `least_turn_rad`; nullopt if there is none. An orientation is the rotation from the uniform
+/// frame of the artefact (artefact.hpp) to machine coordinates.
 [[nodiscard]] std::optional<std::size_t> same_orientation_as(const Matrix3& R_self_uni,
                                                              std::span<const Matrix3> before,
                                                              double least_turn_rad);
 
-/// observe() for errors that were computed elsewhere; block rotations are then unknown. Also
-/// BadInput if the artefact of reading + V has another shape at every position, but the same shape
-/// at all positions once signs, axes or unit of V are changed: the text names that change.
+/// observe() for ball errors that were computed elsewhere; how the machine's errors rotate the
+/// blocks is then unknown. Also BadInput if the ball centres, reading + V, form a different shape
+/// at every position, but the same shape at all positions when signs, axes or unit of V are
+/// changed: the text names this change.
 [[nodiscard]] Result<Observations> observe_errors(std::span<const BallError>, const Machine&,
                                                   RotationOrigin rotation = RotationOrigin::Blocks,
                                                   const ObserveOptions& = {});

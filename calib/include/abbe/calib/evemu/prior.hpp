@@ -1,18 +1,20 @@
 #pragma once
 /// Prior of the coefficients, with a few hyper-parameters that are estimated from the data (maximum
-/// marginal likelihood). It applies to the scaled design, where every coefficient is the size of
-/// its contribution. Prior standard deviations:
+/// marginal likelihood). The prior applies to the scaled design (scaled_design.hpp), where every
+/// coefficient is the size of its contribution to V. Prior standard deviations, with s_d, s_a, rho,
+/// t and w of HyperParameters:
 ///   constants                5 mm
 ///   bayes-pose
 ///     linear translations    max(s_d, 2 mm), because squareness errors can be large
-///     scale of an axis       max(s_d, 100 um/m arm) half width / arm, and s_a: root sum of squares
+///     scale of an axis       root sum of squares of s_a and
+///                            max(s_d, 100 um/m times arm) half width of the axis / arm
 ///     translations, order k  s_d rho^(k-1)
 ///     rotations, order k     s_a rho^(k-1), at the distance arm
 ///     pose rotations         w
 ///   ridge                    t for all coefficients except the constants; no pose rotations
-/// arm: the largest half width. The scale of an axis is its linear translation along itself. Its
-/// s_a stands for rotations at an unknown offset; with a flat array nothing else limits the scale
-/// of the axis perpendicular to the array.
+/// arm: the largest half width of the box of readings. The scale of an axis is its linear
+/// translation along itself. The part s_a of its prior stands for rotations at an unknown offset;
+/// with a flat array only this prior limits the scale of the axis perpendicular to the array.
 
 #include <Eigen/Core>
 #include <span>
@@ -44,9 +46,10 @@ struct HyperParameters {
                                               const HyperParameters&);
 
 /// Hyper-parameters of the largest marginal likelihood: quasi-Newton search from a few starting
-/// points within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad, ...). Deterministic.
-/// `problem`: whitened rows of the design, of columns with the known prior variances `added`, and
-/// of pose rotations, in this order. NotConverged if no starting point has a likelihood.
+/// points within fixed bounds (s 1 nm to 1 mm, w 0.01 urad to 10 mrad, and others). Deterministic.
+/// The whitened columns of `problem` are those of the design, then columns whose prior variances
+/// `added` are known, then those of the pose rotations. NotConverged if the likelihood cannot be
+/// computed at any starting point.
 [[nodiscard]] Result<HyperParameters> most_likely(PriorKind, const ScaledDesign&,
                                                   std::size_t positions,
                                                   const LinearGaussian& problem,
@@ -56,8 +59,8 @@ struct HyperParameters {
 inline constexpr double kComparable = 2.0;
 
 /// Hyper-parameters of bayes-pose that the data hardly distinguish from the most likely ones: each
-/// of s_d, rho, s_a, w is changed in steps of a factor of 2 in both directions, at most 8 times, and
-/// the others are estimated again, until the likelihood is lower by more than e^kComparable.
+/// of s_d, rho, s_a, w is changed in steps of a factor of 2 in both directions, at most 8 times,
+/// and the others are estimated again, until the likelihood is lower by more than e^kComparable.
 [[nodiscard]] std::vector<HyperParameters> comparable_parameters(const HyperParameters& most_likely,
                                                                  const ScaledDesign&,
                                                                  std::size_t positions,

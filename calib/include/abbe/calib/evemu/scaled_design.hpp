@@ -1,9 +1,10 @@
 #pragma once
-/// The design used for all numerical work: the span of the equivalent model's columns in Legendre
-/// polynomials of u = (q - centre) / half width, with arms in units of the largest half width.
+/// The design used for all numerical work: its functions span the same space as the columns of the
+/// equivalent model (equivalent_model.hpp), but are Legendre polynomials of u = (q - centre) / half
+/// width, q: reading. The arm with which a rotation acts is in units of the largest half width.
 /// Every function is at most about 1 in the volume, so every coefficient is a length: the size of
-/// its contribution. Penalties and priors refer to these coefficients. A stylus offset does not
-/// change the span and is therefore not a parameter here.
+/// its contribution to V. Penalties and priors refer to these coefficients. A stylus offset does
+/// not change the space and is therefore not a parameter of the design.
 
 #include <Eigen/Core>
 #include <array>
@@ -25,7 +26,9 @@ struct ReadingBox {
 
 enum class FunctionKind { Constant, Translation, Rotation };
 
-/// Sum over the parts of sign * P_order(u_axis) [* arm of another axis], each in one component.
+/// A vector function: the sum of parts, each in one component of V,
+///     sign * P_order(u_axis)   or   sign * P_order(u_axis) * arm,
+/// P_order: Legendre polynomial, u_axis: scaled reading of the axis, arm: that of another axis.
 struct DesignFunction {
   struct Part {
     std::size_t component = 0;
@@ -56,8 +59,8 @@ class ScaledDesign {
   /// Unit of the arms: the largest half width.
   [[nodiscard]] double arm_unit_m() const { return box_.half_width_m.maxCoeff(); }
   [[nodiscard]] std::size_t size() const { return functions_.size(); }
-  /// In the order of equivalent().names(): function j contributes to name j and, through its lower
-  /// orders, to other names.
+  /// In the order of equivalent().names(): function j contributes to the named coefficient j and,
+  /// because a Legendre polynomial contains lower powers, to other named coefficients.
   [[nodiscard]] std::span<const DesignFunction> functions() const { return functions_; }
 
   [[nodiscard]] Factors factors(const Vector3& reading_m) const;
@@ -67,9 +70,11 @@ class ScaledDesign {
   }
   /// 3 x size(): E_m = B c_m.
   [[nodiscard]] Eigen::Matrix3Xd B(const Vector3& reading_m) const;
-  /// beta = M (1000 c_m): the named coefficients in mm^(1-k), rad mm^-k.
+  /// Matrix M from the coefficients c_m of this design to those of the equivalent model, beta =
+  /// M (1000 c_m), whose units are mm^(1-k) and rad mm^-k for order k.
   [[nodiscard]] Eigen::MatrixXd named_from_scaled() const;
-  /// size() x 3: maps omega to the c of the small rotation omega x (q - about).
+  /// size() x 3: maps a small rotation vector omega to the coefficients c of the field
+  /// V(q) = omega x (q - about).
   [[nodiscard]] Eigen::MatrixX3d rotation_about(const Vector3& about_m) const;
 
  private:

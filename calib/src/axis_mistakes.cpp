@@ -15,7 +15,7 @@ Matrix3 reversed(std::span<const Eigen::Index> axes) {
   return M;
 }
 
-/// Row i selects the given coordinate from[i].
+/// Matrix whose product with a point has the point's coordinate from[i] as coordinate i.
 Matrix3 reordered(const std::array<Eigen::Index, 3>& from) {
   Matrix3 M = Matrix3::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -83,8 +83,8 @@ std::string corrections_inside_travel(std::span<const Vector3> points_m,
     }
   }
 
-  // Smaller coordinates are inside the travel of most machines. Therefore a wrong unit is reported
-  // only if no axis mistake explains the data.
+  // A factor below 1 makes all coordinates small, and small coordinates are inside the travel of
+  // most machines. Therefore a wrong unit is reported only if no axis mistake explains the data.
   const bool explained = !texts.empty();
   for (const UnitMistake& mistake : unit_mistakes()) {
     if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel)) {

@@ -43,8 +43,8 @@ Result<AxisNodes> equidistant_nodes(double min_m, double max_m, double spacing_m
                            " m: needs min < max and a positive spacing"));
   }
 
-  // A whole number of cells. 1e-9: rounding must not add a cell if the range is a multiple of the
-  // spacing.
+  // The number of cells is rounded up to an integer. 1e-9 is subtracted so that rounding errors do
+  // not add a cell if the range is a multiple of the spacing.
   const double cells = std::max(1.0, std::ceil((max_m - min_m) / spacing_m - 1e-9));
   constexpr double kMostCells = 1e5;
   if (cells > kMostCells) {

@@ -18,7 +18,7 @@ inline constexpr double kMostUncertainty = 0.5;
 /// Entry in Verdict::causes.
 inline constexpr std::string_view kUncertain = "uncertainty";
 
-/// Refuses the model if u_m > kMostUncertainty * V_m or if one of them is NaN. V_m, u_m: rms of V
+/// Refuses the model if u_m > kMostUncertainty * V_m or if u_m or V_m is NaN. V_m, u_m: rms of V
 /// and of its standard uncertainty, rigid motion removed.
 inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   if (!(u_m <= kMostUncertainty * V_m)) {
@@ -28,7 +28,8 @@ inline void require_certainty(Verdict& verdict, double V_m, double u_m) {
   }
 }
 
-/// "the axes have backlash: it changes the model by 12 um rms, the uncertainty is 2 um".
+/// A sentence such as "the axes have backlash: it changes the model by 12 um rms, the uncertainty
+/// is 2 um".
 inline std::string with_effect(const std::string& cause, double bias_m, double u_m) {
   if (std::isnan(bias_m)) {
     return cause;  // the effect on the model is not known

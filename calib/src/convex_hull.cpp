@@ -16,8 +16,10 @@ using WideVector = std::array<Wide, 3>;
 using LatticePoint = std::array<std::int64_t, 3>;
 using Index = std::size_t;
 
-/// The lattice has at most 2^39 cells along the longest side. Differences are below 2^39,
-/// components of a cross product below 2^79, heights below 2^121, so that all fit in 128 bits.
+/// The lattice to which the points are rounded has at most 2^39 cells along the longest side.
+/// Differences of coordinates are below 2^39, components of a cross product of two differences
+/// below 2^79, heights (scalar product of a cross product and a difference) below 2^121, so that
+/// all fit in 128 bits.
 constexpr int kCellBits = 39;
 
 LatticePoint minus(const LatticePoint& a, const LatticePoint& b) {
@@ -39,7 +41,7 @@ Vector3 rounded(const WideVector& v) {
 
 struct Triangle {
   std::array<Index, 3> corner{};  ///< anticlockwise seen from outside
-  std::array<Index, 3> beyond{};  ///< neighbour triangle at the edge from corner k to k + 1
+  std::array<Index, 3> beyond{};  ///< [k]: neighbour triangle at the edge from corner k to k + 1
   WideVector normal{};            ///< outward, exact
   double length = 0.0;            ///< of the normal
   std::vector<Index> outside{};   ///< points assigned to this triangle; they are above it
@@ -66,7 +68,8 @@ class Quickhull {
   }
   [[nodiscard]] bool start_with_four();
   void add_triangle(Index a, Index b, Index c);
-  /// Exact height, multiplied by the length of the normal; positive if the point is above t.
+  /// Height of the point above the plane of t, multiplied by the length of the normal, as an exact
+  /// integer; positive on the outer side.
   [[nodiscard]] Wide height(const Triangle& t, Index point) const {
     return dot(t.normal, minus(at_[point], at_[t.corner[0]]));
   }
@@ -89,9 +92,10 @@ class Quickhull {
   double tolerance_cells_ = 0.0;
   ApexFrom apex_from_;
   std::vector<Triangle> triangles_;
-  /// Per point: the new triangle whose edge to an old triangle begins at this point.
+  /// For each point: the triangle added last whose edge to a kept triangle begins at this point.
   std::vector<Index> begins_at_;
-  /// Points that are assigned to no triangle but are above one by less than the tolerance.
+  /// Points that are above a triangle by less than the tolerance and are therefore assigned to
+  /// none.
   std::vector<Index> close_;
 };
 
@@ -133,10 +137,10 @@ bool Quickhull::round_to_lattice(std::span<const Vector3> points_m) {
   return true;
 }
 
-/// The highest of the points. If several are equally high (a face parallel to the plane, an edge),
-/// the one with the least x, then y, then z: this is a corner and not a point between two corners.
-/// "Equally high" means within half the tolerance: if the highest point is outside the tolerance,
-/// the selected point is above the plane.
+/// The highest of the points. If several are equally high (a face or an edge parallel to the
+/// plane), the one with the least x, then y, then z is selected: it is a corner of the hull and not
+/// a point between two corners. "Equally high" means within half the tolerance: if the highest
+/// point is above the plane by more than the tolerance, the selected point is above the plane, too.
 template <class Height>
 Index Quickhull::extreme(const std::vector<Index>& among, const Height& height) const {
   std::vector<Index> left = among;
@@ -226,7 +230,7 @@ void Quickhull::add_triangle(Index a, Index b, Index c) {
   triangles_.push_back(std::move(t));
 }
 
-/// Assigns every point to the first triangle, beginning with `first_triangle`, that it is above by
+/// Assigns every point to the first triangle, searched from `first_triangle` on, below the point by
 /// more than the tolerance.
 void Quickhull::assign(const std::vector<Index>& points, Index first_triangle) {
   for (const Index p : points) {
@@ -260,13 +264,14 @@ std::vector<Index> Quickhull::outside_from(Index first_triangle) const {
 Index Quickhull::apex_above(Index triangle) const {
   const Triangle& t = triangles_[triangle];
   const auto above = [&](Index p) { return height_cells(t, p); };
-  // A corner at the end of an edge may be assigned to another triangle than the points on the edge.
+  // Of points on an edge the corner at its end must be selected, which may be assigned to another
+  // triangle than the points on the edge. AllPoints therefore searches the points of all triangles.
   return apex_from_ == ApexFrom::AllPoints ? extreme(outside_from(triangle), above)
                                            : extreme(t.outside, above);
 }
 
-/// Removes the triangles that the apex is strictly above and returns them. They are connected;
-/// their boundary is one closed polygon.
+/// Removes the triangles that have the apex strictly on their outer side, and returns them. These
+/// triangles are connected; their boundary is one closed polygon.
 std::vector<Index> Quickhull::remove_visible(Index apex, Index from) {
   std::vector<Index> visible{from};
   triangles_[from].removed = true;
@@ -325,8 +330,8 @@ void Quickhull::grow() {
         add_apex(apex_above(t), t);
       }
     }
-    // A point within the tolerance of the triangles tested so far may be above another triangle by
-    // more than the tolerance.
+    // The points in close_ are within the tolerance of the triangles tested so far. They may be
+    // above another triangle by more than the tolerance, and are tested against all triangles here.
     assign(std::exchange(close_, {}), 0);
   } while (!outside_from(0).empty());
 }
@@ -401,7 +406,8 @@ std::vector<std::size_t> hull_corners(std::span<const Vector3> points_m, double 
   std::vector<std::size_t> found = hull.corners();
   bool settled = hull.every_corner_protrudes();
 
-  // Some of the corners may be between others: repeat with the corners found until none is removed.
+  // Some of the corners found may lie between other corners: the hull of the corners found is
+  // computed repeatedly until no corner is removed.
   while (!settled) {
     std::vector<Vector3> some;
     for (const std::size_t i : found) {

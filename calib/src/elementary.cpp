@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// pi/2 and ln 2, each as a sum of parts. The first parts end in enough zero bits that their product
-// with an integer of up to 20 bits is exact.
+// pi/2 and ln 2, each as a sum of parts. All parts but the last end in enough zero bits that their
+// product with an integer of up to 20 bits is exact.
 constexpr double kHalfPi_1 = 0x1.921fb544p+0, kHalfPi_2 = 0x1.0b4611a6p-34,
                  kHalfPi_3 = 0x1.3198a2e037073p-69;
 constexpr double kLn2_1 = 0x1.62e42feep-1, kLn2_2 = 0x1.a39ef35793c76p-33;
@@ -25,7 +25,8 @@ constexpr double polynomial(const std::array<double, n>& c, double z) noexcept {
   return sum;
 }
 
-/// 1/first!, 1/(first + step)! ..., with alternating signs if alternate is -1.
+/// The n numbers 1/first!, 1/(first + step)!, 1/(first + 2 step)! and so on, with alternating signs
+/// if `alternate` is -1.
 template <std::size_t n>
 constexpr std::array<double, n> inverse_factorials(int first, int step, double alternate) noexcept {
   std::array<double, n> c{};
@@ -38,14 +39,16 @@ constexpr std::array<double, n> inverse_factorials(int first, int step, double a
   return c;
 }
 
+// Coefficients of the Taylor series in the parentheses:
 //     sin r = r - r^3 (1/3! - r^2/5! ...),   cos r = 1 - r^2/2 + r^4 (1/4! - r^2/6! ...)
-// The first omitted term is below 1e-18.
+// The first omitted term of each series is below 1e-18.
 constexpr auto kSine = inverse_factorials<8>(3, 2, -1.0);
 constexpr auto kCosine = inverse_factorials<8>(4, 2, -1.0);
 //     e^r = 1 + r + r^2 (1/2! + r/3! ...)
 constexpr auto kExponential = inverse_factorials<13>(2, 1, 1.0);
 
-/// 2/3, 2/5 ...: log((1 + s)/(1 - s)) = 2 s + s z (2/3 + z 2/5 ...), z = s^2.
+/// The coefficients 2/3, 2/5, 2/7 and so on of the series in the parentheses:
+///     log((1 + s)/(1 - s)) = 2 s + s z (2/3 + z 2/5 ...),   z = s^2.
 constexpr std::array<double, 11> odd_fractions() noexcept {
   std::array<double, 11> c{};
   for (std::size_t i = 0; i < c.size(); ++i) c[i] = 2.0 / static_cast<double>(2 * i + 3);
@@ -115,7 +118,8 @@ double natural_logarithm(double x) noexcept {
   const double z = s * s;
   const double half_square = 0.5 * f * f;
 
-  // 2 s = f - f^2/2 + s f^2/2; f itself has no rounding error.
+  // 2 s = f - f^2/2 + s f^2/2 for s = f / (2 + f). In this form the largest term, f, has no
+  // rounding error.
   const double tail = s * (half_square + z * polynomial(kLogarithm, z));
   return twos * kLn2_1 - ((half_square - (tail + twos * kLn2_2)) - f);
 }

@@ -1,10 +1,10 @@
 #pragma once
 /// Elementary functions with bit-identical results on every processor and with every C library.
-/// They use only basic operations and square roots of IEEE 754, in a fixed order. The functions of
-/// C libraries differ between libraries and between processors with and without fused multiply-add.
-/// Error: less than one unit in the last place; for sine and cosine up to 2^-53 more. Arguments are
-/// reduced with constants split into parts whose products are exact ([Cody 1980]); the series are
-/// Taylor series.
+/// They use only basic operations and square roots of IEEE 754, in a fixed order. The results of
+/// the C library's functions differ between libraries and between processors with and without fused
+/// multiply-add. Error: less than one unit in the last place; for sine and cosine up to 2^-53 more.
+/// Arguments are reduced with constants split into parts whose products are exact ([Cody 1980]);
+/// the series are Taylor series.
 
 #include <cstdint>
 #include <random>

@@ -7,8 +7,8 @@
 namespace abbe::calib {
 namespace {
 
-/// Finds the index of the cell that contains x, and the position of x in it as a fraction 0 to 1.
-/// False if x is outside.
+/// Finds the index of the cell that contains x, and the position of x in this cell as a fraction 0
+/// to 1. False if x is outside all cells.
 bool locate(const std::vector<double>& coordinates, double x, std::size_t& cell, double& fraction) {
   if (coordinates.size() < 2 || x < coordinates.front() || x > coordinates.back()) {
     return false;

@@ -37,8 +37,8 @@ double max_error_m(const VolumetricModel& model, const std::vector<Vector3>& at,
   return most;
 }
 
-/// Largest |dV/dq| from central differences. Exact for polynomials of low order; the relative error
-/// for order five is (step / volume)^2, volume: its extent.
+/// Largest |dV/dq| at the given points from central differences. Exact for polynomials of low
+/// order; for order five the relative error is the square of step / extent of the volume.
 double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, const Vector3& t) {
   constexpr double kStep_m = 1e-4;
   double most = 0.0;
@@ -82,9 +82,9 @@ Vector3 mean(std::span<const Vector3> points) {
   return points.empty() ? sum : Vector3(sum / static_cast<double>(points.size()));
 }
 
-/// Points inside the volume: those of a lattice with 32 cells per axis over its bounding box. If
-/// none of them is inside (a tilted volume thinner than a cell), the midpoints between centre and
-/// vertices.
+/// Points inside the volume: the points of a lattice with 32 cells per axis over its bounding box
+/// that are inside. If there are none (a tilted volume thinner than a cell), the midpoints between
+/// centre and vertices.
 std::vector<Vector3> points_inside(const ValidityVolume& volume) {
   constexpr int kCells = 32;
   const std::span<const Vector3> vertices = volume.vertices_m();
@@ -121,8 +121,8 @@ std::vector<Vector3> points_inside(const ValidityVolume& volume) {
   return found;
 }
 
-/// If less than this fraction of the old volume is kept, the new volume counts as smaller. The
-/// scatter from readings and lattice is smaller than 2 %.
+/// If the new volume contains less than this fraction of the old volume, it counts as smaller. The
+/// scatter of the fraction, caused by the readings and the lattice, is smaller than 2 %.
 constexpr double kSameVolume = 0.98;
 
 /// Rim at each side of a volume as a fraction of its width: the typical difference between two
@@ -181,8 +181,8 @@ ScaleDifference scale_difference(const VolumetricModel& candidate, const Volumet
   return {common_scale(at, difference_m), squares > 0.0 ? u_along / squares : 0.0};
 }
 
-/// Residuals do not show a wrong scale of path, ranges or temperature; the difference to the active
-/// model does.
+/// Compares the scale of the candidate with that of the active model. Residuals do not show a wrong
+/// scale of path, ranges or temperature, but the difference between the two models does.
 void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
                     const VolumetricModel& active, const GateLimits& limits) {
   const ScaleDifference g = scale_difference(candidate, active, candidate.tool_offsets_m().front());
@@ -284,9 +284,9 @@ Verdict decide(const VolumetricModel& candidate, const HeldOutFigures& held_out,
   require_better(verdict, held_out.candidate, held_out.no_compensation, limits.min_improvement,
                  "without compensation");
   if (held_out.active) {
-    // The figure of the candidate is from fits to a part of its run; the active model was fitted to
-    // all of its run. On an unchanged machine the active model therefore has the better figure and
-    // remains active.
+    // The held-out figure of the candidate comes from fits to a part of its run, whereas the active
+    // model was fitted to all of its own run. On an unchanged machine the active model therefore
+    // has the better figure and remains active.
     require_better(verdict, held_out.candidate_beside_active.value_or(held_out.candidate),
                    *held_out.active, limits.min_improvement,
                    "of the active model, so the active model remains valid");

@@ -17,11 +17,12 @@ namespace {
 
 using Condition = Eigen::RowVectorXd;
 
-/// A position closer to a node than this fraction of a cell counts as the node; nodes computed from
-/// a range differ by rounding (1e-16). The condition then contains only this node, so that its
-/// value is exactly zero. With a neighbour weight below 1e-6 in the condition, the variance of the
-/// node would be below 1e-12 of that of the neighbour, and rounding could make it negative. V
-/// changes by the gradient times 1e-6 cells: 0.25 nm at the steepest gradient of 5 mm/m and 50 mm.
+/// A position closer to a node than this fraction of a cell counts as the node, because nodes
+/// computed from a range differ by rounding (1e-16). The condition then contains only this node, so
+/// that the value at the node is exactly zero. If the condition also contained the neighbour node
+/// with a weight below 1e-6, the variance of the node would be below 1e-12 of that of the
+/// neighbour, and rounding could make it negative. V changes by the gradient times 1e-6 cells: 0.25
+/// nm at the steepest gradient of 5 mm/m and cells of 50 mm.
 constexpr double kAtNode = 1e-6;
 
 Condition zero_at(const estimation::TableBasis& basis, const Table& table, double position_m,
@@ -43,12 +44,13 @@ Condition zero_at(const estimation::TableBasis& basis, const Table& table, doubl
   return k;
 }
 
-/// Linear tables of a layout. They cannot fail: only a cubic limits the number of nodes.
+/// Basis of linear tables with this layout. TableBasis::of() cannot fail for linear tables, because
+/// the number of nodes is limited only for cubic ones.
 estimation::TableBasis linear_basis(const ParameterLayout& layout) {
   return *estimation::TableBasis::of(layout);
 }
 
-/// Adds complete data of one target: all three components at every node position.
+/// Adds complete data of one target offset: all three components of V at every node position.
 void add_complete_data(estimation::Information& data, const ParameterLayout& layout,
                        const Vector3& target_m, std::size_t target) {
   estimation::RowBatch batch(data.unknowns());

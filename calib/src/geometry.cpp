@@ -16,8 +16,8 @@ Vector3 from_spherical(double range_m, double azimuth_rad, double elevation_rad)
 Result<Matrix3> rotation_from_cross_covariance(const Matrix3& cross) {
   const Eigen::JacobiSVD<Matrix3> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Vector3& s = svd.singularValues();
-  // For points on a line the second singular value is at rounding level: the rotation about the
-  // line is not determined.
+  // For points on a line the second singular value consists of rounding errors, and the rotation
+  // about the line is not determined.
   constexpr double kFlat = 1e-9;
   if (!(s(1) > kFlat * s(0))) {
     return failure(ErrorCode::DegenerateGeometry,

@@ -35,8 +35,8 @@ InterpolationGrid of_tables(const MachineNodes& nodes, std::size_t most_nodes) {
   return grid;
 }
 
-/// Per axis, an estimate of the largest error at the midpoint if V is interpolated with one cell
-/// over the whole box; from second differences on a lattice.
+/// For each axis, an estimate from second differences on a lattice of the largest interpolation
+/// error of V at the midpoint of a cell that extends over the whole box.
 std::array<double, 3> midpoint_error_m(const VolumetricModel& model, const evemu::ReadingBox& box) {
   constexpr std::array kAt{-0.8, -0.4, 0.0, 0.4, 0.8};
   constexpr double kStep = 0.2;  // fraction of the half width; 0.8 + 0.2 is inside the box

@@ -37,8 +37,9 @@ Result<ModelDifference> rigid_free(std::span<const Vector3> points_m,
   }
 
   centre /= static_cast<double>(points_m.size());
-  // Relative to the centroid, translation and rotation are decoupled:
-  //     N = diag(n I, sum |p|^2 I - p p^T).
+  // With points p relative to their centroid, translation and rotation are decoupled: the normal
+  // equations of the n points have the block-diagonal matrix
+  //     N = diag(n I, sum (|p|^2 I - p p^T)).
   Matrix3 inertia = Matrix3::Zero();
   Vector3 translation = Vector3::Zero(), moment = Vector3::Zero();
 

@@ -12,7 +12,7 @@ namespace abbe::calib {
 namespace {
 
 constexpr double kZeroCelsius_K = 273.15;
-constexpr double kGasConstant = 8.314472;   // J/(mol K), CODATA 2002, as in the equation's tables
+constexpr double kGasConstant = 8.314472;   // J/(mol K), CODATA 2002
 constexpr double kStandardCo2_ppm = 450.0;  // reference value of all three equations
 
 double per_square_um(double wavelength_m) {

@@ -9,13 +9,15 @@
 namespace abbe::calib::estimation {
 namespace {
 
-/// One equation of the system for U'': sub U''_i-1 + diagonal U''_i + super U''_i+1.
+/// Left side of equation i of the linear system for the second derivatives U'' at the nodes:
+///     sub U''_i-1 + diagonal U''_i + super U''_i+1.
 struct TridiagonalRow {
   double sub = 0.0, diagonal = 0.0, super = 0.0;
 };
 
-/// Equations of the inner nodes. The end conditions express U'' at the ends by its inner
-/// neighbours; their terms are moved there.
+/// Equations of the inner nodes, without U'' at the two end nodes: the end condition expresses it
+/// by U'' at inner nodes, whose coefficients in the first and last equation are changed
+/// accordingly.
 std::vector<TridiagonalRow> inner_equations(std::span<const double> h_m, Interpolation kind) {
   std::vector<TridiagonalRow> rows;
   for (std::size_t i = 0; i + 1 < h_m.size(); ++i) {

@@ -49,7 +49,8 @@ Result<void> check_every_unknown(const Information& data, const DatumOptions& op
   return {};
 }
 
-/// Conditions for the scaled unknowns, each of length sqrt(weight).
+/// The conditions K for the unknowns divided by `scale`, each row scaled to the length
+/// sqrt(weight).
 Eigen::MatrixXd scaled_conditions(const Eigen::MatrixXd& K, const Eigen::VectorXd& scale,
                                   double weight) {
   Eigen::MatrixXd rows = K * scale.asDiagonal();
@@ -61,7 +62,8 @@ Eigen::MatrixXd scaled_conditions(const Eigen::MatrixXd& K, const Eigen::VectorX
   return rows;
 }
 
-/// Unknowns with a condition of their own: they are exactly zero, in value and covariance.
+/// Indices of the unknowns that a condition with a single nonzero entry sets to zero. Their value
+/// and covariance are exactly zero, without rounding errors.
 std::vector<Eigen::Index> fixed_alone(const Eigen::MatrixXd& K) {
   std::vector<Eigen::Index> fixed;
   for (Eigen::Index i = 0; i < K.rows(); ++i) {
@@ -92,7 +94,7 @@ Result<void> check_rank(const Information& data, std::size_t rank, Eigen::Index 
                          largest_shares(null_space(data).share, options)));
 }
 
-/// Triangle T of [R; sqrt(mu) K] of the unknowns divided by `scale`.
+/// Triangular factor T of [R; sqrt(mu) K] (datum.hpp), for the unknowns divided by `scale`.
 struct BorderedTriangle {
   Eigen::VectorXd scale;
   Eigen::MatrixXd T;
@@ -106,7 +108,8 @@ Result<BorderedTriangle> bordered_triangle(const Information& data, const Eigen:
   bordered.add_rows(data.R() * scale.asDiagonal(), data.z());
   bordered.add_rows(scaled_conditions(K, scale, weight), Eigen::VectorXd::Zero(K.rows()));
 
-  // A combination that neither data nor conditions determine leaves only rounding on the diagonal.
+  // A combination of unknowns that neither data nor conditions determine has a diagonal element of
+  // T that consists of rounding errors only.
   constexpr double kZero = 1e-11;
   BorderedTriangle result{scale, bordered.R(), bordered.z()};
   if (!(result.T.diagonal().minCoeff() > kZero)) {
@@ -191,7 +194,8 @@ Result<Eigen::MatrixXd> Datum::transformation(const Eigen::MatrixXd& null_space)
   const Eigen::MatrixXd K = K_.rowwise().normalized();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> KN(K * N);
 
-  // Entries are at most 1; a combination that the conditions do not contain leaves only rounding.
+  // The columns of N and the rows of K have unit length, so entries of K N are at most 1. For a
+  // combination in N that no condition fixes, a pivot of K N consists of rounding errors only.
   constexpr double kZero = 1e-9;
   const auto fixed = (KN.matrixQR().diagonal().array().abs() > kZero).count();
   if (fixed < N.cols()) {

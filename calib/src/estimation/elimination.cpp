@@ -13,8 +13,8 @@ Eliminated eliminate(Eigen::MatrixXd L, const Eigen::MatrixXd& kept) {
     }
   }
 
-  // Columns of unit length: a column that depends on the others leaves rounding of their number
-  // times eps.
+  // The columns of L have unit length. The pivot of a column that depends on the others is a
+  // rounding error, at most the number of rows or columns times the machine precision.
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(L);
   qr.setThreshold(static_cast<double>(std::max(L.rows(), L.cols())) *
                   std::numeric_limits<double>::epsilon());

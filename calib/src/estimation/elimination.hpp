@@ -9,8 +9,9 @@ struct Eliminated {
   Eigen::MatrixXd rows;   ///< rows of `kept` that do not depend on the eliminated unknowns
   Eigen::Index rank = 0;  ///< number of rows that determined the eliminated unknowns
 };
-/// Rows [L | kept] to rows without the unknowns of L. Orthogonal: the result holds all that the
-/// rows state about the others. L may have any rank.
+/// Transforms the rows [L | kept] to rows that do not contain the unknowns of L. The transformation
+/// is orthogonal, so that the result contains all that the rows state about the other unknowns. L
+/// may have any rank.
 [[nodiscard]] Eliminated eliminate(Eigen::MatrixXd L, const Eigen::MatrixXd& kept);
 
 }  // namespace abbe::calib::estimation

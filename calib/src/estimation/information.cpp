@@ -43,7 +43,8 @@ Result<void> check_block(const Block& b, std::size_t unknowns) {
   return {};
 }
 
-/// Divides rows by the root of the covariance of the block.
+/// Multiplies the rows by the inverse of a root of their covariance, so that their noise becomes
+/// independent with unit variance.
 Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
   if (covariance.cols() == 1) {
     if (!(covariance.minCoeff() > 0.0)) {
@@ -62,7 +63,8 @@ Result<void> whiten(const Eigen::MatrixXd& covariance, Eigen::MatrixXd& rows) {
   return {};
 }
 
-/// One more row c_k / u_k = 0 for every nuisance with a prior, behind the rows [A y L].
+/// The rows [A y L], followed by one row c_k / u_k = 0 for every nuisance c_k with a prior of
+/// standard deviation u_k.
 Eigen::MatrixXd with_priors(const Eigen::MatrixXd& rows, const std::vector<double>& u_nuisance) {
   const Eigen::Index first = rows.cols() - std::ssize(u_nuisance);
   const auto priors = std::count_if(u_nuisance.begin(), u_nuisance.end(),

@@ -21,9 +21,9 @@ double rounding_of(const Information& data) {
          std::numeric_limits<double>::epsilon();
 }
 
-/// Entries d_1 e_1 d_2 e_2 .. d_n of the upper bidiagonal matrix with the singular values of A
-/// ([Golub 2013] section 5.4.8): one Householder reflection from the left and one from the right
-/// for every row.
+/// Transforms A to an upper bidiagonal matrix with the same singular values ([Golub 2013] section
+/// 5.4.8), by one Householder reflection from the left and one from the right for every row.
+/// Returns the diagonal d and the elements e beside the diagonal as d_1 e_1 d_2 e_2 .. d_n.
 Eigen::VectorXd bidiagonal(Eigen::MatrixXd A) {
   const Eigen::Index n = A.rows();
   Eigen::VectorXd entries(2 * n - 1), work(n), v(n);
@@ -43,9 +43,10 @@ Eigen::VectorXd bidiagonal(Eigen::MatrixXd A) {
 }
 
 /// Singular values of a square matrix, descending, with an error of eps times the largest. They are
-/// the non-negative eigenvalues of the tridiagonal matrix with a zero diagonal and the entries of
-/// the bidiagonal one beside it ([Golub 2013] section 8.6.1): nothing is squared. (Eigen 3.4's
-/// BDCSVD fails an assertion for some singular matrices; its JacobiSVD is slower.)
+/// the non-negative eigenvalues of the symmetric tridiagonal matrix that has a zero diagonal and
+/// bidiagonal(A) beside the diagonal ([Golub 2013] section 8.6.1). The product A^T A, which would
+/// lose half of the digits, is not formed. (Eigen 3.4's BDCSVD fails an assertion for some singular
+/// matrices; its JacobiSVD is slower.)
 Eigen::VectorXd singular_values_of(const Eigen::MatrixXd& A) {
   const Eigen::Index n = A.rows();
   if (n == 0) {
@@ -99,7 +100,8 @@ std::size_t pivoted_rank(const Information& data) {
 }
 
 NullSpace null_space(const Information& data) {
-  // R P = Q [R11 R12; 0 0]: the columns of P [-R11^-1 R12; I] span the null space.
+  // R P = Q [R11 R12; 0 0], P: permutation, Q: orthogonal. The columns of P [-R11^-1 R12; I] span
+  // the null space of R.
   const auto qr = pivoted(data);
   const Eigen::Index n = qr.cols(), rank = qr.rank();
   Eigen::MatrixXd null(n, n - rank);

@@ -6,8 +6,8 @@
 namespace abbe::calib::estimation {
 namespace {
 
-/// The reflection I - tau v v^T that moves a column of [triangle; rows] to its diagonal element.
-/// v = 1 at the diagonal.
+/// The Householder reflection I - tau v v^T that makes a column of [triangle; rows] zero below the
+/// diagonal of the triangle. The element of v at the diagonal is 1.
 struct Reflection {
   double tau = 0.0;
   std::vector<double*> rows;  ///< rows that are not zero in the column
@@ -34,8 +34,9 @@ void reflect_column(Reflection& r, double& diagonal, double* rows, std::size_t c
     return;
   }
 
-  // The column becomes -norm times the unit vector: no digits cancel, as the diagonal is not
-  // negative. The sign of the row is changed afterwards.
+  // The reflection gives the diagonal the value -norm: for a diagonal >= 0, the sum diagonal + norm
+  // then loses no digits by cancellation. apply() changes the sign of the triangle's row, so that
+  // the diagonal becomes +norm.
   const double norm = std::sqrt(diagonal * diagonal + squares);
   const double pivot = diagonal + norm;
   r.tau = pivot / norm;
@@ -45,8 +46,8 @@ void reflect_column(Reflection& r, double& diagonal, double* rows, std::size_t c
   diagonal = norm;
 }
 
-/// sum = top + rows^T v, over the columns from `begin` to `end`. Four rows at a time: the sum is
-/// read and written less often. Each element is summed in the order of the rows.
+/// sum = top + rows^T v, over the columns from `begin` to `end`. Four rows are added at a time, so
+/// that `sum` is read and written less often. Each element is summed in the order of the rows.
 void project(const Reflection& r, const double* top, double* __restrict sum, std::size_t begin,
              std::size_t end) {
   const std::size_t n = r.rows.size();
@@ -72,7 +73,8 @@ void project(const Reflection& r, const double* top, double* __restrict sum, std
   }
 }
 
-/// Applies the reflection with the projection `sum`; the row of the triangle changes its sign.
+/// Applies the reflection to the columns from `begin` to `end`; `sum` is the result of project().
+/// Also changes the sign of `top`, the row of the triangle.
 void apply(const Reflection& r, double* top, double* __restrict sum, std::size_t begin,
            std::size_t end) {
   for (std::size_t c = begin; c < end; ++c) {

@@ -20,7 +20,8 @@ Vector3 from_ball1_m(const TouchedArtefact& s, std::size_t b) {
   return s.ideal_m[b] - s.ideal_m.front();
 }
 
-/// First and last index among the touched balls and blocks.
+/// Smallest and largest time index (TouchedArtefact::ball_index, block_index) of the balls and
+/// blocks of these positions.
 std::pair<double, double> touched_between(std::span<const TouchedArtefact> seen) {
   std::pair<double, double> between{seen.front().ball_index.front(),
                                     seen.front().ball_index.front()};
@@ -48,8 +49,9 @@ Rows3 bow(const TouchedArtefact& s, std::size_t ball, double arm_m) {
   return rows;
 }
 
-/// Rotation of the block frame by the motion G (p - p1), of which the fraction share[b] is complete
-/// when block b is touched.
+/// Rotation of the uniform frame, computed from the touched blocks, if points p move by G (p - p1)
+/// during the touches. G: displacement gradient, p1: place of Ball1, share[b]: fraction of the
+/// motion that is complete when block b is touched.
 Vector3 turn_of_blocks(const TouchedArtefact& s, const Matrix3& G,
                        const std::array<double, 2>& share) {
   const Vector3 &n1 = s.blocks[0].normal, &n2 = s.blocks[1].normal;
@@ -63,11 +65,11 @@ Vector3 turn_of_blocks(const TouchedArtefact& s, const Matrix3& G,
   return z.cross(dz) + z * y.dot(dx);
 }
 
-/// Fraction of a motion that is complete at the touch with this index.
+/// Fraction of a motion that is complete at a time, given as index among the touches.
 using DoneShare = std::function<double(double index)>;
 
-/// Displacement of a ball by the motion G (p - p1), relative to the block frame, which the motion
-/// rotates.
+/// Observed displacement of a ball by the motion G (p - p1) of turn_of_blocks(): its own
+/// displacement minus the effect of the rotation of the uniform frame.
 Vector3 seen_of(const TouchedArtefact& s, std::size_t ball, const Matrix3& G,
                 const DoneShare& share) {
   const Vector3 a = from_ball1_m(s, ball);
@@ -75,13 +77,14 @@ Vector3 seen_of(const TouchedArtefact& s, std::size_t ball, const Matrix3& G,
   return share(s.ball_index[ball]) * (G * a) - blocks.cross(a);
 }
 
-/// Displacement of a ball by a translation, relative to Ball1.
+/// Matrix from a translation during the touches to the displacement of a ball relative to Ball1,
+/// which was touched at another time.
 Matrix3 seen_shift(const TouchedArtefact& s, std::size_t ball, const DoneShare& share) {
   return (share(s.ball_index[ball]) - share(s.ball_index.front())) * Matrix3::Identity();
 }
 
-/// Displacement of a ball by unit translations of the array, then by unit rotations about Ball1
-/// (displacement at the distance of one arm).
+/// Observed displacement of a ball: three columns for unit translations of the array, then three
+/// for rotations about Ball1 that displace a point at the distance `arm_m` by one unit.
 Rows3 shifted_and_turned(const TouchedArtefact& s, std::size_t ball, double arm_m,
                          const DoneShare& share) {
   Rows3 rows(3, 6);
@@ -112,7 +115,8 @@ Eigen::Index columns_by_position(Cause cause) {
   return cause == Cause::Bent ? 4 : 6;
 }
 
-/// Largest root mean square over the positions, among the columns of a position.
+/// `d` has `count` coefficients for each position. For each of the `count` coefficients the root
+/// mean square over the positions is formed; the largest of these is returned.
 double largest_rms(const Eigen::VectorXd& d, Eigen::Index count) {
   double most = 0.0;
   for (Eigen::Index k = 0; k < count; ++k) {
@@ -211,7 +215,8 @@ Eigen::MatrixXd AlternativeColumns::by_position(Cause cause) const {
   });
 }
 
-/// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v).
+/// The machine expands, shears and shifts at constant rates: V changes by t (G (p - p1) + v). t:
+/// time as fraction of the session, G: symmetric strain, p1: place of Ball1, v: translation.
 Eigen::MatrixXd AlternativeColumns::of_drift() const {
   const std::array<std::pair<int, int>, 6> strains{
       {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};

@@ -25,7 +25,8 @@ class AlternativeColumns {
 
   /// The alternatives, grouped by cause. Empty for errors that were given without touches.
   [[nodiscard]] std::vector<std::vector<Added>> families() const;
-  /// 3 rows.size() x k. Each unknown is a displacement of the ball farthest from Ball1 [m].
+  /// The columns of the alternative, 3 rows.size() x k. The coefficient of each column is the
+  /// displacement [m] that the alternative causes at the distance of the ball farthest from Ball1.
   [[nodiscard]] Eigen::MatrixXd of(const Added&) const;
 
  private:

@@ -77,8 +77,9 @@ Result<void> check_expansivity(const Calibrator& c) {
   return {};
 }
 
-/// Known uncertainty of a touch, for a fit without residuals (as many touches as unknowns); nullopt
-/// if the residuals show the uncertainty.
+/// Uncertainty of a touch for a fit without residuals (as many touches as unknowns): `u_touch_m`.
+/// nullopt if there are more touches, because the fit then computes the uncertainty from the
+/// residuals.
 Result<std::optional<double>> noise_of(std::size_t touches, std::size_t unknowns,
                                        std::optional<double> u_touch_m) {
   if (touches != unknowns) {

@@ -32,8 +32,9 @@ void add_balls(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   }
 }
 
-/// uniform_frame(): z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e
-/// rotates z by z x e, and rotates x by its effect on n2 x n1.
+/// Adds the effects of errors of the block normals n1, n2. The axes x, y, z of uniform_frame() are
+/// z = n1, x = n2 x z / sine, so n2 = sine y + cosine z. A change of n1 by e rotates z by z x e,
+/// and also rotates x, which is along n2 x n1.
 void add_blocks(const ArtefactUncertainty& u, std::vector<Effect>& effects) {
   const double cosine = u.cosine_between_blocks, sine = std::sqrt(1.0 - cosine * cosine);
   const auto& [u1_rad, u2_rad] = u.u_block_rad;

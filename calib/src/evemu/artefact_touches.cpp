@@ -17,16 +17,16 @@ constexpr std::size_t kLeastBallPoints = 5;
 constexpr std::size_t kLeastFacePoints = 4;
 constexpr double kRingUpper_rad = 45.0 * std::numbers::pi / 180.0;
 constexpr double kRingLower_rad = 80.0 * std::numbers::pi / 180.0;
-constexpr double kOuter = 1.6;                // times the distance from the centre in contact
+constexpr double kOuter = 1.6;                // distance from a ball's centre / that in contact
 constexpr double kCosOfFarthestAround = 0.5;  // 60 degrees: free straight path around a ball
 
 Vector3 across(const Vector3& up) {
   return up.unitOrthogonal();
 }
 
-/// The pole, then the points of two rings in order around the ball. The lower ring is rotated by
-/// half a step: otherwise, with two points on each ring, all points would lie in one plane with the
-/// pole and not determine a sphere.
+/// Directions of the touches on a ball: the pole, then the points of two rings in order around the
+/// ball. The lower ring is rotated by half a step: if it were not, two points on each ring and the
+/// pole would lie in one plane and not determine a sphere.
 std::vector<Vector3> normals_on_a_ball(const Vector3& up, std::size_t points) {
   const Vector3 x = across(up), y = up.cross(x);
   std::vector<Vector3> normals{up};
@@ -138,7 +138,8 @@ class Planner {
   [[nodiscard]] Vector3 raised(const Vector3& p_m) const {
     return p_m + (top_m_ - up_.dot(p_m)) * up_;
   }
-  /// Path to a place: up, across, down. Without the first step if the tip is above all features.
+  /// Path to a place: up, across, down. The step up is left out if the tip is already above all
+  /// features.
   [[nodiscard]] std::vector<Vector3> over_to(const Vector3& place_m) const {
     std::vector<Vector3> way;
     if (!planned_.empty()) way.push_back(here_);  // back from the contact of the last touch
@@ -147,8 +148,9 @@ class Planner {
     way.push_back(place_m);
     return way;
   }
-  /// Path over the pole in three corner points: the angle from a ring to the pole may exceed that
-  /// of one free straight path.
+  /// Path around a ball over its pole, with three corner points: the angle from a point of a ring
+  /// to the pole may exceed 60 degrees, the largest angle at which a straight path is free of
+  /// collision.
   void go_over(const Calibrator::Ball& ball, std::vector<Vector3>& way, const Vector3& to) const {
     const double outer = kOuter * reach(ball);
     const Vector3 from = (way.back() - ball.centre_m).normalized();

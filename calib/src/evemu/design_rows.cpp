@@ -7,9 +7,9 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Change of a face's normal when its points are displaced: the slope of the displacement along the
-/// normal, and the effect of a displacement along the face on points that do not lie in the plane
-/// (a curved V deforms the face).
+/// Column j: change of a face's fitted normal if the touched points are displaced by function j of
+/// the design. It is caused by the slope of the displacement along the normal, and by displacements
+/// along the face of points that do not lie in the fitted plane (a curved V deforms the face).
 Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3> points_m,
                                const ScaledDesign& design) {
   Matrix3 spread = Matrix3::Zero();
@@ -24,8 +24,9 @@ Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3>
     moment.noalias() += r * (plane.normal.transpose() * B) + out_of_plane_m * (in_plane * B);
   }
 
-  // n n^T makes the matrix regular in the direction in which the points have no extent; moment is
-  // zero in that direction.
+  // `spread` is singular in the direction of the normal, in which the points have no extent. Adding
+  // a multiple of n n^T makes the matrix regular without changing the result, because `moment` is
+  // zero in this direction.
   spread += spread.trace() * plane.normal * plane.normal.transpose();
   return -spread.ldlt().solve(moment);
 }
@@ -38,7 +39,8 @@ Eigen::Matrix3Xd block_rotation(const TouchedArtefact& seen, const ScaledDesign&
   const Eigen::Matrix3Xd dn1 = normal_change(seen.blocks[0], seen.block_points_m[0], design);
   const Eigen::Matrix3Xd dn2 = normal_change(seen.blocks[1], seen.block_points_m[1], design);
 
-  // z = n1 rotates with n1, x = n2 x z rotates with both normals: theta = z x dn1 + z (y . dx).
+  // The axes of the uniform frame are z = n1, which rotates with n1, and x along n2 x z, which
+  // rotates with both normals. The rotation of the frame is theta = z x dn1 + z (y . dx).
   const double sine = n2.cross(n1).norm();
   Eigen::Matrix3Xd theta(3, dn1.cols());
   for (Eigen::Index j = 0; j < dn1.cols(); ++j) {
@@ -55,8 +57,9 @@ Eigen::Matrix3Xd ball_displacement(const TouchedArtefact& seen, std::size_t ball
   const Vector3& centre = seen.balls[ball].centre;
   const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
 
-  // Displacements delta of the points change |p - c| - r by n . delta. The fitted dc, dr compensate
-  // this change in the least-squares sense.
+  // A displacement delta of a point p changes its residual |p - c| - r by n . delta (c, r: centre
+  // and radius, n: outward normal at p). The changes of c and r are the least-squares solution that
+  // compensates the changes of all residuals.
   Eigen::MatrixX4d N(static_cast<Eigen::Index>(points_m.size()), 4);
   Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.size()));
   for (std::size_t k = 0; k < points_m.size(); ++k) {

@@ -54,9 +54,10 @@ bool is_translation(const std::string& coefficient) {
   return coefficient.rfind("k_d", 0) == 0;
 }
 
-/// The factor of a single coefficient becomes +1. In a merged row the factor of a translation
-/// becomes positive. Every merged row contains a translation: its monomial is constant or of first
-/// order, and a d function has that monomial.
+/// Multiplies the row by +1 or -1, so that the factor of a single coefficient is +1, and in a
+/// merged row (several coefficients) the factor of a translation is positive. Every merged row
+/// contains a translation, because its monomial is constant or of first order, and a translation
+/// error function has such a monomial.
 void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
   Eigen::Index leading = -1;
   for (Eigen::Index j = 0; j < row.w.size(); ++j) {
@@ -72,7 +73,8 @@ void normalise_sign(CombinedRow& row, std::span<const std::string> names) {
   }
 }
 
-/// Names of rows at tool offset zero, where each row has the fewest coefficients.
+/// Names of the rows of W. `rows` must be those for tool offset zero, with which each row has the
+/// fewest coefficients.
 std::vector<std::string> row_names(const std::vector<CombinedRow>& rows,
                                    std::span<const std::string> K) {
   std::vector<std::string> names(rows.size());

@@ -9,7 +9,7 @@ char small_letter(std::size_t axis) {
   return static_cast<char>('x' + static_cast<char>(axis));
 }
 
-/// +1 for e_a x e_b = e_c, -1 for e_b x e_a = e_c, a != b.
+/// Sign of e_a x e_b = +- e_c, e: unit vectors of the axes, c: the axis other than a and b; a != b.
 double handedness(std::size_t a, std::size_t b) {
   return (a + 1) % 3 == b ? 1.0 : -1.0;
 }
@@ -27,8 +27,9 @@ struct Builder {
     }
   }
 
-  /// e_direction x (sum of q_b e_b over the axes at `first_place` and nearer to the tool, + tool),
-  /// times `m`.
+  /// Adds the terms of a rotation about e_direction (e: unit vectors) with the magnitude `m`:
+  ///     m e_direction x (sum of q_b e_b over the axes b at `first_place` and nearer to the tool
+  ///                      + tool offset)
   void add_rotation(std::size_t direction, std::size_t first_place, const Monomial& m) {
     for (std::size_t tool = 0; tool < tools_mm.size(); ++tool) {
       for (std::size_t b = 0; b < 3; ++b) {

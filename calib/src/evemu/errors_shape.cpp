@@ -15,8 +15,9 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Scatter over the positions of the distances between balls at reading + L V. It is 0 for the true
-/// places of one artefact, also if V contains a rotation.
+/// Scatter over the positions of the distances between balls whose centres are at reading + L V.
+/// The scatter is 0 if these are the true places of the balls of one artefact, also if V contains a
+/// rotation.
 double shape_scatter_m(const Observations& o, const Matrix3& L) {
   std::map<std::pair<int, int>, std::vector<double>> distances_m;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {

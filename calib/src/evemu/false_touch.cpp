@@ -22,7 +22,8 @@ double count_of_touches(const std::vector<FeatureResiduals>& all) {
   return count;
 }
 
-/// The feature with the most significant touch.
+/// The ball or face with the touch that has the largest residual relative to its standard
+/// deviation.
 struct Suspect {
   const FeatureResiduals* feature = nullptr;
   double w = 0.0;  ///< residual of the touch in units of its standard deviation
@@ -41,11 +42,13 @@ Suspect most_suspect(const std::vector<FeatureResiduals>& all, double sigma_m) {
   return worst;
 }
 
-/// With fewer touches than this, the radius of a ball comes from its other positions: four
-/// unknowns do not tell which of five or six touches is false.
+/// With fewer touches than this, the radius of a ball is taken from its touches at other positions:
+/// a sphere with unknown radius has four unknowns, and five or six touches do not show which of
+/// them is false.
 constexpr Eigen::Index kFewTouches = 7;
 
-/// Median radius of a ball over the positions; the false touch is in one of them.
+/// Median of the fitted radii of a ball over the positions. A false touch changes the radius at one
+/// position only, and so hardly the median.
 double radius_at_all_positions_m(const std::vector<FeatureResiduals>& all, std::size_t ball) {
   std::vector<double> radii;
   for (const FeatureResiduals& f : all) {
@@ -60,9 +63,9 @@ double radius_at_all_positions_m(const std::vector<FeatureResiduals>& all, std::
 
 /// The surface through all touches of a feature but one.
 struct WithoutOne {
-  Eigen::Index touch = 0;   ///< the one that is left out
-  double off_m = 0.0;       ///< its distance from the surface, outward
-  double squares_m2 = 0.0;  ///< of the residuals of the others
+  Eigen::Index touch = 0;   ///< index of the touch that is left out
+  double off_m = 0.0;       ///< distance of this touch from the surface, outward
+  double squares_m2 = 0.0;  ///< sum of squares of the residuals of the other touches
 };
 
 std::optional<WithoutOne> face_without(const std::vector<Vector3>& others, const Vector3& left_out,
@@ -95,8 +98,9 @@ std::optional<WithoutOne> ball_without(const std::vector<Vector3>& others, const
                     .squares_m2 = rms_m * rms_m * static_cast<double>(others.size())};
 }
 
-/// Without each of the touches, the smallest sum of squares first. The surface is fitted again: a
-/// touch that is 0.5 mm off moves a ball so far that linearised residuals are wrong by um.
+/// Fits the surface of a feature once without each of the touches; the results are sorted by sum of
+/// squares, smallest first. Each fit is computed anew, because a touch that is 0.5 mm off displaces
+/// a ball so far that linearised residuals are wrong by um.
 std::vector<WithoutOne> without_each(const FeatureResiduals& f, std::optional<double> radius_m) {
   std::vector<WithoutOne> found;
   for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
@@ -117,7 +121,8 @@ std::vector<WithoutOne> without_each(const FeatureResiduals& f, std::optional<do
   return found;
 }
 
-/// True if no other touch explains the residuals nearly as well.
+/// True if leaving out the first touch of `without` reduces the residuals by clearly more than
+/// leaving out any other touch.
 bool is_clear(const std::vector<WithoutOne>& without, double sigma_m) {
   constexpr double kClear = 10.0;  // twice the difference of the log likelihoods
   return without.size() < 2 ||

@@ -1,5 +1,6 @@
 #pragma once
-/// A single false touch among those of one feature, found by the residuals of its surface.
+/// Search for a single false touch on a ball or face, by the residuals of the touches to the fitted
+/// surface.
 
 #include <optional>
 #include <vector>
@@ -9,9 +10,9 @@
 
 namespace abbe::calib::evemu {
 
-/// The most significant single touch, provided the others of its feature fit without it. The text
-/// names the touch; if its feature has too few to find which one is false, only the feature.
-/// `false_alarm`: probability over all touches.
+/// The touch with the most significant residual, provided that the other touches of its feature fit
+/// one surface. The text names the touch; if the feature has too few touches to decide which of
+/// them is false, it names only the feature. `false_alarm`: probability over all touches.
 [[nodiscard]] std::optional<TouchFinding> false_touch(const Observations&,
                                                       const std::vector<FeatureResiduals>&,
                                                       double sigma_m, double false_alarm);

@@ -11,7 +11,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Sets response and free. `design`: touches x unknowns.
+/// Sets f.response and f.free. `design`: effect of the unknowns of the surface on the residuals,
+/// touches x unknowns.
 void finish(FeatureResiduals& f, const Eigen::MatrixXd& design) {
   f.response =
       design.colPivHouseholderQr().solve(Eigen::MatrixXd::Identity(design.rows(), design.rows()));
@@ -56,7 +57,8 @@ std::optional<FeatureResiduals> of_ball(const TouchedArtefact& s, std::size_t ba
   return f;
 }
 
-/// Unknowns: offset of the face, and its slopes along two directions x and y in the face.
+/// Residuals of a face. Unknowns of the fit: offset of the face, and its slopes along two
+/// directions x and y in the face.
 std::optional<FeatureResiduals> of_block(const TouchedArtefact& s, std::size_t block,
                                          const VolumetricModel& model) {
   const std::vector<Vector3> points = without_V(s.block_points_m[block], model);

@@ -19,7 +19,7 @@ struct FeatureResiduals {
   std::size_t index = 0;  ///< of the ball or block, from 0
   std::vector<Vector3> points_m;
   Vector3 centre_m = Vector3::Zero();  ///< of a ball
-  double radius_m = 0.0;               ///< of a ball, with the tip
+  double radius_m = 0.0;               ///< radius of a ball plus radius of the tip
   Eigen::MatrixXd normals;             ///< outward at each touch, 3 columns
   /// Unknowns x touches: effect of a touch's displacement along its normal on the fit.
   Eigen::MatrixXd response;

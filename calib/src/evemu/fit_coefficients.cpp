@@ -10,8 +10,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The error of Ball1 is zero by definition; its rows would be taken for observations without
-/// noise.
+/// Removes the rows of Ball1, whose error is zero by definition: an estimator would take these rows
+/// for observations without noise.
 Eigen::MatrixXd without_ball1(const Observations& o, const Eigen::MatrixXd& rows) {
   std::vector<Eigen::Index> kept;
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
@@ -55,7 +55,8 @@ Result<Fit> fit_ols(const FitProblem& problem) {
   fit.c_m = scale.cwiseProduct(qr.solve(problem.y));
   const Eigen::MatrixXd Q = qr.householderQ() * Eigen::MatrixXd::Identity(problem.X.rows(), n);
 
-  // Residuals are (I - Q Q^T) noise; their mean square gives s^2 for noise of the shape C0.
+  // The residuals are (I - Q Q^T) noise, Q: orthonormal basis of the columns of X. Noise with the
+  // covariance s^2 C0 has the expected sum of squared residuals s^2 (trace C0 - trace Q^T C0 Q).
   const Eigen::MatrixXd C0_Q = times_ball_covariance(problem.observations, Q);
   double trace_C0 = 0.0;
   for (const PositionRows& p : position_rows(problem.observations)) {
@@ -166,8 +167,8 @@ double cover_comparable(Fit& fit, const FitProblem& problem) {
 
 FitProblem problem_of(const Observations& o, const ScaledDesign& design,
                       const SolveOptions& options) {
-  // Rows from touches do not determine the rotation and cannot be solved without a prior. The other
-  // estimators use the rows of [Li OMM].
+  // Design rows from touches do not determine a rotation of V about Ball1 and cannot be solved
+  // without a prior. Estimators without a prior use the rows of [Li OMM].
   if (options.estimator != Estimator::BayesPose && options.estimator != Estimator::Ridge) {
     return {o,     design,          design_rows(o, design, RowsFrom::Centres), observed_m(o),
             false, artefact_rows(o)};

@@ -21,9 +21,9 @@ struct FitProblem {
 struct Fit {
   Eigen::VectorXd c_m;
   Eigen::MatrixXd covariance_m2;
-  /// K A of estimates c = K y: effect on c of one standard uncertainty of each error of the array.
-  /// Not included in covariance_m2. No columns if the array is exact, or if the effect is included
-  /// in covariance_m2 (bootstrap).
+  /// Effect on the coefficients c of one standard uncertainty of each error of the array, one
+  /// column for each: K A, where c = K y and A = artefact_rows(). Not included in covariance_m2. No
+  /// columns if the array is exact, or if covariance_m2 includes the effect (bootstrap).
   Eigen::MatrixXd artefact_m{};
   CovarianceKind kind = CovarianceKind::Analytic;
   std::optional<HyperParameters> hyper;
@@ -38,7 +38,8 @@ struct Fit {
 /// whitened() rows without those of Ball1, whose error is zero by definition.
 [[nodiscard]] Eigen::MatrixXd white_rows(const Observations&, const Eigen::MatrixXd& rows);
 
-/// The rows of the observations. The design may be scaled to more positions than these.
+/// Input of the estimators from these observations. The design may be scaled to the readings of
+/// more positions than the observations contain.
 [[nodiscard]] FitProblem problem_of(const Observations&, const ScaledDesign&, const SolveOptions&);
 [[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);
 

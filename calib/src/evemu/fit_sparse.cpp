@@ -106,8 +106,8 @@ Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd wi
   return (scale.asDiagonal() * M).fullPivLu().solve(scale.cwiseProduct(beta)) / kMmPerM;
 }
 
-/// The path down to the chosen lambda. NotConverged if it ends before: a larger lambda would give
-/// another estimator.
+/// The regularisation path down to the chosen lambda. NotConverged if the path ends before: the
+/// solution for a larger lambda would be another estimate.
 Result<sparse::Path> path_to(const Regression& r, const SolveOptions& asked,
                              const SparseChoice& choice) {
   sparse::PathOptions options = path_along(choice.lambda);
@@ -169,8 +169,8 @@ Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r
                          static_cast<double>(std::max<Eigen::Index>(1, runs - 1)));
 }
 
-/// Noise and pose rotations are taken from the Bayesian estimator: the residuals of a sparse fit
-/// are too small.
+/// Adds the covariance by bootstrap. The sizes of noise and pose rotations are taken from the
+/// estimator bayes-pose, because the residuals of a sparse fit are too small.
 Result<void> add_covariance(const FitProblem& problem, const Regression& r,
                             const Eigen::VectorXd& beta, const SolveOptions& options, Fit& fit) {
   SolveOptions bayes;

@@ -51,7 +51,8 @@ Watch part_of(const Watch& watch, double low, double high) {
   return part;
 }
 
-/// Residuals of a model after the best-fit rotation of each position, summed over positions.
+/// Sums, over all positions, of the squared residuals of a model after the best-fit rotation of
+/// each position.
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
@@ -100,8 +101,8 @@ void note_artefact(const Observations& o, Verdict& verdict) {
   }
 }
 
-/// Largest accepted error of a model in units of its stated uncertainty. An alternative that
-/// exceeds it refuses the model.
+/// Largest accepted error of a model in units of its stated uncertainty. The model is refused if it
+/// has a larger error when an alternative is true.
 constexpr double kCoveredByU = 1.25;
 
 /// True if the uncertainty of the model covers the effect of the alternative. False for NaN.
@@ -115,8 +116,8 @@ bool is_covered(const Alternative& other, const CorrectionSize& size) {
          root_sum_of_squares(other.bias_m, other.u_m) <= kCoveredByU * size.u_m;
 }
 
-/// True for causes that are only consequences: each of the other causes enlarges the scatter of the
-/// touches and the uncertainty.
+/// True for scatter and uncertainty, which are only consequences: every other cause enlarges the
+/// scatter of the touches and the uncertainty.
 bool is_consequence(std::string_view cause) {
   return cause == name(Cause::Scatter) || cause == name(Cause::Form) || cause == kUncertain;
 }
@@ -149,9 +150,10 @@ RefusedFor refused_for(const Verdict& verdict, const std::vector<Alternative>& o
   return refused;
 }
 
-/// True if a cause that the uncertainty covers may be the origin of a refusal for uncertainty,
-/// scatter or form, because it enlarged the uncertainty or the scatter. Only causes that act while
-/// a ball is touched can change its form.
+/// True if the alternative, which by itself does not refuse the model because the uncertainty
+/// covers its effect, may be the origin of a refusal for uncertainty, scatter or form: it may have
+/// enlarged the uncertainty or the scatter. Only causes that act while a ball is touched can change
+/// the form of the ball.
 bool may_be_origin(const RefusedFor& refused, const Alternative& a, const CorrectionSize& size) {
   if (refused.cause || !is_cause(a)) {
     return false;
@@ -164,7 +166,8 @@ bool may_be_origin(const RefusedFor& refused, const Alternative& a, const Correc
   return matters && (refused.scatter_or_uncertainty || (refused.form && in_time));
 }
 
-/// Adds causes as reasons before the reasons that are only consequences.
+/// Adds the alternatives that refuse the model to the reasons, all others to the notes. Causes come
+/// before reasons that are only consequences.
 void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
                       const CorrectionSize& size) {
   const RefusedFor refused = refused_for(verdict, others, size);
@@ -183,8 +186,8 @@ void add_alternatives(Verdict& verdict, std::vector<Alternative> others,
   }
 }
 
-/// Slow noise in the covariance of the estimate is inserted before the first reason that is only a
-/// consequence; without such a reason it becomes a note.
+/// If the covariance of the estimate includes slow noise, reports it: as a reason before the first
+/// reason that is only a consequence, or as a note if there is no such reason.
 void add_slow_noise(Verdict& verdict, const Solution& solution) {
   if (!(solution.slow_noise > 0.0)) {
     return;

@@ -31,8 +31,9 @@ namespace {
 
 /// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
-/// The same for alternatives that change the model by more than kLarge standard uncertainties. In a
-/// run without a fault they are rare; one that is overlooked makes the stated uncertainty wrong.
+/// Probability of a false alarm for alternatives that change the model by more than kLarge standard
+/// uncertainties. In a run without a fault such alternatives are rare; if one is overlooked, the
+/// stated uncertainty is wrong.
 constexpr double kFalseAlarmIfLarge = 1e-2;
 constexpr double kLarge = 2.0;
 constexpr double kCauses = 13.0;
@@ -169,7 +170,8 @@ struct Screened {
   Screen::Gain gain{0.0, 0.0};
 };
 
-/// The most likely alternative of one cause, by the screen. None if one of them cannot be compared.
+/// The most likely alternative of one cause, by the fast estimate of Screen. No alternative if one
+/// of them cannot be compared.
 Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
                           std::span<const Added> family) {
   Screened most;
@@ -468,9 +470,10 @@ std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& ba
       .u_m = rows.norm.rms_u_m(base.covariance_m2)};
 }
 
-/// Noise of the probe averages out in the model; errors of the machine within a ball do not.
-/// Touches cannot distinguish the two. Backlash that was found is not included: the model is the
-/// mean of both directions of approach.
+/// The scatter of the touches as an alternative. Noise of the probe averages out in the model;
+/// errors of the machine that vary within a ball do not, and touches cannot distinguish them from
+/// noise. The effect of backlash that was found is not part of this scatter, because the model is
+/// the mean of both directions of approach.
 std::optional<Alternative> scatter_of_touches(const CorrectionSize& size,
                                               const TouchResiduals& touches) {
   const double within_m = std::sqrt(3.0) * touches.sigma_of_no_cause_m;
@@ -532,9 +535,10 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
     all.add(*std::move(scatter));
   }
 
-  // First the alternatives that change the model: backlash is highly significant but hardly moves
-  // the centres. Among these a single touch off its surface comes first: it can be the origin of a
-  // displaced ball or of an array that seems to have moved. Then by likelihood.
+  // Alternatives that change the model come first (backlash, for example, can have the highest
+  // likelihood but hardly changes the ball centres). Among them a single touch off its surface
+  // comes first, because it can be the origin of a displaced ball or of an array that seems to have
+  // moved. The rest is sorted by likelihood.
   const auto key = [](const Alternative& a) {
     return std::tuple(!(a.bias_m > kMatters * a.u_m), a.cause != Cause::Touch, -a.log_likelihood);
   };

@@ -31,7 +31,8 @@ LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& 
 LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
                                                   double noise) const {
   const Eigen::Index m = R_.rows(), out_of_reach = rows_ - m;
-  // K = R diag(prior) R^T + s^2 I is the covariance of z; the rest of y contains only noise.
+  // With [X S] = Q R and z = Q^T y, K = R diag(prior) R^T + s^2 I is the covariance of z. The part
+  // of y perpendicular to Q contains only noise.
   const Eigen::MatrixXd scaled = R_ * prior.cwiseSqrt().asDiagonal();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m, m);
   K.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
@@ -63,8 +64,8 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
   return e;
 }
 
-/// Posterior information matrix, scaled by the prior: large and small variances are not subtracted
-/// from each other.
+/// Posterior information matrix of the unknowns divided by their prior standard deviations. In this
+/// scale no large and small variances are subtracted from each other.
 struct LinearGaussian::Information {
   Eigen::VectorXd root;
   Eigen::MatrixXd scaled;

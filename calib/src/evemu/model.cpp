@@ -90,7 +90,9 @@ void EvemuModel::V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& c
     V_m(static_cast<Eigen::Index>(e.part.component)) += b[i] * e.c_m;
   }
 
-  // cov_cd = b_c^T C_cd b_d. Every column of C is read once, from its own component downwards.
+  // Covariance of the components c and d of V: b_c^T C_cd b_d, b_c: values of the entries of
+  // component c, C: entry_covariance_. Every column of C is read once, from the first row of its
+  // own component downwards.
   using Column = Eigen::Map<Eigen::VectorXd>;
   alignas(32) std::array<double, kMostEntries> sum;
   const std::size_t total = entries_.size();

@@ -9,7 +9,7 @@
 namespace abbe::calib::evemu {
 namespace {
 
-constexpr double kBall1Variance = 1e-4;  // of s^2; keeps the covariance regular
+constexpr double kBall1Variance = 1e-4;  // in units of s^2; keeps the covariance regular
 
 /// Applies `act` to the rows of all balls of a position, separately for each position and each
 /// component.
@@ -27,9 +27,9 @@ Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, 
   return result;
 }
 
-/// k_ij - k_i1 - k_1j + k_11 of the balls of a position.
+/// Matrix with the elements k_ij - k_i1 - k_1j + k_11 (noise.hpp), i, j: balls of a position.
 Eigen::MatrixXd slow_covariance(const TouchedArtefact& seen) {
-  constexpr double kPerPosition = 4.0;  // correlation times in one position
+  constexpr double kPerPosition = 4.0;  // touching one position takes 4 correlation times
   const std::vector<double> t = times_in_position(seen);
   const auto k = [&](Eigen::Index i, Eigen::Index j) {
     return exponential(-kPerPosition *

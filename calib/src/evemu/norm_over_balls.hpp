@@ -7,7 +7,8 @@
 
 namespace abbe::calib::evemu {
 
-/// Over the readings of all balls at all positions; for coefficients of the design.
+/// Root mean square of V over the readings of all balls at all positions, without rigid motion, for
+/// a V given by coefficients of the design.
 [[nodiscard]] RigidFreeNorm norm_over_balls(const Observations&, const ScaledDesign&);
 
 }  // namespace abbe::calib::evemu

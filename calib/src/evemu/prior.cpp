@@ -59,7 +59,8 @@ double own_scale_variance_m2(const DesignFunction& f, const ScaledDesign& design
   return sd_m * sd_m;
 }
 
-/// d log(prior variance) / d theta of one column. `f`: its function; null: a pose rotation.
+/// d log(prior variance) / d theta of one column, theta: logarithms of the hyper-parameters. `f`:
+/// the design function of the column; null: the column is a pose rotation.
 Theta sensitivity(PriorKind kind, const DesignFunction* f, const ScaledDesign& design,
                   const HyperParameters& h) {
   Theta d = Theta::Zero();
@@ -115,7 +116,8 @@ struct Objective {
   }
 };
 
-/// Sets those components of a direction to zero that would leave the bounds or the fixed value.
+/// Sets the components of a search direction to zero along which theta would leave its bounds or
+/// change a fixed parameter.
 void keep_inside(const Theta& theta, const Theta& gradient, std::optional<Eigen::Index> fixed,
                  Theta& direction) {
   if (fixed) {
@@ -135,8 +137,8 @@ struct Minimum {
   double value = std::numeric_limits<double>::infinity();
 };
 
-/// BFGS with backtracking, steps of at most a factor e^2 in any parameter. `fixed`: a parameter that
-/// keeps its starting value.
+/// BFGS with backtracking, steps of at most a factor e^2 in any parameter. `fixed`: a parameter
+/// that keeps its starting value.
 Minimum descend(Objective& f, const Theta& start, std::optional<Eigen::Index> fixed = {}) {
   constexpr int kMostIterations = 60;
   // Gradient of the log likelihood by theta (logarithms): far below a significant difference.
@@ -189,8 +191,8 @@ Minimum descend(Objective& f, const Theta& start, std::optional<Eigen::Index> fi
   return at;
 }
 
-/// Follows the likelihood away from `from` in steps of one parameter, the others re-estimated, as
-/// long as the data do not distinguish them. Adds the places to `comparable`.
+/// Changes one parameter in steps away from `from`, estimates the others again after each step, and
+/// adds the parameters to `comparable`, as long as the data hardly distinguish them from `from`.
 void follow(Objective& f, const Minimum& from, Eigen::Index along, double step,
             std::vector<HyperParameters>& comparable) {
   constexpr int kMostSteps = 8;
@@ -251,9 +253,9 @@ Result<HyperParameters> most_likely(PriorKind kind, const ScaledDesign& design,
                                     std::size_t positions, const LinearGaussian& problem,
                                     std::span<const double> added) {
   Objective f{kind, design, positions, problem, added};
-  // The likelihood can have several maxima: one explains the scatter as noise, one as pose
-  // rotations. With a flat array one maximum explains noise as the scale perpendicular to the array
-  // (large s_d, small rho), another one belongs to an accurate machine.
+  // The likelihood can have several maxima, with noise or with pose rotations as the origin of the
+  // scatter. With a flat array one maximum attributes noise to the scale of the axis perpendicular
+  // to the array (large s_d, small rho), another one belongs to an accurate machine.
   const std::array<HyperParameters, 4> starts{
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 1e-5, .w_rad = 1e-4},
       HyperParameters{.s_d_m = 5e-4, .rho = 0.6, .s_a_m = 5e-4, .s_m = 5e-6, .w_rad = 2e-6},

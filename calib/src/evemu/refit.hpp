@@ -1,6 +1,6 @@
 #pragma once
-/// Hyper-parameters of the largest marginal likelihood with columns added to the design, searched
-/// from a starting point near the solution.
+/// Search for the most likely hyper-parameters of a design with added columns, from a starting
+/// point near the solution (the most likely parameters without these columns).
 
 #include <Eigen/Core>
 #include <span>

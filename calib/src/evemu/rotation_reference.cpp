@@ -13,13 +13,13 @@ namespace {
 
 struct Used {
   std::vector<BallError> points;
-  std::vector<std::size_t> numbers;  ///< of `points` as they were given, from 1
+  std::vector<std::size_t> numbers;  ///< number, from 1, of each of `points` in the given list
   std::vector<std::size_t> outside;
 };
 
-/// Points inside the hull, or outside by at most 2 % of the distance from its centre. The balls
-/// themselves are the vertices of the hull, and a repeated measurement of a ball may lie some
-/// micrometres outside.
+/// Points inside the hull, or outside by at most 2 % of the distance from the centre of the hull.
+/// The balls themselves are the vertices of the hull, and a repeated measurement of a ball may lie
+/// some micrometres outside.
 Used inside_of(const ValidityVolume& volume, std::span<const BallError> points) {
   constexpr double kPulledIn = 0.98;
   const Vector3 centre = bounding_box(volume.vertices_m()).centre_m;
@@ -121,7 +121,8 @@ double chi2_of_one_in_1000(double dof) {
   return dof * root * root * root;
 }
 
-/// The covariance of the shape alone, without the rotation that set_gauge() added.
+/// Covariance of the coefficients without the uncertainty of the rotation about Ball1, which
+/// set_gauge() (solve.cpp) added.
 Eigen::MatrixXd shape_covariance(const EvemuModel& model, const MeanRotation& rotation) {
   const Eigen::MatrixX3d G = model.design().rotation_about(model.ball1_m());
   return rotation.referenced
@@ -166,9 +167,10 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   const Turn turn = turn_onto(rows, C_shape, reference.sigma_m);
   const double chi2_limit = chi2_of_one_in_1000(turn.dof);
 
-  // Errors of a real machine are not exactly polynomials, and many points detect this before the
-  // reference is wrong. Residuals of up to twice the stated uncertainties therefore only enlarge
-  // the rotation's uncertainty, as [Birge 1932]. The comparison is written to refuse NaN.
+  // Errors of a real machine are not exactly polynomials. With many points chi-square therefore
+  // exceeds its limit even if the reference is correct. Residuals of up to twice the stated
+  // uncertainties only enlarge the rotation's uncertainty, as in [Birge 1932]. With NaN the
+  // condition below is true, and the reference is refused.
   constexpr double kMostPerDof = 4.0;
   const double widened = turn.chi2 > chi2_limit ? turn.chi2 / turn.dof : 1.0;
   if (!(turn.chi2 <= std::max(chi2_limit, kMostPerDof * turn.dof))) {
@@ -182,7 +184,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
   }
 
   const Eigen::MatrixX3d G = evemu.design().rotation_about(evemu.ball1_m());
-  // Error after the rotation: G (K (B dc + noise)) - dc.
+  // Error of the rotated coefficients: G (K (B dc + noise)) - dc, dc: error of the model's shape.
   const Eigen::MatrixXd kept =
       Eigen::MatrixXd::Identity(C_shape.rows(), C_shape.cols()) - G * (turn.K * rows.B);
   const Matrix3 from_noise = reference.sigma_m * reference.sigma_m * turn.K * turn.K.transpose();

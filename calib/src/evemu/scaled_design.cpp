@@ -91,7 +91,7 @@ Result<ScaledDesign> ScaledDesign::of(const KinematicChain& chain, int order,
     return failure(ErrorCode::NotFinite, "scaled design: the box of readings is not finite");
   }
 
-  // A micrometre of travel does not determine polynomials along an axis.
+  // Readings within a travel of a micrometre do not determine polynomials along an axis.
   constexpr double kLeastHalfWidth_m = 1e-6;
   if (box.half_width_m.minCoeff() < kLeastHalfWidth_m) {
     return failure(ErrorCode::DegenerateGeometry,
@@ -150,7 +150,8 @@ Eigen::Matrix3Xd ScaledDesign::B(const Vector3& reading_m) const {
 }
 
 Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
-  // A name with two monomials (a rotation with two arms) receives half from each of them.
+  // A named coefficient with two monomials (a rotation with two arms) is the mean of the values
+  // that its two monomials give.
   struct Target {
     Eigen::Index row;
     double per_factor;
@@ -199,8 +200,8 @@ Eigen::MatrixXd ScaledDesign::named_from_scaled() const {
 }
 
 Eigen::MatrixX3d ScaledDesign::rotation_about(const Vector3& about_m) const {
-  // omega x (q - about) = L omega with L affine in q: the constant part is L at the centre of the
-  // box, the linear part is the slope along each axis.
+  // omega x (q - about) = L(q) omega, L affine in q. The coefficients of constant functions follow
+  // from L at the centre of the box, those of linear functions from the slope of L along each axis.
   const Matrix3 at_centre = rotation_effect(box_.centre_m - about_m);
   Eigen::MatrixX3d C = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(size()), 3);
   for (std::size_t j = 0; j < size(); ++j) {

@@ -12,7 +12,7 @@ namespace {
 struct RowsInUse {
   Eigen::Index first, count;
 };
-/// From the first to the last row that is not zero.
+/// Range of rows from the first to the last row that is not zero.
 RowsInUse rows_in_use(const Eigen::MatrixXd& C) {
   Eigen::Index first = 0, end = C.rows();
   while (first < end && C.row(first).isZero(0.0)) {
@@ -48,8 +48,10 @@ Screen::Gain Screen::gain(const Eigen::MatrixXd& C) const {
   Gain best{-std::numeric_limits<double>::infinity(), 0.0};
 
   for (const double size_m : kSizes_m) {
-    // log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,
-    // M = 1 + t^2 C^T K^-1 C,  g = C^T K^-1 y
+    // K: covariance of y, N: density of the normal distribution with this covariance, t: prior
+    // standard deviation of the coefficients of C:
+    //     log N(y; K + t^2 C C^T) - log N(y; K) = g^T M^-1 g t^2 / 2 - log |M| / 2,
+    //     M = 1 + t^2 C^T K^-1 C,  g = C^T K^-1 y
     const double t2 = size_m * size_m;
     const Eigen::LLT<Eigen::MatrixXd> M(Eigen::MatrixXd::Identity(GG.rows(), GG.cols()) + t2 * GG);
     const double log_det = 2.0 * M.matrixLLT().diagonal().unaryExpr(&natural_logarithm).sum();

@@ -1,15 +1,16 @@
 #pragma once
-/// Fast estimate of the likelihood ratio for columns added to the design of a ball array. It needs
-/// no separate fit for each candidate and selects among many.
+/// Fast estimate of the likelihood ratio for columns added to the design of a ball array. The
+/// estimate needs no fit for each candidate, so that one of many candidates can be selected.
 
 #include <Eigen/Core>
 #include <array>
 
 namespace abbe::calib::evemu {
 
-/// At the hyper-parameters of an estimate y has the covariance s^2 1 + U U^T. U: columns of design,
-/// pose rotations and array, each times its prior standard deviation. Q R is the QR decomposition
-/// of the matrix with U above s 1; Q1: the rows of Q that belong to U. Then
+/// With the hyper-parameters of an estimate, the observed errors y have the covariance s^2 1 + U
+/// U^T. U: columns of design, pose rotations and array, each times its prior standard deviation. Q
+/// R is the QR decomposition of the stacked matrix [U; s 1]; Q1: the rows of Q that belong to U.
+/// Then
 ///     (s^2 1 + U U^T)^-1 = (1 - Q1 Q1^T) / s^2.
 class Screen {
  public:
@@ -26,7 +27,8 @@ class Screen {
     double log_likelihood = 0.0;  ///< natural logarithm of the ratio
     double size_m = 0.0;
   };
-  /// Gain of the whitened columns C with the best of kSizes_m. NaN: no likelihood.
+  /// Likelihood gained by adding the whitened columns C, with the prior of kSizes_m that gives the
+  /// largest gain. NaN if the likelihood cannot be computed.
   [[nodiscard]] Gain gain(const Eigen::MatrixXd& C) const;
 
  private:

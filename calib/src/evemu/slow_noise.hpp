@@ -9,9 +9,9 @@
 
 namespace abbe::calib::evemu {
 
-/// Slow noise is included if the logarithm of its likelihood ratio exceeds this. White noise alone
-/// reaches the limit in 1 of 40 runs (twice the logarithm is distributed as chi2 with one degree of
-/// freedom, and is 0 in half of the runs).
+/// Slow noise is included if the logarithm of its likelihood ratio exceeds this limit. In runs that
+/// have only white noise, 1 of 40 reaches the limit (twice the logarithm is distributed as chi2
+/// with one degree of freedom, and is 0 in half of the runs).
 inline constexpr double kLeastSlowNoiseGain = 2.0;
 
 struct SlowNoise {

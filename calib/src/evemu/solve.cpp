@@ -31,7 +31,7 @@ std::vector<Vector3> readings_m(const Observations& o) {
   return readings;
 }
 
-/// Theta averaged over the positions, 3 x size().
+/// block_rotation() (Theta of observe.hpp) averaged over the positions, 3 x size().
 Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& design) {
   Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
   for (const TouchedArtefact& seen : o.seen) {
@@ -40,8 +40,8 @@ Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& 
   return mean;
 }
 
-/// Prior covariance of the rotation of the blocks by squareness errors and slopes of the machine:
-/// the prior of a linear translation over the volume, as an angle.
+/// Prior covariance of the rotation by which squareness errors and slopes of the machine's errors
+/// rotate the measured blocks: kLinearPrior_m over the largest half width, as an angle.
 Matrix3 prior_rotation_rad2(const ScaledDesign& design) {
   const double u_rad = kLinearPrior_m / design.arm_unit_m();
   return u_rad * u_rad * Matrix3::Identity();
@@ -136,8 +136,8 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   const Eigen::VectorXd sv = singular_values(problem.X * scale.asDiagonal());
 
-  // Relative singular values: 1e-7 for unobservable rotations (readings of Ball1 differ by
-  // nanometres), 1e-4 and more for determined coefficients.
+  // Singular values relative to the largest are about 1e-7 for the unobservable rotations (not 0,
+  // because readings of Ball1 differ by nanometres), and 1e-4 and more for determined coefficients.
   constexpr double kZero = 1e-6;
   s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());
   s.condition = sv(0) / sv(static_cast<Eigen::Index>(s.rank) - 1);

@@ -31,8 +31,8 @@ std::optional<Surface> sphere_through(std::span<const Vector3> points) {
 }
 
 std::optional<Surface> plane_through(std::span<const Vector3> points) {
-  // The side of the normal does not matter here. fit_plane() needs a direction outside the plane:
-  // at least one of the three axes is.
+  // fit_plane() needs a direction that is not parallel to the plane, to choose the side of the
+  // normal; the side has no effect here. At least one of the three axes is such a direction.
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (const auto s = fit::fit_plane(points, Vector3(Vector3::Unit(axis)))) {
       return Surface{
@@ -45,11 +45,11 @@ std::optional<Surface> plane_through(std::span<const Vector3> points) {
 
 std::optional<std::string> wrong_touch(std::span<const Vector3> points, std::size_t unknowns,
                                        double most_off_m, const FitSurface& fit) {
-  constexpr double kShare = 0.25;  // least ratio of a false touch's residual to its distance
-  constexpr double kClear = 10.0;  // least ratio of its distance to the rms of the others
+  constexpr double kShare = 0.25;  // least ratio of a false touch's residual to its true distance
+  constexpr double kClear = 10.0;  // least ratio of that distance to the rms of the other touches
 
-  // Machine errors of some mm deform a sphere by 0.4 mm. With few touches, the others may fit
-  // another sphere by chance.
+  // Machine errors of some mm deform a sphere by 0.4 mm. If there are few touches, all but one of
+  // them may fit another sphere by chance, although no touch is false.
   constexpr std::size_t kPerUnknown = 4;
   const std::optional<Surface> all = fit(points);
   if (!all || all->largest_m < kShare * most_off_m || points.size() < kPerUnknown * unknowns) {

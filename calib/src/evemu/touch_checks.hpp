@@ -19,8 +19,9 @@ namespace abbe::calib::evemu {
 [[nodiscard]] std::optional<std::string> wrong_touch_on_face(std::span<const Vector3> points_m,
                                                              const ObserveOptions&);
 
-/// True if the balls were touched from below, where the plate is. The mirror image of a planar
-/// array has the same shape: only the touched side reveals a mirrored axis.
+/// True if the balls seem to be touched from below, where the plate is. This shows that an axis is
+/// mirrored: the mirror image of a planar array has the same shape, and only the touched side
+/// differs.
 [[nodiscard]] bool touched_from_below(const TouchedArtefact&);
 
 }  // namespace abbe::calib::evemu

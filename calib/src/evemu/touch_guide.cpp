@@ -185,8 +185,8 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
                out.notes.back()));
 }
 
-/// A touch on a feature that already has all its points. If it is on Ball1 and no feature lacks
-/// points, the next position has begun.
+/// Handles a touch on a feature that already has all its points. If the touch is on Ball1 and no
+/// feature lacks points, it is the first touch of the next position.
 void TouchGuide::on_complete_feature(std::size_t feature, const Vector3& p_m, GuidedTouch& out) {
   if (feature == kBall1 && feature_ != kBall1 && all_have_enough()) {
     if (skip_to(passed_.size(), out) && all_have_enough()) {
@@ -214,9 +214,10 @@ void TouchGuide::put(std::size_t feature, const Vector3& p_m, GuidedTouch& out) 
     expect_next_after(feature, out);
 }
 
-/// The operator has gone on to a later feature. Reports the points missing on the features before
-/// it; a feature with too few points is requested again at the end of the position. False if the
-/// guide failed, or if a feature was discarded: that feature is then expected next.
+/// Called when the operator touches `feature`, which comes after the expected one. Reports the
+/// points missing on the features before `feature`; a feature with too few points is requested
+/// again at the end of the position. False if the guide failed, or if a feature was discarded: the
+/// discarded feature is then expected next.
 bool TouchGuide::skip_to(std::size_t feature, GuidedTouch& out) {
   for (std::size_t f = feature_; f < feature; ++f) {
     const std::size_t points = site_->points(f).size();

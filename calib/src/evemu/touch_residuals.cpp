@@ -55,14 +55,15 @@ double minus_log_tail(double share, double a, double b) {
                 b * natural_logarithm((1.0 - mean) / (1.0 - share)));
 }
 
-/// Sum of squares of the remaining residuals of one ball or face, and its degrees of freedom.
+/// Sum of squares of the residuals of one ball or face, and the degrees of freedom of this sum.
 struct FormSquares {
   const FeatureResiduals* of;
   double m2, dof;
 };
 
-/// An error in the slopes of the model's V deforms a ball into an ellipsoid: this is removed too.
-/// nullopt if no degree of freedom remains.
+/// FormSquares of a ball or face. An error in the slopes of the model's V deforms a ball into an
+/// ellipsoid; this deformation is removed from the residuals, too. nullopt if no degree of freedom
+/// remains.
 std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
   if (f.feature == Feature::Block) {
     return f.dof() > 0.0 ? std::optional(FormSquares{&f, f.r_m.squaredNorm(), f.dof()})
@@ -86,9 +87,9 @@ std::optional<FormSquares> form_squares(const FeatureResiduals& f) {
 }
 
 /// Compares the k features that scatter most with the others, for every k from 2. With white noise
-/// of any size, the share of k features in the sum of squares follows the beta distribution; the
-/// number of choices of k features is allowed for. Balls and faces are compared separately:
-/// backlash or a probe with lobing shows on balls alone.
+/// of any size, the share of k given features in the sum of squares follows the beta distribution;
+/// the probability is multiplied by the number of ways to choose k features. Balls and faces are
+/// compared separately, because backlash and lobing of the probe enlarge the scatter of balls only.
 std::optional<TouchFinding> form_of_several(const Observations& o,
                                             const std::vector<FeatureResiduals>& all, Feature kind,
                                             double false_alarm) {
@@ -136,11 +137,11 @@ std::optional<TouchFinding> form_of_several(const Observations& o,
   return found;
 }
 
-/// Backlash of axis a is a vector b_a: by it the position differs at the same reading after the
-/// axis reverses. A touch against the normal n then lies farther out by
+/// Backlash of axis a is a vector b_a: the difference of the positions at the same reading before
+/// and after the axis reverses. A touch against the outward normal n then lies farther out by
 ///     sum_a sign(n_a) b_a . n / 2.
-/// Column 3 a + m: component m of b_a. If an axis hardly moves on the way to the touch, its side is
-/// unknown and it does not contribute.
+/// Column 3 a + m: component m of b_a. An axis that hardly moves on the way to the touch does not
+/// contribute, because its direction of motion is uncertain.
 constexpr Eigen::Index kBacklashes = 9;
 constexpr double kLeastMotion = 0.1;  // component of the unit normal along the axis
 
@@ -171,9 +172,10 @@ struct Backlash {
   bool across = false;  ///< includes components perpendicular to the axes
 };
 
-/// Estimates the unknowns of some columns. Prior: 0 with a standard deviation of 100 um, more than
-/// the backlash of a sound axis. Components that the touches hardly distinguish from radius and
-/// position of a ball therefore stay near zero.
+/// Estimates the components of backlash in `columns`, from the normal equations N b = g. Their
+/// prior has mean 0 and a standard deviation of 100 um, more than the backlash of a sound axis.
+/// Components that the touches hardly distinguish from radius and position of a ball therefore stay
+/// near zero.
 Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::MatrixXd& N,
                      const Eigen::VectorXd& g, double sigma_m) {
   constexpr double kPrior_m = 100e-6;
@@ -190,7 +192,8 @@ Backlash backlash_of(const std::vector<Eigen::Index>& columns, const Eigen::Matr
   return found;
 }
 
-/// Backlash along the axes; also perpendicular to them if that explains significantly more.
+/// Backlash with components along the axes; with perpendicular components, too, if these explain
+/// significantly more.
 Backlash significant_backlash(const std::vector<FeatureResiduals>& all, double sigma_m,
                               double false_alarm) {
   Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kBacklashes, kBacklashes);
@@ -284,9 +287,10 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
   auto touch = false_touch(o, all, found.sigma_m, false_alarm);
   std::optional<TouchFinding> form;
 
-  if (!touch) {  // a single false touch makes its ball or block scatter
+  if (!touch) {  // else the scatter of a ball or block may be caused by that false touch
     form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
-    // Backlash across an axis that hardly moves on the way to a touch stays in the residual.
+    // Backlash perpendicular to an axis that hardly moves on the way to a touch is not removed from
+    // the residual (kLeastMotion) and would appear as scatter of several balls.
     if (!form && !backlash.across) {
       form = form_of_several(o, left, Feature::Ball, 0.25 * false_alarm);
     }

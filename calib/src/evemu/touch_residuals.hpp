@@ -1,6 +1,6 @@
 #pragma once
-/// Residuals of touches to the spheres and planes of their features, after the V of a model is
-/// removed. They contain the noise of the probe and faults.
+/// Residuals of touches to the fitted spheres and planes of balls and faces, after the V of a model
+/// is removed. These residuals contain the noise of the probe and the effects of faults.
 
 #include <Eigen/Core>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace abbe::calib::evemu {
 
-/// A significant deviation in the touches.
+/// A cause of lack of fit that the residuals of the touches show significantly.
 struct TouchFinding {
   Cause cause = Cause::Touch;
   std::string text;

@@ -31,7 +31,8 @@ bool spans_a_face(const std::vector<Vector3>& points) {
   return set && set->singular_values(1) > kLeastWidth * set->singular_values(0);
 }
 
-/// The plane of a face with at least `least` points. A single wrong point may still change it.
+/// The plane of a face with at least `least` points; nullopt with fewer points or if they do not
+/// lie in a plane. A single wrong point may have changed the plane.
 std::optional<fit::Plane> likely_face(const std::vector<Vector3>& points, std::size_t least,
                                       double max_off_m) {
   if (points.size() < least || !spans_a_face(points)) return std::nullopt;
@@ -40,7 +41,7 @@ std::optional<fit::Plane> likely_face(const std::vector<Vector3>& points, std::s
   return *plane;
 }
 
-/// The plane of a face, if it remains determined without any single one of its points.
+/// The plane of a face; nullopt if leaving out one of the points, whichever it is, leaves no plane.
 std::optional<fit::Plane> sure_face(const std::vector<Vector3>& points, double max_off_m) {
   constexpr std::size_t kLeast = 5;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -103,9 +104,10 @@ std::optional<std::size_t> Site::feature_of(const Vector3& p_m, std::size_t expe
   return ball_of(p_m, expected);
 }
 
-/// Used while no feature is known. Touches of one ball are at most one diameter apart; twice the
-/// diameter of the calibrator is accepted, so that a ball of another artefact is recognised by its
-/// radius.
+/// True if the point may be on the ball touched first. Used while the place of no feature is known.
+/// Touches of one ball are at most one diameter apart; twice the diameter in the calibrator is
+/// accepted, so that all touches of a larger ball of another artefact are collected and its radius
+/// is computed and reported.
 bool Site::near_first_ball(const Vector3& p_m) const {
   constexpr double kMostDiameters = 2.0;
   return std::ranges::all_of(points_[kBall1], [&](const Vector3& q) {
@@ -121,8 +123,9 @@ bool Site::on_face(std::size_t block, const Vector3& p_m) const {
          (p_m - face->point).norm() <= 2.0 * spread_m(points_[block], face->point) + kBeyond_m;
 }
 
-/// The calibrator states the directions of the faces, not their places. Until a face is known, a
-/// touch that is not on Ball1 and is expected on the face is assigned to it.
+/// The face on which the point lies; nullopt if it lies on none. The calibrator states the
+/// directions of the faces, not their places. Until the place of a face is known, a touch that is
+/// not on Ball1 is assigned to the face if the face is `expected`.
 std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expected) const {
   for (const std::size_t block : {kBlock1, kBlock2}) {
     if (on_face(block, p_m)) return block;
@@ -142,8 +145,9 @@ std::optional<std::size_t> Site::face_of(const Vector3& p_m, std::size_t expecte
   return std::nullopt;
 }
 
-/// The expected ball is tested first: a ball with one pair of face sides may be at the place of
-/// another ball with the other sides.
+/// The ball on which the point lies; nullopt if it lies on none. The expected ball is tested first,
+/// because the place of one ball under one assumption about the sides of the faces (Candidate) may
+/// be the place of another ball under another assumption.
 std::optional<std::size_t> Site::ball_of(const Vector3& p_m, std::size_t expected) const {
   for (const Candidate& candidate : candidates_) {
     const std::size_t ball = nearest_ball(candidate, p_m);
@@ -271,7 +275,8 @@ void Site::place_balls() {
   }
 }
 
-/// The artefact is rigid: a face that points away from Ball1 does so at every position.
+/// Stores on which side of each face Ball1 lies. The artefact is rigid, so that the side is the
+/// same at every position.
 void Site::keep_sides() {
   if (candidates_.empty()) return;
   for (const std::size_t block : {kBlock1, kBlock2}) {

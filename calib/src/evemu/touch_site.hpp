@@ -21,7 +21,7 @@ inline constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;  ///< feature
 struct FeatureCheck {
   bool valid = false;
   std::optional<std::size_t> outlier{};    ///< index of a point without which the others are valid
-  double off_m = 0.0;                      ///< distance of the outlier from the others' surface
+  double off_m = 0.0;  ///< distance of the outlier from the surface through the others
   std::optional<double> other_radius_m{};  ///< the points lie on a sphere of this other radius
 };
 
@@ -31,8 +31,8 @@ class Site {
   /// faces are copied; may be null. The calibrator and the options must outlive the site.
   Site(const Calibrator&, const GuideOptions&, const Site* before);
 
-  /// The feature on which p lies; nullopt: on no known feature. If the places of the features do
-  /// not decide, `expected` does.
+  /// The feature on which p lies; nullopt: on no known feature. If p may be on several features, or
+  /// if the place of the feature `expected` is not known yet, p is assigned to `expected`.
   [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m,
                                                       std::size_t expected) const;
   /// Distance to the surface of the nearest ball with a known place, and its index in `ball`;
@@ -52,8 +52,8 @@ class Site {
   /// Call when the position is finished: keeps the sides of the faces for the next position.
   void keep_sides();
   [[nodiscard]] FeatureCheck check(std::size_t feature) const;
-  /// Absolute difference between the angle of the two faces and that of the calibrator; pi if a
-  /// face has too few points.
+  /// Absolute difference between the measured angle of the two faces and their angle in the
+  /// calibrator; pi if a face has too few points.
   [[nodiscard]] double faces_off_rad() const;
   [[nodiscard]] std::vector<Touch> touches(int position) const;
 
@@ -88,7 +88,7 @@ class Site {
   std::array<std::optional<double>, 2> sides_;  ///< known from previous positions
   std::vector<std::vector<Vector3>> points_;    ///< by feature
   std::vector<bool> accepted_;                  ///< by feature; only balls are accepted
-  std::vector<Candidate> candidates_;           ///< those consistent with all accepted balls
+  std::vector<Candidate> candidates_;           ///< assumptions that agree with all accepted balls
 };
 
 }  // namespace abbe::calib::evemu

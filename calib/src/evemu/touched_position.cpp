@@ -104,7 +104,8 @@ Result<void> check_twice(int position, std::span<const fit::Sphere> balls) {
   return {};
 }
 
-/// "; they fit with ..." and the mistake in the unit of length; empty if no unit fits.
+/// Text "; they fit with ..." that names the wrong unit of length with which the radii of the balls
+/// agree with the calibrator; empty if no tested unit does.
 std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator& c) {
   constexpr double kSame = 0.05;  // relative: touches determine radii to a few per cent
   for (const UnitMistake& mistake : unit_mistakes()) {
@@ -120,11 +121,12 @@ std::string radii_fit_with(std::span<const fit::Sphere> balls, const Calibrator&
   return "";
 }
 
-/// With at most this many touches, two or fewer residuals do not tell which touch is false.
+/// With at most this many touches the false one is not named: a sphere has four unknowns, and two
+/// or fewer redundant touches do not show which of them is false.
 constexpr std::size_t kTooFewToName = 6;
 
-/// The touch without which the others fit a sphere much better, and the radius of that sphere is at
-/// most half as far from `radius_m`. nullopt if there is none.
+/// Index of the touch without which the other touches fit a sphere much better, with a radius whose
+/// difference to `radius_m` is at most half of that with all touches. nullopt if there is none.
 std::optional<std::size_t> touch_off_radius(std::span<const Vector3> points_m, double radius_m) {
   constexpr double kClear = 3.0;  // ratio of rms; machine errors of some mm deform the sphere
   const Result<fit::Sphere> all = fit::fit_sphere(points_m);
@@ -208,8 +210,8 @@ Result<void> check_unit(int position, const Touched& touched, std::span<const fi
                                           : check_radii(position, touched, balls, c, options);
 }
 
-/// "; they fit with ..." and the mistakes that explain the shape: a reflection, other ball numbers.
-/// Empty if none of the tested mistakes does.
+/// Text "; they fit with ..." that names the mistakes with which the ball centres agree with the
+/// calibrator: a reflection, other ball numbers. Empty if no tested mistake does.
 std::string balls_fit_with(std::span<const Vector3> calibrated, std::span<const Vector3> seen,
                            const ObserveOptions& options) {
   const auto fits = [&](const std::vector<Vector3>& from) {

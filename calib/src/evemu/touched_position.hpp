@@ -39,8 +39,8 @@ using Touched = std::map<std::pair<Feature, int>, TouchedPoints>;
                                                          const ObserveOptions&);
 
 /// Spheres, planes and pose of a position. `at_machine`: the calibrator at the array's temperature;
-/// `T_uni_pre`: from its coordinates into the uniform frame. The text of BadInput names the feature
-/// that does not fit, and the mistake that would explain it.
+/// `T_uni_pre`: from the coordinates of the calibrator to the uniform frame. The text of BadInput
+/// names the feature that does not fit, and the mistake that would explain the misfit.
 [[nodiscard]] Result<TouchedArtefact> see(int position, const Touched&,
                                           const Calibrator& at_machine,
                                           const RigidTransform& T_uni_pre, const ObserveOptions&);

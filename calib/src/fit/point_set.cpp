@@ -36,7 +36,8 @@ Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed, 
   }
 
   if (points.size() >= needed && !points.empty()) {
-    // Coordinates relative to the first point: the mean of large coordinates would lose digits.
+    // The mean is computed from coordinates relative to the first point, because the mean of large
+    // coordinates would lose digits.
     set.centred.colwise() -= points.front();
     const Vector3 mean = set.centred.rowwise().mean();
     set.centred.colwise() -= mean;

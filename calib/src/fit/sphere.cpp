@@ -25,7 +25,8 @@ Normalised algebraic(const Eigen::Matrix3Xd& p) {
   return {x.head<3>(), std::sqrt(std::max(0.0, x(3) + x.head<3>().squaredNorm()))};
 }
 
-/// Jacobian of |p_i - c| - r by centre and radius; writes the residuals to `r`.
+/// Jacobian of the residuals |p_i - c| - radius with respect to centre c and radius; writes the
+/// residuals to `r`.
 Eigen::MatrixX4d jacobian(const Eigen::Matrix3Xd& p, const Normalised& s, Eigen::VectorXd& r) {
   Eigen::MatrixX4d J(p.cols(), 4);
   r.resize(p.cols());

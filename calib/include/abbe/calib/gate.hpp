@@ -20,22 +20,23 @@
 namespace abbe::calib {
 
 /// Root mean square of the residuals of held-out observations, each residual divided by its
-/// standard uncertainty (1: the residuals are as small as the noise permits). From the residuals of
-/// each alternative (no compensation, candidate, active model) the best-fit rigid motion is removed
-/// first.
+/// standard uncertainty (1: the residuals are as small as the noise permits). The compared models
+/// are no compensation, the candidate and the active model; from the residuals of each the best-fit
+/// rigid motion is removed first.
 struct HeldOutFigures {
   double no_compensation = 0.0;
   double candidate = 0.0;
   std::size_t observations = 0;
-  /// Observations that were never held out: without them the model is not determined.
+  /// Number of observations that were never held out, because the model is not determined without
+  /// them.
   std::size_t not_held_out = 0;
-  /// Figure of the active model, from the observations inside its validity volume only: outside, it
-  /// extrapolates, and a comparison there is meaningless. nullopt if there is no active model, if
-  /// it is not valid for this tool, or if no observation is inside.
+  /// Figure of the active model, from the observations inside its validity volume only: outside
+  /// this volume the active model extrapolates, and a comparison is meaningless. nullopt if there
+  /// is no active model, if it is not valid for this tool, or if no observation is inside.
   std::optional<double> active{};
   std::optional<double> candidate_beside_active{};  ///< from the same observations as `active`
   std::size_t observations_beside_active = 0;
-  /// The same figures, unweighted and in m, for display.
+  /// The figures above from residuals in m, not divided by their uncertainty; for display.
   double no_compensation_rms_m = 0.0;
   double candidate_rms_m = 0.0;
   std::optional<double> active_rms_m{};
@@ -69,7 +70,7 @@ inline constexpr std::string_view kScaleChange = "scale-change";
 
 /// Fraction of the volume of `before` that is inside `after`, estimated with the points of a
 /// lattice over `before`, accurate to a few per cent. Points outside `after` by at most the
-/// fraction `rim` of its width count as inside.
+/// fraction `rim` of the width of `after` count as inside.
 [[nodiscard]] double kept_share(const ValidityVolume& before, const ValidityVolume& after,
                                 double rim = 0.0);
 

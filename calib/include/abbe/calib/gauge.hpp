@@ -2,7 +2,7 @@
 /// A gauge (datum) selects one of the many parameter sets that describe the same machine.
 /// Measurements of one target leave a datum defect of 20: 20 combinations of the 14 tables,
 /// 3 squareness and 6 rigid unknowns are not determined (24 for all 18 tables and three or more
-/// targets). Every choice predicts the same V up to a rigid motion.
+/// targets). All these parameter sets predict the same V up to a rigid motion.
 ///
 /// Gauge G1 ([Sanders 2023] sections 2.3.1 and 2.3.2) has conditions K U = 0, exactly as many as
 /// there are undetermined combinations:
@@ -42,13 +42,14 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
 /// those of the nodes are zero: squareness, differences between directions of travel, nuisances.
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const estimation::TableBasis&,
                                                std::size_t unknowns);
-/// The same for linear tables: one row per condition, fit_size() columns. The last six columns belong to
-/// the rigid unknowns and are zero.
+/// Matrix K of gauge G1 for linear tables: one row per condition, fit_size() columns. The last six
+/// columns belong to the rigid unknowns and are zero.
 [[nodiscard]] Eigen::MatrixXd gauge_conditions(Gauge, const ParameterLayout&);
 
-/// Basis of the parameter combinations (columns, fit_size() rows) that measurements of `targets_m`
-/// cannot determine, at whatever position in the volume: the null space of complete 3D data at all
-/// node positions. The offset of each target except the first has an unknown constant.
+/// Basis of the parameter combinations (columns, fit_size() rows) that measurements with the target
+/// offsets `targets_m` cannot determine, at whatever positions in the volume: the null space of the
+/// design matrix with all three components of V at all node positions. In this matrix the offset of
+/// each target except the first has an unknown constant.
 [[nodiscard]] Eigen::MatrixXd unobservable_combinations(const ParameterLayout&,
                                                         std::span<const Vector3> targets_m);
 

@@ -25,10 +25,11 @@ struct InterpolationGrid {
 ///   axes along which V has a larger second derivative.
 [[nodiscard]] InterpolationGrid interpolation_grid(const VolumetricModel&, std::size_t most_nodes);
 
-/// Second moment of the linear interpolation error around node (i, j, k), averaged over a cell. The
-/// caller adds it to cov_V_m2 at this node. Along each axis the interpolation error is modelled as
-/// a parabola c p(x) between nodes, p = 1 halfway. c is the error halfway to a neighbour node; of
-/// the two neighbours, the one with the larger error counts. The averages over a cell are
+/// Second moment of the linear interpolation error in the cells around node (i, j, k), averaged
+/// over a cell. The caller adds this matrix to cov_V_m2 at this node. Along each axis the
+/// interpolation error is modelled as a parabola c p(x) between nodes, p = 1 halfway. c is the
+/// error halfway to a neighbour node; of the two neighbours, the one with the larger error counts.
+/// The averages over a cell are
 ///     E[p^2] = 8/15,   E[p p'] = 4/9   (p' along another axis).
 /// Zero if every_node. Pure.
 [[nodiscard]] Matrix3 interpolation_moment(const VolumetricModel&, const InterpolationGrid&,

@@ -18,7 +18,7 @@ struct VectorStatistics {
 
 struct ModelDifference {
   VectorStatistics as_stated;       ///< of the difference of V, gauges unchanged
-  VectorStatistics rigid_free;      ///< after removing the best-fit T + r x p
+  VectorStatistics rigid_free;      ///< of the difference minus its best-fit rigid motion T + r x p
   Vector6 rigid = Vector6::Zero();  ///< the removed tx ty tz [m], rx ry rz [rad]
 };
 

@@ -18,7 +18,7 @@ namespace abbe::calib {
 
 struct Table {
   ErrorMotion motion;
-  std::size_t offset = 0;  ///< index of its first node in U
+  std::size_t offset = 0;  ///< index in U of the table's first node
 };
 
 /// Immutable value.
@@ -33,7 +33,8 @@ class ParameterLayout {
                                                                           MachineNodes);
   /// All 18 tables; estimable only with three or more non-collinear target offsets.
   [[nodiscard]] static Result<ParameterLayout> all_tables(const KinematicChain&, MachineNodes);
-  /// Any subset; the tables are sorted into the order above. BadInput if a table is repeated.
+  /// Any subset of the 18 tables, sorted into the order EXX .. ECZ of this header. BadInput if a
+  /// table is repeated.
   [[nodiscard]] static Result<ParameterLayout> with_tables(const KinematicChain&, MachineNodes,
                                                            std::span<const ErrorMotion>);
 

@@ -19,7 +19,8 @@ struct HalfSpace {
 /// stored as its vertices and read again is identical.
 class ValidityVolume {
  public:
-  /// Tolerance of contains(): at the end of its travel an axis can read slightly more than the end.
+  /// Tolerance of contains(): an axis at the end of its travel can read slightly more than the
+  /// nominal end of the travel.
   static constexpr double kTolerance_m = 1e-6;
 
   ValidityVolume() = default;  ///< contains nothing

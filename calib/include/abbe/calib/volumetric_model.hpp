@@ -1,18 +1,18 @@
 #pragma once
 /// The result of every identification method: the volumetric error V of a machine and its
-/// uncertainty.
+/// uncertainty. V is the error of the functional point (stylus tip or reflector)
 ///     V(q, t) = actual - nominal = true position - reading
-/// of the functional point, in machine coordinates, at the scale reading q, for the tool offset t
-/// (tool reference point to functional point). Use of a model:
+/// in machine coordinates, at the scale reading q, for the tool offset t (tool reference point to
+/// functional point). Use of a model, p: nominal position:
 /// - measuring: corrected = reading + V(reading),
 /// - positioning: command p + c with c = -V(p + c).
 /// A rigid motion of the whole volume is not estimable and not part of a model; neither are errors
 /// outside the validity volume.
 ///
 /// A model has one of two forms: tables with nodes (rigid-body model), or polynomials without
-/// tables (equivalent model of a ball array). Gate, grid, comparison and export need not know which
-/// one: nodes() and linear_between_nodes() describe both. Values and uncertainties refer to the
-/// stated gauge; compare two models with rigid_free_difference().
+/// tables (equivalent model of a ball array). Gate, grid, comparison and export treat both forms
+/// alike: nodes() and linear_between_nodes() describe both. Values and uncertainties refer to the
+/// gauge of the model; compare two models with rigid_free_difference().
 
 #include <Eigen/Core>
 #include <optional>
@@ -85,7 +85,7 @@ class VolumetricModel {
   /// BadInput or NotFinite if the parameters are wrong (unknown or repeated name, missing node,
   /// wrong size); the text names the first wrong parameter.
   [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
-  /// `U`: the model_size() parameters of the layout; `covariance`: theirs.
+  /// `U`: the model_size() parameters of the layout; `covariance`: their covariance.
   [[nodiscard]] static Result<VolumetricModel> from_vector(const ParameterLayout&, Gauge,
                                                            std::span<const Vector3> tool_offsets_m,
                                                            const Eigen::VectorXd& U,
@@ -115,7 +115,7 @@ class VolumetricModel {
   [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
   /// V is linear between nodes() along each axis.
   [[nodiscard]] bool linear_between_nodes() const { return tables() != nullptr; }
-  /// Null for a model of another form.
+  /// Null for a model of polynomials.
   [[nodiscard]] const estimation::TableBasis* tables() const {
     return std::get_if<estimation::TableBasis>(&form_);
   }

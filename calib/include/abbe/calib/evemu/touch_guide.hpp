@@ -2,12 +2,12 @@
 /// Determines which ball or block of the array is being touched, what is to be touched next, and
 /// which touches are wrong. [Li OMM] section 3: at every position Ball1, Block1, Block2, then Ball2
 /// to the last; the artefact is turned about Ball1 between positions. Only the coordinates of the
-/// touches are used, no clock and no command: a touch is assigned to the feature that must be at
-/// its place. Ball1 stays in place. Ball1 and the two faces determine the place of every other ball
-/// (the side to which the faces point follows from the first completed balls and is known at later
-/// positions). A missed, repeated or wrong touch is therefore detected and reported, the touches
-/// acquired before are kept, and missing points are requested again. Lengths in m, machine
-/// coordinates. Not for the RT path; not thread-safe.
+/// touches are used, no time and no operator command: a touch is assigned to the feature that must
+/// be at its place. Ball1 stays in place. Ball1 and the two faces determine the place of every
+/// other ball (on which side of the faces the balls lie follows from the first completed balls and
+/// is known at later positions). A missed, repeated or wrong touch is therefore detected and
+/// reported, the touches acquired before are kept, and missing points are requested again. Lengths
+/// in m, machine coordinates. Allocates, so not for a real-time thread; not thread-safe.
 
 #include <cstddef>
 #include <memory>
@@ -32,8 +32,9 @@ struct GuideOptions {
   /// Two touches nearer than this are the same place touched twice. The repeatability of a touch is
   /// far below this distance, the distance between planned points far above.
   double same_place_m = 50e-6;
-  /// Largest distance of a touch from the expected surface of its ball: machine errors near 3 mm
-  /// over the length of the array, and errors of the measured faces.
+  /// Largest distance of a touch from the expected surface of its ball. The expected place differs
+  /// from the true one by machine errors (up to 3 mm over the length of the array) and by errors of
+  /// the measured faces.
   double max_off_expected_m = 5e-3;
   /// Number of successive touches on no known feature after which the guide fails.
   std::size_t most_off_feature = 20;
@@ -55,8 +56,9 @@ struct NextTouch {
 };
 
 /// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched
-/// before; Doubled: the feature has all its points; NotOnFeature: on no known feature, or not taken
-/// (the guide is complete or has failed, or the feature before was discarded).
+/// before; Doubled: the feature already has all its points; NotOnFeature: the touch is on no known
+/// feature, or was ignored because the guide is complete or has failed, or because the feature
+/// touched before was discarded.
 enum class TouchFate { Taken, SamePlace, Doubled, NotOnFeature };
 struct GuidedTouch {
   TouchFate fate = TouchFate::Taken;
@@ -84,7 +86,7 @@ class TouchGuide {
   [[nodiscard]] NextTouch next() const;
   [[nodiscard]] std::size_t taken() const;
   [[nodiscard]] std::size_t planned() const;
-  /// Of the finished positions and the current one.
+  /// Taken touches of the finished positions and of the current one.
   [[nodiscard]] std::vector<Touch> touches() const;
   [[nodiscard]] const TouchPlan& plan() const;
 

@@ -19,9 +19,10 @@ struct Plane {
   ResidualStatistics residuals;
 };
 
-/// The normal points to the side of `towards`. NotFinite; TooFewObservations below 3 different
-/// points; DegenerateGeometry if the points lie on a line, or if `towards` lies in the plane and
-/// does not determine the side. `known_sigma` as for fit_sphere().
+/// The scalar product of the normal with the vector `towards` is positive. NotFinite;
+/// TooFewObservations below 3 different points; DegenerateGeometry if the points lie on a line, or
+/// if `towards` is parallel to the plane and does not determine the side. `known_sigma`: standard
+/// deviation of a point along the normal, used instead of that of the residuals.
 [[nodiscard]] Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
                                       std::optional<double> known_sigma = {});
 

@@ -1,6 +1,7 @@
 #pragma once
-/// The checks before every fit, relative to the size of the point set: the points are finite and
-/// different, and do not lie on a line, or in a plane, if the surface requires that.
+/// Checks of the points before a fit, with limits relative to the size of the point set: the points
+/// are finite and different. The caller then checks that they do not lie on a line or in a plane,
+/// as the fitted surface requires.
 
 #include <Eigen/Core>
 #include <span>
@@ -28,8 +29,8 @@ struct PointSet {
   }
 };
 
-/// NotFinite; TooFewObservations with fewer than `needed` different points. The error text begins
-/// with `what`.
+/// NotFinite; TooFewObservations with fewer than `needed` different points. `what`, the name of the
+/// fit, begins the error text.
 [[nodiscard]] Result<PointSet> point_set(std::span<const Vector3> points, std::size_t needed,
                                          const char* what);
 

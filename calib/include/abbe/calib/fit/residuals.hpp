@@ -12,7 +12,7 @@ struct ResidualStatistics {
   std::size_t degrees_of_freedom = 0;
   double rms = 0.0;     ///< sqrt(sum r^2 / points)
   double sigma0 = 0.0;  ///< sqrt(sum r^2 / degrees of freedom); 0 without redundancy
-  double min = 0.0;     ///< signed: a negative residual lies inside, or behind the normal
+  double min = 0.0;     ///< negative: point inside the sphere, or on the side opposite the normal
   double max = 0.0;
 };
 

@@ -16,7 +16,8 @@ struct Sphere {
   /// of centre x y z and radius; zero for 4 points
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   ResidualStatistics residuals;
-  /// condition number of the Jacobian in units of the radius: the flatter the cap, the larger
+  /// condition number of the Jacobian with lengths in units of the radius; large if the points
+  /// cover only a flat cap
   double condition = 0.0;
   int iterations = 0;
 };

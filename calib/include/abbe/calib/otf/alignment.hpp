@@ -20,7 +20,7 @@ struct Alignment {
   std::vector<bool> used;                  ///< usable and outside the corners
   int iterations = 0;
   double first_rms_m = 0.0;  ///< rms distance of the used blocks to the path, first iteration
-  double last_rms_m = 0.0;   ///< the same, last iteration
+  double last_rms_m = 0.0;   ///< rms distance of the used blocks to the path, last iteration
   double measured_length_m = 0.0;
   double path_length_m = 0.0;
 };
@@ -30,7 +30,7 @@ struct Alignment {
 /// all blocks of
 ///     distance^2 + direction_m^2 (1 - chord . d)
 /// distance: block to leg, chord: unit vector of the direction of travel at the block, d: unit
-/// vector of the leg. To take the closest leg of each block would confuse legs that cross or
+/// vector of the leg. Taking the closest leg of each block would confuse legs that cross or
 /// coincide. `points_m` are axis positions (target offset subtracted); NaN marks a lost block.
 /// TooFewObservations if there are fewer blocks than legs.
 [[nodiscard]] Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m,

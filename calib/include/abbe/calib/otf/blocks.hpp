@@ -27,7 +27,7 @@ struct BlockSeries {
   /// Number of sub-points per block: Options::row_points, or fewer if a block has fewer samples.
   std::size_t sub_points = 0;
   Vector3 start_tracker_m = Vector3::Zero();  ///< mean of the standstill at the first vertex
-  Vector3 end_tracker_m = Vector3::Zero();    ///< the same at the last vertex
+  Vector3 end_tracker_m = Vector3::Zero();    ///< mean of the standstill at the last vertex
   std::size_t samples = 0;
   std::size_t lost_samples = 0;  ///< invalid samples, and samples missing in the time series
 };
@@ -35,18 +35,18 @@ struct BlockSeries {
 /// Number of samples per block, 1 to 1000, for which the target travels 8.3 mm in a block. This
 /// length is small compared with nodes 50 mm apart; it is also the length used to re-evaluate
 /// [Sanders 2023] (100 samples at 500 Hz and 2500 mm/min). The travel per sample is computed from
-/// chords over 50 samples, so that noise does not add to it, or over fewer if these are longer than
-/// a block. The upper quartile of the chords is used, so that standstill and acceleration ramps
-/// have no influence.
+/// chords over 50 samples, so that noise does not lengthen it; if such a chord is longer than a
+/// block, over fewer samples. The upper quartile of the chords is used, so that standstill and
+/// acceleration ramps have no influence.
 [[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
 
 /// NotFinite if a valid sample contains NaN (the text names the sample). BadInput if time does not
 /// ascend, has a gap of more than one hour, or an option is 0. TooFewObservations for fewer than
-/// four blocks, fewer samples than two standstills have, or none that is valid.
+/// four blocks, fewer samples than the two standstills need, or no valid sample.
 [[nodiscard]] Result<BlockSeries> make_blocks(std::span<const TrackerObservation>, const Options&);
 
-/// Blocks from block means only (a reduced recording). The sub-points are spaced along the
-/// direction of travel.
+/// Blocks from block means only, for a recording without the single samples. The sub-points of a
+/// block are spaced around its mean along the direction of travel.
 [[nodiscard]] Result<BlockSeries> blocks_from_means(std::span<const Vector3> means_tracker_m,
                                                     const Vector3& start_tracker_m,
                                                     const Vector3& end_tracker_m, const Options&);

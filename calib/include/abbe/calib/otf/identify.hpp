@@ -1,6 +1,6 @@
 #pragma once
-/// observe() followed by solve(). judge() is separate because it needs the active model and the
-/// limits.
+/// observe() followed by solve(). The caller calls judge(), which also needs the active model and
+/// the limits of the gate.
 
 #include "abbe/calib/otf/judge.hpp"
 

@@ -5,8 +5,9 @@
 /// Leg i belongs to fold i mod k, so that neighbours in time are in different folds and every fold
 /// covers the whole volume. The model for a fold is fitted to the other folds.
 ///
-/// The alignment removes from y a rigid motion that depends on the errors of the machine; no model
-/// contains this motion. Therefore, on each held-out fold, the best-fit rigid motion (six
+/// The alignment removes from the observations a rigid motion that depends on the errors of the
+/// machine; no model contains this motion. Therefore, on each held-out fold, the best-fit rigid
+/// motion (six
 /// parameters, same rows) is removed from the residuals of no compensation, candidate and active
 /// model separately, and the remaining residuals are compared. This also makes the comparison
 /// independent of the gauges.
@@ -17,11 +18,11 @@
 
 namespace abbe::calib::otf {
 
-/// `active` may be null. It is compared on the rows inside its validity volume, and not at all if
-/// it is not valid for the target offset of this run. If a node of the tables has observations from
-/// one leg only, this leg is never held out, because without it the node is not determined; its
-/// observations are counted in `not_held_out`. RankDeficient if no fold can be held out.
-/// TooFewObservations if there are fewer legs than folds.
+/// `active`, the model in use, may be null. The active model is compared on the rows inside its
+/// validity volume, and not at all if it is not valid for the target offset of this run. If a node
+/// of the tables has observations from one leg only, this leg is never held out, because without
+/// the leg the node is not determined; the observations of the leg are counted in `not_held_out`.
+/// RankDeficient if no fold can be held out. TooFewObservations if there are fewer legs than folds.
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 

@@ -6,7 +6,8 @@
 ///   the ranges have an offset,
 /// - another design matrix: another order of the axes, or closer nodes.
 ///
-/// With the residuals r of the model and Q = (A^T W^2 A)^-1 in the gauge:
+/// With the residuals r of the model, the weights W of the rows (1/sigma) and Q = (A^T W^2 A)^-1,
+/// restricted by the gauge conditions (estimation/datum.hpp):
 ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = S^+ C^T W^2 r
 ///     decrease of chi2 = d^T C^T W^2 r
 ///     dU = Q A^T W^2 C d: error of U if the alternative is true but not modelled
@@ -63,14 +64,14 @@ enum class Cause {
 struct Alternative {
   Cause cause;
   std::string text;        ///< cause, location and magnitude
-  double explained = 0.0;  ///< fraction of the chi2 in excess of local noise that it removes
+  double explained = 0.0;  ///< fraction of (chi2 - chi2 of local noise) that the cause explains
   double bias_m = 0.0;     ///< rms change of V over the nodes, rigid motion removed
-  double u_m = 0.0;        ///< rms standard uncertainty of V if it is true, rigid motion removed
+  double u_m = 0.0;        ///< rms u of V if the alternative is true, rigid motion removed
 };
 
 /// The significant alternatives (family-wise error probability 1e-4), at most one per cause, sorted
 /// by `explained`, largest first. CorrelatedNoise is put first if the residuals are correlated and
-/// no alternative explains half of the excess chi2.
+/// no alternative has `explained` of one half or more.
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
                                                             const Options& = {});
 

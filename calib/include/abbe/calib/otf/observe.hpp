@@ -44,7 +44,7 @@ struct Observation {
   std::size_t sub_points = 0;
 };
 
-/// Number of unknowns of the rigid motion T, r of the tracker station:
+/// Number of unknowns of the rigid motion of the tracker station, translation T and rotation r:
 ///     measured error = V + T + r x p,   p = axis position + target offset
 inline constexpr std::size_t kRigidUnknowns = 6;
 
@@ -66,7 +66,8 @@ struct Observations {
   std::size_t blocks_used = 0;
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
-  /// Index of T, r in U: behind the parameters of the model.
+  /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the
+  /// model.
   [[nodiscard]] std::size_t rigid_offset() const { return basis.size(); }
   [[nodiscard]] std::size_t unknowns() const { return basis.size() + kRigidUnknowns; }
   /// Name of an unknown for messages: "EXX at -0.300 m", "EC0Y", "rx".
@@ -82,23 +83,23 @@ struct PointOnPath {
   PathFrame frame;
   double samples = 1.0;  ///< number of samples in the mean
 };
-/// Appends the two rows of a point along a2 and a3: P M B and P V of [Sanders 2023] eq. (6), before
-/// weighting with W. `sub_points_m` are the nominal axis positions over which the design matrix is
-/// averaged.
+/// Appends the two rows of a point, along a2 and a3 of its path frame: design P M B and observed
+/// error P V of [Sanders 2023] eq. (6), not yet weighted. `sub_points_m` are the nominal axis
+/// positions over which the design matrix is averaged.
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
 
-/// Derivative of y of a row with respect to a common offset of all ranges.
+/// Derivative of the row's y_m with respect to an offset common to all ranges of the tracker.
 [[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);
-/// The observations that result if this offset is subtracted from all ranges.
+/// The observations that result if `range_offset_m` is subtracted from all ranges.
 [[nodiscard]] Observations without_range_offset(Observations, double range_offset_m);
 
-/// The same observations with the design matrix of another basis: another order of the axes, other
-/// nodes.
+/// The observations with the design matrix of another basis, which has another order of the axes or
+/// other nodes.
 [[nodiscard]] Observations with_basis(const Observations&, estimation::TableBasis);
 
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});
-/// The same, from blocks that are already averaged.
+/// observe() from blocks that are already averaged.
 [[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
                                                   const Noise&, const Options& = {});
 

@@ -14,7 +14,7 @@ namespace abbe::calib::otf {
 struct PathFrame {
   Vector3 a1, a2, a3;
   double sigma2_m = 0.0;  ///< standard uncertainty of one sample along a2
-  double sigma3_m = 0.0;  ///< along a3, perpendicular to the beam
+  double sigma3_m = 0.0;  ///< standard uncertainty along a3, which is perpendicular to the beam
 };
 
 /// `beam_m`: vector from the tracker to the point in machine coordinates, not zero.

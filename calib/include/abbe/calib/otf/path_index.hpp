@@ -1,7 +1,7 @@
 #pragma once
 /// Search index for the legs of a path near a point: a binary tree of bounding boxes around groups
-/// of consecutive legs. The results are bit-identical to a search with nearest_on_leg() over all
-/// legs. Pure.
+/// of consecutive legs. The results are bit-identical to those of a search with nearest_on_leg()
+/// over all legs. Pure.
 
 #include <cstddef>
 #include <optional>

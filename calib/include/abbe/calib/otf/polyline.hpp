@@ -19,7 +19,7 @@ struct LegPoint {
 [[nodiscard]] LegPoint closest_on_leg(const Vector3& from_m, const Vector3& to_m,
                                       const Vector3& p_m);
 
-/// Position of `p_m` relative to the leg between its two ends. The length of the leg may be 0.
+/// Position of a point relative to the line segment of a leg, whose length may be 0.
 struct OnLeg {
   double off_m = 0.0;    ///< distance to the nearest point of the leg
   double along_m = 0.0;  ///< distance of that point from the beginning of the leg
@@ -32,8 +32,8 @@ struct OnLeg {
 /// Length of the path up to each vertex. The first value is 0, the last is the length of the path.
 [[nodiscard]] std::vector<double> lengths_to_vertices_m(const Path&);
 
-/// Centroid weighted by length. A mean over time would give too much weight to standstills and slow
-/// corners.
+/// Centroid of a curve, each part weighted by its length. A mean over time would give too much
+/// weight to standstills and slow corners.
 struct Centroid {
   Vector3 centre_m = Vector3::Zero();  ///< not finite for a length of 0
   double length_m = 0.0;
@@ -44,8 +44,8 @@ struct Centroid {
 /// consecutive vertices coincide. NotFinite: a vertex contains NaN or infinity. DegenerateGeometry:
 /// start, end and centroid are on a line, so that the rough alignment is not determined.
 [[nodiscard]] Result<void> check(const Path&);
-/// The same, and BadInput for a vertex outside the travel of the axes. Call this before the machine
-/// moves.
+/// check(Path), and BadInput for a vertex outside the travel of the axes. Call this before the
+/// machine moves.
 [[nodiscard]] Result<void> check(const Path&, const MachineNodes& travel);
 
 }  // namespace abbe::calib::otf

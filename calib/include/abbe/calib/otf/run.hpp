@@ -48,8 +48,8 @@ struct Noise {
   /// Residuals do not show such an error: its effect is a scale error of the whole machine.
   double u_scale = 0.0;
   /// Relative standard uncertainty of the length of the scales of X, Y, Z (temperature and thermal
-  /// expansion), common to all readings of an axis. Residuals do not show such an error either: its
-  /// effect is a positioning error.
+  /// expansion), common to all readings of an axis. Residuals do not show an error of the scale
+  /// length, because its effect is a positioning error of the axis.
   std::array<double, 3> u_axis_scale{};
   /// Standard uncertainty of the offset common to all ranges (home position, reflector). If
   /// positive, the adjustment estimates the offset with this prior. 0: the offset is not estimated.
@@ -88,13 +88,13 @@ struct Options {
   /// Number of sub-points of a block over which design rows are averaged. With 10 the result does
   /// not differ from that with all samples.
   std::size_t row_points = 10;
-  /// Fine alignment: minimum and maximum number of updates. It stops when the relative decrease of
-  /// the rms is less than the tolerance.
+  /// Fine alignment: minimum and maximum number of updates. The iteration stops when the relative
+  /// decrease of the rms distance to the path is less than the tolerance.
   int min_alignment_updates = 7;
   int max_alignment_updates = 200;
   double alignment_tolerance = 1e-6;
-  /// Number of updates in which blocks are assigned to legs. After them the assignment is kept: the
-  /// alignment then changes by um, while legs are mm apart.
+  /// Number of updates in which blocks are assigned to legs. Later updates keep the assignment,
+  /// because they change the alignment by um, while legs are mm apart.
   int leg_assignment_updates = 5;
   /// Weight of the direction of travel in the leg assignment, in m: (0.02 m)^2 (1 - cos) is added
   /// to the squared distance.

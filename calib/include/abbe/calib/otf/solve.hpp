@@ -3,8 +3,10 @@
 /// adjustment minimises
 ///     |W (A U - y)|^2 + mu |K U|^2
 /// in square-root form (estimation/information.hpp; the pseudo-inverse of [Sanders 2023] eq. (7)
-/// gives the same fit in another gauge). The conditions K U = 0 do not change the residuals, so that
-/// they are met exactly and the solution does not depend on mu (estimation/datum.hpp).
+/// gives the same fit in another gauge). A: design matrix, U: parameters, y: observations, W:
+/// diagonal, W^2: weights, K U = 0: gauge conditions (gauge.hpp). These conditions can be satisfied
+/// without changing the residuals; so they hold exactly, and the solution does not depend on mu
+/// (estimation/datum.hpp).
 ///
 /// Covariance, with H = A^T W^2 A and Q = (H + mu K^T K)^-1:
 ///     Cov = Q H Q                      if the weights are 1/sigma^2
@@ -37,27 +39,27 @@
 
 namespace abbe::calib::otf {
 
-/// In files and messages: the alignment first, then the adjustment.
+/// Name of this estimator in files and messages: alignment first, then adjustment.
 inline constexpr std::string_view kEstimator = "two-step";
-/// In files: the adjustment is a linear problem, solved without iteration.
+/// Stop reason in files: the adjustment is a linear problem, solved without iteration.
 inline constexpr std::string_view kStopReason = "direct";
 
-/// What rows state about the unknowns of Observations.
+/// Information of a set of rows about the unknowns of Observations.
 struct RowInformation {
   estimation::Information data;  ///< weighted with `weight`
-  /// weighted with weight^2 sigma^2 (the noise of the weighted rows); absent if all weights are
-  /// 1/sigma^2
+  /// the rows weighted with weight^2 sigma^2: covariance of A^T W^2 y from the noise of the rows;
+  /// absent if all weights are 1/sigma^2, because it then equals `data`
   std::optional<estimation::Information> noise;
 
   explicit RowInformation(std::size_t unknowns) : data(unknowns) {}
   RowInformation& operator+=(const RowInformation&);
 };
-/// Of the rows for which `take` returns true; of all rows if `take` is empty. The rows are added in
-/// a fixed order: the same input gives bit-identical results.
+/// Information of the rows for which `take` returns true; of all rows if `take` is empty. The rows
+/// are added in a fixed order: the same input gives bit-identical results.
 [[nodiscard]] RowInformation information_of(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
-/// U in gauge G1, with the covariance of the rows' noise.
+/// Parameters U in gauge G1, with their covariance caused by the noise of the rows.
 using Adjustment = estimation::DatumSolution;
 /// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
 /// text names parameters that are not determined.
@@ -112,7 +114,7 @@ struct Solution {
   Adjustment adjustment;  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
-  Residuals residuals;  ///< in after_m the range offset is subtracted, too
+  Residuals residuals;  ///< after_m: model and effect of the range offset subtracted
   RangeOffset range_offset;
 };
 

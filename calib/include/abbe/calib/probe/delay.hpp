@@ -4,10 +4,11 @@
 /// approach therefore increases with the feed:
 ///     p_i = p0 + tau v_i + e_i,   var e_i = s0^2 + (v_i s_tau)^2
 /// s0: scatter of probe and surface; s_tau: jitter of the delay; both are estimated from the
-/// scatter at each feed. Weighted least squares; pure; allocates. Lengths in m, times in s.
+/// scatter at each feed. p_i: position and v_i: feed of touch i, p0: position of the surface, tau:
+/// delay. Weighted least squares; pure; allocates. Lengths in m, times in s.
 ///
-/// Not distinguished from the delay: pre-travel that is linear in the feed. It is compensated
-/// together with the delay. Pre-travel that is not linear in the feed shows in the lack of fit.
+/// Pre-travel that is linear in the feed has the same effect as a delay and is compensated together
+/// with the delay. Pre-travel that is not linear in the feed increases lack_of_fit.
 
 #include <cstddef>
 #include <span>

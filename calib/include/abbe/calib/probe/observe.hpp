@@ -1,6 +1,6 @@
 #pragma once
 /// Observations from recorded touches: touches of one place from one direction (for the delay), and
-/// touches around a sphere (for the qualification). Pure; allocates. SI.
+/// touches around a sphere (for the qualification). Pure; allocates. SI units.
 
 #include <span>
 #include <vector>
@@ -17,8 +17,8 @@ struct RecordedTouch {
 };
 
 struct SamePlaceOptions {
-  double min_cosine = 0.999;       ///< between approaches from one direction: 2.6 degrees
-  double max_sideways_m = 0.2e-3;  ///< between places, perpendicular to the approach
+  double min_cosine = 0.999;       ///< approaches within 2.6 degrees count as one direction
+  double max_sideways_m = 0.2e-3;  ///< largest distance across the approach within one place
 };
 
 /// The largest set of touches of one place from one direction, as speed and position along the mean

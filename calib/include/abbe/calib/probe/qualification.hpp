@@ -6,7 +6,7 @@
 /// c: centre of the sphere; r: effective tip radius. Y_j: the harmonic polynomials of degree 2 and
 /// 3 in n (degree 0 is r, degree 1 would be c; the three lobes of a kinematic seat are of degree
 /// 3). Gauss-Newton; residuals along n, independent, with one common standard deviation. Valid for
-/// the stylus and the measuring speed of the qualification. Pure; allocates. SI.
+/// the stylus and the measuring speed of the qualification. Pure; allocates. SI units.
 
 #include <Eigen/Core>
 #include <span>
@@ -32,7 +32,8 @@ struct QualificationOptions {
   double max_condition = 300.0;
 };
 
-/// Radius to subtract along n, and its standard uncertainty.
+/// Effective tip radius for one outward direction n, to be subtracted along n, and its standard
+/// uncertainty.
 struct EffectiveRadius {
   double radius_m = 0.0;
   double u_m = 0.0;

@@ -1,10 +1,11 @@
 #pragma once
-/// Choice of lambda, or of gamma and lambda together, by cross-validation. For every gamma one path
-/// is fitted to all rows and one to the training rows of each fold (standardised separately). A
-/// cell is the mean over all rows of the squared error of the fit that did not use the row. A cell
-/// is missing (NaN) if a fold or the full path did not reach it within its sweep budget. The
-/// smallest cell is chosen, on ties the first (smallest index of gamma, then of lambda). For rows
-/// that share noise see folds.hpp.
+/// Choice of lambda, or of gamma and lambda together (penalty.hpp), by cross-validation. For every
+/// gamma one regularisation path is fitted to all rows and one to the training rows of each fold
+/// (standardised separately). The error of a pair (lambda, gamma) is the mean over all rows of the
+/// squared error of the fit that did not use the row; it is missing (NaN) if one of these paths did
+/// not reach lambda within its sweep budget. The pair with the smallest error is chosen, on ties
+/// the one with the smallest index of gamma, then of lambda. For rows that share noise see
+/// folds.hpp.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -17,10 +18,10 @@
 
 namespace abbe::calib::sparse {
 
-/// Calls task(0) .. task(count - 1), each once, in any order and on any threads, and returns when
-/// all have returned. This library creates no threads; a caller that has threads supplies them
-/// through this function. The tasks write no shared data; results do not depend on the order and
-/// the threads.
+/// A function of the caller that calls task(0) .. task(count - 1), each once, in any order and on
+/// any threads, and returns when all have returned. This library creates no threads; a caller that
+/// has threads supplies them through this function. The tasks write no shared data; results do not
+/// depend on the order and the threads.
 using ParallelFor =
     std::function<void(std::size_t count, const std::function<void(std::size_t)>& task)>;
 void serial_for(std::size_t count, const std::function<void(std::size_t)>& task);
@@ -29,7 +30,7 @@ struct CrossValidation {
   Path path;  ///< regularisation path, fitted to all rows
   /// Mean squared held-out error, unit of y squared, lambda.size(); NaN: missing.
   Eigen::VectorXd error;
-  /// Of `error`, with rows taken as independent (too small when rows share noise).
+  /// Standard error of `error`, with rows taken as independent (too small when rows share noise).
   Eigen::VectorXd standard_error;
   double null_error = 0.0;  ///< mean (y - mean)^2: the error of the empty model
   Eigen::Index best = 0;    ///< index of lambda
@@ -61,9 +62,9 @@ struct GridSearch {
   }
 };
 
-/// Gives the same bits as cross_validate at each of `gamma`, in one call: the paths of one fold
-/// share its Gram matrix and run side by side in vector registers. One task for all rows and one
-/// for each fold.
+/// Gives the same bits as one call of cross_validate for each gamma. Takes less time: the paths of
+/// one fold for all gamma use the same Gram matrix and are computed in parallel lanes of the vector
+/// registers. One task for all rows and one for each fold.
 [[nodiscard]] Result<GridSearch> grid_search(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                              PenaltyKind, const std::vector<double>& gamma,
                                              const Folds&, const PathOptions& = {},

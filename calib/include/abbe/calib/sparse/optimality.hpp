@@ -1,6 +1,6 @@
 #pragma once
-/// Checks of a solution: the first-order conditions, and whether the objective is convex around
-/// it.
+/// Checks of a solution of penalised least squares (penalty.hpp): the first-order conditions, and
+/// whether the objective is convex around the solution.
 
 #include <Eigen/Core>
 #include <optional>
@@ -29,7 +29,7 @@ namespace abbe::calib::sparse {
 /// its own support). Negative: the objective is not convex there and other minima may be near.
 /// Infinite where U is empty.
 struct Convexity {
-  Eigen::VectorXd smallest_eigenvalue;          ///< reached() of the path
+  Eigen::VectorXd smallest_eigenvalue;          ///< of each reached lambda of the path
   std::optional<Eigen::Index> first_nonconvex;  ///< index of lambda; nullopt: convex everywhere
 };
 [[nodiscard]] Result<Convexity> convexity(const Eigen::MatrixXd& X, const Path&);

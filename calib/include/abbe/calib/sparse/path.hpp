@@ -10,13 +10,13 @@
 ///   - The budget counts the sweeps of the whole path. When it is used up, the current lambda keeps
 ///     the coefficients it has, and the solutions of the remaining lambdas are missing
 ///     (Path::reached() < Path::lambda.size()).
-/// The result is a stationary point only to within the tolerance: with badly conditioned columns it
-/// depends on their order. MCP and SCAD have many local minima; the warm start determines which one
-/// is found. Check with kkt_violation().
+/// The result is a stationary point only to within the tolerance: with badly conditioned columns
+/// the result depends on the order of the columns. MCP and SCAD have many local minima; the warm
+/// start determines which one is found. kkt_violation() (optimality.hpp) checks a result.
 ///
-/// Works on the Gram matrix of the columns: memory p^2, time n p^2 once and p^2 per sweep; intended
-/// for n > p and up to a few thousand columns. Pure, no threads. The same input gives the same bits
-/// on every x86-64 processor, for a single path and in a grid.
+/// Works on the Gram matrix of the columns. For n rows and p columns: memory p^2, time n p^2 once
+/// and p^2 per sweep; intended for n > p and up to a few thousand columns. Pure, no threads. The
+/// same input gives the same bits on every x86-64 processor, for a single path and in a grid.
 
 #include <Eigen/Core>
 #include <optional>
@@ -44,7 +44,8 @@ struct PathOptions {
                                                          const Eigen::VectorXd& y, int count = 100,
                                                          std::optional<double> ratio = {});
 
-/// Column k belongs to lambda[k]; only the first reached() of lambda have one.
+/// A path of solutions. Column k of the matrices belongs to lambda[k]; only the first reached()
+/// values of lambda have a column.
 struct Path {
   Penalty penalty;
   std::vector<double> lambda;  ///< all that were requested
@@ -65,7 +66,8 @@ struct Path {
 [[nodiscard]] Result<Path> fit_path(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                     const Penalty&, const PathOptions& = {});
 
-/// Rows of X times column k of coefficients, intercept included. X has the columns of the fit.
+/// Predictions for the rows of X, intercept included, from the solution at lambda[k]. X has the
+/// columns of the fit, in the original units.
 [[nodiscard]] Eigen::VectorXd predict(const Path&, const Eigen::MatrixXd& X, Eigen::Index k);
 
 }  // namespace abbe::calib::sparse

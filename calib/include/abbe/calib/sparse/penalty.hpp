@@ -37,7 +37,7 @@ struct Penalty {
 [[nodiscard]] double value(const Penalty&, double lambda, double magnitude);
 [[nodiscard]] double derivative(const Penalty&, double lambda, double magnitude);
 
-/// argmin over b of (z - b)^2 / 2 + p(|b|): the one-coefficient solution.
+/// Value of b that minimises (z - b)^2 / 2 + p(|b|), p: the penalty.
 [[nodiscard]] double minimiser(const Penalty&, double lambda, double z);
 
 /// Largest downward curvature of p: 1/gamma for MCP, 1/(gamma - 1) for SCAD, 0 for the lasso.

@@ -1,9 +1,10 @@
 #pragma once
-/// The inner loop: sweeps of coordinate descent over the active columns of one Gram matrix for
-/// eight paths at once, one path in each lane of the vector registers. The paths differ in penalty,
-/// lambda and active columns. The arithmetic of a lane and its order depend neither on the other
-/// lanes nor on the width of the registers. The result of a lane therefore has the same bits alone
-/// and with other lanes, with AVX-512, AVX2 or neither (multiply and add are never fused).
+/// The inner loop of the sparse solver: sweeps of coordinate descent over the active columns of one
+/// Gram matrix for eight paths at once, one path in each lane of the vector registers. The paths
+/// differ in penalty, lambda and active columns. The arithmetic of a lane and its order depend
+/// neither on the other lanes nor on the width of the registers. The result of a lane therefore has
+/// the same bits alone and with other lanes, with AVX-512, AVX2 or neither (multiply and add are
+/// never fused).
 
 #include <cstddef>
 #include <cstdint>
@@ -24,20 +25,22 @@ struct alignas(64) LaneMask {
   std::int64_t of[kLanes]{};  ///< all bits set: the column is active in this lane; else 0
 };
 
-/// For every lane the shrinkage of z to b and the convergence criterion. |b| is, times sgn(z):
+/// Parameters of every lane: tolerance of convergence, and the function that shrinks z, the
+/// solution without penalty, to the coefficient b with the penalty. b has the sign of z; |b| is
 ///     |z| <= lambda       0
 ///     |z| <= inner_end    |z| - lambda
 ///     |z| <= outer_end    (|z| - offset) * factor
 ///     else                |z|
 struct LaneParameters {
   Lanes lambda, inner_end, outer_end, offset, factor;
-  /// A lane has converged after a sweep with a smaller largest change; -1: idle, never converges.
+  /// A lane has converged when the largest change of b in a sweep is below this value. -1: the lane
+  /// is not in use and never converges.
   Lanes tolerance;
 };
 
 struct SweepProblem {
   std::size_t columns = 0;       ///< multiple of kBlock
-  const double* gram = nullptr;  ///< columns x columns; row j is used for z_j
+  const double* gram = nullptr;  ///< columns x columns; row j is used to compute z of column j
   const double* xty = nullptr;
   const LaneMask* mask = nullptr;
   Lanes* b = nullptr;
@@ -45,7 +48,7 @@ struct SweepProblem {
 
 struct SweepOutcome {
   long sweeps = 0;         ///< number of sweeps done
-  unsigned converged = 0;  ///< bit of every lane whose last sweep was within its tolerance
+  unsigned converged = 0;  ///< bit k is set if lane k has converged
 };
 
 /// Sweeps until at least one lane has converged, at most `max_sweeps` (>= 1) times.

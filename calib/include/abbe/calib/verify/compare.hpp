@@ -2,14 +2,14 @@
 /// Stage two of a verification: the part of the measured error V_las that a model does not
 /// compensate. [Li OMM] eqs. (20), (21):
 ///     V_residual = V_las - V_comp,   R_resmag = |V_residual| / |V_las|
-/// V_comp: V of the model. R_resmag < 1: the model reduces the error. Both are evaluated on a grid
-/// inside the validity volume of the model, relative to their value at an origin (Ball1). V_las is
-/// interpolated linearly onto the grid.
+/// V_comp: V of the model. R_resmag < 1: the model reduces the error. V_las and V_comp are
+/// evaluated on a grid inside the validity volume of the model, relative to their value at an
+/// origin (Ball1). V_las is interpolated linearly onto the grid.
 ///
 /// The comparison is made twice: with the model as stated, and with the model after the small rigid
-/// motion that fits it best to V_las. There are two reasons for the second: a frame that is fitted
-/// to the readings removes the rotation from V_las, and the rotation of a ball-array model may be
-/// unknown. For any VolumetricModel. Lengths in m. Pure; allocates.
+/// motion that fits it best to V_las. The rigid motion is necessary if the frame of the instrument
+/// was fitted to the readings, which removes the rotation from V_las, and if the rotation of a
+/// ball-array model is unknown. For any VolumetricModel. Lengths in m. Pure; allocates.
 
 #include <cstddef>
 #include <optional>
@@ -25,11 +25,12 @@ struct Options {
   /// no origin: the means of V_las and of the model are subtracted, and the rigid motion of the
   /// model includes a translation.
   std::optional<Vector3> origin_m{};
-  /// Grid spacing; the grid points are the multiples of it. 0: 1/20 of the extent of the validity
-  /// volume, per axis.
+  /// Grid spacing per axis; the coordinates of the grid points are multiples of the spacing. 0:
+  /// 1/20 of the extent of the validity volume.
   Vector3 step_m = Vector3::Zero();
-  /// Grid points closer to the origin than this are left out: there |V| goes to zero and the ratio
-  /// is meaningless. Default: 1/10 of the diagonal of the validity volume.
+  /// Grid points closer to the origin than this are left out, because |V| goes to zero near the
+  /// origin and R_resmag, divided by |V_las|, is meaningless. Default: 1/10 of the diagonal of the
+  /// validity volume.
   std::optional<double> least_distance_m{};
 };
 
@@ -37,12 +38,12 @@ struct GridPoint {
   Vector3 q_m = Vector3::Zero();
   Vector3 V_las_m = Vector3::Zero();      ///< relative to the origin
   Vector3 stated_m = Vector3::Zero();     ///< V of the model, relative to the origin
-  Vector3 turned_m = Vector3::Zero();     ///< the same after the rigid motion
+  Vector3 turned_m = Vector3::Zero();     ///< stated_m after the rigid motion of the model
   double R_stated = 0.0, R_turned = 0.0;  ///< R_resmag
 };
 
-/// As in [Li OMM] Table 4: percentiles are interpolated between order statistics; the standard
-/// deviation is that of the sample.
+/// Statistics of R_resmag as in [Li OMM] Table 4: percentiles are interpolated between order
+/// statistics; the standard deviation is that of the sample.
 struct RatioStatistics {
   std::size_t count = 0;
   double mean = 0.0, standard_deviation = 0.0;
@@ -74,14 +75,14 @@ struct Comparison {
 /// Effect of the model at the measured points inside its validity volume.
 enum class Effect { Better, NotSeen, Worse };
 
-/// Compares the mean over the points of |left_before|^2 - |left_after|^2 with three times its
-/// standard error (s / sqrt(n), [GUM] 4.2.3). NotSeen if the absolute value of the mean is smaller.
-/// The errors of neighbouring points are correlated, so that this standard error is an
-/// underestimate.
+/// Compares the mean over the points of |residual_before_m|^2 - |residual_after_m|^2 with three
+/// times the standard error of this mean (s / sqrt(n), [GUM] 4.2.3). NotSeen if the absolute value
+/// of the mean is smaller. The errors of neighbouring points are correlated, so that this standard
+/// error is an underestimate.
 [[nodiscard]] Effect effect_at_points(const Comparison&) noexcept;
 
-/// Largest permitted interpolation error as a fraction of the residual rms at the points. A third
-/// adds 5 % in quadrature.
+/// Largest permitted interpolation error as a fraction of the residual rms at the measured points.
+/// An interpolation error of a third of the rms increases the rms by 5 % (root sum of squares).
 inline constexpr double kMostInterpolation = 1.0 / 3.0;
 
 /// True if the interpolation error is at most kMostInterpolation times the residual rms after

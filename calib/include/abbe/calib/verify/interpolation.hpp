@@ -1,11 +1,11 @@
 #pragma once
-/// Interpolation of values at scattered points: linear within the tetrahedra of the Delaunay
-/// triangulation of the points; no value outside their convex hull. The tetrahedron that contains a
-/// place x is the convex combination of points that solves
+/// Interpolation of values at scattered points p_i: linear within the tetrahedra of the Delaunay
+/// triangulation of the points; no value outside their convex hull. The interpolation weights w_i
+/// at a place x, nonzero only at the corners of the tetrahedron that contains x, solve
 ///     minimise sum w_i |p_i|^2   subject to   sum w_i p_i = x,  sum w_i = 1,  w_i >= 0
 /// because the triangulation is the lower hull of the points lifted onto a paraboloid. This is a
-/// linear programme with four rows; no mesh is built. Coordinates are first scaled to the bounding
-/// box of the points, because measured volumes are often flat.
+/// linear programme with four constraints; no mesh is built. Coordinates are first scaled to the
+/// bounding box of the points, because measured volumes are often flat.
 
 #include <array>
 #include <cstddef>

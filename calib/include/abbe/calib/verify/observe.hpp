@@ -34,8 +34,8 @@ struct Observations {
 };
 
 /// Largest permitted rms residual after the rigid fit, as a fraction of the extent of the points.
-/// Errors of machines are smaller; exchanged rows, inches or a left-handed frame give larger
-/// residuals.
+/// Errors of machines are smaller. Exchanged rows, coordinates in inches or a left-handed frame
+/// give larger residuals.
 inline constexpr double kMostLackOfFit = 0.01;
 
 /// Errors: NotFinite; TooFewObservations for fewer than 4 points; DegenerateGeometry if the points

@@ -11,7 +11,8 @@ target_compile_options(abbe_warnings INTERFACE
   # GCC 12 at -O3 gives false warnings of overlaps and bounds in inlined std::string (GCC bug 105651)
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-restrict$<SEMICOLON>-Wno-array-bounds$<SEMICOLON>-Wno-stringop-overflow>)
 
-# What a build adds to observe a program. abbe_compile_mathematics removes it where it observes nothing.
+# Options with which the fuzzer and ThreadSanitizer observe a program. abbe_compile_mathematics()
+# removes them from targets in which they find nothing.
 set(abbe_observing_options "")
 if(ABBE_FUZZ)
   list(APPEND abbe_observing_options -fsanitize=fuzzer-no-link)
@@ -23,16 +24,20 @@ elseif(ABBE_SANITIZE)
   add_compile_options(-fsanitize=${ABBE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${ABBE_SANITIZE})
   if(ABBE_SANITIZE MATCHES "undefined")
-    # ASan finds accesses outside an object. object-size costs a fifth of the optimizer's time.
+    # The check object-size takes a fifth of the optimizer's time, and ASan finds the same accesses
+    # outside an object.
     add_compile_options(-fno-sanitize-recover=undefined -fno-sanitize=object-size)
   endif()
 endif()
 add_compile_options(${abbe_observing_options})
 
-# Identification gives the same bits on every processor. Eigen without vectors sums in one order, independent of the width
-# of the registers, the place of the data in memory and the size of the caches; no fused multiply-add.
+# Identification gives the same bits on every processor: abbe_same_bits() compiles Eigen without
+# vector instructions, so that it sums in one order, independent of the width of the registers, the
+# place of the data in memory and the size of the caches; and multiplication and addition are not
+# fused.
 add_compile_options(-ffp-contract=off)
-# OFF in the preset campaign, which also turns warnings off: GCC 12 has false ones in its own AVX-512 headers.
+# The preset "campaign" sets this OFF. It also turns warnings off, because GCC 12 gives false
+# warnings for its own AVX-512 headers.
 option(ABBE_SAME_BITS "Eigen without vectors: the same bits on every processor" ON)
 function(abbe_same_bits target)
   if(NOT ABBE_SAME_BITS)
@@ -42,24 +47,27 @@ function(abbe_same_bits target)
                              EIGEN_DEFAULT_L2_CACHE_SIZE=262144 EIGEN_DEFAULT_L3_CACHE_SIZE=2097152)
 endfunction()
 
-# For code that computes little: in sanitizer builds the optimizer takes longer than it saves at run time.
+# For targets that compute little: in sanitizer builds optimising them takes longer than it saves at
+# run time.
 function(abbe_compile_fast target)
   if(ABBE_SANITIZE)
     target_compile_options(${target} PRIVATE -O0)
   endif()
 endfunction()
 
-# For code that reads a configuration, writes a report or runs a command: at -O3 the templates of CLI11, fmt, toml++ and
-# JSON are most of a release build.
+# For targets that read a configuration, write a report or run a command. At -O3 the templates of
+# CLI11, fmt, toml++ and JSON take most of the time of a release build; -O1 is sufficient for such
+# code.
 function(abbe_compile_brief target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# For Eigen's code.
-# - Two checks of UBSan, of every access, are half of its compile time, and what they find ends the program anyway (ASan's
-#   report of a null access; SSE's trap on an unaligned one).
-# - It starts no threads and decodes nothing. Without the options of ThreadSanitizer and libFuzzer it is compiled as in the
-#   release build or with ASan, and ccache has the result; with ThreadSanitizer an identification would take minutes.
+# For targets that use Eigen.
+# - UBSan's checks for null pointers and alignment take half of their compile time, and are not
+#   needed: ASan reports a null access, and an unaligned SSE access ends the program.
+# - These targets start no threads and decode no input, so the options of ThreadSanitizer and
+#   libFuzzer are removed. The targets are then compiled as in the release or ASan build, and ccache
+#   has the result. With ThreadSanitizer an identification would take minutes.
 function(abbe_compile_mathematics target)
   if(ABBE_SANITIZE MATCHES "undefined")
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment)
@@ -69,13 +77,16 @@ function(abbe_compile_mathematics target)
   set_property(TARGET ${target} PROPERTY COMPILE_OPTIONS ${options})
 endfunction()
 
-# GCC warns about types in unnamed namespaces of source files that another file includes.
+# GCC warns about types in the unnamed namespaces of source files that another source file includes
+# (unity builds); this turns the warning off.
 function(abbe_allow_local_types target)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endfunction()
 
-# Most of the compile time of a source file is spent on the templates of its headers. With ABBE_UNITY_BUILD up to 25 files
-# of a target are compiled as one. Names that are local to a file are therefore unique in their target, tests included.
+# Most of the compile time of a source file is spent on the templates of its headers. With
+# ABBE_UNITY_BUILD up to 25 files of a target are compiled as one, so that a header is compiled once
+# for all of them. A name that is local to a file must therefore be unique in its target, also in
+# tests.
 option(ABBE_UNITY_BUILD "Compile several source files of a module as one: faster when everything is built" OFF)
 function(abbe_unity_build target)
   if(ABBE_UNITY_BUILD)

@@ -1,4 +1,5 @@
-# Asks PROGRAM for its suites and writes to FILE, which ctest reads, one test for each.
+# Asks the GoogleTest program PROGRAM for its test suites, and writes one ctest test for each suite
+# to FILE, which ctest reads.
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE listed COMMAND_ERROR_IS_FATAL ANY TIMEOUT 60)
 string(REGEX MATCHALL "(^|\n)[A-Za-z0-9_/]+[.]" suites "${listed}")
 if(NOT suites)

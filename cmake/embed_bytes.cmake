@@ -1,4 +1,5 @@
-# Writes FILE as a C++ array behind `std::string_view abbe::NAMESPACE::FUNCTION() noexcept` into OUT.
+# Writes the C++ source file OUT. Its function `std::string_view abbe::NAMESPACE::FUNCTION()
+# noexcept` returns the bytes of FILE.
 file(READ ${FILE} bytes HEX)
 string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," bytes "${bytes}")
 file(WRITE ${OUT} "#include <string_view>

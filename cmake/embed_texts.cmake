@@ -1,6 +1,7 @@
-# Writes text files as `std::span<const EmbeddedText> abbe::NAMESPACE::FUNCTION() noexcept` into OUT. EmbeddedText has a name
-# and a text, and is declared in HEADER. FILES: "NAME=PATH|NAME=PATH". In the text of each file, the words of DROP
-# ("WORD|WORD") are left out: folders of the source tree, before names of other files.
+# Writes the C++ source file OUT. Its function `std::span<const EmbeddedText>
+# abbe::NAMESPACE::FUNCTION() noexcept` returns the text files FILES ("NAME=PATH|NAME=PATH").
+# EmbeddedText has a name and a text, and is declared in HEADER. The words of DROP ("WORD|WORD") are
+# left out of the texts: folders of the source tree that precede the names of other files.
 string(REPLACE "|" ";" FILES "${FILES}")
 string(REPLACE "|" ";" DROP "${DROP}")
 set(texts "")

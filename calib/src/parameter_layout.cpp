@@ -27,7 +27,8 @@ Result<void> check(const MachineNodes& nodes) {
   return {};
 }
 
-/// With a constant target offset, the effect of this rotation is the same as that of translations.
+/// True if e is a rotation whose effect, with a constant target offset, is the same as that of
+/// translations, so that data cannot separate them.
 bool inseparable_from_translation(const KinematicChain& chain, ErrorMotion e) {
   if (!is_rotation(e.motion)) {
     return false;

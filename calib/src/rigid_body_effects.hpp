@@ -1,5 +1,6 @@
 #pragma once
-/// The matrix M of V = M B U (rigid_body_model.hpp): what a unit of each error does.
+/// The matrix M of V = M B U (rigid_body_model.hpp): displacement of the target per unit of each
+/// error motion.
 
 #include <array>
 
@@ -30,8 +31,8 @@ namespace abbe::calib {
   return is_rotation(e.motion) ? Vector3(unit.cross(lever_m)) : unit;
 }
 
-/// Displacements per unit of EA0Z, EB0Z, EC0Y. These tilt only the direction of motion, so that the
-/// lever has no effect.
+/// Displacements per unit of the squareness errors EA0Z, EB0Z, EC0Y. A squareness error tilts only
+/// the direction of motion, so that the lever has no effect.
 [[nodiscard]] inline std::array<Vector3, 3> squareness_effects(const Vector3& q) {
   return {Vector3(0, -q.z(), 0), Vector3(q.z(), 0, 0), Vector3(-q.y(), 0, 0)};
 }

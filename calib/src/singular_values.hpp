@@ -1,6 +1,6 @@
 #pragma once
-/// In a separate source file so that the decomposition, the largest template of this module, is
-/// compiled only once.
+/// Singular values of a matrix. They have a source file of their own so that the decomposition, the
+/// largest template of this module, is compiled only once.
 
 #include <Eigen/Core>
 

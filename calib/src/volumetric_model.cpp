@@ -13,10 +13,12 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Columns of all 18 tables and squareness at one position: memory on the stack.
+/// Largest number of columns at one position: two nodes of each of 18 tables, and squareness.
+/// Arrays of this size are on the stack.
 constexpr std::size_t kMostColumns = 18 * 2 + 3;
 
-/// sum_ij v_i C_ij v_j^T over the non-zero columns.
+/// Covariance of V: sum_ij v_i C_ij v_j^T over the non-zero columns v_i = dV/dU_i, C: covariance of
+/// the parameters U.
 Matrix3 propagate(std::span<const estimation::Column> columns, const Eigen::MatrixXd& covariance) {
   const double* data = covariance.data();
   const auto stride = static_cast<std::size_t>(covariance.rows());
@@ -63,8 +65,8 @@ struct ToolSpan {
   Vector3 line = Vector3::Zero();
 };
 
-/// Offsets closer to each other than kToolTolerance_m count as one offset; offsets closer to a line
-/// than that count as on the line.
+/// Offsets closer to each other than kToolTolerance_m count as one offset; offsets closer than
+/// kToolTolerance_m to a line count as on the line.
 ToolSpan tool_span(std::span<const Vector3> offsets_m) {
   const Vector3& first = offsets_m.front();
   Vector3 along = Vector3::Zero();
@@ -96,7 +98,8 @@ std::vector<ErrorMotion> tables_named(std::span<const Parameter> parameters) {
   return found;
 }
 
-/// Stored nodes can differ by rounding because files contain decimal numbers in mm.
+/// Stored node positions that differ by less than this are the same node: files contain decimal
+/// numbers in mm, so that positions differ by rounding.
 constexpr double kSameNode_m = 1e-9;
 
 Result<void> check_parameters(const std::vector<Parameter>& stored,
@@ -153,8 +156,8 @@ Result<void> check_names(const std::vector<Parameter>& stored,
   return {};
 }
 
-/// Grid over the bounding box of the hull. Polynomials up to order 5 have less than one turning
-/// point in a quarter of it.
+/// Grid of kCells cells per axis over the bounding box of the hull. Polynomials up to order 5 have
+/// less than one turning point in a quarter of the box.
 MachineNodes grid_over(const ValidityVolume& validity) {
   constexpr int kCells = 8;
   const evemu::ReadingBox box = evemu::bounding_box(validity.vertices_m());
@@ -198,8 +201,8 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
     return valid;
   }
 
-  // Scale to correlations. A variance below 1e-12 of the largest belongs to a parameter fixed by
-  // the gauge and is only rounding.
+  // The covariance is scaled to correlations. A variance below 1e-12 of the largest belongs to a
+  // parameter that the gauge fixes, and is only rounding.
   const double least = 1e-12 * (C.size() > 0 ? C.diagonal().maxCoeff() : 0.0);
   const Eigen::VectorXd scale = C.diagonal().unaryExpr(
       [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
@@ -386,9 +389,9 @@ bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
 }
 
 Vector3 VolumetricModel::lever_offset_m(const Vector3& offset_m) const {
-  // The tables include the effect of the lever perpendicular to the line of their tools. A slightly
-  // different offset is therefore projected onto the line: otherwise the difference would act
-  // through some of the rotations only.
+  // The tables include the effect of the components of the tool offset perpendicular to the line of
+  // the tools with which they were measured. An offset that differs slightly is therefore projected
+  // onto the line: if it were not, only some of the rotations would act on the difference.
   const Vector3& first = tool_offsets_m_.front();
   return holds_for_any_tool_ ? offset_m
                              : Vector3(first + tool_line_ * tool_line_.dot(offset_m - first));

@@ -2,8 +2,9 @@
 // driver, its ring and a reader. Requirement: 33,333 scans/s of 8 counters without loss, at most 10
 // % of one processor for driver and ring, and ten times this rate without loss.
 //   bench_counter_card [--seconds N] [--short]
-// bench_counter_card --serve PORT        only the simulated card, until killed (`usbip attach`)
-// bench_counter_card --libusb [...]      a card on a real port, or attached by usbip, by libusb
+// bench_counter_card --serve PORT        runs only the simulated card (for `usbip attach`), until
+// killed bench_counter_card --libusb [...]      reads, by libusb, a card on a USB port or attached
+// by usbip
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -53,7 +54,8 @@ sim::CounterCardOptions simulated_card() {
   card.channels[5].phases = sim::ClockSignal{.hz = kClock_hz};
   card.channels[6] = {sim::ClockSignal{.hz = kClock_hz}, true};
   card.channels[7].phases = sim::ProbeSignal{};
-  // this process may be stopped for a while: an overflow of the card is not measured here
+  // the scheduler may stop this process for a while; the buffer of the card is so large that it
+  // does not overflow, because an overflow of the card is not what is measured
   card.fifo_bytes = 4 << 20;
 
   return card;
@@ -131,7 +133,7 @@ class Reader {
   std::uint32_t last_ = 0;
 };
 
-/// Port 0: a card found by libusb instead of USB/IP.
+/// Connects by USB/IP to the simulated card on `port`, or with port 0 by libusb to a card.
 std::unique_ptr<drivers::UsbLink> make_link(std::uint16_t port,
                                             const drivers::CounterCardOptions& wanted,
                                             const drivers::TimeSource& time) {

@@ -1,5 +1,5 @@
-// One-way delay of 200 bytes from one process to another through plain Fast DDS: the lower limit of
-// every delay of abbe. bench_wire_to_dds compares abbe with it in the same run.
+// One-way delay of 200 bytes from one process to another through plain Fast DDS, which is the lower
+// limit of every delay of abbe. bench_wire_to_dds compares abbe with this delay in the same run.
 #include "dds_hop.hpp"
 
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
 #pragma once
-/// The plain Fast DDS hop used for comparison: a fixed number of bytes from one process to another,
-/// without key or CDR, best effort, keep last 1, UDP on loopback with the transport profile of
-/// abbe. One-way delay by CLOCK_MONOTONIC, which is common to both processes. Forks: call it before
-/// the process has threads or a DDS participant.
+/// One hop through plain Fast DDS, used for comparison: a fixed number of bytes from one process to
+/// another, without key or CDR, best effort, keep last 1, UDP on loopback with the transport
+/// profile of abbe. The one-way delay is measured with CLOCK_MONOTONIC, which is common to both
+/// processes. measure_dds_hop() forks: call it before the process has threads or a DDS participant.
 
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -196,8 +196,8 @@ inline HopResult result_of(const Shared& shared) {
 
 }  // namespace hop
 
-/// received == 0: a participant could not be created, or the two processes did not discover each
-/// other.
+/// Measures the delays. `received` of the result is 0 if a participant could not be created, or if
+/// the two processes did not discover each other.
 [[nodiscard]] inline HopResult measure_dds_hop(const HopOptions& options) {
   void* memory = ::mmap(nullptr, sizeof(hop::Shared), PROT_READ | PROT_WRITE,
                         MAP_SHARED | MAP_ANONYMOUS, -1, 0);

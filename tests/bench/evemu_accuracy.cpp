@@ -1,7 +1,8 @@
 // Question: how much of a machine's errors remains after correction with each estimator of the
 // ball-array method, and are the stated uncertainties right? Machine: the weak-stiffness machine of
-// [Li OMM] Table 3 (3.3 mm) in the layout of the reference data, at 2964 points, which include
-// regions without balls in the flatter layout. Requirements for the mean R_resmag of bayes-pose
+// [Li OMM] Table 3 (errors up to 3.3 mm) with the ball positions of the reference data, evaluated
+// at 2964 points, which include regions without balls in the flatter layout. R_resmag: remaining
+// error divided by the error of the machine. Requirements for the mean R_resmag of bayes-pose
 // relative to that of ols with the same seeds: 8 um white noise: <= 0.80; with 0.15 mrad pose
 // rotations: <= 0.52; near-planar layout with 0.32 mrad, where ols has points above 1: no point
 // above 1. Simulated touches: rms after the best-fit rotation about Ball1 <= 0.07 mm (ols 0.23).
@@ -70,8 +71,8 @@ void compare(const char* what, const Layout& layout, const Noise& noise, unsigne
   ask(worst[2] <= 1.0, "no point above 1");
 }
 
-/// SCAD with the grid of [Li OMM] and folds by position. Its fit is compared before V(Ball1) = 0 is
-/// set, as for ols.
+/// Compares with SCAD, with the grid of [Li OMM] and folds by position. The fits of SCAD and ols
+/// are evaluated before V(Ball1) = 0 is set.
 void against_scad(unsigned seeds) {
   const Field V = table3_machine();
   for (const Noise noise : {Noise{8e-6, 0.0}, Noise{8e-6, 0.15e-3}}) {
@@ -196,7 +197,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
 
   bool covered = true;
   for (std::size_t e = 0; e < estimators.size(); ++e) {
-    covered = true;  // of the last estimator, bayes-pose
+    covered = true;  // after the loop: the result of the last estimator, bayes-pose
     std::printf("coverage %-34s %-10s", what, std::string(name(estimators[e])).c_str());
     for (const std::size_t in : found[e].in) {
       const double percent = 100.0 * static_cast<double>(in) / static_cast<double>(found[e].all);
@@ -272,8 +273,8 @@ int main(int argc, char** argv) {
   compare("8 um, 0.32 mrad, tilt x 0.5", reference_layout(0.5), {8e-6, 0.32e-3}, seeds, 1.0);
   compare("8 um, 0.32 mrad, tilt x 0.4", reference_layout(0.4), {8e-6, 0.32e-3}, seeds, 1.0);
 
-  // A flatter layout is compared inside the balls only. Outside, the model reports inside = false,
-  // and there is no requirement.
+  // Flatter layouts are compared only inside the hull of the balls. Outside the hull the model
+  // reports inside = false, and there is no requirement.
   compare("the same x 0.3, inside", reference_layout(0.3), {8e-6, 0.32e-3}, seeds, 1.0,
           Grid::OwnHull);
   compare("the same x 0.1, inside", reference_layout(0.1), {8e-6, 0.32e-3}, seeds, 1.0,
@@ -289,8 +290,8 @@ int main(int argc, char** argv) {
       "Table 3, 8 um, 0.15 mrad", [](unsigned) { return table3_machine(); }, {8e-6, 0.15e-3},
       coverage_seeds, false);
 
-  // The array's errors also appear in the residuals and so in s and w: they count twice, and the
-  // coverage is somewhat above 95 %.
+  // The array's errors also enlarge the residuals, and so the estimated noise s and pose rotations
+  // w. They therefore count twice in the uncertainty, and the coverage is somewhat above 95 %.
   coverage("prior machine, uncertain array", drawn_machine, {3e-6, 0.0}, coverage_seeds, true,
            UncertainArray{});
   coverage("the same, not stated", drawn_machine, {3e-6, 0.0}, coverage_seeds, false,

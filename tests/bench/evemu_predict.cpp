@@ -1,6 +1,7 @@
-// Question: does a model of a ball array (45 polynomials) compute V with its covariance, inside and
-// tool at a million points within one second on one core? Processor time, which excludes other
-// processes; median of 7 runs. The ratio to the limit must be below 1.
+// Question: does a model of a ball array (45 polynomials) compute V with its covariance, including
+// the tests for validity volume and tool, at a million points within one second on one core? The
+// processor time, which excludes other processes, is measured; median of 7 runs. The ratio to the
+// limit must be below 1.
 //
 //   bench_evemu_predict [points = 1000000]
 

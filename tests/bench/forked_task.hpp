@@ -1,6 +1,6 @@
 #pragma once
-/// A task in a child process. The child is forked while this process has no thread, and starts the
-/// task on request. Fast DDS starts threads, and a process with threads must not fork.
+/// A task in a child process. The child is forked early and starts the task later, on request: Fast
+/// DDS starts threads in this process, and a process with threads must not fork.
 
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -24,7 +24,8 @@ template <class T>
   return *new (memory) T;  // stays until the process ends
 }
 
-/// The child process ends when `work` returns, or when this process ends.
+/// A child process that runs `work` after begin(). It ends when `work` returns, or when this
+/// process ends.
 class ForkedTask {
  public:
   template <class Work>

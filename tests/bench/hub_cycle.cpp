@@ -1,11 +1,11 @@
-// The longest cycle of the hub with the largest permitted inputs: models with the maximum number of
-// parameters that can be published, with covariance, become active (this is checked); a request of
-// almost 4 MB, a path of 1e5 vertices, arrives on the control socket; the machine drives the whole
-// path, measured by a tracker in bursts of 332 points, and the run is identified; status requests
-// arrive as fast as they are answered. A thread of the highest priority on the hub's processor
-// wakes every 100 us. If it wakes late, no thread ran there, because the hypervisor gave the
-// processor to another guest. This time is printed and subtracted from the hub's cycle. The
-// processor time of the longest cycle is printed as well.
+// The longest cycle of the hub, abbed's main loop, with the largest permitted inputs: models with
+// the maximum number of parameters that can be published, with covariance, become active (this is
+// checked); a request of almost 4 MB, a path of 1e5 vertices, arrives on the control socket; the
+// machine drives the whole path, measured by a tracker in bursts of 332 points, and the run is
+// identified; status requests arrive as fast as they are answered. A thread of the highest priority
+// on the hub's processor wakes every 100 us. If this thread wakes late, no thread ran on the
+// processor, because the hypervisor gave it to another guest. This time is printed and subtracted
+// from the hub's cycle. The processor time of the longest cycle is printed as well.
 //   bench_hub_cycle [--short]          as root, or with CAP_SYS_NICE, for real-time priority
 // Exit code 1: a cycle longer than 2 ms, or a model that did not become active.
 #include <fmt/format.h>
@@ -92,9 +92,9 @@ bool real_time(int priority) {
          ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters) == 0;
 }
 
-/// The times at which no thread could run on the hub's processor. look() and taken_away() run on it
-/// too, look() with a higher priority than the hub: after an interruption look() records it before
-/// taken_away() reads it.
+/// The times at which no thread could run on the hub's processor. look() and taken_away() run on
+/// this processor, look() with a higher priority than the hub, which calls taken_away(): so after
+/// an interruption look() records it before the hub reads it.
 class Interruptions {
  public:
   void look(const std::atomic<bool>& stop) {
@@ -147,8 +147,8 @@ void run_periodically(const std::atomic<bool>& stop, Longest& longest,
   }
 }
 
-/// Rows along X with a distance of 25 mm, in layers; 0.6 mm from vertex to vertex. Additional
-/// digits bring the request to the maximum length.
+/// A path of rows along X with a distance of 25 mm, in layers, with 0.6 mm from vertex to vertex.
+/// The coordinates have more digits than necessary, so that the request has the maximum length.
 std::vector<std::array<double, 3>> long_path() {
   constexpr std::size_t kInRow = 668, kRows = 17;
   constexpr double kStep_m = 0.6e-3, kRow_m = 25e-3, kLayer_m = 30e-3, kDigit_m = 1e-8;
@@ -335,7 +335,8 @@ class Bench {
   }
 
   void stream() const { std::this_thread::sleep_for(seconds_ * 1s); }
-  /// The same as `abbe model activate` in another process; the daemon follows the store.
+  /// Activates models in the model store as `abbe model activate` in another process does; the hub
+  /// notices the change of the store.
   void activate_models() {
     for (unsigned seed = 1; seed <= 3; ++seed) {
       auto document = daemon::test::synthetic_document(seed);
@@ -365,7 +366,7 @@ class Bench {
     request_bytes_ = request.dump().size();
     (void)ask(request);
   }
-  /// Drives the whole path; returns when the identification of the run has started,
+  /// Drives the whole path; returns when the identification of the run has started.
   void drive() {
     machine_.drive();
     json session;
@@ -383,7 +384,7 @@ class Bench {
     for (const auto end = Clock::now() + seconds_ * 1s; Clock::now() < end;)
       (void)ask({{"do", "status"}});
   }
-  /// Accepts that the identification has already ended.
+  /// Cancels the identification; no error if it has already ended.
   void cancel() {
     (void)daemon::ask_daemon(folder_ / "control.sock", {{"do", "cancel"}}, 60s);
     stream();

@@ -1,11 +1,10 @@
-/// Square-root information against its peers: the rows of one on-the-fly run (9,200 rows of 169
-/// unknowns, 38 entries each) are accumulated
-/// - by Householder reflections in batches (estimation::Information),
-/// - the same, rows of one cell first (estimation::information_of),
-/// - as normal equations, sparse,
-/// - by Eigen's dense QR of all rows at once,
-/// and the solutions are compared with that of the dense QR. Then four parts are merged, as in the
-/// held-out test. Build type Release.
+/// Time and accuracy of four ways to solve the least-squares problem of one on-the-fly run (9,200
+/// rows of 169 unknowns, 38 entries each):
+/// - Householder reflections in batches (estimation::Information),
+/// - Householder reflections, first for the rows of each cell (estimation::information_of),
+/// - sparse normal equations,
+/// - Eigen's dense QR of all rows at once, with whose solution the others are compared.
+/// Then the information of four parts is merged, as in the held-out test. Build type Release.
 ///     bench_information [--short]
 
 #include <fmt/format.h>
@@ -41,7 +40,8 @@ struct Run {
   std::vector<double> y;
 };
 
-/// Points on straight legs between random vertices, two directions across each leg.
+/// A simulated run: points on straight legs between random vertices, with one row for each of two
+/// directions across the leg.
 Run random_run() {
   MachineNodes nodes{*equidistant_nodes(-0.3, 0.3), *equidistant_nodes(-0.25, 0.25),
                      *equidistant_nodes(-0.4, 0.0)};

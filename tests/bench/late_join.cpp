@@ -1,6 +1,6 @@
 // The time until a Cyclone DDS subscriber that joins late receives ModelState: from the start of
-// its process to the first state that its example prints. Discovery by unicast on loopback, which
-// is slower than by multicast.
+// its process (the example program for Cyclone DDS) to the first state that it prints. Discovery is
+// by unicast on loopback, which is slower than multicast.
 //   bench_late_join [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -35,7 +35,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kMedian_s = 0.3, kWorst_s = 1.0;  // required
 constexpr auto kPatience = 5s;
 
-/// Replaces abbed: a state every second, a vector every 10 ms.
+/// Takes the place of abbed: publishes a ModelState every second and a compensation vector every
+/// 10 ms.
 class Publisher {
  public:
   explicit Publisher(daemon::DdsLink link) : link_(std::move(link)) {}
@@ -116,7 +117,8 @@ class Subscriber {
   std::string text_;
 };
 
-/// Seconds; nullopt if no state arrived in time.
+/// Starts a subscriber and returns the time until its first state, in seconds; nullopt if no state
+/// arrived in time.
 std::optional<double> join(Publisher& publisher, const std::string& domain) {
   const auto start = Clock::now();
   Subscriber subscriber(domain);
@@ -128,7 +130,7 @@ std::optional<double> join(Publisher& publisher, const std::string& domain) {
 }
 
 int measure(Publisher& publisher, const std::string& domain, std::size_t joins) {
-  // abbe-dds itself starts during this first measurement
+  // the first measurement is not used, because abbe-dds itself starts during it
   static_cast<void>(join(publisher, domain));
   std::vector<double> joined_s;
   std::size_t missed = 0;

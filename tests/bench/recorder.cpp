@@ -1,6 +1,6 @@
-// The cost of recording per sample, compared with plain write() of the same bytes, and how many
-// times faster than real time a recording is read. Ten minutes of a calibration: 2000 axis samples
-// and 500 tracker points per second, and their raw bytes.
+// The processor time of recording per sample, compared with write() of the same number of bytes,
+// and how many times faster than real time a recording is read. The recording is ten minutes of a
+// calibration: 2000 axis samples and 500 tracker points per second, and their raw bytes.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -112,7 +112,8 @@ std::filesystem::path record_all(const std::filesystem::path& folder, bool raw) 
   return closed->file;
 }
 
-/// The same number of bytes with the same number of writes and syncs: the minimum for any recorder.
+/// Writes as many bytes as the recorder, with as many write() and sync calls: the minimum for any
+/// recorder.
 void write_all(const std::filesystem::path& folder, std::uint64_t bytes) {
   const auto file = folder / "plain";
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);

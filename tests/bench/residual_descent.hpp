@@ -1,6 +1,7 @@
 #pragma once
-/// The reference implementation of bench_sparse_grid: SCAD paths by coordinate descent that updates
-/// the residual, one path after the other, in plain loops. Standardisation, warm starts, strong and
+/// The reference implementation with which bench_sparse_grid compares: SCAD paths by coordinate
+/// descent that updates the residual after each coefficient, one path after the other, in loops
+/// without vector instructions of our own. Standardisation, warm starts, strong and
 /// active sets, stopping rule and budget are those of abbe::calib::sparse, so that every sweep
 /// count can be compared.
 
@@ -19,7 +20,7 @@ struct ResidualPath {
 
 class ResidualDescent {
  public:
-  /// Columns of X and y are standardised and centred.
+  /// The columns of X must be standardised, and y must be centred.
   ResidualDescent(const Eigen::MatrixXd& X, const Eigen::VectorXd& y)
       : n_(static_cast<std::size_t>(X.rows())),
         p_(static_cast<std::size_t>(X.cols())),

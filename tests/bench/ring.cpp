@@ -1,16 +1,18 @@
 // Question: does the sample ring transfer as many samples per second between two threads as the
 // faster of boost::lockfree::spsc_queue and moodycamel::ReaderWriterQueue? Requirement: median
 // ratio >= 0.95 over >= 21 rounds. Each round runs all three, in an order that rotates with every
-// round, and gives one ratio ours / faster other queue. The fastest of five short runs of each
-// counts: a run in which a thread lost its processor does not measure the ring. Writer: one push
-// per sample, as receive() does, repeated while the queue is full (no queue drops, so all transfer
-// the same samples). Reader: in batches of 64 where the queue supports batches (ours, boost), one
-// by one otherwise (moodycamel). The other lines show the best rate of each: ours and boost also
-// push in batches of 16.
+// round, and gives one ratio: rate of the sample ring / rate of the faster other queue. The rate of
+// a queue in a round is that of the fastest of five short runs, because a run in which a thread
+// lost its processor does not measure the queue. Writer: one push per sample, as receive() does,
+// repeated while the queue is full (no sample is dropped, so all queues transfer the same samples).
+// Reader: in batches of 64 where the queue supports batches (the sample ring, boost), else one by
+// one (moodycamel). Further lines of the output show the best rate of each queue, of the sample
+// ring and boost also with pushes in batches of 16.
 //
-// The sample ring is boost's queue with the rule of this project (drop, count, mark), so the
-// comparison with boost measures the cost of the rule: a check of the loss counter, and a marked
-// copy after each full queue, which is frequent with this writer.
+// The sample ring is boost's queue plus the treatment of a full queue in this project: the sample
+// is dropped, counted, and the next one marked. So the comparison with boost measures the cost of
+// this treatment: a check of the loss counter, and a marked copy after each full queue, which is
+// frequent with this writer.
 //
 //   bench_ring [rounds = 41] [samples per run = 200000]
 
@@ -59,15 +61,17 @@ std::uint32_t number_of(const AxisSample& s) {
 }
 
 /// Index of the i-th prepared sample: blocks of kWriteBatch in a scattered order. In a regular
-/// order a source would have the same address modulo 4096 as its slot in the queue during a whole
-/// run, or never, depending on the heap. A load whose address matches an earlier store modulo 4096
-/// waits for the store: the placement would change the rate by a factor of two.
+/// order a prepared sample would have the same address modulo 4096 as its slot in the queue during
+/// a whole run, or never, depending on the addresses that the heap returned. The processor makes a
+/// load whose address matches an earlier store modulo 4096 wait for the store; so these addresses
+/// would change the rate by a factor of two.
 std::uint32_t source_of(std::uint32_t i) {
   constexpr std::uint32_t kScatter = 13;  // coprime to the number of blocks
   return (i / kWriteBatch * kScatter * kWriteBatch + i % kWriteBatch) % kPrepared;
 }
 
-/// All queues with the same four functions. push() functions return the number of accepted samples.
+/// Adapter of the sample ring. The adapters of all queues have the same four functions; those that
+/// push return the number of accepted samples.
 template <class T>
 struct Ours {
   abbe::drivers::SampleRing<T> ring{kCapacity};
@@ -115,8 +119,8 @@ class Patience {
   unsigned turns_ = 0;
 };
 
-/// Numbered samples in memory, as a decoder writes them: the compiler cannot evaluate them in
-/// advance.
+/// Numbered samples in memory, as a decoder writes them. Samples made from constants would allow
+/// the compiler to evaluate them in advance.
 template <class T>
 const std::vector<T>& prepared() {
   static const std::vector<T> samples = [] {
@@ -219,8 +223,8 @@ double compare(const char* what, bool batches, int rounds, std::uint32_t samples
   return median(ratios);
 }
 
-/// On a busy machine a run measures the scheduler rather than the ring. Both threads inherit the
-/// priority.
+/// Requests real-time priority, because on a busy computer a run would measure the scheduler and
+/// not the queue. Both threads inherit the priority.
 bool take_priority() {
   const sched_param param{.sched_priority = 1};
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;

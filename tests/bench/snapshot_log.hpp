@@ -1,8 +1,8 @@
 #pragma once
 /// A subscriber that records when each Snapshot arrived, with the same kind of reader as the plain
-/// hop: the time is taken in the listener after the sample was taken from the reader. Compensation
-/// contains when the hub had the axes (age_ns counts from host_time_ns to that instant), so that
-/// the measurement needs no further clock.
+/// Fast DDS hop (dds_hop.hpp): the time is read in the listener after the sample was taken from the
+/// reader. Compensation states when abbed's hub received the axis positions (age_ns counts from
+/// host_time_ns to that instant), so that the measurement needs no clock in abbed.
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -30,8 +30,8 @@ namespace abbe::bench {
   return std::chrono::steady_clock::now().time_since_epoch().count();
 }
 
-/// One writer, one reader, in memory shared by two processes. When it is full, further arrivals are
-/// not recorded.
+/// A log with one writer and one reader, in memory shared by two processes. When the log is full,
+/// further arrivals are not recorded.
 template <class T, std::size_t Capacity>
 class SharedLog {
  public:
@@ -49,7 +49,7 @@ class SharedLog {
   std::array<T, Capacity> entries_;
 };
 
-/// Times are CLOCK_MONOTONIC, which at speed 1 is host time.
+/// Times are CLOCK_MONOTONIC, which is the host time of abbe if the simulation runs at speed 1.
 struct Arrival {
   std::int64_t host_time_ns = 0;            ///< time of the SYNC
   std::int64_t tracker_device_time_ns = 0;  ///< time of the newest point; 0: no point yet

@@ -1,9 +1,10 @@
 #pragma once
-/// The simulated devices at real speed. They record when the last TPDO of a cycle and the last byte
-/// of a burst were sent. Both are sent at the rate of their transport: three TPDOs one after the
-/// other at 1 Mbit/s, a burst in Ethernet segments at 100 Mbit/s. The bytes are prepared before;
-/// the times are taken just before and after the last of them is sent, so that the duration of this
-/// system call is part of the measured delay.
+/// Simulated encoders (CANopen) and tracker at real speed. They record when the last TPDO of a
+/// cycle and the last byte of a burst of tracker points were sent. Both are sent at the rate of
+/// their transport: three TPDOs one after the other at 1 Mbit/s, a burst in Ethernet segments at
+/// 100 Mbit/s. The bytes are prepared before; the time is read just before and just after the
+/// system call that sends the last byte, so that the duration of this call is part of the measured
+/// delay.
 
 #include <poll.h>
 
@@ -44,8 +45,8 @@ class StampedStage {
                                                              {.node = 2, .axis = sim::Axis::Y},
                                                              {.node = 3, .axis = sim::Axis::Z}}};
 
-    // Without .speed a SYNC gets the time at which it is read, and its replies are sent at the
-    // times given here.
+    // With the default of .speed a SYNC gets the time at which it is read, and each node replies
+    // after the delay that delay_until() sets below.
     auto bus = sim::EncoderBus::open({}, nodes, stage->machine_, now);
     if (!bus) return tl::unexpected(bus.error());
     stage->bus_ = std::make_unique<sim::EncoderBus>(std::move(*bus));
@@ -84,17 +85,18 @@ class StampedStage {
   explicit StampedStage(sim::PathMotion path) : machine_({}, std::move(path)) {}
 
   static constexpr std::size_t kNodes = 3;
-  // At 1 Mbit/s: a frame without data takes 44 bits, one with a position of 4 bytes 76, plus 3 bits
-  // between frames and at most 8 and 16 stuff bits.
+  // Duration of frames at 1 Mbit/s: a frame without data takes 44 bits, a frame with a position of
+  // 4 bytes 76 bits; added are 3 bits between frames and stuff bits, at most 8 and 16.
   static constexpr std::chrono::microseconds kSyncOnTheBus{55};
   static constexpr std::chrono::microseconds kTpdoOnTheBus{95};
   // At 100 Mbit/s a full Ethernet segment takes, with its headers, the time of 1538 bytes.
   static constexpr std::size_t kSegmentBytes = 1448;
   static constexpr std::chrono::microseconds kSegmentOnTheWire{123};
 
-  /// Records the time of the poll that sends the last reply to a SYNC. A SYNC was received if a
-  /// reply is due when the first TPDO is due. This also applies to node 1's reply to its
-  /// configuration: call forget() before measuring.
+  /// Records the time of the poll() that sends the last reply to a SYNC. That a SYNC was received
+  /// is seen from a reply that is due at the time of a first TPDO. Node 1's reply to its
+  /// configuration is due at such a time, too, and is recorded as a cycle; so call forget() before
+  /// measuring.
   void cycle_bus(bool asked) {
     const auto now = clock_.now();
     const std::int64_t before_ns = monotonic_ns();
@@ -107,8 +109,8 @@ class StampedStage {
       last_answer_due_ = now + kSyncOnTheBus + kNodes * kTpdoOnTheBus;
   }
 
-  /// The points are made first, so that only the sending is measured. Records the time of the poll
-  /// after which no byte of a burst is left to send.
+  /// Records the time of the poll() after which no byte of a burst is left to send. The points are
+  /// made before the time is read, so that only the sending is measured.
   void cycle_tracker() {
     const auto now = clock_.now();
     if (tracker_->wants_write() && now < segment_due_) return;

@@ -1,12 +1,12 @@
 // From the wire to DDS: the delay from the last TPDO of a cycle, or the last byte of a burst,
 // leaving the simulated device until a subscriber in another process has the sample, through abbed
-// and abbe-dds as installed. It is compared with a plain Fast DDS hop of the same period that runs
-// at the same time, shifted by half a cycle, when abbe only polls its rings every P: a shared
-// machine wakes a sleeping process within 30 us in one minute and within 200 us in the next. The
-// hop without abbe is measured first and printed as well. The hub polls every P, so a sample waits
-// P/2 on average and P at most before it is processed. Other load on the machine appears in the
-// tails of both: with `nice -n -20 bench_wire_to_dds` the whole chain and the plain hop run before
-// it.
+// and abbe-dds as installed. This delay is compared with that of a plain Fast DDS hop (dds_hop.hpp)
+// of the same period. The hop runs at the same time, because a shared computer wakes a sleeping
+// process within 30 us in one minute and within 200 us in the next; it is shifted by half a cycle,
+// when abbe only polls its rings. The hop is also measured alone, before abbe starts, and printed.
+// The main loop of abbed (hub) polls every P, so a sample waits P/2 on average and P at most before
+// it is processed. Other load on the computer increases the largest delays of both; with `nice -n
+// -20 bench_wire_to_dds`, abbe and the hop have priority over this load.
 //   bench_wire_to_dds [--short]
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -45,8 +45,9 @@ namespace config_tables = abbe::config_tables;
 namespace fs = std::filesystem;
 
 constexpr auto kHubPeriod = 250us;
-// 100 Hz: the processors stay idle between two cycles. Not a multiple of P: both run on one clock,
-// and a sample would wait for the hub equally long in every cycle.
+// About 100 Hz, so that the processors are idle between two cycles. Not a multiple of the hub's
+// period P: SYNC and hub run on the same clock, and with a multiple a sample would wait for the hub
+// equally long in every cycle.
 constexpr auto kSyncPeriod = 10'007us;
 constexpr std::int64_t kHalfPeriod_ns = std::chrono::nanoseconds{kSyncPeriod}.count() / 2;
 constexpr double kHops = 3.0;  // the limits: median P/2 + 3 hops, p99 P + 3 hops
@@ -56,7 +57,7 @@ struct Plan {
   std::size_t cycles = 6500;
   std::size_t bursts = 200;
   std::size_t hops_alone = 700;
-  std::size_t hops_beside = 6200;  ///< must not last longer than the cycles
+  std::size_t hops_beside = 6200;  ///< hops during the run of abbe; must not last longer than that
 };
 
 double us(std::int64_t ns) {
@@ -85,7 +86,7 @@ struct Path {
 // -------------------------------------------------------------------------------------------------
 // matching departures and arrivals
 
-/// The publishing cycle of the hub that an arrival belongs to: the last one before it.
+/// The publishing cycle of the hub to which an arrival belongs: the last cycle before the arrival.
 const HubCycle* turn_of(const SnapshotLog& log, std::int64_t arrived_ns, std::int64_t left_ns) {
   const HubCycle* found = nullptr;
   for (std::size_t i = 0; i < log.turns.size(); ++i) {
@@ -107,7 +108,8 @@ void note(Path& path, const SnapshotLog& log, const Departure& departure, std::i
   }
 }
 
-/// A cycle's sample carries the time of its SYNC, shortly before its TPDOs were sent.
+/// Results for the encoders. Arrivals and departures are matched by time: the sample of a cycle
+/// carries the time of the SYNC, shortly before the TPDOs of the cycle were sent.
 Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) {
   Path path;
   std::size_t i = 0;
@@ -125,8 +127,8 @@ Path encoder_path(const SnapshotLog& log, const std::vector<Departure>& cycles) 
   return path;
 }
 
-/// A burst has arrived with the first snapshot that contains its last point: the newest one
-/// received before the next burst was sent.
+/// Results for the tracker. A burst has arrived with the first snapshot that contains its last
+/// point, which is the newest point in all snapshots received before the next burst was sent.
 Path tracker_path(const SnapshotLog& log, const std::vector<Departure>& bursts) {
   Path path;
   std::size_t i = 0;
@@ -199,7 +201,7 @@ std::string configuration(const StampedStage& stage, std::uint32_t domain) {
                                     .more = "snapshot_hz = 0\ncompensation_hz = 0\n"});
 }
 
-/// Stopped with SIGTERM, as systemd does.
+/// The process abbed. stop() sends SIGTERM, as systemd does.
 class Daemon {
  public:
   explicit Daemon(const fs::path& folder) {
@@ -271,7 +273,7 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
   stage.forget();
   cycle_until(stage, 5s, [&] { return !stage.cycles().empty(); });
   if (!stage.cycles().empty()) begin_hop(stage.cycles().back().before_ns + kHalfPeriod_ns);
-  // for the clock model, caches and DDS discovery
+  // before the measurement, the clock model, the caches and DDS discovery need this time
   const auto settled = std::chrono::steady_clock::now() + 3s;
   cycle_until(stage, 10s, [&] { return std::chrono::steady_clock::now() > settled; });
   stage.forget();
@@ -290,8 +292,8 @@ bool run_chain(StampedStage& stage, SnapshotLog& log, ForkedTask& subscriber,
   return complete;
 }
 
-/// A real device does not wait for a processor: its simulator gets a higher priority than
-/// everything measured. Returns false if it is not permitted.
+/// Gives this process, which simulates the devices, a higher priority than everything measured,
+/// because a real device does not wait for a processor. Returns false if this is not permitted.
 bool stand_for_hardware() {
   ::prctl(PR_SET_TIMERSLACK, 1UL);
   const sched_param first{.sched_priority = 80};
@@ -303,8 +305,9 @@ std::string load_average() {
   return ::getloadavg(load.data(), 1) == 1 ? fmt::format("{:.2f}", load[0]) : "unknown";
 }
 
-/// The idle share of the processors between two calls. If it is near zero, p99 is the time slice
-/// that the scheduler gave another program (about 3 ms), not the delay of abbe.
+/// The share of the time between two calls in which the processors were idle. If this share is near
+/// zero, p99 of the delay is the time slice that the scheduler gave another program (about 3 ms),
+/// not the delay of abbe.
 class IdleShare {
  public:
   IdleShare() { read(); }
@@ -330,7 +333,8 @@ class IdleShare {
   double idle_ = 0.0, all_ = 0.0;
 };
 
-/// True if both limits, computed with the simultaneous hop, are met.
+/// Prints the delays. True if the limits for median and p99, computed with the simultaneous hop,
+/// are met.
 bool print_verdict(std::string_view what, const Path& path, const HopResult& hop,
                    const HopResult& alone) {
   const double P = us(std::chrono::nanoseconds{kHubPeriod}.count());

@@ -23,7 +23,7 @@ namespace abbe::tests::never_worse {
 struct Outcome {
   bool accepted = false;
   std::string first_reason;
-  std::string first_cause;  ///< of Verdict::causes; empty if an error came first
+  std::string first_cause;  ///< first of Verdict::causes; empty if an error ended the run before
   double before_m = 0.0;    ///< mean |V| of the truth, without rigid motion
   double left_m = 0.0;      ///< mean |V of the model - true V|, without rigid motion
   double u_m = 0.0;         ///< mean stated standard uncertainty: root of the trace

@@ -85,7 +85,8 @@ TEST(EvemuFalseTouch, IsNotFoundInASoundRunOfFewTouches) {
   }
 }
 
-// The ball moves by up to 0.2 mm: the linearised residuals of the other touches are wrong by um.
+// The false touch displaces the fitted ball by up to 0.2 mm, so that linearised residuals of the
+// other touches are wrong by um.
 TEST(EvemuFalseTouch, OfABallIsNamed) {
   for (const auto& [seed, by_m] : {std::pair{3u, kOff_m}, std::pair{4u, -kOff_m}}) {
     const auto [outcome, place] = run_with(10, Feature::Ball, seed, by_m);
@@ -94,7 +95,8 @@ TEST(EvemuFalseTouch, OfABallIsNamed) {
   }
 }
 
-// Four unknowns leave one or two residuals: the radius comes from the other positions.
+// Five or six touches and four unknowns leave one or two redundant touches, which do not show the
+// false one; so the radius is taken from the other positions.
 TEST(EvemuFalseTouch, AmongFewOfABallIsNamedByTheRadius) {
   for (const std::size_t count : {6u, 5u}) {
     const auto [outcome, place] = run_with(count, Feature::Ball, 5, kOff_m);

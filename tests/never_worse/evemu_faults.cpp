@@ -37,7 +37,8 @@ void move_within(EvemuRun& run, double shift_m, double angle_rad) {
   };
 }
 
-/// Ball1 is not placed exactly at its previous point.
+/// When the array is turned to the next position, Ball1 is not placed exactly at its previous
+/// point.
 void move_between(EvemuRun& run) {
   for (Isometry3d& T : run.T_machine_array) {
     const double by_m = log_uniform(run.random, 5e-6, 200e-6);

@@ -43,8 +43,9 @@ sim::BallArray random_array(std::mt19937_64& random) {
   return array;
 }
 
-/// Positions rotated about Ball1 as in [Li OMM]. Tilt and roll are 2 to 5 degrees as there, where
-/// the scale of the axis across the array is poorly observable, or up to four times as large.
+/// Positions rotated about Ball1 as in [Li OMM]. Tilt and roll are 2 to 5 degrees as in [Li OMM],
+/// with which the scale of the axis across the array is poorly observable, or up to four times as
+/// large.
 std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3& ball1_m,
                                          std::size_t count) {
   constexpr double kRadPerDeg = M_PI / 180.0;
@@ -66,7 +67,8 @@ std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3&
   return positions;
 }
 
-/// sum_k c_k P_k((q - centre) / half), k = 1 .. 3, as a polynomial of q in m.
+/// sum_k c_k P_k((q - centre) / half), k = 1 .. 3, as a polynomial of q in m. P_k: Legendre
+/// polynomials.
 sim::ErrorFunction cubic(const std::array<double, 3>& c, double centre_m, double half_m) {
   // in u: c1 u + c2 (1.5 u^2 - 0.5) + c3 (2.5 u^3 - 1.5 u)
   const std::array<double, 4> in_u{-0.5 * c[1], c[0] - 1.5 * c[2], 1.5 * c[1], 2.5 * c[2]};
@@ -96,7 +98,8 @@ void draw_errors(EvemuRun& run, double size) {
     const double centre_m = 0.5 * (axis.range.min_m + axis.range.max_m);
     const double half_m = 0.5 * (axis.range.max_m - axis.range.min_m);
     for (std::size_t m = 0; m < sim::kMotions; ++m) {
-      // Rotations: the same displacement at 0.5 m.
+      // Rotations get twice the number, in rad, so that at a distance of 0.5 m they displace a
+      // point as much as translations.
       const double amplitude = size * (m < 3 ? 1.0 : 2.0);
       std::array<double, 3> c{};
       for (std::size_t k = 0; k < 3; ++k) {
@@ -144,7 +147,8 @@ void set_ranges(EvemuRun& run) {
   }
 }
 
-/// The calibrator that a calibration with these uncertainties states for the array.
+/// The calibrator file that a calibration with the uncertainties and errors of `state` gives for
+/// the array.
 evemu::Calibrator as_stated(const sim::BallArray& array, const sim::ArrayState& state) {
   evemu::Calibrator c;
   c.name = array.name;
@@ -212,7 +216,7 @@ std::vector<Aim> aims_of(const EvemuRun& run) {
   return aims;
 }
 
-/// The reading at which the tip's centre is at p.
+/// The scale reading at which the centre of the tip is at p, given the errors of the machine.
 Vector3 reading_at(const EvemuRun& run, const Vector3& p_m, const Vector3& normal,
                    const TouchTime& when) {
   const Vector3 at_m = p_m - run.truth.target_offset_m;
@@ -313,7 +317,8 @@ std::vector<Vector3> places_in(const calib::ValidityVolume& volume) {
   return found;
 }
 
-/// Compares without the best-fit rigid motion, which the touches cannot determine.
+/// Compares the model with the truth, without the best-fit rigid motion of the difference, which
+/// the touches cannot determine.
 void compare(Outcome& outcome, const EvemuRun& run, const calib::VolumetricModel& model) {
   const std::vector<Vector3> points = places_in(model.validity());
   const auto rows = 3 * std::ssize(points);
@@ -371,7 +376,7 @@ EvemuRun random_evemu_run(std::uint64_t seed) {
   run.points_per_face = 6 + random() % 15;
   run.sigma_touch_m = log_uniform(random, 0.3e-6, 1.5e-6);
 
-  // Errors drawn with their stated uncertainties.
+  // The errors of the array are drawn from the uncertainties that its calibration states.
   sim::ArrayState state{.temperature_C = uniform(random, 17.0, 26.0),
                         .alpha_per_K = 11.5e-6,
                         .u_alpha_per_K = uniform(random, 0.2e-6, 1e-6),

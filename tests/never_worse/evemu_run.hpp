@@ -33,11 +33,11 @@ struct EvemuRun {
   double sigma_touch_m = 1e-6;
   /// standard deviation of a shift of all touches that changes over a quarter of a position
   double slow_noise_m = 0.0;
-  /// In addition to T_machine_array, about Ball1 of the position; may be empty.
+  /// Motion of the array in addition to T_machine_array, about Ball1 of the position; may be empty.
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;
   /// Displacement of a point of the array, in its own frame; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& place_m)> bent;
-  /// In addition to V, in machine coordinates; may be empty.
+  /// Error of the machine in addition to the constant V, in machine coordinates; may be empty.
   std::function<Vector3(const TouchTime&, const Vector3& q_m)> drift;
   /// Changes the list of touches; may be empty.
   std::function<void(std::vector<calib::evemu::Touch>&)> spoil;

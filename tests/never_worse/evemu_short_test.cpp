@@ -35,23 +35,24 @@ TEST(NeverWorseBallArray, NoAcceptedModelIsWorseThanNone) {
   }
 }
 
-// With a noise model of white noise the first of these runs is wrong by 3.1 u.
+// If the noise model contains white noise only, the model of the first of these runs is wrong by
+// 3.1 times its uncertainty u.
 TEST(NeverWorseBallArray, SlowNoiseIsInTheUncertainty) {
   const auto slow = tallies_of(ball_array({"slow noise"}), 2, 5000).front();
   EXPECT_EQ(slow.runs, 2);
   EXPECT_EQ(slow.too_sure, 0) << slow.largest_left_over_u;
 }
 
-// The false touch increases the estimated uncertainty, which then covers the touch, and the ball
-// centres scatter.
+// The false touch increases the estimated uncertainty so much that it covers the effect of the
+// touch. It also makes the ball centres scatter; this scatter must not be named as the cause.
 TEST(NeverWorseBallArray, AFalseTouchIsNamedBeforeTheScatterThatFollows) {
   const auto tally = tallies_of(ball_array({"false trigger"}), 1, 7004).front();
   EXPECT_EQ(tally.accepted, 0);
   EXPECT_EQ(tally.named, 1) << tally.other_reason;
 }
 
-// This run is wrong by 3.3 u if the errors within a ball are compared with the uncertainty of
-// another estimate.
+// The model of this run is wrong by 3.3 times its uncertainty u. It would be accepted if the errors
+// within a ball were compared with the uncertainty of another estimate.
 TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
   const auto screw = tallies_of(ball_array({"screw pitch"}), 1, 8092).front();
   EXPECT_EQ(screw.accepted, 0) << screw.largest_left_over_u;
@@ -59,7 +60,7 @@ TEST(NeverWorseBallArray, ErrorsWithinABallAreNotLargeBesideTheUncertainty) {
 }
 
 // The array is flat. The likelihood hardly distinguishes noise from a scale of the axis across the
-// array; the estimate with the scale leaves 36 um of a machine of 11 um.
+// array; with the scale, the error of the machine after correction is 36 um, and 11 um before.
 TEST(NeverWorseBallArray, NoiseThatLooksLikeAScaleIsRefused) {
   const auto slow = tallies_of(ball_array({"slow noise"}), 1, 579).front();
   EXPECT_EQ(slow.runs, 1);

@@ -45,7 +45,8 @@ void make_machine(OtfRun& run, double spacing_m) {
   for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     auto nodes = calib::equidistant_nodes(range.min_m, range.max_m, spacing_m);
-    // The truth is zero there: the intervals are valid in this gauge.
+    // The true errors are zero at this position, as gauge G1 requires; so the intervals of the
+    // model, which is in gauge G1, can be compared with the truth.
     nodes->reference_m = range.reference_m;
     run.machine.nodes[static_cast<std::size_t>(a)] = *std::move(nodes);
   }
@@ -157,7 +158,8 @@ calib::RigidTransform about(const Vector3& centre, const Vector3& rotation_rad,
   return T;
 }
 
-/// From `share` of the run on the tracker is rotated about its own position and shifted.
+/// From the fraction `share` of the run on, the tracker is rotated about its own position and
+/// shifted.
 void move_tracker(OtfRun& run, double share, double angle_rad, double shift_m) {
   const auto T = about(run.T_machine_tracker.t_m, angle_rad * direction(run.random),
                        shift_m * direction(run.random));
@@ -172,7 +174,8 @@ void turn_path(OtfRun& run, const Vector3& signs) {
 void displace_vertex(OtfRun& run, double by_m) {
   const std::size_t i = 3 + run.random() % (run.path_m.size() - 6);
   Vector3 by = by_m * direction(run.random);
-  // Towards the middle of the travel, so that the path is not refused.
+  // The vertex is moved towards the middle of the travel, so that it stays inside and the path is
+  // not refused.
   for (const sim::Axis a : sim::kAxes) {
     const auto& range = run.truth.axis(a).range;
     const auto k = static_cast<Eigen::Index>(a);
@@ -213,7 +216,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   run.evidence.up = Vector3::UnitZ();
   run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
 
-  // Errors drawn with their stated uncertainties.
+  // The true errors of ranges and scales are drawn with the uncertainties stated in `noise`.
   run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
   run.range_scale = 1.0 + 0.45e-6 * normal(random);
   run.noise.u_range_offset_m = 6e-6;

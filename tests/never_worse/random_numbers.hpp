@@ -10,7 +10,7 @@ namespace abbe::tests::never_worse {
 inline double uniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11U) / 9007199254740992.0);
 }
-/// Between `low` and `high`; its logarithm is uniform.
+/// Random number between `low` and `high` whose logarithm is uniformly distributed.
 inline double log_uniform(std::mt19937_64& random, double low, double high) {
   return low * std::pow(high / low, uniform(random, 0.0, 1.0));
 }

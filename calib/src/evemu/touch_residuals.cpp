@@ -289,8 +289,9 @@ TouchResiduals touch_residuals(const Observations& o, const VolumetricModel& mod
 
   if (!touch) {  // else the scatter of a ball or block may be caused by that false touch
     form = worst_form(o, left, found.sigma_m, 0.5 * false_alarm);
-    // Backlash perpendicular to an axis that hardly moves on the way to a touch is not removed from
-    // the residual (kLeastMotion) and would appear as scatter of several balls.
+    // Balls are not compared if there is backlash perpendicular to an axis: for an axis that hardly
+    // moves on the way to a touch it is not removed from the residual (kLeastMotion), and it would
+    // appear as scatter of several balls.
     if (!form && !backlash.across) {
       form = form_of_several(o, left, Feature::Ball, 0.25 * false_alarm);
     }

@@ -41,7 +41,8 @@ std::optional<fit::Plane> likely_face(const std::vector<Vector3>& points, std::s
   return *plane;
 }
 
-/// The plane of a face; nullopt if leaving out one of the points, whichever it is, leaves no plane.
+/// The plane of a face with at least five points; nullopt if there is a point without which the
+/// other points do not span a plane.
 std::optional<fit::Plane> sure_face(const std::vector<Vector3>& points, double max_off_m) {
   constexpr std::size_t kLeast = 5;
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -9,7 +9,8 @@
 
 namespace abbe::calib::otf {
 
-/// Normal equation sums over the rows for a few added columns C.
+/// Sums over the rows of an adjustment that the normal equations for at most kMost added columns C
+/// need.
 class AddedColumns {
  public:
   static constexpr std::size_t kMost = 18;
@@ -25,12 +26,12 @@ class AddedColumns {
     std::size_t columns = 0;      ///< number of columns determined by the data
     Eigen::VectorXd d;            ///< coefficient of each added column
     Eigen::VectorXd u;            ///< standard uncertainty of d
-    Eigen::VectorXd dU;           ///< Q A^T W^2 C d: error of U without the added columns
-    Eigen::MatrixXd root_cov_dU;  ///< root of the covariance that they add to U: cov = root root^T
+    Eigen::VectorXd dU;           ///< Q A^T W^2 C d: error of U if the columns are left out
+    Eigen::MatrixXd root_cov_dU;  ///< root of the covariance of dU: covariance = root root^T
   };
   /// Estimates d without a prior. Uses only the directions of d that decrease chi2 by at least
-  /// `least_drop`. Others are noise, which would be amplified for columns that the model can almost
-  /// reproduce. The weights of the rows are 1/sigma^2.
+  /// `least_drop`. The other directions are noise, which would be amplified for columns that the
+  /// model can almost reproduce. The weights of the rows are 1/sigma^2. Q: cofactor matrix of U.
   [[nodiscard]] Estimate estimate(const Eigen::MatrixXd& Q, double least_drop) const;
   /// Estimates d with the prior N(0, u^2) for every column. The variances of the rows are `factor`
   /// times the stated ones.

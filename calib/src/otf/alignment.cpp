@@ -243,8 +243,8 @@ Path times(const Matrix3& M, Path path) {
   return path;
 }
 
-/// Names the reflections after which the path is inside the travel. A rigid fit cannot distinguish
-/// between them.
+/// Names the reflections after which the path is inside the travel. A rigid fit does not show which
+/// of these reflections is the mistake.
 std::string reflections(const Path& path, const MachineNodes& travel) {
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {

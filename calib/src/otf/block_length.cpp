@@ -37,7 +37,8 @@ std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) 
   std::size_t chord = 50;
   std::optional<double> travel_m = travel_per_sample_m(samples, chord);
 
-  // The chord of a slow tracker would cut the corners of the path.
+  // With a low sample rate, a chord over many samples would be longer than a block and cut the
+  // corners of the path.
   while (chord > 1 && travel_m && *travel_m * static_cast<double>(chord) > kBlockTravel_m) {
     chord = std::max<std::size_t>(1, chord / 5);
     travel_m = travel_per_sample_m(samples, chord);

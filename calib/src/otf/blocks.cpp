@@ -108,8 +108,9 @@ class BlockCutter {
     ticks_ = 0;
   }
 
-  /// Appends the midpoints of equal parts of the block. Their mean is the mean of the block; with
-  /// points at both ends it would not be. With one part per sample they are the samples.
+  /// Appends the midpoints of equal parts of the block as sub-points. The mean of the midpoints is
+  /// the mean of the block; the mean of equally spaced points from end to end would not be. If
+  /// there is one part per sample, the sub-points are the samples.
   void push_sub_points() {
     const double step =
         static_cast<double>(in_block_.size()) / static_cast<double>(series_.sub_points);
@@ -129,9 +130,9 @@ class BlockCutter {
   std::size_t ticks_ = 0;
 };
 
-/// Mean of the first valid samples in [begin, end): of at most `count`, and of those before the
-/// machine has moved. A slow tracker sees few points of a short standstill; the mean of 20 would be
-/// far from the vertex.
+/// Mean of the first valid samples in [begin, end): at most `count` samples, and only samples
+/// before the machine has moved. A tracker with a low sample rate measures few points during a
+/// short standstill; the mean of 20 points would then be far from the vertex.
 template <class Iterator>
 Result<Vector3> standstill(Iterator begin, Iterator end, std::size_t count) {
   constexpr double kMoved_m = 1e-3;  // more than noise, less than the limit of the alignment

@@ -29,8 +29,8 @@ struct Remainder {
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
-/// The entries of the rigid unknowns. A best-fit rigid motion fits kRigidUnknowns rows or fewer
-/// exactly for any model; their residuals are only rounding and cannot be used for a comparison.
+/// Entries of the six rigid unknowns in a row of the design. (Residuals of at most kRigidUnknowns
+/// rows are not compared: a best-fit rigid motion fits so few rows exactly, whatever the model.)
 Vector6 rigid_row(const Observations& o, std::size_t row) {
   Vector6 r = Vector6::Zero();
   for (const SparseRows::Entry& e : o.A.row(row)) {
@@ -75,8 +75,8 @@ double predicted_by_fit(const Observations& o, std::size_t row, const Eigen::Vec
   return sum;
 }
 
-/// Prediction of the model, averaged over the same sub-points as the row. This is necessary for a
-/// model with other nodes.
+/// Prediction of y by a model, averaged over the sub-points of the row, as the row is. The model
+/// may have other nodes than the design, so the row of the design cannot be used.
 double predicted_by_model(const Observations& o, std::size_t row, const VolumetricModel& model) {
   const Observation& r = o.rows[row];
   Vector3 sum = Vector3::Zero();
@@ -183,7 +183,8 @@ Result<HeldOutFold> hold_out(const std::vector<RowInformation>& parts, std::size
   return held;
 }
 
-/// Inserts the alternatives before the other reasons, which may be only consequences of them.
+/// Inserts the alternatives that refuse the model before the other reasons, because these may be
+/// only consequences of the alternatives.
 void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others) {
   std::size_t reasons = 0;
   for (const Alternative& other : others) {

@@ -24,7 +24,8 @@ namespace {
 /// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
 constexpr double kCauses = 9.0;
-/// Other design matrices are tested only above this variance factor: each test costs an adjustment.
+/// Other design matrices are tested only above this variance factor, because each test takes the
+/// time of an adjustment.
 constexpr double kSuspicious = 2.0;
 
 std::size_t series_end(const Observations& o, std::size_t begin) {
@@ -166,8 +167,9 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
   const double factor =
       residual_noise(fit.o, left, fit.degrees_of_freedom - best_estimate.columns).variance_factor();
 
-  // Second test, with the noise after the alternative is applied: with the true cause only noise
-  // remains. Slow noise would give every alternative a small decrease of chi2.
+  // Second test, with the noise that remains when the alternative is applied. With the true cause
+  // only white noise remains. If the cause is slow noise, it remains and raises `factor`; in the
+  // first test every alternative decreases chi2 a little and would seem significant.
   if (!(best_estimate.drop > std::max(noise, factor) * chi2_bound(columns_added, x))) {
     return std::nullopt;
   }
@@ -181,8 +183,9 @@ Result<std::optional<Alternative>> best_of(const Fit& fit, const AlternativeColu
                      .u_m = root_sum_of_squares(fit.u_white_m, added_u_m) * std::sqrt(factor)};
 }
 
-/// Alternative: the data show an offset of the ranges that its prior does not explain. The sums in
-/// `family` are of the residuals after subtraction of the offset `estimated`.
+/// The alternative that the data show an offset of the ranges too large for its prior. The sums in
+/// `family` were computed from residuals from which the effect of the offset `estimated` is
+/// subtracted.
 Result<std::optional<Alternative>> offset_beyond_prior(const Fit& fit,
                                                        const AlternativeColumns& columns,
                                                        const AlternativeColumns::Family& family,
@@ -259,8 +262,9 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const auto bias = rigid_free(points, difference);
   const double u_m = rigid_free_norm(other.layout(), t).rms_u_m(a->covariance) * std::sqrt(factor);
 
-  // Tables with too wide nodes have errors everywhere. A change of V that is covered by the stated
-  // (increased) uncertainty must not refuse the model.
+  // Tables with too large distances between nodes have errors between all nodes. These errors
+  // increase the stated uncertainty; a change of V below this uncertainty must not refuse the
+  // model.
   const double stated_u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor());
   return Alternative{
       .cause = cause,

@@ -59,9 +59,9 @@ Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, 
                            " legs, needs at least one block per leg"));
   }
 
-  // Viterbi algorithm. best[j]: least cost of blocks 0..i with block i on leg j; block i - 1 is
-  // then on leg j or j - 1. n - m of the n blocks are on the same leg as the block before,
-  // therefore
+  // Viterbi algorithm for n blocks and m legs. best[j]: least cost of blocks 0..i with block i on
+  // leg j; block i - 1 is then on leg j or j - 1. n - m of the n blocks are on the same leg as the
+  // block before, therefore
   //     j <= i <= j + n - m.
   // `advanced` has one bit for each such pair (i, j): block i - 1 is on leg j - 1.
   std::vector<double> best(m, std::numeric_limits<double>::infinity());

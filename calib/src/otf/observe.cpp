@@ -170,9 +170,9 @@ std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const 
   return points;
 }
 
-/// First and last measured position of every leg. If it is within three corner exclusions of the
-/// vertex, the vertex itself counts as covered: the model extrapolates there by less than the
-/// distance of two nodes.
+/// First and last measured position of every leg. A vertex itself counts as covered if such a
+/// position is within three corner exclusions of it: between this position and the vertex the model
+/// extrapolates by less than the distance of two nodes.
 std::vector<Vector3> covered(const Observations& o, const Path& path, double corner_m) {
   std::vector<Vector3> points;
   for (std::size_t i = 0; i < o.rows.size();) {

@@ -149,8 +149,9 @@ bool agrees_with_up(Verdict& verdict, std::vector<Matrix3>& open,
               " degrees off the up direction of the machine"));
 }
 
-/// A rotation of the path is about the origin of the machine coordinates. The tracker position
-/// rotates about the target offset; it is subtracted from both positions.
+/// agrees() for the position of the tracker. If the path is rotated about the origin of the axis
+/// positions, the tracker, which measures targets at axis position + target offset, seems to rotate
+/// about the target offset. Therefore this offset is subtracted from both tracker positions.
 bool agrees_with_place(Verdict& verdict, std::vector<Matrix3>& open, const Vector3& found_m,
                        const Vector3& given_m, const Vector3& target_offset_m) {
   return agrees(verdict, open, found_m - target_offset_m, given_m - target_offset_m,

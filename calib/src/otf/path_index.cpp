@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kLegsInLeaf = 8;
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
-/// Reduces the distance to a box so that rounding cannot make it larger than the distance to a leg
-/// in the box. The rounding error is below 1e-12 of any travel.
+/// Reduces a computed distance to a box so that rounding cannot make it larger than the distance to
+/// a leg in the box. Its rounding error is below 1e-12 of the travel of any machine.
 double rounded_down(double off_m) {
   return off_m * (1.0 - 1e-9) - 1e-12;
 }

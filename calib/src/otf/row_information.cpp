@@ -8,7 +8,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// The weight is 1/sigma^2, within rounding.
+/// True if the weight of the row is 1/sigma^2, within rounding.
 bool is_weighted_by_sigma(const Observation& o) {
   constexpr double kRounding = 1e-14;
   return std::abs(o.weight * o.sigma_m * o.sigma_m - 1.0) < kRounding;

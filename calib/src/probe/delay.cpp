@@ -144,15 +144,15 @@ Result<ProbeDelayFit> fit_delay(std::span<const FeedTouch> touches, const DelayO
   }
 
   const Scatter scatter = scatter_of(*feeds);
-  // Computed relative to the mean position and speed of the feeds, so that positions far from the
-  // origin lose no digits.
+  // The line is fitted relative to the mean position and speed of the feeds, so that no digits are
+  // lost if positions are far from the origin.
   double sum_w = 0.0;
   double mean_v = 0.0;
   double mean_p = 0.0;
   const double origin = feeds->front().along_m;
   const auto weight = [&](const Feed& f) {
     const double variance = scatter.s0_m2 + f.speed_m_s * f.speed_m_s * scatter.jitter_s2;
-    // At least (1 fm)^2: simulated touches may have no scatter.
+    // The variance is taken as at least (1 fm)^2, because simulated touches may have no scatter.
     return f.count / std::max(variance, 1e-30);
   };
   for (const Feed& f : *feeds) {

@@ -13,7 +13,7 @@ namespace {
 constexpr int kUnknowns = 3 + LobingMap::kTerms;
 constexpr std::size_t kLeastTouches = 24;  // 1.5 times the number of unknowns
 constexpr int kMostIterations = 20;
-constexpr double kStep_m = 1e-13;  // far below any measurable length
+constexpr double kStep_m = 1e-13;  // converged below this step, which is far below any measurement
 
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
@@ -46,8 +46,9 @@ System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x,
     const Vector3 unit = d.normalized();
     const LobingMap::Terms Y = LobingMap::basis(unit);
     s.r[i] = d.norm() - sphere_radius_m - Y.dot(x.tail<LobingMap::kTerms>());
-    // The change of the direction with the centre is neglected: it is lobing divided by the radius,
-    // 1e-4 of this term, and Gauss-Newton converges without it.
+    // A change of the centre also changes the direction `unit` and so the lobing. This is
+    // neglected: it is lobing divided by the radius, 1e-4 of `unit`, and Gauss-Newton converges
+    // without it.
     s.J.row(i).head<3>() = unit.transpose();
     s.J.row(i).tail<LobingMap::kTerms>() = Y.transpose();
   }
@@ -132,7 +133,8 @@ Result<Qualification> qualify(std::span<const QualifyingTouch> touches,
   q.cov_centre_m2 = covariance.topLeftCorner<3, 3>();
   LobingMap::Covariance terms =
       covariance.bottomRightCorner<LobingMap::kTerms, LobingMap::kTerms>();
-  // An error of the sphere radius is an opposite error of the effective tip radius.
+  // An error of the sphere radius causes an error of equal size and opposite sign of the effective
+  // tip radius.
   terms(0, 0) += options.u_sphere_radius_m * options.u_sphere_radius_m;
   q.map = LobingMap{x.tail<LobingMap::kTerms>(), terms};
   q.lobing_m = lobing_over(touches, q.map);

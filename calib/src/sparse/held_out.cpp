@@ -15,7 +15,8 @@ Moments moments_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return {static_cast<double>(values.size()), mean, (values.array() - mean).square().sum()};
 }
 
-/// X with the standardisation of `design`.
+/// X with the columns that `design` keeps, shifted and scaled with the means and scales of
+/// `design`.
 Eigen::MatrixXd like(const Standardised& design, const Eigen::MatrixXd& X) {
   return (X(Eigen::all, design.kept).rowwise() - design.mean.transpose()) *
          design.scale.cwiseInverse().asDiagonal();

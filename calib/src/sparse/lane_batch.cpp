@@ -91,7 +91,8 @@ class LaneBatch {
     }
   }
 
-  /// Copies the state of a lane's path to the lane's registers; clears them if the lane is idle.
+  /// Copies coefficients, active columns and parameters of a lane's path to the arrays of the sweep
+  /// function; zeros if the lane has no path.
   void write_out(std::size_t lane) {
     std::optional<PathLane>& path = lanes_[lane].path;
     if (path) make_room(path->active());
@@ -120,7 +121,8 @@ class LaneBatch {
     parameters_.tolerance.of[lane] = idle ? -1.0 : lanes_[lane].path->tolerance();
   }
 
-  /// Adds columns to those in use. Columns are never removed, so a rebuild is rare.
+  /// Adds columns to those that a sweep visits. Columns are never removed, so that these arrays and
+  /// their Gram matrix are rarely rebuilt.
   void make_room(const std::vector<Index>& wanted) {
     bool added = false;
     for (const Index j : wanted) {

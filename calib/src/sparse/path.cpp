@@ -15,8 +15,9 @@ namespace {
 
 constexpr int kDefaultCount = 100;
 
-/// For n > p the solution at a thousandth of lambda_max is close to least squares; for n <= p the
-/// end of the path with many nonzero coefficients is not meaningful.
+/// Default ratio of the smallest lambda to lambda_max. For n > p (n rows, p columns) the solution
+/// at a thousandth of lambda_max is close to least squares; for n <= p solutions at small lambda,
+/// with many nonzero coefficients, are not meaningful.
 double default_ratio(const GramProblem& problem) {
   return problem.y.size() > problem.columns() ? 0.001 : 0.05;
 }
@@ -59,7 +60,8 @@ Result<void> check(const PathOptions& options) {
 std::vector<double> default_lambda(const GramProblem& problem, int count, double ratio) {
   const double largest = problem.lambda_max();
   std::vector<double> lambda = log_spaced(largest, ratio * largest, count);
-  // Set exactly: exp(log(x)) may be smaller, and then the first solution would not be empty.
+  // log_spaced() computes exp(log(largest)), which may be smaller than `largest` by rounding; the
+  // first solution would then not be empty.
   lambda.front() = largest;
   return lambda;
 }

@@ -55,8 +55,9 @@ double PathLane::correlation(Eigen::Index j) const {
   return z;
 }
 
-/// One pass over the inactive columns that are in the strong set (`strong`), or over those that are
-/// not. Columns with a nonzero coefficient become active; true if there was one.
+/// One pass over the inactive columns in the strong set if `strong`, else over those not in this
+/// set. Columns for which the shrinkage gives a nonzero coefficient become active; true if there
+/// was such a column.
 bool PathLane::admit(bool strong) {
   bool entered = false;
   for (std::size_t i = 0; i < is_active_.size(); ++i) {

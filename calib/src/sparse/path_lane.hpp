@@ -1,7 +1,7 @@
 #pragma once
-/// State of one path between sweeps. It gives the active columns and the shrinkage for the next
-/// sweeps; the caller does the sweeps and reports them by swept(), which continues with more
-/// columns or the next lambda.
+/// State of one regularisation path between sweeps of coordinate descent. PathLane returns the
+/// active columns and the shrinkage for the next sweeps; the caller does the sweeps and reports
+/// them by swept(), which adds active columns or goes on to the next lambda.
 
 #include <optional>
 #include <span>
@@ -15,7 +15,7 @@ namespace abbe::calib::sparse {
 struct PathTask {
   Penalty penalty;
   std::span<const double> lambda;
-  bool first_is_empty = false;  ///< lambda[0] is lambda_max: its solution is known
+  bool first_is_empty = false;  ///< lambda[0] is lambda_max: all coefficients are zero there
   double tolerance = 0.0;       ///< for the change of a coefficient, absolute
   long max_sweeps = 0;
   Eigen::Index max_nonzero = 0;

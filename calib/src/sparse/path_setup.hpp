@@ -18,7 +18,7 @@ struct LambdaList {
 [[nodiscard]] LambdaList lambda_list(const GramProblem&, const PathOptions&);
 [[nodiscard]] std::vector<double> default_lambda(const GramProblem&, int count, double ratio);
 
-/// The task refers to `lambda`, which must outlive it.
+/// The returned task refers to `lambda`, which must outlive the task.
 [[nodiscard]] PathTask path_task(const GramProblem&, const Penalty&, const LambdaList& lambda,
                                  const PathOptions&);
 [[nodiscard]] Path to_path(const GramProblem&, const PathTask&, SolvedPath);

@@ -1,6 +1,7 @@
 #pragma once
-/// The one-coefficient solution of all three penalties as one piecewise linear function of |z|, so
-/// that scalar code and vector code compute the same bits. The solution is, times sgn(z):
+/// The coefficient b that minimises (z - b)^2 / 2 + penalty, for all three penalties as one
+/// piecewise linear function of |z|, so that scalar code and vector code compute the same bits. b
+/// has the sign of z; |b| is
 ///     |z| <= lambda       0
 ///     |z| <= inner_end    |z| - lambda
 ///     |z| <= outer_end    (|z| - offset) * factor

@@ -1,6 +1,6 @@
 #pragma once
-/// One sweep function for each width of the vector registers. sweep_variants() gives those that
-/// this processor can run.
+/// One sweep function for each width of the vector registers. sweep_variants() returns the
+/// functions that this processor can run.
 
 #include "abbe/calib/sparse/sweep.hpp"
 

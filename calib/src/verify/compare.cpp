@@ -14,7 +14,8 @@ namespace {
 
 // With fewer points the fitted rigid motion leaves too few degrees of freedom.
 constexpr std::size_t kLeastPoints = 4;
-// Below the resolution of any instrument; a ratio to a smaller length is meaningless.
+// This length is below the resolution of any instrument; a ratio R_resmag to a smaller |V_las| is
+// meaningless.
 constexpr double kNegligible_m = 1e-9;
 
 Vector3 mean_of(std::span<const Vector3> v) {
@@ -25,7 +26,7 @@ Vector3 mean_of(std::span<const Vector3> v) {
   return sum / static_cast<double>(v.size());
 }
 
-/// Residuals T measured - wanted after the best rigid fit T.
+/// Residuals T measured - wanted, T: the rigid motion for which they are least.
 Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
                                             std::span<const Vector3> wanted_m) {
   const auto T = fit_rigid(measured_m, wanted_m);
@@ -271,7 +272,8 @@ void compute_ratios(Comparison& c) {
   c.R_turned = ratio_statistics(std::move(turned));
 }
 
-/// Interpolated between the order statistics next to share * (n - 1).
+/// The percentile `share` (0 to 1) of n sorted values, interpolated between the two order
+/// statistics next to the index share * (n - 1).
 double percentile(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(at);
@@ -279,7 +281,7 @@ double percentile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-/// Comparison with the options applied, defaults included.
+/// A Comparison with origin, step and least distance from the options, or their defaults.
 Comparison with_options(const VolumetricModel& model, const Options& options) {
   constexpr double kSteps = 20.0, kTenth = 0.1;
   Comparison c;

@@ -16,8 +16,8 @@ using Matrix4 = Eigen::Matrix4d;
 // Tolerance for rounding; scaled coordinates are of the order of 1.
 constexpr double kRounding = 1e-10;
 
-/// Simplex basis: four columns, and the matrix that computes their weights for a place. An index in
-/// `point` >= the number of points is the slack variable of a row.
+/// Basis of the simplex method: four columns, and the matrix that computes their weights for a
+/// place. An index in `point` >= the number of points stands for the slack variable of a row.
 struct Cell {
   std::array<Eigen::Index, 4> point{};
   Matrix4 weights_from_place = Matrix4::Identity();

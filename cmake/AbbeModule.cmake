@@ -1,5 +1,6 @@
-# A module is a folder: its public headers in include/abbe/NAME, its sources in src, one static library abbe_NAME.
-# The library exposes nothing but its own include folder, so a dependency that the architecture forbids does not compile.
+# A module is a folder with public headers in include/abbe/NAME and sources in src, built as one
+# static library abbe_NAME. The library exposes nothing but its own include folder, so a dependency
+# that the architecture forbids does not compile.
 
 add_library(abbe_warnings INTERFACE)
 add_library(abbe::warnings ALIAS abbe_warnings)

@@ -104,7 +104,8 @@ Quickhull::Quickhull(std::span<const Vector3> points_m, double tolerance_m, Apex
   if (points_m.size() < 4 || !round_to_lattice(points_m)) {
     return;
   }
-  // A tolerance of less than a few cells would be smaller than the rounding of the coordinates.
+  // A tolerance of less than a few cells of the lattice would be smaller than the rounding of the
+  // coordinates.
   constexpr double kLeastCells = 4.0;
   tolerance_cells_ = tolerance_m > 0.0 ? std::max(kLeastCells, tolerance_m / cell_m_) : 0.0;
   if (start_with_four()) {

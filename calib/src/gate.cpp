@@ -125,9 +125,9 @@ std::vector<Vector3> points_inside(const ValidityVolume& volume) {
 /// scatter of the fraction, caused by the readings and the lattice, is smaller than 2 %.
 constexpr double kSameVolume = 0.98;
 
-/// Rim at each side of a volume as a fraction of its width: the typical difference between two
-/// recalibrations of one machine. A ball array that is set up by hand, within 3 degrees, loses 2.4
-/// to 4.1 % of the volume at the rim.
+/// Rim at each side of a volume, as a fraction of its width, by which the volumes of two
+/// calibrations of one machine typically differ. If a ball array is set up by hand, within 3
+/// degrees of its previous orientation, 2.4 to 4.1 % of the volume are lost at the rim.
 constexpr double kRim = 0.02;
 
 void compare_volumes(Verdict& verdict, const VolumetricModel& candidate,
@@ -188,7 +188,7 @@ void compare_scales(Verdict& verdict, const VolumetricModel& candidate,
   const ScaleDifference g = scale_difference(candidate, active, candidate.tool_offsets_m().front());
   constexpr double kCoverage = 2.0;
 
-  // This form of the condition refuses NaN.
+  // With NaN this condition is false, and the candidate is refused.
   if (std::abs(g.value) <= limits.max_scale_change + kCoverage * g.u) {
     return;
   }
@@ -220,7 +220,7 @@ void note_what_was_compared(Verdict& verdict, bool holds_for_tool) {
 
 void require_better(Verdict& verdict, double candidate, double other, double min_improvement,
                     const char* than) {
-  // This form of the condition refuses NaN.
+  // With NaN this condition is true, and the candidate is refused.
   if (!(candidate < other * (1.0 - min_improvement))) {
     verdict.refuse(
         "held-out",

@@ -13,7 +13,7 @@ template <class... Pieces>
   return out.str();
 }
 
-/// "(20, -15, -120) mm" of a vector in metres.
+/// Text of a vector in metres, such as "(20, -15, -120) mm".
 template <class Vector>
 [[nodiscard]] std::string mm_text(const Vector& v_m) {
   constexpr double kMmPerM = 1e3;

@@ -9,9 +9,9 @@
 
 namespace abbe::calib {
 
-/// V at the places is D c, c: coefficients. After removal of the best-fit rigid motion it is P D c,
-/// P: projection. The class stores D^T P D / n (n places); the mean squares for any c and any
-/// covariance follow from it.
+/// V at n places is D c, c: coefficients of a model. V after removal of the best-fit rigid motion
+/// is P D c, P: projection. The class stores D^T P D / n, from which the mean squares for any c and
+/// for any covariance of c follow.
 class RigidFreeNorm {
  public:
   /// `points_m`: points at which the rigid motion acts (axis position + tool offset). D: 3 rows per

@@ -6,8 +6,8 @@
 
 namespace abbe::calib {
 
-/// Singular values of A in descending order, from a QR decomposition and Jacobi rotations of R.
-/// Small singular values are accurate relative to the scale of the columns.
+/// Singular values of A in descending order, from the QR decomposition A = Q R and Jacobi rotations
+/// of R. Small singular values are accurate relative to the scale of the columns of A.
 [[nodiscard]] Eigen::VectorXd singular_values(const Eigen::MatrixXd& A);
 
 }  // namespace abbe::calib

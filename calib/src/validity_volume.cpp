@@ -88,7 +88,7 @@ std::vector<Vector3> spread_subset(std::span<const Vector3> points_m, std::size_
     mean += p / static_cast<double>(points_m.size());
   }
 
-  // Distance to the nearest selected point; for the first selection, distance to the mean.
+  // Distance of each point to the nearest selected point; before a point is selected, to the mean.
   std::vector<double> distance_m;
   for (const Vector3& p : points_m) {
     distance_m.push_back((p - mean).norm());

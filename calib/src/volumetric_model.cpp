@@ -208,8 +208,9 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
       [&](double variance) { return least > 0 ? 1 / std::sqrt(std::max(variance, least)) : 1.0; });
   Eigen::MatrixXd correlation = scale.asDiagonal() * C * scale.asDiagonal();
 
-  // A covariance in a gauge is singular. With ill-conditioned data (condition 1e5) rounding changes
-  // its eigenvalues by 1e-6.
+  // The covariance of parameters that satisfy gauge conditions is singular. With ill-conditioned
+  // data (condition number 1e5) rounding changes its eigenvalues by 1e-6, so zero may become
+  // negative.
   constexpr double kRounding = 1e-6;
   correlation.diagonal().array() += kRounding;
   if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(correlation).info() != Eigen::Success) {

@@ -155,8 +155,8 @@ struct ExactArray {
   Observations operator()(Observations o, const Layout&, unsigned) const { return o; }
 };
 
-/// Random errors of 2 um per ball coordinate, 5 urad per block and 0.5 K of steel for every seed.
-/// `stated`: the fit gets their covariance.
+/// Adds random errors of the array, another set for every seed: 2 um per ball coordinate, 5 urad
+/// per block and 0.5 K of steel. `stated_too`: the fit is told these uncertainties.
 struct UncertainArray {
   bool stated_too = true;
   Observations operator()(Observations o, const Layout& layout, unsigned seed) const {
@@ -211,7 +211,7 @@ void coverage(const char* what, const Machine& machine_of, const Noise& noise, u
   ask(!asked || covered || seeds < kEnough, "bayes covers 93 to 97 %");
 }
 
-/// A random machine from the prior of bayes-pose.
+/// A machine with random coefficients, drawn from the prior that the estimator bayes-pose assumes.
 Field drawn_machine(unsigned seed) {
   const ScaledDesign design =
       *ScaledDesign::of(reference_machine().chain, 3, {{0.26, 0.14, 0.05}, {0.35, 0.2, 0.05}});

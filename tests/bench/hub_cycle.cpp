@@ -62,7 +62,7 @@ std::int64_t cpu_ns() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// Written by one thread; read and reset by another.
+/// The longest cycle since the last reset(). Written by one thread; read and reset by another.
 struct Longest {
   std::atomic<std::int64_t> wall_ns{0}, cycle_ns{0}, cpu_ns{0};
   std::atomic<std::uint64_t> cycles{0};
@@ -238,7 +238,7 @@ class DrivenMachine final : public daemon::SampleSource {
   std::size_t driven_ = 0;
 };
 
-/// Replaces abbe-dds: reads everything from the socket.
+/// Takes the place of abbe-dds: reads and discards everything that the hub writes to the socket.
 void swallow(const std::filesystem::path& socket) {
   const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};

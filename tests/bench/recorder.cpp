@@ -87,7 +87,7 @@ void record_second(daemon::Recorder& recorder, std::uint32_t second, bool raw) {
   block.length = 2048;
   block.bytes = {};
 
-  // raw bytes of one second: 500 points of 36 bytes, and TPDOs
+  // raw bytes of one second: 500 tracker points of 36 bytes, and TPDOs of the encoders
   for (std::uint32_t i = 0; i < 12; ++i) {
     block.time = time_at(second * 12 + i, 12);
     recorder.record(protocol::to_raw_bytes(block, "tracker"));

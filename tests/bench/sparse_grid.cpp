@@ -89,7 +89,8 @@ struct PeerResult {
   std::vector<std::vector<long>> sweeps;  ///< of the paths of all rows, per gamma
 };
 
-/// Adds squared errors of the rows of one fold; NaN where the path of the fold ended earlier.
+/// Adds the squared errors of the rows of one fold to `error`; NaN for every lambda that the path
+/// of the fold did not reach.
 void hold_out(const Case& c, const Standardised& all, int fold, Eigen::MatrixXd& error) {
   std::vector<Eigen::Index> train, test;
   for (std::size_t i = 0; i < c.folds.of_row.size(); ++i) {

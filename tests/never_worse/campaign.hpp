@@ -1,7 +1,7 @@
 #pragma once
-/// Runs the faults of a calibration method on many random machines, on two threads, and prints what
-/// the gate accepts and how good the accepted models are.
-/// Arguments of the programs: [MACHINES [FIRST_SEED [PART OF A FAULT'S NAME...]]].
+/// Calibrates many random machines with each fault of a shop floor that is defined for a
+/// calibration method, on two threads, and prints how many models the gate accepts and how good
+/// these are. Arguments of the programs: [MACHINES [FIRST_SEED [PART OF A FAULT'S NAME...]]].
 
 #include <fmt/format.h>
 

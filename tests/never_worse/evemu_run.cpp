@@ -70,7 +70,8 @@ std::vector<Isometry3d> random_positions(std::mt19937_64& random, const Vector3&
 /// sum_k c_k P_k((q - centre) / half), k = 1 .. 3, as a polynomial of q in m. P_k: Legendre
 /// polynomials.
 sim::ErrorFunction cubic(const std::array<double, 3>& c, double centre_m, double half_m) {
-  // in u: c1 u + c2 (1.5 u^2 - 0.5) + c3 (2.5 u^3 - 1.5 u)
+  // The sum as a polynomial in u = (q - centre) / half:
+  //     c1 u + c2 (1.5 u^2 - 0.5) + c3 (2.5 u^3 - 1.5 u)
   const std::array<double, 4> in_u{-0.5 * c[1], c[0] - 1.5 * c[2], 1.5 * c[1], 2.5 * c[2]};
   std::vector<double> in_q(4, 0.0);
   const std::array<std::array<double, 4>, 4> binomial{
@@ -252,7 +253,7 @@ double mean_length(const Eigen::VectorXd& v) {
   return 3.0 * sum / static_cast<double>(v.size());
 }
 
-/// A shift of all touches that changes slowly within a position.
+/// A random shift that is added to all touches and changes slowly from touch to touch.
 class SlowNoise {
  public:
   SlowNoise(EvemuRun& run, std::size_t touches)

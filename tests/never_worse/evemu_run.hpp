@@ -16,13 +16,15 @@ namespace abbe::tests::never_worse {
 
 using calib::Vector3;
 
-/// The time of a touch, as a share of the touches of the position and of the session.
+/// The time of a touch: its position, and the fractions (0 to 1) of the touches of this position
+/// and of the whole session that were made before.
 struct TouchTime {
   int position = 1;
   double in_position = 0.0, in_session = 0.0;
 };
 
-/// The true machine and array, and their configuration; a fault changes one of the two.
+/// The true machine and array, and what the configuration states about them; a fault changes the
+/// truth or the configuration.
 struct EvemuRun {
   // the truth
   sim::TruthMachine truth;
@@ -31,7 +33,8 @@ struct EvemuRun {
   std::vector<int> order;                          ///< in which the positions are touched
   std::size_t points_per_ball = 13, points_per_face = 9;
   double sigma_touch_m = 1e-6;
-  /// standard deviation of a shift of all touches that changes over a quarter of a position
+  /// standard deviation of a random shift common to successive touches, whose correlation time is a
+  /// quarter of the time of a position
   double slow_noise_m = 0.0;
   /// Motion of the array in addition to T_machine_array, about Ball1 of the position; may be empty.
   std::function<Eigen::Isometry3d(const TouchTime&)> moved;

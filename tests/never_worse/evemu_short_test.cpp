@@ -67,8 +67,8 @@ TEST(NeverWorseBallArray, NoiseThatLooksLikeAScaleIsRefused) {
   EXPECT_EQ(slow.accepted, 0) << slow.largest_left_over_u;
 }
 
-// The likelihood ratio of the drift of the first run is e^10.7, and the drift moves the model by
-// 3.1 u. The drift of the second run is certain and moves the model by 0.8 u.
+// In the first run the likelihood ratio of a drift is only e^10.7, but the drift moves the model by
+// 3.1 times its uncertainty u. In the second run the drift is certain and moves the model by 0.8 u.
 TEST(NeverWorseBallArray, DriftThatTheUncertaintyDoesNotCoverIsNamed) {
   for (const std::uint64_t seed : {82u, 665u}) {
     const auto drift = tallies_of(ball_array({"drifts"}), 1, seed).front();

@@ -133,7 +133,7 @@ void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& 
              left = calib::rigid_free(points, difference);
   outcome.before_m = before->rigid_free.mean_m;
   outcome.left_m = left->rigid_free.mean_m;
-  // A component below kFixed_m is fixed by the gauge and has no interval.
+  // A component of V whose uncertainty is below kFixed_m is fixed by the gauge and has no interval.
   constexpr double kNormal975 = 1.95996, kFixed_m = 1e-9;
 
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -17,7 +17,8 @@ namespace abbe::tests::never_worse {
 
 using calib::Vector3;
 
-/// The true machine and its configuration; a fault changes one of the two.
+/// The true machine, and what the configuration states about it; a fault changes the truth or the
+/// configuration.
 struct OtfRun {
   // the truth
   sim::TruthMachine truth;

@@ -63,7 +63,8 @@ double ciddor(const Air& air, double wavelength_m) {
   return 1.0 + rho_a / rho_axs * r_axs + rho_v / kVapourDensity * r_vs;
 }
 
-/// [Birch & Downs 1993, 1994] for 450 ppm; the CO2 factor is that of [Ciddor 1996].
+/// Refractive index by the modified Edlen equation [Birch & Downs 1993, 1994], which is for 450 ppm
+/// of CO2; for another CO2 content the factor of [Ciddor 1996] is used.
 double edlen(const Air& air, double wavelength_m) {
   const double S = per_square_um(wavelength_m);
   const double t = air.temperature_K - kZeroCelsius_K;
@@ -95,7 +96,8 @@ double index_of(const Air& air, double wavelength_m, IndexEquation equation) {
 
 /// Contribution of one input quantity to u_n: sensitivity coefficient times u, computed as
 ///     (n(value + u) - n(value - u)) / 2.
-/// Exact for linear n; for any realistic u the nonlinearity changes the contribution by 1e-3.
+/// This is exact if n is linear in the quantity; for any realistic u the nonlinearity changes the
+/// contribution by one part in 1000.
 double share(Air air, double Air::*quantity, double u, double wavelength_m,
              IndexEquation equation) {
   const double value = air.*quantity;

@@ -39,8 +39,8 @@ double share_of(const std::pair<double, double>& between, double index) {
   return (index - between.first) / std::max(1.0, between.second - between.first);
 }
 
-/// Four shapes of a bent array: the long leg bent upwards, the long leg bent sideways, the short
-/// leg bent upwards, a twist.
+/// Displacement of a ball for four shapes of a bent array, one column each: the long leg of the L
+/// bent upwards, the long leg bent sideways, the short leg bent upwards, a twist.
 Rows3 bow(const TouchedArtefact& s, std::size_t ball, double arm_m) {
   const Vector3 a = s.T_self_uni.R.transpose() * from_ball1_m(s, ball) / arm_m;
   Rows3 rows(3, 4);

@@ -11,8 +11,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The regression of [Li OMM]: plain monomials in mm, because the result of a penalty depends on
-/// the columns.
+/// The regression problem of [Li OMM]. Its columns are plain monomials in mm and not those of the
+/// scaled design, because the result of a penalised fit depends on the form of the columns.
 struct Regression {
   Eigen::MatrixXd X;
   Eigen::VectorXd y;
@@ -99,8 +99,8 @@ Eigen::VectorXd scaled_from_named(const ScaledDesign& design, Eigen::VectorXd wi
       beta(static_cast<Eigen::Index>(j)) += with_intercept(0);
     }
   }
-  // The units of the rows range from mm to rad mm^-order: rows are scaled to unit norm before the
-  // solution.
+  // The rows of M have units from mm to rad mm^-order and very different sizes. They are scaled to
+  // unit norm before the system is solved.
   const Eigen::MatrixXd M = design.named_from_scaled();
   const Eigen::VectorXd scale = M.rowwise().norm().cwiseInverse();
   return (scale.asDiagonal() * M).fullPivLu().solve(scale.cwiseProduct(beta)) / kMmPerM;
@@ -132,7 +132,7 @@ Eigen::VectorXd at_end(const sparse::Path& path) {
   return path.coefficients.col(path.reached() - 1);
 }
 
-/// Covariance of refits to random data drawn around the fit.
+/// Covariance of the coefficients of fits to random data, which are drawn around the fitted values.
 Result<Eigen::MatrixXd> bootstrap(const FitProblem& problem, const Regression& r,
                                   const Eigen::VectorXd& fitted_mm, const SolveOptions& options,
                                   const SparseChoice& choice, const HyperParameters& noise) {

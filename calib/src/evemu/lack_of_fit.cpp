@@ -447,7 +447,7 @@ Result<void> compare_all(Comparisons& all, const Solution& solution) {
   return compared;
 }
 
-/// Scatter of the ball centres beyond that of touches and array. Its origin is in the machine.
+/// The alternative that the ball centres scatter more than touches and array explain.
 std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& base,
                                                const TouchResiduals& touches) {
   constexpr double kSuspicious = 2.0;

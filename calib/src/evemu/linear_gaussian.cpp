@@ -56,7 +56,8 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
   const Eigen::VectorXd used = L_inv_scaled.colwise().squaredNorm();
   e.by_log_prior = 0.5 * (projected.cwiseAbs2() - used);
 
-  // trace(K^-1) s^2 = m - trace(K^-1 R D R^T), D = diag(prior); z^T K^-2 z from one more solve.
+  // The derivative by log s^2 needs trace(K^-1) s^2 = m - trace(K^-1 R D R^T), D = diag(prior), and
+  // z^T K^-2 z = |K^-1 z|^2, for which one more triangular system is solved.
   const Eigen::VectorXd K_inv_z = llt.matrixU().solve(L_inv_z);
   e.by_log_noise = 0.5 * (noise * K_inv_z.squaredNorm() - (static_cast<double>(m) - used.sum()) +
                           rest_ / noise - static_cast<double>(out_of_reach));

@@ -8,7 +8,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// Size of the arrays on the stack for the entries of all components: 3 * 42 at order 5.
+/// Size of the arrays on the stack for the entries of all three components: at order 5 there are at
+/// most 3 * 42.
 constexpr std::size_t kMostEntries = 128;
 
 std::string unit_of(const DesignFunction& f) {

@@ -189,7 +189,7 @@ Result<Observations> observe(std::span<const Touch> touches, const Calibrator& a
     }
     for (std::size_t i = 0; i < c.balls.size(); ++i) {
       const Vector3& reading_m = seen->balls[i].centre;
-      // Ball1 is the origin of both frames: its error is set to exactly zero, without rounding.
+      // Errors are relative to Ball1: the error of Ball1 is set to exactly zero, without rounding.
       const Vector3 V_m = i == 0 ? Vector3(Vector3::Zero()) : Vector3(seen->ideal_m[i] - reading_m);
       o.rows.push_back({position, c.balls[i].number, reading_m, V_m});
     }

@@ -141,7 +141,8 @@ struct Minimum {
 /// that keeps its starting value.
 Minimum descend(Objective& f, const Theta& start, std::optional<Eigen::Index> fixed = {}) {
   constexpr int kMostIterations = 60;
-  // Gradient of the log likelihood by theta (logarithms): far below a significant difference.
+  // The search ends where no component of the gradient of the log likelihood by theta (logarithms
+  // of the parameters) exceeds this: far below a significant difference.
   constexpr double kFlat = 1e-4;
   Minimum at{start};
   Theta gradient;

@@ -109,7 +109,8 @@ bool touched_from_below(const TouchedArtefact& seen) {
               static_cast<double>(seen.ball_points_m[b].size());
     }
   }
-  // Mean component along z: 0 for touches all around a ball, about 0.5 for its upper half.
+  // Mean component along z of the directions from ball centre to touch: 0 for touches all around a
+  // ball, about 0.5 for touches on its upper half.
   constexpr double kClearly = 0.2;
   return mean.dot(seen.T_self_uni.R.col(2)) < -kClearly * static_cast<double>(seen.balls.size());
 }

@@ -168,7 +168,7 @@ void TouchGuide::astray(const Vector3& p_m, GuidedTouch& out) {
   if (const double off_m = site_->nearest_ball_m(p_m, ball); std::isfinite(off_m))
     text += message("; nearest is ball ", ball + 1, ", ", kMmPerM * off_m, " mm away");
   else if (site_->points(kBall1).size() == 1) {
-    // Two touches do not show which of them was wrong: both are discarded.
+    // There are only two touches, which do not show which of them was wrong: both are discarded.
     site_->clear(kBall1);
     text = where() + message("the touch at ", place_text(p_m),
                              " and the one before are not on one ball: both are discarded");

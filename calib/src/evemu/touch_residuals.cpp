@@ -15,7 +15,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// The feature whose touches scatter most, if significant.
+/// Finding for the ball or face whose touches scatter most, if they scatter significantly more than
+/// sigma_m.
 std::optional<TouchFinding> worst_form(const Observations& o,
                                        const std::vector<FeatureResiduals>& all, double sigma_m,
                                        double false_alarm) {
@@ -43,9 +44,9 @@ std::optional<TouchFinding> worst_form(const Observations& o,
       .rows_m = {}};
 }
 
-/// Negative logarithm of an upper bound of a probability: that a of the a + b degrees of freedom
-/// have more than the fraction `share` of the sum of squares (Chernoff's bound of the beta
-/// distribution). 0 if `share` is below the mean.
+/// Negative logarithm of an upper bound of the probability that a of the a + b degrees of freedom
+/// of white noise have more than the fraction `share` of the sum of squares (Chernoff's bound of
+/// the beta distribution). 0 if `share` is below its mean.
 double minus_log_tail(double share, double a, double b) {
   const double mean = a / (a + b);
   if (!(share > mean && share < 1.0)) {

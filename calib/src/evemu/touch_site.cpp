@@ -185,8 +185,8 @@ double Site::nearest_ball_m(const Vector3& p_m, std::size_t& ball) const {
   return nearest;
 }
 
-/// Removes the candidates that do not agree with an accepted ball. Only accepted balls are used, so
-/// that a stray touch cannot remove a candidate.
+/// Removes the candidates (assumptions about the sides of the faces) that do not agree with an
+/// accepted ball. Only accepted balls are used, so that a stray touch cannot remove a candidate.
 void Site::rule_out_by(std::size_t feature) {
   const auto agrees = [&](const Candidate& candidate) {
     return std::ranges::all_of(points_[feature], [&](const Vector3& p) {
@@ -305,7 +305,8 @@ FeatureCheck Site::check_ball(std::size_t feature) const {
   if (sphere && fits(*sphere)) return {.valid = true};
   FeatureCheck found;
 
-  // More points than necessary lie on one sphere, but of another radius.
+  // If more points than necessary lie on one sphere, but its radius is not that of the calibrator,
+  // the radius is reported.
   if (sphere && points.size() > options_.observe.least_points_per_ball &&
       largest(sphere->residuals) <= options_.observe.max_off_surface_m)
     found.other_radius_m = sphere->radius;

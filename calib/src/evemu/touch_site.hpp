@@ -20,7 +20,7 @@ inline constexpr std::size_t kBall1 = 0, kBlock1 = 1, kBlock2 = 2;  ///< feature
 /// Check of the points of one feature against the surface of the feature.
 struct FeatureCheck {
   bool valid = false;
-  std::optional<std::size_t> outlier{};    ///< index of a point without which the others are valid
+  std::optional<std::size_t> outlier{};  ///< index of a point without which the others are valid
   double off_m = 0.0;  ///< distance of the outlier from the surface through the others
   std::optional<double> other_radius_m{};  ///< the points lie on a sphere of this other radius
 };
@@ -46,8 +46,9 @@ class Site {
   void add(std::size_t feature, const Vector3& p_m);
   void drop(std::size_t feature, std::size_t point);
   void clear(std::size_t feature);
-  /// Accepts a ball whose points are all valid. The ball determines the sides to which the faces
-  /// point. Removes touches that lie on no other ball with these sides and returns their number.
+  /// Accepts a ball whose points are all valid. The accepted ball determines the sides to which the
+  /// faces point, and so the places of all balls. Touches that now lie on no ball are removed;
+  /// returns the number of removed touches.
   std::size_t accept_ball(std::size_t feature);
   /// Call when the position is finished: keeps the sides of the faces for the next position.
   void keep_sides();

@@ -202,8 +202,8 @@ Result<void> check_radii(int position, const Touched& touched, std::span<const f
   return {};
 }
 
-/// Reports a wrong unit of length before single touches are checked: with a wrong unit every touch
-/// seems false.
+/// BadInput if the touches have a wrong unit of length. The unit is checked before single touches,
+/// because with a wrong unit every touch seems false.
 Result<void> check_unit(int position, const Touched& touched, std::span<const fit::Sphere> balls,
                         const Calibrator& c, const ObserveOptions& options) {
   return radii_fit_with(balls, c).empty() ? Result<void>{}

@@ -58,8 +58,8 @@ Result<Sphere> fit_sphere(std::span<const Vector3> points, std::optional<double>
   Sphere sphere;
   Eigen::VectorXd r;
 
-  // Gauss-Newton reaches rounding level in 2 to 13 steps on sets with noise of up to a fortieth of
-  // the radius.
+  // On points with noise of up to a fortieth of the radius, Gauss-Newton needs 2 to 13 steps until
+  // only rounding errors remain.
   constexpr int kMostIterations = 100;
   constexpr double kSettled = 1e-15;
   double step = 1.0, before = 2.0;

@@ -105,8 +105,9 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
   }
 }
 
-/// Sums for steps at about 100 positions, in one pass: the sums of the rows after a step are those
-/// of all rows minus those of the rows before it.
+/// Sums for a step (the tracker or the machine moved) at each of about 100 places of the run, in
+/// one pass over the rows: the sums of the rows after a step are the sums of all rows minus those
+/// of the rows before the step.
 AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> residual_m) const {
   constexpr std::size_t kPlaces = 100, kMargin = 2;
   const std::size_t rows = o_.rows.size(), stride = std::max<std::size_t>(2, rows / kPlaces);

@@ -14,8 +14,8 @@
 
 namespace abbe::calib::otf {
 
-/// One alternative. `place`: index of the first block after the step (Moved), of the vertex or of
-/// the leg.
+/// One alternative. `place`: for Cause::Moved the index of the first block after the motion, for
+/// other causes the index of the vertex or of the leg.
 struct Added {
   Cause cause;
   std::size_t place = 0;
@@ -38,7 +38,8 @@ class AlternativeColumns {
   [[nodiscard]] std::string text(const Added&, const Eigen::VectorXd& d) const;
 
  private:
-  /// Columns of a translation and of a rotation about the centre of the path.
+  /// Values in one row of the columns of a translation and of a rotation about the centre of the
+  /// path.
   void rigid(const Observation&, Values&) const;
   [[nodiscard]] Family steps(std::span<const double> residual_m) const;
 

@@ -17,7 +17,7 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Sums over all held-out rows of the residuals of one model (or of no compensation).
+/// Sums of squares, over all held-out rows, of the residuals of one model or of no compensation.
 struct Remainder {
   double whitened_squares = 0.0;
   double squares_m2 = 0.0;
@@ -99,7 +99,7 @@ std::vector<std::size_t> inside(const Observations& o, std::span<const std::size
   return found;
 }
 
-/// Residuals of the given rows with a prediction.
+/// Residuals y - predicted_m(row) of the given rows.
 template <class Prediction>
 std::vector<double> residuals(const Observations& o, std::span<const std::size_t> rows,
                               Prediction predicted_m) {
@@ -146,8 +146,9 @@ struct HeldOutFold {
   std::vector<std::size_t> rows;  ///< the held-out rows: U was not fitted to them
 };
 
-/// Fits U without the legs of a fold. A leg with the only observations of a node remains in the
-/// fit. If the model is not determined even then, the result has no held-out rows.
+/// Fits U without the legs of a fold. A leg that has the only observations of a node of a table
+/// remains in the fit. If U is not determined even with these legs, the result has no held-out
+/// rows.
 Result<HeldOutFold> hold_out(const std::vector<RowInformation>& parts, std::size_t fold,
                              const Observations& o, const Options& options) {
   estimation::Information training(o.unknowns());

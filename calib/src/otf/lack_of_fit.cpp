@@ -372,7 +372,8 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
                         : kMadToSigma * median(std::move(second_differences)) /
                               std::sqrt(kOfSecondDifference);
 
-  // 99.9 % quantile; for white noise the coefficient from n pairs has standard deviation 1/sqrt(n)
+  // 99.9 % quantile of the normal distribution. For white noise an autocorrelation coefficient from
+  // n pairs has the standard deviation 1/sqrt(n).
   constexpr double kNormal999 = 3.090;
   for (std::size_t lag = 1; lag <= kLags && pairs[lag] > 0; ++lag) {
     const auto n = static_cast<double>(pairs[lag]);

@@ -46,7 +46,7 @@ constexpr double kUpTolerance = 0.17;
 /// Tolerance of the given tracker position, which may be measured with a tape.
 constexpr double kPlaceTolerance_m = 0.5;
 
-/// The axis, if R is a rotation by 180 degrees about X, Y or Z.
+/// The axis about which R rotates by 180 degrees; nullopt if R is another rotation.
 std::optional<Axis> half_turn_about(const Matrix3& R) {
   for (const Axis axis : kAllAxes) {
     const auto k = static_cast<Eigen::Index>(index(axis));
@@ -57,7 +57,8 @@ std::optional<Axis> half_turn_about(const Matrix3& R) {
   return std::nullopt;
 }
 
-/// Columns of the path file after the rotation R: "(-y, x, z)".
+/// How the columns x, y, z of the path file would have to be read so that the path is rotated by R:
+/// "(-y, x, z)".
 std::string columns(const Matrix3& R) {
   std::string text;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -70,7 +71,7 @@ std::string columns(const Matrix3& R) {
   return "(" + text + ")";
 }
 
-/// "A", "A or B", "A, B or C", "A, B, C or 4 others".
+/// Joins the texts to a list: "A", "A or B", "A, B or C", "A, B, C or 4 others".
 std::string list_of(std::vector<std::string> texts) {
   constexpr std::size_t kMost = 3;
   if (texts.size() > kMost + 1) {
@@ -85,8 +86,8 @@ std::string list_of(std::vector<std::string> texts) {
   return list;
 }
 
-/// "turned by 180 degrees about X or Z (signs of the other two axes reversed), or with x, y, z read
-/// as ..."
+/// Text that lists rotations: "turned by 180 degrees about X or Z (signs of the other two axes
+/// reversed), or with x, y, z read as ...".
 std::string list_of_turns(const std::vector<Matrix3>& turns) {
   std::vector<std::string> half, other;
   for (const Matrix3& R : turns) {

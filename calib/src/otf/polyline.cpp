@@ -76,8 +76,8 @@ Result<void> check(const Path& path) {
   const Vector3 centre = centroid(path.vertices_m).centre_m;
   const Vector3 to_centre = centre - start, to_end = end - start;
 
-  // If the angle at the start is below 1 degree, the errors of the machine determine the rotation
-  // about the line.
+  // If the directions from the start to the centroid and to the end differ by less than 1 degree,
+  // the rotation about this line would be determined by the errors of the machine.
   constexpr double kCollinear = 0.017;
   if (to_centre.cross(to_end).norm() <= kCollinear * to_centre.norm() * to_end.norm()) {
     return failure(ErrorCode::DegenerateGeometry,

@@ -66,8 +66,9 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   return s;
 }
 
-/// Change of U per relative change of all ranges. The constant part of the lever changes only the
-/// rigid unknowns.
+/// Change of U per relative change of all ranges, which displaces a point by its vector from the
+/// tracker. The part of this vector that is the same for all points changes only the rigid
+/// unknowns.
 Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
   Eigen::VectorXd g = Eigen::VectorXd::Zero(a.U.size());

@@ -68,14 +68,15 @@ Result<std::vector<Feed>> group(std::span<const FeedTouch> touches, const DelayO
 }
 
 /// s0^2 and s_tau^2, neither negative, such that s0^2 + v^2 s_tau^2 best fits the variances of the
-/// feeds.
+/// positions at each feed v.
 struct Scatter {
   double s0_m2 = 0.0;
   double jitter_s2 = 0.0;
 };
 
-/// One weighted fit of the variances. The weights are computed from `guess`: the standard deviation
-/// of a variance that is estimated from n touches is proportional to the true variance.
+/// One weighted fit of the variances at the feeds. The weights are computed from the variances that
+/// follow from `guess`, because the standard deviation of an estimated variance is proportional to
+/// the true variance.
 Scatter refined(const std::vector<Feed>& feeds, const Scatter& guess) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();

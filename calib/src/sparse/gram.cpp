@@ -8,7 +8,8 @@
 namespace abbe::calib::sparse {
 namespace {
 
-/// Largest standard deviation of a constant y after rounding, relative to its size.
+/// If the standard deviation of y relative to its size is at most this, y counts as constant: so
+/// much can come from rounding.
 constexpr double kConstantY = 1e-14;
 
 Result<void> check_shapes(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {

@@ -9,8 +9,8 @@
 
 namespace abbe::calib::sparse {
 
-/// Count, mean and sum of squared deviations from the mean. add() combines folds without
-/// cancellation.
+/// Count, mean and sum of squared deviations from the mean of a set of values. add() combines the
+/// moments of two sets without cancellation of digits.
 struct Moments {
   double count = 0.0;
   double mean = 0.0;

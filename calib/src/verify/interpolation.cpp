@@ -124,8 +124,9 @@ class Programme {
     return best;
   }
 
-  /// `entering` replaces the column whose weight first becomes zero. In a tie, slack variables
-  /// leave before points, then lower indices before higher ones.
+  /// Exchanges a column of the basis: `entering` replaces the column whose weight becomes zero
+  /// first when the weight of `entering` grows. In a tie, slack variables leave before points, then
+  /// lower indices before higher ones.
   void pivot(Cell& cell, Eigen::Index entering, const Vector4& place) const {
     const Vector4 weight = cell.weights_from_place * place,
                   rate = cell.weights_from_place * columns_.col(entering);

@@ -20,8 +20,9 @@ Result<void> check_finite(std::span<const MeasuredPoint> points) {
   return {};
 }
 
-/// "; they fit with ..." names the mistakes after whose correction the points fit: a reflection,
-/// another unit, reversed order of the rows. Empty if no correction does.
+/// Text "; they fit with ..." that names the mistakes after whose correction the points fit the
+/// readings: a reflection, another unit, reversed order of the rows. Empty if no tested correction
+/// makes them fit.
 std::string fits_with(const Observations& o, double most_rms_m) {
   const auto fits = [&](const Matrix3& M, bool backwards) {
     std::vector<Vector3> from;

@@ -43,7 +43,7 @@ struct OutsideTravel {
 [[nodiscard]] std::string corrections_inside_travel(std::span<const Vector3> points_m,
                                                     const MachineNodes& travel);
 
-/// "A", "A, or with B", "A, or with B, or with C"
+/// Joins the texts to a list: "A", "A, or with B", "A, or with B, or with C".
 [[nodiscard]] std::string or_list(std::span<const std::string> texts);
 
 }  // namespace abbe::calib

@@ -1,6 +1,7 @@
 #pragma once
-/// Acceptance test for an identified model, common to all identification methods. A model is
-/// accepted if all of the following are true:
+/// Acceptance test for an identified model (the candidate), common to all identification methods.
+/// The active model is the one in use on the machine. A candidate is accepted if all of the
+/// following are true:
 /// - It predicts observations to which it was not fitted better than no compensation does and,
 ///   inside the validity volume of the active model, better than the active model does.
 /// - Its validity volume contains that of the active model, apart from a rim of 2 %, unless the
@@ -47,17 +48,18 @@ struct GateLimits {
   /// wrong.
   double max_error_m = 1e-3;
   double max_gradient = 5e-3;  ///< |dV/dq| in m/m; 5 mm/m: 250 um between nodes 50 mm apart
-  /// Absolute value of the scale error common to all directions. 200 um/m: a larger value means a
-  /// wrong unit, path, range or temperature.
+  /// Largest absolute value of the scale error common to all directions. 200 um/m: a larger value
+  /// means a wrong unit, path, range or temperature.
   double max_scale_error = 200e-6;
-  /// Absolute value of the scale difference to the active model, common to all directions, in
-  /// addition to twice its standard uncertainty. 20 um/m: steel at 1.7 K temperature difference. A
-  /// larger value means a wrong scale of path, ranges or temperature, or a changed machine.
+  /// Largest absolute value of the scale difference to the active model, common to all directions.
+  /// Twice the standard uncertainty of this difference is added to the limit. 20 um/m: steel at 1.7
+  /// K temperature difference. A larger value means a wrong scale of path, ranges or temperature,
+  /// or a changed machine.
   double max_scale_change = 20e-6;
   /// Required relative decrease of the held-out figure; 0: any decrease is sufficient.
   double min_improvement = 0.0;
   bool accept_smaller_volume = false;  ///< smaller than that of the active model
-  bool accept_scale_change = false;    ///< larger than max_scale_change
+  bool accept_scale_change = false;    ///< accept a scale difference above max_scale_change
 };
 
 /// Entry in the configuration that permits a model to replace an active model with a larger
@@ -92,7 +94,8 @@ struct Verdict {
   void refuse(std::string_view cause, std::string text, std::size_t before);
 };
 
-/// Pure. `active` may be null. Points at which magnitude and gradient of V are evaluated:
+/// Applies these conditions to the candidate. Pure. `active` may be null. Points at which magnitude
+/// and gradient of V are evaluated:
 /// - tables: the tensor grid of the nodes (V is linear between them along each axis),
 /// - polynomials: the vertices of the validity hull (each is a measured reading), the midpoints
 ///   between any two vertices, and the nodes inside the hull.

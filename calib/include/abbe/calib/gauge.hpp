@@ -53,11 +53,12 @@ enum class Gauge { G1, Ball1Blocks, Ball1 };
 [[nodiscard]] Eigen::MatrixXd unobservable_combinations(const ParameterLayout&,
                                                         std::span<const Vector3> targets_m);
 
-/// Transforms U into the gauge: U + N z with K (U + N z) = 0, N from unobservable_combinations().
-/// Both vectors have fit_size() entries. For the tools of `targets_m` the result predicts the same
-/// V as U up to a rigid motion and a constant per tool. DegenerateGeometry if the targets leave
-/// more combinations undetermined than the gauge has conditions. All 18 tables need three targets
-/// that are not on a line; then the result predicts the same as U for every tool.
+/// Transforms U into the gauge with the conditions K: U + N z, N from unobservable_combinations(),
+/// z such that K (U + N z) = 0. Both vectors have fit_size() entries. For the tools of `targets_m`
+/// the result predicts the same V as U up to a rigid motion and a constant per tool.
+/// DegenerateGeometry if the targets leave more combinations undetermined than the gauge has
+/// conditions. All 18 tables need three targets that are not on a line; then the result predicts
+/// the same as U for every tool.
 [[nodiscard]] Result<Eigen::VectorXd> to_gauge(Gauge, const ParameterLayout&,
                                                std::span<const Vector3> targets_m,
                                                const Eigen::VectorXd& U);

@@ -28,8 +28,9 @@ class ValidityVolume {
   /// 1 nm of the hull of the other points are not vertices; points inside a face or an edge are
   /// therefore left out. 5,000 vertices take 0.1 s.
   [[nodiscard]] static Result<ValidityVolume> hull_of(std::span<const Vector3> axis_positions_m);
-  /// From vertices_m() of another volume. Every given point is kept as a vertex, whether it is a
-  /// corner of the hull or not. contains() returns the same results as that of the other volume.
+  /// Restores a volume from its vertices_m(). Every given point is kept as a vertex, whether it is
+  /// a corner of the hull or not. contains() returns the same results as that of the original
+  /// volume.
   [[nodiscard]] static Result<ValidityVolume> of_vertices(std::span<const Vector3> vertices_m);
 
   [[nodiscard]] bool contains(const Vector3& axis_position_m) const;

@@ -97,14 +97,14 @@ class VolumetricModel {
                                                                 const Vector3& tool_offset_m,
                                                                 ValidityVolume);
 
-  /// About 1 us with covariance. No allocation.
+  /// V with its covariance. Takes about 1 us. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m) const;
   /// V alone, about four times faster. NaN for a tool for which the model is not valid.
   [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m) const;
-  /// Solves c = -V(p + c) by iteration until c changes by less than 1e-9 m. NotApplicable for
-  /// another tool. NotConverged after 50 evaluations; this occurs only if |dV/dq| is close to 1
-  /// (implausible tables).
+  /// Solves c = -V(p + c) for the nominal position p, by iteration until c changes by less than
+  /// 1e-9 m. NotApplicable for a tool for which the model is not valid. NotConverged after 50
+  /// evaluations; this occurs only if |dV/dq| is close to 1 (implausible tables).
   [[nodiscard]] Result<Correction> command_correction(const Vector3& nominal_m,
                                                       const Vector3& tool_offset_m) const;
 

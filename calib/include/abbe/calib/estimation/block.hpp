@@ -20,7 +20,7 @@ struct Block {
   Eigen::MatrixXd L{};                ///< rows x nuisances; without columns: no nuisances
   std::vector<double> u_nuisance{};   ///< standard deviation of the prior, or kNoPrior
   Eigen::VectorXd y;
-  /// of y: rows x rows, or one column with the variances of independent rows
+  /// covariance of y: rows x rows, or one column with the variances of independent rows
   Eigen::MatrixXd covariance;
   /// blocks with the same number are left out together in cross-validation; the noise of different
   /// groups is independent

@@ -58,7 +58,8 @@ class Datum {
   /// RankDeficient if an unknown has no observation, or if the data leave more combinations
   /// undetermined than there are conditions; the text names unknowns that are not determined.
   [[nodiscard]] Result<DatumSolution> solve(const Information&, const DatumOptions& = {}) const;
-  /// U alone, in less time: the rank is judged by column pivoting instead of singular values.
+  /// The U of solve() without covariance, in less time: the rank is judged by column pivoting
+  /// instead of singular values.
   [[nodiscard]] Result<Eigen::VectorXd> estimate(const Information&,
                                                  const DatumOptions& = {}) const;
 

@@ -31,7 +31,7 @@ class ModelBasis {
     columns.clear();
     std::visit([&](const auto& form) { form.append_columns(state, columns); }, form_);
   }
-  /// `U` has size() entries. No allocation.
+  /// V = B(state) U. `U` has size() entries. No allocation.
   [[nodiscard]] Vector3 V_m(const MachineState& state, std::span<const double> U) const {
     return std::visit([&](const auto& form) { return form.V_m(state, U); }, form_);
   }

@@ -9,7 +9,7 @@
 
 namespace abbe::calib::estimation {
 
-/// Singular values of the column-scaled R.
+/// Singular values of the R of an Information, with columns scaled to unit length.
 struct Spectrum {
   Eigen::VectorXd singular_values;  ///< descending
   std::size_t rank = 0;             ///< number of singular values above the threshold

@@ -1,9 +1,9 @@
 #pragma once
-/// Information of many sparse rows. Rows that begin with the same column have most columns in
-/// common: in on-the-fly calibration they are the rows of one cell of the first axis, with 103 of
-/// 169 unknowns. They are triangularised by themselves, over the unknowns that occur in them, and
-/// the triangles are merged. For n unknowns, m rows and groups of k unknowns this takes m k^2
-/// operations instead of m n^2.
+/// Information of many sparse rows. Rows that begin with the same column form a group, because they
+/// have most columns in common: in on-the-fly calibration a group is the rows of one cell of the
+/// first axis, with 103 of 169 unknowns. Each group is triangularised by itself, over the unknowns
+/// that occur in it, and the triangles are merged. For n unknowns, m rows and groups of k unknowns
+/// this takes m k^2 operations instead of m n^2.
 
 #include <span>
 

@@ -30,7 +30,7 @@ struct TableOptions {
 /// Immutable value.
 class TableBasis {
  public:
-  /// BadInput for too many nodes of a cubic.
+  /// BadInput if a cubic table has too many nodes (AxisInterpolation::kMostCubicNodes).
   [[nodiscard]] static Result<TableBasis> of(ParameterLayout, const TableOptions& = {});
 
   [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
@@ -45,7 +45,8 @@ class TableBasis {
   /// V = M B U. No allocation.
   [[nodiscard]] Vector3 V_m(const MachineState&, std::span<const double> U) const;
 
-  /// "EXX at -0.300 m", "EC0Y", "backlash of EXX", "travel difference of EXX at -0.300 m".
+  /// Name of a parameter for messages: "EXX at -0.300 m", "EC0Y", "backlash of EXX", "travel
+  /// difference of EXX at -0.300 m".
   [[nodiscard]] std::string label(std::size_t parameter) const;
 
  private:

@@ -107,7 +107,7 @@ struct TouchedArtefact {
 /// approximate outward directions of the block faces. Ball radii are the fitted radii minus the tip
 /// radius. Uncertainties are computed from the residuals of the fits. Four touches of a ball or
 /// three of a block have no residuals: `u_touch_m`, the standard uncertainty of a touch, is then
-/// used instead. TooFewObservations if it is needed and missing.
+/// used instead. TooFewObservations if `u_touch_m` is needed but not given.
 [[nodiscard]] Result<Calibrator> precalibrated(std::string name, std::span<const Touch>,
                                                double tip_radius_m,
                                                const std::array<Vector3, 2>& outward,

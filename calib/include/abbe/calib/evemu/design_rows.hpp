@@ -22,8 +22,8 @@ namespace abbe::calib::evemu {
 /// Observations::seen. With Touches the three rotations of V about Ball1 are not observable.
 enum class RowsFrom { Centres, Touches };
 
-/// Design rows of the observations, 3 rows.size() x design.size(). The rows of Ball1 state that V
-/// (or D) is 0 there.
+/// Design rows of the observations, 3 rows.size() x design.size(). With the observed error zero,
+/// the rows of Ball1 state that V (RowsFrom::Centres) or D (RowsFrom::Touches) is 0 at Ball1.
 [[nodiscard]] Eigen::MatrixXd design_rows(const Observations&, const ScaledDesign&, RowsFrom);
 /// design_rows() relative to Ball1 of the position, as the observed errors are. The rows of Ball1
 /// state that V = 0 at the mean reading of Ball1. If they stated V = 0 at every single reading, the

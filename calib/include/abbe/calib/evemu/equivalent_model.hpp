@@ -45,7 +45,8 @@ class EquivalentModel {
   }  ///< names of K
   [[nodiscard]] const Eigen::MatrixXd& W() const { return W_; }
   [[nodiscard]] std::span<const Share> shares(std::size_t column) const { return shares_[column]; }
-  /// 3 x size(). Its columns span 20 orders of magnitude: use ScaledDesign for computations.
+  /// The matrix X at the reading p, 3 x size(). The sizes of its columns span 20 orders of
+  /// magnitude: use ScaledDesign for computations.
   [[nodiscard]] Eigen::Matrix3Xd X(const Vector3& p_mm) const;
 
  private:

@@ -69,7 +69,8 @@ struct Alternative {
   Comparison comparison = Comparison::Made;  ///< unless Made, the figures are NaN
 };
 
-/// Root mean squares over the balls, without the best-fit rigid motion.
+/// Size of the correction by a model and of its uncertainty: root mean squares over the balls,
+/// without the best-fit rigid motion.
 struct CorrectionSize {
   double V_m = 0.0;
   double u_m = 0.0;  ///< standard uncertainty of V: root of the trace

@@ -1,5 +1,6 @@
 #pragma once
-/// The linear algebra of the Bayesian estimators, independent of the meaning of the numbers:
+/// The linear algebra of the Bayesian estimators: likelihood and posterior of the linear model with
+/// observations y, unknowns b and omega, and noise n
 ///     y = X b + S omega + n,
 ///     b ~ N(0, diag v),  omega ~ N(0, w^2 I),  n ~ N(0, s^2 I)  after whitening.
 /// One QR decomposition of [X S] reduces the cost of each evaluation of the marginal likelihood,
@@ -22,8 +23,9 @@ class LinearGaussian {
 
   struct Evidence {
     /// Natural logarithm of the marginal likelihood of y. Minus infinity, with derivatives of zero,
-    /// where the covariance of y is not positive definite after rounding (noise 1e-8 of the part
-    /// that comes from the prior). The likelihood is unknown there and is not a maximum.
+    /// if the covariance of y is not positive definite after rounding (if the noise is 1e-8 of the
+    /// part that comes from the prior). The likelihood is then unknown, and a search for its
+    /// maximum leaves such values of prior and noise.
     double log_likelihood = 0.0;
     Eigen::VectorXd by_log_prior;  ///< derivative by the logarithm of each column's prior variance
     double by_log_noise = 0.0;     ///< derivative by log s^2
@@ -37,11 +39,12 @@ class LinearGaussian {
     double effective_parameters = 0.0;       ///< trace of d(X b)/dy: degrees of freedom of b
     double effective_pose_parameters = 0.0;  ///< the same for omega
   };
-  /// NaN where the posterior information matrix is not positive definite after rounding.
+  /// All values are NaN if the posterior information matrix is not positive definite after
+  /// rounding.
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
   /// The posterior mean for each column of `rows` (whitened) in place of y: the mean is linear in
-  /// y. NaN where the posterior information matrix is not positive definite after rounding.
+  /// y. NaN if the posterior information matrix is not positive definite after rounding.
   [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance,
                                          const Eigen::MatrixXd& rows) const;
 

@@ -41,7 +41,7 @@ class EvemuModel {
   /// V and its covariance; takes well below a microsecond in an optimised build. No allocation.
   void V_and_cov_at(const Vector3& reading_m, Vector3& V_m, Matrix3& cov_m2) const;
 
-  /// In the order of the equivalent model's names.
+  /// The coefficients of the equivalent model (equivalent_model.hpp), in the order of its names.
   [[nodiscard]] std::vector<NamedCoefficient> named_coefficients() const;
 
  private:

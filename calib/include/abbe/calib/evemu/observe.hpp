@@ -46,18 +46,21 @@ struct ObserveOptions {
   /// A sphere has 4 unknowns; a fifth point is redundant and reveals a wrong touch.
   std::size_t least_points_per_ball = 5;
   std::size_t least_points_per_block = 4;
-  /// Largest difference between fitted radius and calibrated radius + tip. Machine errors near 3 mm
-  /// change the radius by 0.04 mm; the next size of precision ball differs by 1 mm or more.
+  /// Largest difference between fitted radius and calibrated radius + tip radius. Machine errors of
+  /// about 3 mm change the radius by 0.04 mm; the next size of precision ball differs by 1 mm or
+  /// more.
   double max_radius_mismatch_m = 0.2e-3;
-  /// Largest difference of a ball centre from the calibrator's after the best-fit rigid motion:
-  /// machine errors near 3 mm leave 0.5 mm.
+  /// Largest distance between a measured and the calibrated ball centre after the best-fit rigid
+  /// motion of all balls. Machine errors of about 3 mm leave distances of 0.5 mm.
   double max_shape_mismatch_m = 3e-3;
-  /// Largest angle between measured and calibrated normal of a block, after the same rigid motion.
+  /// Largest angle between measured and calibrated normal of a block, after the best-fit rigid
+  /// motion of all balls.
   double max_block_tilt_rad = 0.05;
   /// Largest distance of a reading of Ball1 from the mean of its readings. Ball1 stays in place
   /// while the artefact is turned about it, because V is relative to Ball1.
   double max_ball1_shift_m = 1e-3;
-  /// Smallest rotation between two positions; with a smaller one they count as the same position.
+  /// Smallest rotation between two positions of the array. Positions that differ by a smaller
+  /// rotation count as one position.
   double least_turn_rad = 2e-3;
   /// Largest distance of a touch from the surface of its feature. Machine errors near 3 mm deform a
   /// sphere by 0.4 mm.

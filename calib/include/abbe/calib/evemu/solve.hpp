@@ -67,7 +67,7 @@ struct SparseChoice {
   std::vector<double> lambda;  ///< the path down to the chosen lambda, which is the last [mm]
   double gamma = 3.7;
   std::vector<double> all_lambda, all_gamma;
-  /// Mean squared held-out error, all_lambda x all_gamma; NaN: not reached.
+  /// Mean squared held-out error, all_lambda x all_gamma; NaN: a path ended before this lambda.
   Eigen::MatrixXd error_mm2;
   /// Smallest eigenvalue of sparse::convexity at the chosen lambda and gamma; if negative, the
   /// objective may have other minima near the solution.
@@ -170,7 +170,8 @@ struct Solution {
 /// DegenerateGeometry if the balls enclose no volume.
 [[nodiscard]] Result<Solution> solve(const Observations&, const SolveOptions& = {});
 
-/// V known independently at some readings in the machine's directions, up to a common translation.
+/// V at some readings, measured by another instrument whose axes are parallel to those of the
+/// machine. A constant vector that is common to all readings may be unknown.
 struct RotationReference {
   /// `position` and `ball` are ignored; >= 3 points in the hull, not on a line.
   std::span<const BallError> points;

@@ -1,6 +1,7 @@
 #pragma once
-/// Least-squares plane by total least squares: the direction of the smallest singular value of the
-/// centred points. Covariance: equal, independent noise along the normal, sigma from the residuals.
+/// Plane by total least squares: the normal is the direction of the smallest singular value of the
+/// centred points. The covariance assumes equal, independent noise of the points along the normal,
+/// with a standard deviation computed from the residuals.
 
 #include <optional>
 #include <span>

@@ -1,6 +1,7 @@
 #pragma once
 /// Least-squares sphere: minimises sum (|p_i - c| - r)^2 by Gauss-Newton from the algebraic fit.
-/// Covariance: equal, independent noise of the points along the normal, sigma from the residuals.
+/// The covariance assumes equal, independent noise of the points along the normal, with a standard
+/// deviation computed from the residuals.
 
 #include <optional>
 #include <span>

@@ -107,8 +107,8 @@ struct Options {
   double max_alignment_distance_m = 3e-3;
   /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
   double max_length_mismatch = 0.05;
-  /// Gauge weight relative to trace(H)/trace(K^T K). Any positive value gives the same solution
-  /// (minimal constraints).
+  /// Weight of the gauge conditions in the adjustment (DatumOptions::weight). Any positive value
+  /// gives the same solution (minimal constraints).
   double gauge_weight = 1.0;
   /// Number of folds of the cross-validation; the observations are assigned to folds by leg.
   std::size_t held_out_folds = 5;

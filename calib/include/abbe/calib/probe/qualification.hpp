@@ -25,10 +25,10 @@ struct QualifyingTouch {
 struct QualificationOptions {
   double sphere_radius_m = 12.5e-3;  ///< certified
   double u_sphere_radius_m = 0.0;
-  /// Limit for the condition number of the Jacobian with columns of unit length. Above it the
-  /// touches cover too little of the sphere to distinguish lobing from the centre. Condition of
-  /// evenly distributed touches: down to the equator 74; to 0.3 rad below it 18; to 0.3 rad above
-  /// it 369.
+  /// Limit for the condition number of the Jacobian with columns of unit length. Above this limit
+  /// the touches cover too little of the sphere to distinguish lobing from the centre. Condition
+  /// numbers for touches evenly distributed from the pole to a latitude: to the equator 74, to 0.3
+  /// rad below the equator 18, to 0.3 rad above it 369.
   double max_condition = 300.0;
 };
 
@@ -53,7 +53,7 @@ class LobingMap {
   [[nodiscard]] EffectiveRadius at(const Vector3& normal) const;
   [[nodiscard]] const Terms& terms_m() const { return terms_m_; }
   [[nodiscard]] const Covariance& covariance_m2() const { return covariance_m2_; }
-  /// Y_0 ... Y_12 at a unit vector; Y_0 = 1.
+  /// Values of the harmonic polynomials Y_0 ... Y_12 at a unit vector; Y_0 = 1.
   [[nodiscard]] static Terms basis(const Vector3& unit);
 
  private:

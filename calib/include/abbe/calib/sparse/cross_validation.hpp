@@ -28,7 +28,7 @@ void serial_for(std::size_t count, const std::function<void(std::size_t)>& task)
 
 struct CrossValidation {
   Path path;  ///< regularisation path, fitted to all rows
-  /// Mean squared held-out error, unit of y squared, lambda.size(); NaN: missing.
+  /// Mean squared held-out error for each lambda, unit of y squared; NaN: missing.
   Eigen::VectorXd error;
   /// Standard error of `error`, with rows taken as independent (too small when rows share noise).
   Eigen::VectorXd standard_error;
@@ -37,7 +37,8 @@ struct CrossValidation {
 };
 
 /// Errors of fit_path, also for the training rows of every fold (TooFewObservations names the
-/// fold); BadInput if `folds` does not match the rows; NotConverged if no cell was reached.
+/// fold); BadInput if `folds` does not match the rows; NotConverged if the error is missing for
+/// every lambda.
 [[nodiscard]] Result<CrossValidation> cross_validate(const Eigen::MatrixXd& X,
                                                      const Eigen::VectorXd& y, const Penalty&,
                                                      const Folds&, const PathOptions& = {},

@@ -10,8 +10,9 @@
 
 namespace abbe::calib::sparse {
 
-/// Largest violation, in units of y, of the conditions at a stationary point b of the standardised
-/// problem, with g_j = x_j' (y - X b) / n:
+/// Largest violation, in units of y, of the conditions that a stationary point b of the
+/// standardised problem satisfies. With column x_j of X, n rows, penalty p and g_j = x_j' (y - X b)
+/// / n they are
 ///     |g_j| <= lambda                where b_j = 0,
 ///     g_j = sgn(b_j) p'(|b_j|)       elsewhere.
 /// `b` has one coefficient for each column of X, as Path::standardised; columns that do not vary
@@ -20,14 +21,14 @@ namespace abbe::calib::sparse {
 [[nodiscard]] Result<double> kkt_violation(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                            const Penalty&, double lambda, const Eigen::VectorXd& b);
 
-/// Objective 1/(2n) |y - X b|^2 + sum p(|b_j|) of the standardised problem.
+/// Objective 1/(2n) |y - X b|^2 + sum p(|b_j|) of the standardised problem with n rows, p: penalty.
 [[nodiscard]] Result<double> objective(const Eigen::MatrixXd& X, const Eigen::VectorXd& y,
                                        const Penalty&, double lambda, const Eigen::VectorXd& b);
 
-/// The convexity diagnostic of [Breheny 2011]: smallest eigenvalue of X_U' X_U / n - concavity * I
-/// over the union U of the supports of neighbouring solutions k and k + 1 (for the last solution:
-/// its own support). Negative: the objective is not convex there and other minima may be near.
-/// Infinite where U is empty.
+/// The convexity diagnostic of [Breheny 2011] for every solution k of a path: smallest eigenvalue
+/// of X_U' X_U / n - concavity * I. X_U: the columns of X with a nonzero coefficient in solution k
+/// or k + 1 (for the last solution: in this solution). If negative, the objective is not convex
+/// around the solution, and other minima may be near. Infinite if X_U has no columns.
 struct Convexity {
   Eigen::VectorXd smallest_eigenvalue;          ///< of each reached lambda of the path
   std::optional<Eigen::Index> first_nonconvex;  ///< index of lambda; nullopt: convex everywhere

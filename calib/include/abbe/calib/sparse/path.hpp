@@ -33,13 +33,15 @@ struct PathOptions {
   std::vector<double> lambda{};
   double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
   long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
-  /// The path ends after a lambda with more nonzero coefficients; nullopt: no limit.
+  /// The path ends after the first lambda with more nonzero coefficients than this; nullopt: no
+  /// limit.
   std::optional<Eigen::Index> max_nonzero{};
 };
 
-/// `count` values equally spaced in the logarithm, from lambda_max = max_j |x_j' y| / n, the
-/// smallest lambda with an empty solution, down to `ratio` times lambda_max; ratio defaults to
-/// 0.001 for n > p, else 0.05. Errors as fit_path.
+/// `count` values equally spaced in the logarithm, from lambda_max down to `ratio` times
+/// lambda_max. lambda_max = max_j |x_j' y| / n is the smallest lambda for which all coefficients
+/// are zero; x_j: standardised columns. `ratio` defaults to 0.001 for n > p (n rows, p columns),
+/// else 0.05. Errors as fit_path.
 [[nodiscard]] Result<std::vector<double>> default_lambda(const Eigen::MatrixXd& X,
                                                          const Eigen::VectorXd& y, int count = 100,
                                                          std::optional<double> ratio = {});

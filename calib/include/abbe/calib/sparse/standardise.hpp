@@ -9,8 +9,8 @@
 
 namespace abbe::calib::sparse {
 
-/// Columns whose root mean square about the mean is at most this are dropped: their coefficient is
-/// 0.
+/// Columns whose root mean square deviation from their mean is at most this are dropped: their
+/// coefficient is 0.
 inline constexpr double kConstantColumn = 1e-6;
 
 struct Standardised {

@@ -56,9 +56,9 @@ struct Comparison {
   std::optional<Vector3> origin_m;
   Vector3 step_m = Vector3::Zero();
   double least_distance_m = 0.0;
-  /// Indices of the measured points inside the validity volume, and the residual errors at them:
-  /// without compensation, and with the model. From each of the two, its own best-fit rigid motion
-  /// is removed.
+  /// Indices of the measured points inside the validity volume, and the residual errors at these
+  /// points without compensation (`before`) and with the model (`after`). From the errors before
+  /// and from those after, the best-fit rigid motion of each is removed.
   std::vector<std::size_t> inside;
   std::vector<Vector3> residual_before_m, residual_after_m;
   VectorStatistics before, after;
@@ -72,7 +72,8 @@ struct Comparison {
   RatioStatistics R_stated, R_turned;
 };
 
-/// Effect of the model at the measured points inside its validity volume.
+/// Effect of the model on the residual errors at the measured points inside its validity volume.
+/// NotSeen: the effect is not significant.
 enum class Effect { Better, NotSeen, Worse };
 
 /// Compares the mean over the points of |residual_before_m|^2 - |residual_after_m|^2 with three

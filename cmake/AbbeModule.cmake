@@ -37,8 +37,8 @@ add_compile_options(${abbe_observing_options})
 # place of the data in memory and the size of the caches; and multiplication and addition are not
 # fused.
 add_compile_options(-ffp-contract=off)
-# The preset "campaign" sets this OFF. It also turns warnings off, because GCC 12 gives false
-# warnings for its own AVX-512 headers.
+# The preset "campaign" sets ABBE_SAME_BITS to OFF. The preset also turns warnings off, because GCC
+# 12 gives false warnings for its own AVX-512 headers.
 option(ABBE_SAME_BITS "Eigen without vectors: the same bits on every processor" ON)
 function(abbe_same_bits target)
   if(NOT ABBE_SAME_BITS)

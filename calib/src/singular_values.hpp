@@ -1,6 +1,6 @@
 #pragma once
-/// Singular values of a matrix. They have a source file of their own so that the decomposition, the
-/// largest template of this module, is compiled only once.
+/// Singular values of a matrix. The function has a source file of its own so that the
+/// decomposition, the largest template of this module, is compiled only once.
 
 #include <Eigen/Core>
 

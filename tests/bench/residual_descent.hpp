@@ -1,9 +1,8 @@
 #pragma once
 /// The reference implementation with which bench_sparse_grid compares: SCAD paths by coordinate
-/// descent that updates the residual after each coefficient, one path after the other, in loops
-/// without vector instructions of our own. Standardisation, warm starts, strong and
-/// active sets, stopping rule and budget are those of abbe::calib::sparse, so that every sweep
-/// count can be compared.
+/// descent that updates the residual after each coefficient, one path after the other, in plain
+/// loops. Standardisation, warm starts, strong and active sets, stopping rule and budget are those
+/// of abbe::calib::sparse, so that every sweep count can be compared.
 
 #include <Eigen/Core>
 #include <algorithm>

@@ -8,8 +8,9 @@ namespace abbe::calib::evemu {
 namespace {
 
 /// Column j: change of a face's fitted normal if the touched points are displaced by function j of
-/// the design. It is caused by the slope of the displacement along the normal, and by displacements
-/// along the face of points that do not lie in the fitted plane (a curved V deforms the face).
+/// the design. The slope of the displacement along the normal changes the normal, and so do
+/// displacements along the face of points that do not lie in the fitted plane (a curved V deforms
+/// the face).
 Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3> points_m,
                                const ScaledDesign& design) {
   Matrix3 spread = Matrix3::Zero();

@@ -10,7 +10,8 @@
 namespace abbe::calib::evemu {
 namespace {
 
-/// One row of W with the terms of A from which it was formed.
+/// One row of W (equivalent_model.hpp), and the components and monomials of A from which it was
+/// formed.
 struct CombinedRow {
   Eigen::RowVectorXd w;
   std::vector<Share> shares;  ///< component = row of A

@@ -43,8 +43,9 @@ struct Fit {
 [[nodiscard]] FitProblem problem_of(const Observations&, const ScaledDesign&, const SolveOptions&);
 [[nodiscard]] Result<Fit> fit_with(const FitProblem&, const SolveOptions&);
 
-/// Enlarges the covariance of a bayes-pose fit until the uncertainty covers the estimates of all
-/// comparable_parameters(). Returns the largest rms difference of V over the balls [m].
+/// Enlarges the covariance of a fit of the estimator bayes-pose until the uncertainty covers the
+/// estimates with all comparable_parameters(). Returns the largest rms difference of V over the
+/// balls [m].
 double cover_comparable(Fit&, const FitProblem&);
 
 [[nodiscard]] Result<Fit> fit_ols(const FitProblem&);

@@ -363,9 +363,10 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   return {};
 }
 
-/// The alternative for a finding in the touches. Its effect is subtracted from the observed errors;
-/// the more significant the finding, the better the size of the effect is known. A finding of
-/// scatter has no known effect: bias_m stays NaN, and the alternative refuses the model.
+/// The alternative for a finding in the touches. The effect of the finding is subtracted from the
+/// observed errors, and the estimate is repeated; the more significant the finding, the better the
+/// size of its effect is known. A finding of scatter has no known effect: bias_m stays NaN, and the
+/// model is refused.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   // Smallest relative uncertainty of the effect: the real surface differs from the fitted one.

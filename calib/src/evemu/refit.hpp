@@ -9,7 +9,7 @@
 
 namespace abbe::calib::evemu {
 
-/// As most_likely() for bayes-pose, from one starting point.
+/// most_likely() for PriorKind::BayesPose, from one starting point.
 [[nodiscard]] Result<HyperParameters> most_likely_near(const HyperParameters& start,
                                                        const ScaledDesign&, std::size_t positions,
                                                        const LinearGaussian& problem,

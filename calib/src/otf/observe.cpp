@@ -118,7 +118,7 @@ double travel_per_block_m(const BlockSeries& series) {
   return *middle;
 }
 
-/// BadInput if the travel of a block is longer than twice the corner exclusion: such a block could
+/// BadInput if the travel of a block is longer than twice Options::corner_m: a block so long could
 /// extend over a corner and still be used.
 Result<void> check_travel(const BlockSeries& series, const Options& options) {
   const double travel_m = travel_per_block_m(series), most_m = 2.0 * options.corner_m;

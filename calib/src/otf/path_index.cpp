@@ -12,7 +12,7 @@ constexpr std::size_t kLegsInLeaf = 8;
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
 /// Reduces a computed distance to a box so that rounding cannot make it larger than the distance to
-/// a leg in the box. Its rounding error is below 1e-12 of the travel of any machine.
+/// a leg in the box. The rounding error of the distance is below 1e-12 m for any machine's travel.
 double rounded_down(double off_m) {
   return off_m * (1.0 - 1e-9) - 1e-12;
 }

@@ -46,9 +46,9 @@ System system_at(std::span<const QualifyingTouch> touches, const Unknowns& x,
     const Vector3 unit = d.normalized();
     const LobingMap::Terms Y = LobingMap::basis(unit);
     s.r[i] = d.norm() - sphere_radius_m - Y.dot(x.tail<LobingMap::kTerms>());
-    // A change of the centre also changes the direction `unit` and so the lobing. This is
-    // neglected: it is lobing divided by the radius, 1e-4 of `unit`, and Gauss-Newton converges
-    // without it.
+    // A change of the centre also changes the direction `unit`, and so the lobing. The Jacobian
+    // neglects this effect, which is lobing divided by the radius, 1e-4 of `unit`; Gauss-Newton
+    // converges without it.
     s.J.row(i).head<3>() = unit.transpose();
     s.J.row(i).tail<LobingMap::kTerms>() = Y.transpose();
   }

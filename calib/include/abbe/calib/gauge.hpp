@@ -11,9 +11,10 @@
 /// - rotations: 0 at the reference position.
 /// Squareness and the rigid unknowns have no condition.
 ///
-/// A model from a ball array ([Li OMM]) states V relative to Ball1: V = 0 there. Its rotation about
-/// Ball1 is either that of the blocks of the artefact as the machine measured them (Ball1Blocks),
-/// or known from another source (Ball1). Neither gauge has conditions on tables.
+/// A model from a ball array ([Li OMM]) has V = 0 at the centre of ball 1 (Ball1). The rotation of
+/// V about Ball1 is either that of the blocks of the artefact as the machine measured them (gauge
+/// Ball1Blocks), or was measured by another instrument (gauge Ball1). Neither gauge has conditions
+/// on tables.
 
 #include <Eigen/Core>
 #include <span>

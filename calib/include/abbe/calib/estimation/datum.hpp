@@ -41,7 +41,8 @@ struct DatumOptions {
   /// mu of each condition is this weight divided by the squared length of the condition's row of K,
   /// whose columns are scaled as those of R to unit length
   double weight = 1.0;
-  /// its R is R_n above: A^T W^2 C W^2 A = R_n^T R_n; null: the weights W are 1/sigma
+  /// Information whose R is R_n with A^T W^2 C W^2 A = R_n^T R_n (A: design, W: weights, C:
+  /// covariance of the observations); null: the weights W are 1/sigma
   const Information* noise = nullptr;
   /// name of an unknown in messages
   std::function<std::string(std::size_t)> label;
@@ -64,7 +65,8 @@ class Datum {
                                                  const DatumOptions& = {}) const;
 
   /// The matrix S of the S-transformation of a solution with another datum to this datum. N: the
-  /// given basis of the combinations that the data leave undetermined, S = I - N (K N)^-1 K,
+  /// given basis of the combinations that the data leave undetermined, K: the conditions of this
+  /// datum, S = I - N (K N)^-1 K,
   ///     U' = S U,   Cov' = S Cov S^T
   /// DegenerateGeometry if the conditions do not fix all combinations of N.
   [[nodiscard]] Result<Eigen::MatrixXd> transformation(const Eigen::MatrixXd& null_space) const;

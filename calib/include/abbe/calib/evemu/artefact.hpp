@@ -3,7 +3,9 @@
 /// [Li OMM] eqs. (11), (12): the uniform coordinate system has its origin in Ball1, z along the
 /// normal of block 1, x along (normal of block 2) x z. Through this system the ball centres of the
 /// artefact's calibration are transformed to a position on the machine: these are the ideal
-/// centres. Ideal centre minus measured centre is the error. Lengths in m.
+/// centres. Ideal centre minus measured centre is the error. Here a position (of the array) is one
+/// of the orientations to which the array is turned about Ball1; a feature is a ball or a block.
+/// Lengths in m.
 
 #include <Eigen/Core>
 #include <array>

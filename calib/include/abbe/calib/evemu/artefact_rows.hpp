@@ -19,10 +19,9 @@ namespace abbe::calib::evemu {
 
 /// Matrix A, 3 rows.size() x n: errors of the array change the errors observed at the balls by
 /// A zeta, zeta ~ N(0, 1). Each column is the effect of one error that is as large as its standard
-/// uncertainty. Order of the columns: x, y, z of every ball;
-/// direction of block 1 along x and y; direction of block 2 along x; length. A quantity with zero
-/// uncertainty has no column. No columns if the errors were given without an array
-/// (observe_errors()).
+/// uncertainty. Order of the columns: x, y, z of every ball; direction of block 1 along x and y;
+/// direction of block 2 along x; length. A quantity with zero uncertainty has no column. No columns
+/// if the errors were given without an array (observe_errors()).
 [[nodiscard]] Eigen::MatrixXd artefact_rows(const Observations&);
 
 }  // namespace abbe::calib::evemu

@@ -3,16 +3,16 @@
 /// alternatives. Most alternatives add a few columns C:
 ///     y = X c + S omega + C d + noise,    d ~ N(0, t^2),  t from 10 to 300 um,
 /// y: observed errors, X c: the model, S omega: random rotations of the array at each position.
-/// Such an alternative is a ball displaced at one position or wrong in the calibrator file, an
-/// array that moved, creeps or is bent, or a machine that drifts. Other alternatives replace X
-/// (another order of the axes, polynomials of one order more) or the noise (slow noise, noise.hpp).
-/// If bayes-pose has estimated slow noise, all alternatives are compared without it. Alternatives
-/// are compared by the marginal likelihood of y with their own hyper-parameters (prior.hpp): the
-/// likelihood ratio to the model alone bounds the probability of a false alarm. Each touch is
-/// compared with the sphere or plane through the other touches of its feature, after the V of the
-/// model is removed. Not detected: every effect that the model follows at all positions alike
-/// (length and temperature of the array, a rotation common to all positions, a drift that is the
-/// same at every position).
+/// With them an alternative describes a ball displaced at one position or wrong in the calibrator
+/// file, an array that moved, creeps or is bent, or a machine that drifts. Other alternatives
+/// replace X (another order of the axes, polynomials of one order more) or the noise (slow noise,
+/// noise.hpp). If the estimator bayes-pose has estimated slow noise, all alternatives are compared
+/// with an estimate without slow noise. Alternatives are compared by the marginal likelihood of y
+/// with their own hyper-parameters (prior.hpp): the likelihood ratio to the model alone bounds the
+/// probability of a false alarm. In addition each touch is compared with the sphere or plane
+/// through the other touches of its feature, after the V of the model is removed. Not detected:
+/// every effect that the model follows at all positions alike (length and temperature of the array,
+/// a rotation common to all positions, a drift that is the same at every position).
 
 #include <functional>
 #include <string>
@@ -24,8 +24,8 @@
 namespace abbe::calib::evemu {
 
 enum class Cause {
-  Touch,  ///< one touch lies off the surface through the other touches of its ball or face
-  Form,   ///< touches of one ball or face scatter more than those of others: it moved, or is dirty
+  Touch,       ///< one touch lies off the surface through the other touches of its ball or face
+  Form,        ///< touches of one ball or face scatter more than those of others (motion, dirt)
   Backlash,    ///< touches depend on the direction of approach
   Ball,        ///< a ball is displaced at one position
   ArrayFile,   ///< the position of a ball in the calibrator file is wrong

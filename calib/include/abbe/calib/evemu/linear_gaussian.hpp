@@ -37,7 +37,7 @@ class LinearGaussian {
     Eigen::VectorXd mean;                    ///< of b and omega
     Eigen::MatrixXd covariance;              ///< of b and omega, columns() x columns()
     double effective_parameters = 0.0;       ///< trace of d(X b)/dy: degrees of freedom of b
-    double effective_pose_parameters = 0.0;  ///< the same for omega
+    double effective_pose_parameters = 0.0;  ///< trace of d(S omega)/dy: freedoms of omega
   };
   /// All values are NaN if the posterior information matrix is not positive definite after
   /// rounding.

@@ -25,8 +25,8 @@ struct NamedCoefficient {
 class EvemuModel {
  public:
   /// BadInput / NotFinite unless c and its covariance have the size of the design and the
-  /// covariance is symmetric without a negative variance. Both are stored unchanged: to get
-  /// V(Ball1) = 0, apply zero_at() first.
+  /// covariance is symmetric without a negative variance. c and covariance are stored unchanged:
+  /// for V(Ball1) = 0 the caller applies zero_at() before.
   [[nodiscard]] static Result<EvemuModel> of(ScaledDesign, const Vector3& ball1_m,
                                              Eigen::VectorXd c_m,
                                              const Eigen::MatrixXd& covariance_m2);

@@ -8,8 +8,8 @@
 ///     V_seen(ball i) = D_i(V) - D_1(V) - Theta_p(V) x (P_i - P_1)
 /// D and Theta are linear in V at the touched points. A rotation common to all positions cancels:
 /// touches cannot detect it ([Li OMM] does not mention this). If the touched points are available,
-/// D and Theta are part of the design (design_rows.hpp); otherwise D_i = V(P_i), and Theta is
-/// treated as noise.
+/// D and Theta are part of the design (design_rows.hpp). If only ball errors are given, D_i is
+/// taken as V(P_i), and Theta is treated as noise.
 
 #include <Eigen/Core>
 #include <cstddef>

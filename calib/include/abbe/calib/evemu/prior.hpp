@@ -58,9 +58,10 @@ struct HyperParameters {
 /// hyper-parameters: about the 95 % interval of one parameter.
 inline constexpr double kComparable = 2.0;
 
-/// Hyper-parameters of bayes-pose that the data hardly distinguish from the most likely ones: each
-/// of s_d, rho, s_a, w is changed in steps of a factor of 2 in both directions, at most 8 times,
-/// and the others are estimated again, until the likelihood is lower by more than e^kComparable.
+/// Hyper-parameters of the estimator bayes-pose that the data hardly distinguish from the most
+/// likely ones: each of s_d, rho, s_a, w is changed in steps of a factor of 2 in both directions,
+/// at most 8 times, and the others are estimated again, until the likelihood is lower by more than
+/// e^kComparable.
 [[nodiscard]] std::vector<HyperParameters> comparable_parameters(const HyperParameters& most_likely,
                                                                  const ScaledDesign&,
                                                                  std::size_t positions,

@@ -12,8 +12,8 @@
 ///                     by cross-validation; covariance by bootstrap (see CovarianceKind)
 ///
 /// Not estimable from touches: a rotation of V about Ball1 common to all positions (observe.hpp).
-/// It is set to the direction of the blocks (gauge Ball1-blocks), and its uncertainty is in the
-/// covariance.
+/// This rotation is set to that of the measured blocks (gauge Ball1-blocks), and its uncertainty is
+/// in the covariance.
 ///
 /// Errors of the array that all positions share (artefact_rows.hpp) are not estimated: the
 /// coefficients c do not depend on their uncertainty. With the hyper-parameters fixed, c is linear
@@ -140,7 +140,7 @@ struct MeanRotation {
   /// mean of the estimated pose rotations.
   Vector3 removed_rad = Vector3::Zero();
   Matrix3 cov_rad2 = Matrix3::Zero();  ///< included in the model's covariance
-  bool referenced = false;             ///< measured otherwise; if not, V is correct in shape only
+  bool referenced = false;  ///< measured by another instrument; else V is correct in shape only
   std::optional<ReferenceFit> reference{};  ///< from with_rotation_reference()
 };
 

@@ -7,9 +7,8 @@
 ///
 /// The alignment removes from the observations a rigid motion that depends on the errors of the
 /// machine; no model contains this motion. Therefore, on each held-out fold, the best-fit rigid
-/// motion (six
-/// parameters, same rows) is removed from the residuals of no compensation, candidate and active
-/// model separately, and the remaining residuals are compared. This also makes the comparison
+/// motion (six parameters, same rows) is removed from the residuals of no compensation, candidate
+/// and active model separately, and the remaining residuals are compared. So the comparison is also
 /// independent of the gauges.
 
 #include "abbe/calib/gate.hpp"

@@ -26,9 +26,10 @@ struct Machine {
   Vector3 target_offset_m = Vector3::Zero();
 };
 
-/// Polyline of the path; a vertex is an axis position (scale readings) in m with an exact stop.
-/// Start, end and centroid must not be on a line: they determine the rough alignment. A leg shorter
-/// than twice the corner exclusion is not used.
+/// Polyline of the path; a vertex is an axis position (scale readings) in m with an exact stop, a
+/// leg is the straight segment between two consecutive vertices. Start, end and centroid of the
+/// path must not be on a line, because they determine the rough alignment. A leg shorter than twice
+/// Options::corner_m is not used.
 struct Path {
   std::vector<Vector3> vertices_m;
 };

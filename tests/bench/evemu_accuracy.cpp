@@ -1,6 +1,6 @@
 // Question: how much of a machine's errors remains after correction with each estimator of the
 // ball-array method, and are the stated uncertainties right? Machine: the weak-stiffness machine of
-// [Li OMM] Table 3 (errors up to 3.3 mm) with the ball positions of the reference data, evaluated
+// [Li OMM] Table 3 (errors of 3.3 mm) with the ball positions of the reference data, evaluated
 // at 2964 points, which include regions without balls in the flatter layout. R_resmag: remaining
 // error divided by the error of the machine. Requirements for the mean R_resmag of bayes-pose
 // relative to that of ols with the same seeds: 8 um white noise: <= 0.80; with 0.15 mrad pose

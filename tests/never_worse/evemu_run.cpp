@@ -148,8 +148,8 @@ void set_ranges(EvemuRun& run) {
   }
 }
 
-/// The calibrator file that a calibration with the uncertainties and errors of `state` gives for
-/// the array.
+/// The calibrator with the dimensions of `array` and the uncertainties of `state`, as a calibration
+/// of the array would state them; the true array (sim::true_array()) differs from it.
 evemu::Calibrator as_stated(const sim::BallArray& array, const sim::ArrayState& state) {
   evemu::Calibrator c;
   c.name = array.name;

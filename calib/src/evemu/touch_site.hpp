@@ -31,8 +31,8 @@ class Site {
   /// faces are copied; may be null. The calibrator and the options must outlive the site.
   Site(const Calibrator&, const GuideOptions&, const Site* before);
 
-  /// The feature on which p lies; nullopt: on no known feature. If p may be on several features, or
-  /// if the place of the feature `expected` is not known yet, p is assigned to `expected`.
+  /// The feature on which p lies; nullopt: on no known feature. If the known places of the features
+  /// do not decide on which feature p lies, the feature `expected` next does.
   [[nodiscard]] std::optional<std::size_t> feature_of(const Vector3& p_m,
                                                       std::size_t expected) const;
   /// Distance to the surface of the nearest ball with a known place, and its index in `ball`;

@@ -144,7 +144,7 @@ std::optional<TouchFinding> form_of_several(const Observations& o,
 /// Column 3 a + m: component m of b_a. An axis that hardly moves on the way to the touch does not
 /// contribute, because its direction of motion is uncertain.
 constexpr Eigen::Index kBacklashes = 9;
-constexpr double kLeastMotion = 0.1;  // component of the unit normal along the axis
+constexpr double kLeastMotion = 0.1;  // least component of the unit normal along the axis
 
 Eigen::MatrixXd along_of_backlash(const FeatureResiduals& f) {
   Eigen::MatrixXd along(f.normals.rows(), kBacklashes);

@@ -148,7 +148,8 @@ PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a,
   const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
   const Vector3 q = a.T_machine_tracker * block.mean_tracker_m - t;
   const Vector3 closest = closest_on_leg(from, to, q).closest_m;
-  // The tracker position in machine coordinates is T.t_m, so that the beam vector is R m.
+  // Measured points are relative to the tracker, so that rotating them to machine coordinates gives
+  // the vector of the beam.
   const Vector3 beam_m = a.T_machine_tracker.R * block.mean_tracker_m;
   return {a.leg[i],
           i,

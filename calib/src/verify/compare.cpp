@@ -112,7 +112,7 @@ std::vector<Vector3> grid_places(const VolumetricModel& model, const evemu::Read
   return places;
 }
 
-/// Grid points with the interpolation weights of the measured points. The last one is the origin,
+/// Grid points with the interpolation weights of the measured points. The last entry is the origin,
 /// if there is an origin.
 struct WeightedPlaces {
   std::vector<Vector3> q_m;

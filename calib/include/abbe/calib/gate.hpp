@@ -87,7 +87,7 @@ struct Verdict {
   std::vector<std::string> notes;  ///< further information, no reason to refuse
   HeldOutFigures held_out;
   double max_error_m = 0.0;   ///< of the candidate, at the points that decide() evaluates
-  double max_gradient = 0.0;  ///< |dV/dq| along an axis, at the same points
+  double max_gradient = 0.0;  ///< |dV/dq| along an axis, at these points
 
   /// Adds a reason: at the end, or before the reason with index `before`.
   void refuse(std::string_view cause, std::string text);

@@ -33,7 +33,7 @@ enum class Cause {
   Creep,       ///< the array moves gradually at every position
   Bent,        ///< the array is bent differently at every position
   Drift,       ///< the machine drifts during the session
-  ChainOrder,  ///< the kinematic order of the axes is another one
+  ChainOrder,  ///< the order of the axes is not that of the configured chain
   Order,       ///< polynomials of one order more
   SlowNoise,   ///< slow noise within positions
   Scatter      ///< more scatter than touches and array explain, without any other cause
@@ -64,8 +64,8 @@ struct Alternative {
   std::string
       text;  ///< what happened, where, how much, what to do; or what was not compared and why
   double log_likelihood = 0.0;  ///< natural logarithm of the likelihood ratio to the model alone
-  double bias_m = 0.0;  ///< rms change of V that it causes over the balls, without rigid motion
-  double u_m = 0.0;     ///< rms standard uncertainty of V if it is true, without rigid motion
+  double bias_m = 0.0;  ///< rms change of V by the alternative over the balls, rigid motion removed
+  double u_m = 0.0;     ///< rms u of V if the alternative is true, rigid motion removed
   Comparison comparison = Comparison::Made;  ///< unless Made, the figures are NaN
 };
 

@@ -136,8 +136,8 @@ struct ReferenceFit {
 /// The rotation about Ball1 that touches cannot detect.
 struct MeanRotation {
   /// Rotation of the estimated V, which was removed so that V has the direction of the blocks. With
-  /// touches the prior alone determines its value; if only ball errors were given, it is the mean of
-  /// the estimated pose rotations.
+  /// touches the prior alone determines its value; if only ball errors were given, it is the mean
+  /// of the estimated pose rotations.
   Vector3 removed_rad = Vector3::Zero();
   Matrix3 cov_rad2 = Matrix3::Zero();  ///< included in the model's covariance
   bool referenced = false;  ///< measured by another instrument; else V is correct in shape only

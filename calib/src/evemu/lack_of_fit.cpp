@@ -193,8 +193,8 @@ Result<Screened> screened(Comparisons& all, const AlternativeColumns& columns, c
   return most;
 }
 
-/// The screen selects the most likely alternative of one cause; a separate fit computes its
-/// likelihood.
+/// `screen` selects the most likely alternative of one cause by a fast estimate; a separate fit
+/// then computes the likelihood of this alternative.
 Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, const Screen& screen,
                           std::span<const Added> family) {
   const Result<Screened> best = screened(all, columns, screen, family);
@@ -369,7 +369,8 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
 /// model is refused.
 Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  // Smallest relative uncertainty of the effect: the real surface differs from the fitted one.
+  // The size of the effect is never known better than to this fraction, because the real surface
+  // differs from the fitted one.
   constexpr double kKnownTo = 0.3;
   Alternative found{f.cause, f.text, f.log_likelihood, kNaN, rows.norm.rms_u_m(base.covariance_m2)};
 

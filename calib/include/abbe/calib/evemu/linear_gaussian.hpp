@@ -24,8 +24,8 @@ class LinearGaussian {
   struct Evidence {
     /// Natural logarithm of the marginal likelihood of y. Minus infinity, with derivatives of zero,
     /// if the covariance of y is not positive definite after rounding (if the noise is 1e-8 of the
-    /// part that comes from the prior). The likelihood is then unknown, and a search for its
-    /// maximum leaves such values of prior and noise.
+    /// part that comes from the prior). The likelihood is then unknown; minus infinity keeps a
+    /// search for the maximum away from such priors.
     double log_likelihood = 0.0;
     Eigen::VectorXd by_log_prior;  ///< derivative by the logarithm of each column's prior variance
     double by_log_noise = 0.0;     ///< derivative by log s^2

@@ -15,9 +15,6 @@ target_compile_options(abbe_warnings INTERFACE
 # Options with which the fuzzer and ThreadSanitizer observe a program. abbe_compile_mathematics()
 # removes them from targets in which they find nothing.
 set(abbe_observing_options "")
-if(ABBE_FUZZ)
-  list(APPEND abbe_observing_options -fsanitize=fuzzer-no-link)
-endif()
 if(ABBE_SANITIZE MATCHES "thread")
   list(APPEND abbe_observing_options -fsanitize=thread -fno-omit-frame-pointer -O1 -g1 -UNDEBUG)
   add_link_options(-fsanitize=thread)
@@ -31,6 +28,11 @@ elseif(ABBE_SANITIZE)
   endif()
 endif()
 add_compile_options(${abbe_observing_options})
+# The fuzzer measures coverage in modules, not in programs and tests.
+if(ABBE_FUZZ)
+  set(abbe_coverage_options -fsanitize=fuzzer-no-link)
+  list(APPEND abbe_observing_options ${abbe_coverage_options})
+endif()
 
 # Identification gives the same bits on every processor: abbe_same_bits() compiles Eigen without
 # vector instructions, so that it sums in one order, independent of the width of the registers, the
@@ -107,5 +109,6 @@ function(abbe_module name)
                                      FILES ${headers})
   target_include_directories(abbe_${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
   target_compile_features(abbe_${name} PUBLIC cxx_std_20)
+  target_compile_options(abbe_${name} PRIVATE ${abbe_coverage_options})
   target_link_libraries(abbe_${name} PRIVATE $<BUILD_INTERFACE:abbe::warnings>)
 endfunction()

@@ -1,18 +1,22 @@
 #include "abbe/calib/evemu/lack_of_fit.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <iterator>
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
+#include <vector>
 
-#include "abbe/calib/evemu/artefact_rows.hpp"
-#include "abbe/calib/evemu/design_rows.hpp"
+#include "abbe/calib/evemu/prior.hpp"
+#include "abbe/calib/kinematic_chain.hpp"
 #include "check_stopped.hpp"
 #include "elementary.hpp"
 #include "evemu/alternative_columns.hpp"
@@ -37,89 +41,6 @@ constexpr double kFalseAlarm = 1e-4;
 constexpr double kFalseAlarmIfLarge = 1e-2;
 constexpr double kLarge = 2.0;
 constexpr double kCauses = 13.0;
-
-/// Whitened rows of a run, and the hyper-parameters of bayes-pose without any alternative.
-struct Rows {
-  const Observations& o;
-  const ScaledDesign& design;
-  std::size_t positions;
-  Eigen::MatrixXd X, S, A;
-  Eigen::VectorXd y;
-  HyperParameters hyper;
-  RigidFreeNorm norm;
-};
-
-Result<Rows> rows_of(const Observations& o, const ScaledDesign& design, const Solution& solution) {
-  const FitProblem problem = problem_of(o, design, {});
-  Rows rows{.o = o,
-            .design = design,
-            .positions = o.positions(),
-            .X = white_rows(o, problem.X),
-            .S = white_rows(o, pose_rotation_rows(o)),
-            .A = white_rows(o, problem.A),
-            .y = white_rows(o, problem.y),
-            .hyper = {},
-            .norm = norm_over_balls(o, design)};
-
-  if (solution.estimator == Estimator::BayesPose && solution.hyper && solution.slow_noise == 0.0) {
-    rows.hyper = *solution.hyper;
-    return rows;
-  }
-
-  const auto hyper = most_likely(PriorKind::BayesPose, design, rows.positions,
-                                 LinearGaussian(rows.X, rows.S, rows.y));
-  if (!hyper) {
-    return tl::unexpected(hyper.error());
-  }
-
-  rows.hyper = *hyper;
-  return rows;
-}
-
-/// Estimate with added columns. The columns of the array's own uncertainty are always added.
-struct Refit {
-  HyperParameters hyper;
-  Eigen::VectorXd c_m, d_m;
-  Eigen::MatrixXd covariance_m2;  ///< of the coefficients c_m
-};
-
-Result<Refit> refit_to(const Eigen::VectorXd& y, const Rows& rows, const ScaledDesign& design,
-                       const Eigen::MatrixXd& X, const Eigen::MatrixXd& C, double size_m) {
-  Eigen::MatrixXd all(X.rows(), X.cols() + rows.A.cols() + C.cols());
-  all << X, rows.A, C;
-  std::vector<double> added(static_cast<std::size_t>(rows.A.cols()), 1.0);
-  added.resize(added.size() + static_cast<std::size_t>(C.cols()), size_m * size_m);
-  const LinearGaussian gaussian(all, rows.S, y);
-  const auto hyper = most_likely_near(rows.hyper, design, rows.positions, gaussian, added);
-
-  if (!hyper) {
-    return tl::unexpected(hyper.error());
-  }
-
-  const Eigen::VectorXd prior = with_added(
-      prior_variances(PriorKind::BayesPose, design, rows.positions, *hyper), design.size(), added);
-  const auto p = gaussian.posterior(prior, hyper->s_m * hyper->s_m);
-
-  if (!p.mean.allFinite() || !p.covariance.allFinite()) {
-    return failure(ErrorCode::NotConverged, message("bayes: no solution at s = ", hyper->s_m,
-                                                    " m, w = ", hyper->w_rad, " rad"));
-  }
-
-  const Eigen::Index n = X.cols();
-  return Refit{*hyper, p.mean.head(n), p.mean.segment(n + rows.A.cols(), C.cols()),
-               p.covariance.topLeftCorner(n, n)};
-}
-
-Result<Refit> refit(const Rows& rows, const ScaledDesign& design, const Eigen::MatrixXd& X,
-                    const Eigen::MatrixXd& C, double size_m) {
-  return refit_to(rows.y, rows, design, X, C, size_m);
-}
-
-/// The estimate with which alternatives are compared: only the columns of the array's uncertainty
-/// are added.
-Result<Refit> base_of(const Rows& rows) {
-  return refit(rows, rows.design, rows.X, Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
-}
 
 double threshold(double family, double false_alarm = kFalseAlarm) {
   return natural_logarithm(kCauses * family / false_alarm);
@@ -147,7 +68,7 @@ Alternative impossible(Cause cause, std::string text) {
 
 /// Input and results of the comparisons.
 struct Comparisons {
-  const Rows& rows;
+  const RunRows& rows;
   const Refit& base;
   const Watch& watch;
   std::vector<Alternative> found{}, not_made{};
@@ -206,7 +127,7 @@ Result<void> compare_with(Comparisons& all, const AlternativeColumns& columns, c
     return {};
   }
 
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   const Added& added = *best->best;
   const auto with =
       refit(rows, rows.design, rows.X, white_rows(rows.o, columns.of(added)), best->gain.size_m);
@@ -235,7 +156,7 @@ void compare_with_design(Comparisons& all, const Result<ScaledDesign>& design, C
     return;
   }
 
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   const FitProblem problem = problem_of(rows.o, *design, {});
   const auto with =
       refit(rows, *design, white_rows(rows.o, problem.X), Eigen::MatrixXd(rows.X.rows(), 0), 1.0);
@@ -287,7 +208,7 @@ void keep_the_most_likely(std::vector<Alternative>& found, std::size_t from) {
 }
 
 Result<void> compare_orders_of_axes(Comparisons& all) {
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   const std::string used = letters(rows.o.machine.chain);
   const std::size_t before = all.found.size();
   std::string order = "XYZ";
@@ -313,7 +234,7 @@ Result<void> compare_orders_of_axes(Comparisons& all) {
 }
 
 Result<void> compare_higher_order(Comparisons& all) {
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   if (Result<void> goes_on = check_stopped(all.watch.stopped); !goes_on) {
     return goes_on;
   }
@@ -329,7 +250,7 @@ Result<void> compare_higher_order(Comparisons& all) {
 /// Compares with slow noise, for estimators that do not model it. For bayes-pose solve() has made
 /// this comparison.
 Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   if (solution.estimator == Estimator::BayesPose || rows.o.seen.empty()) {
     return {};
   }
@@ -346,8 +267,8 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
   }
 
   const Observations o = with_slow_noise(rows.o, slow->per_s);
-  const auto with = rows_of(o, rows.design, solution);
-  const auto fit = with.and_then([](const Rows& r) { return base_of(r); });
+  const auto with = run_rows(o, rows.design, solution);
+  const auto fit = with.and_then([](const RunRows& r) { return base_refit(r); });
 
   if (!fit) {
     all.add(not_compared(Cause::SlowNoise, "", fit.error().text));
@@ -367,7 +288,7 @@ Result<void> compare_slow_noise(Comparisons& all, const Solution& solution) {
 /// observed errors, and the estimate is repeated; the more significant the finding, the better the
 /// size of its effect is known. A finding of scatter has no known effect: bias_m stays NaN, and the
 /// model is refused.
-Alternative compared_touch(const Rows& rows, const Refit& base, const TouchFinding& f) {
+Alternative compared_touch(const RunRows& rows, const Refit& base, const TouchFinding& f) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   // The size of the effect is never known better than to this fraction, because the real surface
   // differs from the fitted one.
@@ -415,7 +336,7 @@ Result<void> compare_touches(Comparisons& all, const TouchResiduals& touches) {
 
 Result<void> compare_all(Comparisons& all, const Solution& solution) {
   const AlternativeColumns columns(all.rows.o);
-  const Rows& rows = all.rows;
+  const RunRows& rows = all.rows;
   const Screen screen(
       rows.X, rows.S, rows.A, rows.y,
       prior_variances(PriorKind::BayesPose, rows.design, rows.positions, rows.hyper),
@@ -450,7 +371,7 @@ Result<void> compare_all(Comparisons& all, const Solution& solution) {
 }
 
 /// The alternative that the ball centres scatter more than touches and array explain.
-std::optional<Alternative> unexplained_scatter(const Rows& rows, const Refit& base,
+std::optional<Alternative> unexplained_scatter(const RunRows& rows, const Refit& base,
                                                const TouchResiduals& touches) {
   constexpr double kSuspicious = 2.0;
   const double s_m = base.hyper.s_m;
@@ -517,8 +438,8 @@ Result<std::vector<Alternative>> alternatives(const Observations& observations,
     return tl::unexpected(design.error());
   }
 
-  const auto rows = rows_of(o, *design, solution);
-  const auto base = rows.and_then([](const Rows& r) { return base_of(r); });
+  const auto rows = run_rows(o, *design, solution);
+  const auto base = rows.and_then([](const RunRows& r) { return base_refit(r); });
   if (!base) {
     return failure(base.error().code,
                    message("lack of fit of the estimate itself: ", base.error().text));

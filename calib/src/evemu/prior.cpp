@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "elementary.hpp"
-#include "evemu/refit.hpp"
+#include "evemu/most_likely_near.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "evemu/fit_coefficients.hpp"
-#include "evemu/refit.hpp"
+#include "evemu/most_likely_near.hpp"
 #include "message.hpp"
 #include "units.hpp"
 

@@ -1,33 +1,36 @@
 #include <fmt/format.h>
 
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "abbe/base/input_file.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/evemu/document.hpp"
-#include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/report.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/replay/replay.hpp"
-#include "abbe/tables/evemu_files.hpp"
-#include "abbe/tables/touches_not_seen.hpp"
-#include "abbe/tables/travel_faults.hpp"
 #include "commands.hpp"
+#include "evemu_input.hpp"
 #include "identified_model.hpp"
-#include "opened_recording.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
@@ -38,25 +41,10 @@ namespace {
 namespace evemu = calib::evemu;
 
 struct IdentifyEvemuArguments {
-  std::string machine, touches, calibrator, errors, recording, reference, keep, out;
-  // without a value: that of [evemu]
-  std::optional<std::string> estimator, folds;
-  std::optional<int> order, positions;
-  std::optional<double> artefact_C;
-  double u_artefact_K = 0.0;
-  double u_reference_um = 1.0;
-  bool rotation_known = false, scales_corrected = false, accept_shape_only = false, json = false;
-};
-
-/// The measured data, from files or from a recording.
-struct Input {
-  Config config;
-  std::vector<InputFile> sources;
-  evemu::Observations observations;
-  std::optional<RotationPoints> reference;
-  /// refuses the model if the recording is damaged
-  std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
-  std::string recording_gap{};
+  EvemuInputArguments input;
+  std::string keep, out;
+  std::optional<std::string> estimator, folds;  // without a value: that of [evemu]
+  bool accept_shape_only = false, json = false;
 };
 
 struct Outcome {
@@ -67,204 +55,6 @@ struct Outcome {
   calib::Verdict verdict;
   std::string recording_gap;
 };
-
-/// From the option, else the fixed temperature of [evemu]; the values of a sensor are in no file.
-std::optional<evemu::ArtefactTemperature> artefact_temperature(
-    const IdentifyEvemuArguments& arguments, const EvemuConfig& config) {
-  if (arguments.artefact_C)
-    return evemu::ArtefactTemperature{*arguments.artefact_C + kZeroCelsius_K,
-                                      arguments.u_artefact_K};
-  if (config.artefact && !config.artefact->sensor)
-    return evemu::ArtefactTemperature{config.artefact->fixed_K, config.artefact->u_temperature_K};
-  return std::nullopt;
-}
-
-/// A message if the configuration gives the artefact's temperature by a sensor, but the input is a
-/// file of touches, which has no sensor values. Empty otherwise.
-std::string missing_sensor(const IdentifyEvemuArguments& arguments, const Config& config) {
-  const auto& artefact = config.evemu.artefact;
-  if (arguments.touches.empty() || arguments.artefact_C || !artefact || !artefact->sensor)
-    return {};
-  return fmt::format("[evemu] artefact_sensor \"{}\" is in no file of touches",
-                     config.temperatures[*artefact->sensor]);
-}
-
-Result<void> check_artefact(const IdentifyEvemuArguments& arguments,
-                            const evemu::Calibrator& calibrator, bool temperature_known,
-                            const std::string& missing) {
-  const auto fault = artefact_temperature_fault(
-      calibrator, arguments.calibrator,
-      !temperature_known     ? ""
-      : arguments.artefact_C ? "--artefact-C"
-                             : "[evemu] artefact_C",
-      fmt::format(
-          "{}give --artefact-C and --u-artefact-K (or [evemu] artefact_C and u_artefact_K in {})",
-          missing.empty() ? "" : missing + "; ", arguments.machine));
-  return fault.empty() ? Result<void>{} : fail(ErrorCode::BadInput, fault);
-}
-
-std::vector<calib::Vector3> positions_of(const std::vector<evemu::Touch>& touches) {
-  std::vector<calib::Vector3> out;
-  for (const evemu::Touch& touch : touches) out.push_back(touch.p_m);
-  return out;
-}
-
-std::vector<calib::Vector3> positions_of(const std::vector<evemu::BallError>& errors) {
-  std::vector<calib::Vector3> out;
-  for (const evemu::BallError& error : errors) out.push_back(error.reading_m);
-  return out;
-}
-
-tl::unexpected<Error> in_file(const std::string& file, const calib::Error& error) {
-  Error out = error_of(error);
-  out.text = fmt::format("{}: {}", file, out.text);
-  return tl::unexpected(std::move(out));
-}
-
-Result<void> observe_touches(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
-                             const evemu::ObserveOptions& options, Input& input) {
-  const auto calibrator = read_calibrator_toml(arguments.calibrator);
-  if (!calibrator) return tl::make_unexpected(calibrator.error());
-  if (auto valid = check_artefact(arguments, calibrator->calibrator,
-                                  options.artefact_temperature.has_value(),
-                                  missing_sensor(arguments, input.config));
-      !valid)
-    return valid;
-
-  const auto touches = read_touches_csv(arguments.touches);
-  if (!touches) return tl::make_unexpected(touches.error());
-  if (auto inside = check_travel(arguments.touches, positions_of(touches->touches), touches->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
-
-  input.sources.insert(input.sources.end(), {touches->source, calibrator->source});
-  auto observed = evemu::observe(touches->touches, calibrator->calibrator, machine, options);
-  if (!observed)
-    return in_file(arguments.touches + line_not_seen(*touches, calibrator->calibrator, options),
-                   observed.error());
-  input.observations = std::move(*observed);
-
-  return {};
-}
-
-Result<void> observe_errors(const IdentifyEvemuArguments& arguments, const evemu::Machine& machine,
-                            const evemu::ObserveOptions& options, Input& input) {
-  const auto errors = read_errors_csv(arguments.errors);
-  if (!errors) return tl::make_unexpected(errors.error());
-  if (auto inside = check_travel(arguments.errors, positions_of(errors->errors), errors->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
-
-  input.sources.push_back(errors->source);
-  const auto rotation =
-      arguments.rotation_known ? evemu::RotationOrigin::Independent : evemu::RotationOrigin::Blocks;
-  auto observed = evemu::observe_errors(errors->errors, machine, rotation, options);
-  if (!observed) return in_file(arguments.errors, observed.error());
-  input.observations = std::move(*observed);
-
-  return {};
-}
-
-evemu::ObserveOptions observe_options(const IdentifyEvemuArguments& arguments,
-                                      const EvemuConfig& config, std::size_t positions) {
-  evemu::ObserveOptions options;
-  options.order = arguments.order.value_or(config.order);
-  options.positions = arguments.positions.value_or(static_cast<int>(positions));
-  return options;
-}
-
-Result<Input> from_files(const IdentifyEvemuArguments& arguments) {
-  auto config = load_config(arguments.machine);
-  if (!config) return tl::make_unexpected(config.error());
-  const auto hash = sha256_hex_of_file(arguments.machine);
-  if (!hash) return tl::make_unexpected(hash.error());
-  Input input;
-  input.sources.push_back({std::filesystem::path(arguments.machine).filename().string(), *hash});
-
-  const auto* what = arguments.touches.empty() ? "errors" : "touches";
-  if (const auto valid = check_scales("identify evemu", what, *config, arguments.scales_corrected);
-      !valid)
-    return tl::make_unexpected(valid.error());
-  if (const auto given = require_target(config->machine); !given)
-    return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
-  const auto machine = evemu_machine(config->machine);
-  if (!machine) return tl::make_unexpected(machine.error());
-
-  auto options = observe_options(arguments, config->evemu, config->evemu.positions.size());
-  options.artefact_temperature = artefact_temperature(arguments, config->evemu);
-  input.config = std::move(*config);
-  const auto observe = arguments.touches.empty() ? observe_errors : observe_touches;
-  if (const auto observed = observe(arguments, *machine, options, input); !observed)
-    return tl::make_unexpected(observed.error());
-
-  return input;
-}
-
-/// The last run of the recording in which all touches were made.
-Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
-  std::optional<EvemuRun> last;
-  ProgressBar bar;
-  const auto replayed = replay(recording.reader, recording.config,
-                               {.progress = [&bar](double share) { bar.show("replaying", share); },
-                                .runs =
-                                    [&last](CalibrationRun run) {
-                                      if (auto* touched = std::get_if<EvemuRun>(&run))
-                                        last = std::move(*touched);
-                                    }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
-  if (last) return std::move(*last);
-  std::string why = "none was requested";
-  for (const auto& c : replayed->calibrations)
-    if (c.ended.method == "evemu") why = c.ended.reason;
-
-  return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete calibration with a ball array: {}",
-                          recording.source.name, why));
-}
-
-Result<Input> from_recording(const IdentifyEvemuArguments& arguments) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
-  if (!recording) return tl::make_unexpected(recording.error());
-  if (const auto given = require_target(recording->config.machine); !given)
-    return tl::make_unexpected(given.error());
-  const auto machine = evemu_machine(recording->config.machine);
-  if (!machine) return tl::make_unexpected(machine.error());
-
-  const auto run = last_complete_run(*recording);
-  if (!run) return tl::make_unexpected(run.error());
-  auto options =
-      observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());
-  options.artefact_temperature = run->artefact;
-  auto observed = evemu::observe(run->touches, run->asked.calibrator, *machine, options);
-  if (!observed) return tl::make_unexpected(error_of(observed.error()));
-
-  Input input{std::move(recording->config),
-              {recording->source},
-              std::move(*observed),
-              run->asked.reference};
-  const auto entered = inputs_of(*run);
-  input.sources.insert(input.sources.end(), entered.begin(), entered.end());
-  input.recording_gap = recording->reader.damage();
-  input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
-                           calib::Verdict& verdict) { judge_recording(*reader, verdict); };
-
-  return input;
-}
-
-Result<void> read_reference(const IdentifyEvemuArguments& arguments, Input& input) {
-  if (arguments.reference.empty()) return {};
-  const auto points = read_errors_csv(arguments.reference);
-  if (!points) return tl::make_unexpected(points.error());
-  if (auto inside = check_travel(arguments.reference, positions_of(points->errors), points->lines,
-                                 input.config.machine);
-      !inside)
-    return inside;
-  input.sources.push_back(points->source);
-  input.reference = RotationPoints{points->errors, arguments.u_reference_um / kUmPerM};
-  return {};
-}
 
 /// `given` is a keyword, or a file with one fold number for each of the 3 rows of every ball, in
 /// the order of position and ball.
@@ -284,7 +74,8 @@ Result<evemu::SparseOptions> sparse_options(const std::string& given,
   return options;
 }
 
-Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& arguments, Input& input) {
+Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& arguments,
+                                          EvemuInput& input) {
   const Config& config = input.config;
   evemu::JudgeOptions options;
   options.solve.estimator = *evemu::estimator(arguments.estimator.value_or(config.evemu.estimator));
@@ -299,11 +90,11 @@ Result<evemu::JudgeOptions> judge_options(const IdentifyEvemuArguments& argument
 Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
-  auto input = arguments.recording.empty() ? from_files(arguments) : from_recording(arguments);
+  auto input = read_evemu_input(arguments.input);
   if (!input) return tl::make_unexpected(input.error());
   const auto judging = judge_options(arguments, *input);
   if (!judging) return tl::make_unexpected(judging.error());
-  if (const auto read = read_reference(arguments, *input); !read)
+  if (const auto read = read_rotation_reference(arguments.input, *input); !read)
     return tl::make_unexpected(read.error());
 
   auto solution = evemu::solve(input->observations, judging->solve);
@@ -317,7 +108,7 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.add_note(*verdict);
   input->judge_source(*verdict);
-  if (const auto missing = missing_sensor(arguments, input->config); !missing.empty())
+  if (const auto missing = missing_array_sensor(arguments.input, input->config); !missing.empty())
     verdict->notes.push_back(fmt::format(
         "the temperature of the array is not known: {}; give it with --artefact-C", missing));
 
@@ -457,32 +248,33 @@ int run(const IdentifyEvemuArguments& arguments) {
 }
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
+  EvemuInputArguments& input = arguments.input;
   auto* machine =
-      command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml");
+      command.add_option("--machine", input.machine, "machine.toml or the daemon's abbed.toml");
   auto* touches =
-      command.add_option("--touches", arguments.touches,
+      command.add_option("--touches", input.touches,
                          "touches.csv: position,kind,index,x_mm,y_mm,z_mm; kind ball or block");
-  auto* calibrator = command.add_option("--calibrator", arguments.calibrator, "calibrator.toml");
-  auto* errors = command.add_option("--errors", arguments.errors,
+  auto* calibrator = command.add_option("--calibrator", input.calibrator, "calibrator.toml");
+  auto* errors = command.add_option("--errors", input.errors,
                                     "instead of touches, errors.csv: "
                                     "position,ball,x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
-  auto* recording = command.add_option("--recording", arguments.recording,
+  auto* recording = command.add_option("--recording", input.recording,
                                        "instead of files, a recording of the daemon (.mcap): its "
                                        "last complete run with a ball array,\n"
                                        "with the recorded configuration unless --machine is given");
   touches->needs(machine, calibrator);
   calibrator->needs(touches);
   auto* artefact_C =
-      command.add_option("--artefact-C", arguments.artefact_C,
+      command.add_option("--artefact-C", input.artefact_C,
                          "temperature of the array, C, for a calibrator.toml with alpha_um_per_m_K;"
                          "\ndefault: [evemu] artefact_C");
-  auto* u_artefact_K = command.add_option("--u-artefact-K", arguments.u_artefact_K,
+  auto* u_artefact_K = command.add_option("--u-artefact-K", input.u_artefact_K,
                                           "standard uncertainty of --artefact-C, K");
   artefact_C->needs(calibrator, u_artefact_K)->check(CLI::Range(-50.0, 100.0));
   u_artefact_K->needs(artefact_C)->check(CLI::Range(0.0, 50.0));
   errors->needs(machine)->excludes(touches);
   recording->excludes(touches)->excludes(errors);
-  recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
+  recording->excludes(add_scales_corrected(command, input.scales_corrected));
   command
       .add_option("--estimator", arguments.estimator,
                   "bayes-pose: priors by order, common noise of Ball1, random pose rotations;\n"
@@ -496,22 +288,22 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
       "have common noise), or a file with one fold number per row; default: that of [evemu], or\n"
       "position");
   command
-      .add_option("--order", arguments.order,
+      .add_option("--order", input.order,
                   "order of the polynomials; default: that of [evemu], or 3")
       ->check(CLI::Range(evemu::kLeastOrder, evemu::kMostOrder));
   command
-      .add_option("--positions", arguments.positions,
+      .add_option("--positions", input.positions,
                   "required number of artefact positions; default: the requested ones, or 8")
       ->check(CLI::Range(2, 1000));
   command
-      .add_flag("--rotation-known", arguments.rotation_known,
+      .add_flag("--rotation-known", input.rotation_known,
                 "the directions of the errors do not come from the artefact's blocks")
       ->needs(errors);
   command.add_option(
-      "--rotation-reference", arguments.reference,
+      "--rotation-reference", input.reference,
       "errors.csv of points where V is known independently: the model is rotated to fit them");
   command
-      .add_option("--u-reference-um", arguments.u_reference_um,
+      .add_option("--u-reference-um", input.u_reference_um,
                   "standard uncertainty of the reference's V")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -541,7 +333,8 @@ void add_identify_evemu(CLI::App& parent, int& exit) {
   add_options(*command, *arguments);
 
   command->callback([arguments, &exit] {
-    exit = arguments->touches.empty() && arguments->errors.empty() && arguments->recording.empty()
+    const EvemuInputArguments& input = arguments->input;
+    exit = input.touches.empty() && input.errors.empty() && input.recording.empty()
                ? report({ErrorCode::Usage,
                          "identify evemu needs --machine with --touches and --calibrator or "
                          "with --errors, or --recording"})

@@ -27,7 +27,6 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/unix_socket.hpp"
 #include "abbe/config/capabilities.hpp"
-#include "abbe/devices/device_kind.hpp"
 #include "abbe/devices/device_set.hpp"
 #include "abbe/drivers/cpu_latency.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
@@ -40,6 +39,7 @@
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
+#include "abbed_options.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
 
@@ -70,31 +70,6 @@ std::string recording_name() {
   ::gmtime_r(&now, &utc);
   return fmt::format("abbe-{:04}-{:02}-{:02}T{:02}-{:02}-{:02}Z-{}", utc.tm_year + 1900,
                      utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec, ::getpid());
-}
-
-RecorderThreadOptions recorder_options(const Config& config, const std::string& name) {
-  RecorderThreadOptions options;
-  options.recorder.directory = config.recording.dir;
-  options.recorder.name = name;
-  options.recorder.chunk_bytes = config.recording.chunk_bytes;
-  options.recorder.chunk_period = config.recording.chunk_period;
-  options.recorder.min_free_bytes = config.recording.min_free_bytes;
-  options.recorder.max_file_bytes = config.recording.max_file_bytes;
-  options.raw = config.recording.raw;
-
-  options.devices = device_names(config);
-  return options;
-}
-
-PublisherOptions publisher_options(const Config& config) {
-  return {.machine = config.machine.name,
-          .tool_offset_m = config.machine.target_offset_m,
-          .snapshot_hz = config.dds.snapshot_hz,
-          .compensation_hz = config.dds.compensation_hz,
-          .validity = config.dds.validity,
-          .security_warning = dds_is_secured(config.dds.security, config.dds.profile)
-                                  ? std::string{}
-                                  : dds_security_is_off(config.dds.domain)};
 }
 
 /// The hub is soft real time: above the ordinary programs, below the devices. A refusal is a
@@ -227,21 +202,8 @@ struct Abbed::State {
     publisher.emplace(std::move(*link), publisher_options(config), utc);
     check_dds_security();
     if (!supervised) return {};
-    DdsSupervisor::Options child{.program = options.dds_program,
-                                 .arguments = {"--socket", config.dds.socket.string(), "--domain",
-                                               std::to_string(config.dds.domain)},
-                                 .priority = config.dds.priority,
-                                 .process = &dds_process};
-
-    if (!config.dds.profile.empty()) {
-      child.arguments.insert(child.arguments.end(), {"--profile", config.dds.profile.string()});
-    }
-
-    if (!config.dds.security.empty()) {
-      child.arguments.insert(child.arguments.end(), {"--security", config.dds.security.string()});
-    }
-
-    auto started = DdsSupervisor::start(std::move(child), WallTime::clock::now());
+    auto started = DdsSupervisor::start(abbe_dds_options(config, options.dds_program, dds_process),
+                                        WallTime::clock::now());
     if (!started) return tl::unexpected(started.error());
     supervisor.emplace(std::move(*started));
 

@@ -21,10 +21,6 @@ std::string refusal(const char* tried) {
   return fmt::format("{}: {}", tried, std::strerror(errno));
 }
 
-}  // namespace
-
-namespace {
-
 std::vector<std::string> lock_now() {
   std::vector<std::string> refusals;
   if (prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0) != 0)

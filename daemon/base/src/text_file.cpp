@@ -37,10 +37,6 @@ bool sync_folder(const std::filesystem::path& folder) {
   return fd.get() >= 0 && ::fsync(fd.get()) == 0;
 }
 
-}  // namespace
-
-namespace {
-
 Result<std::string> read_all(const FileDescriptor& fd, const struct stat& status,
                              const std::filesystem::path& file) {
   std::string text(static_cast<std::size_t>(status.st_size), '\0');

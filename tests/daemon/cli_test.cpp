@@ -1,21 +1,22 @@
 /// `abbe` as people use it: the built program as a process, its files, output and exit codes.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <signal.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
-#include <atomic>
+#include <algorithm>
 #include <cstdlib>
-#include <fstream>
-#include <functional>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "abbe/calib/model_comparison.hpp"
-#include "abbe/model/model_store.hpp"
+#include "abbe/model/model_document.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "abbe_command.hpp"
-#include "synthetic_model.hpp"
 #include "synthetic_otf_run.hpp"
 #include "warm_scales.hpp"
 
@@ -408,80 +409,6 @@ TEST_F(Cli, ExitsWith4WhenAFileIsMissingOrNotWritable) {
   EXPECT_EQ(ran.exit, 4) << ran.err;
 }
 
-TEST_F(Cli, HelpNamesTheExitCodesAndEnds0) {
-  const auto ran = abbe("identify otf --help");
-  EXPECT_EQ(ran.exit, 0);
-  EXPECT_THAT(ran.out,
-              AllOf(HasSubstr("--tracker"), HasSubstr("Exit codes"), HasSubstr("range_mm")));
-}
-
-TEST_F(Cli, NamesTheNearestCommand) {
-  const auto ran = abbe("identfy otf");
-  EXPECT_EQ(ran.exit, 2);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"identfy\" is not a command"),
-                             HasSubstr("the nearest one is `abbe identify`")));
-  EXPECT_THAT(abbe("model lst").err, HasSubstr("the nearest one is `abbe model list`"));
-  EXPECT_THAT(abbe("wacth").err, HasSubstr("the nearest one is `abbe watch`"));
-  EXPECT_THAT(abbe("frobnicate").err, HasSubstr("known: status, "));
-}
-
-TEST_F(Cli, HelpIsACommand) {
-  const auto help = abbe("help");
-  EXPECT_EQ(help.exit, 0);
-  EXPECT_EQ(help.out, abbe("--help").out);
-  EXPECT_EQ(abbe("help model show").out, abbe("model show --help").out);
-  EXPECT_EQ(abbe("help help").exit, 0);
-}
-
-TEST_F(Cli, HelpForAnUnknownCommandNamesTheNearestOne) {
-  const auto ran = abbe("help identfy");
-  EXPECT_EQ(ran.exit, 2);
-  EXPECT_EQ(ran.out, "");
-  EXPECT_THAT(ran.err, HasSubstr("the nearest one is `abbe identify`"));
-  EXPECT_THAT(abbe("help model lst").err, HasSubstr("the nearest one is `abbe model list`"));
-  EXPECT_EQ(abbe("identfy --help").exit, 2);
-}
-
-TEST_F(Cli, TheHelpOfEveryCommandHasAnExample) {
-  for (const std::string command : {"status",
-                                    "calibrate",
-                                    "calibrate otf",
-                                    "calibrate evemu",
-                                    "calibrate probe",
-                                    "calibrate artefact",
-                                    "reference",
-                                    "machine",
-                                    "machine where",
-                                    "machine stop",
-                                    "machine release",
-                                    "tracker",
-                                    "tracker status",
-                                    "tracker initialize",
-                                    "tracker home",
-                                    "tracker find",
-                                    "tracker reflector",
-                                    "tracker reflector list",
-                                    "tracker reflector set",
-                                    "replay",
-                                    "identify",
-                                    "identify otf",
-                                    "identify evemu",
-                                    "identify artefact",
-                                    "verify",
-                                    "model",
-                                    "model eval",
-                                    "model compare",
-                                    "model list",
-                                    "model show",
-                                    "model activate",
-                                    "model rollback",
-                                    "dds",
-                                    "dds keys"}) {
-    EXPECT_THAT(abbe(command + " --help").out,
-                AllOf(HasSubstr("Example: abbe " + command), HasSubstr("Exit codes: 0 done")));
-  }
-}
-
 TEST_F(Cli, ShowsAModelFile) {
   const auto ran = abbe("model show out/model.json");
   EXPECT_EQ(ran.exit, 0) << ran.err;
@@ -494,60 +421,6 @@ TEST_F(Cli, AModelFileWithASyntaxErrorIsNamedWithLineAndColumn) {
   EXPECT_EQ(ran.exit, 3);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("broken.json: line 2, column 11: "),
                              HasSubstr("expected ':'"), Not(HasSubstr("json.exception"))));
-}
-
-TEST_F(Cli, SaysThatAFolderIsNoModelStore) {
-  const auto missing = abbe("model list --store nowhere");
-  EXPECT_EQ(missing.exit, 4);
-  EXPECT_THAT(missing.err, HasSubstr("nowhere: there is no such folder"));
-  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
-
-  fs::create_directories(folder_ / "empty");
-  const auto empty = abbe("model list --store empty");
-  EXPECT_EQ(empty.exit, 3);
-  EXPECT_THAT(empty.err, HasSubstr("empty: is not a model store"));
-  EXPECT_TRUE(fs::is_empty(folder_ / "empty"));
-}
-
-TEST_F(Cli, SaysThatAStoreHasNoModelsAndNoActiveOne) {
-  ASSERT_TRUE(ModelStore::open(folder_ / "new_store"));
-  const auto list = abbe("model list --store new_store");
-  EXPECT_EQ(list.exit, 0);
-  EXPECT_THAT(list.out, HasSubstr("the store has no models"));
-
-  const auto show = abbe("model show active --store new_store");
-  EXPECT_EQ(show.exit, 5);
-  EXPECT_THAT(show.err, HasSubstr("no model is active"));
-}
-
-TEST_F(Cli, ActivateAsksForFourCharacters) {
-  const auto folder = folder_ / "short_ids";
-  auto store = ModelStore::open(folder).value();
-  const auto id = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
-  const auto ran =
-      abbe(fmt::format("model activate {} --store '{}'", id.substr(0, 3), folder.string()));
-  EXPECT_EQ(ran.exit, 2);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("give at least 4 characters"), HasSubstr("  " + id)));
-}
-
-TEST_F(Cli, ListsActivatesAndRollsBackModelsOfAStore) {
-  const auto folder = folder_ / "store";
-  auto store = ModelStore::open(folder).value();
-  const auto a = store.add(test::synthetic_document(1), true, {}, {"test", "", {}}).value();
-  const auto b =
-      store.add(test::synthetic_document(2), false, {"no better"}, {"test", "", {}}).value();
-  const auto at = fmt::format(" --store '{}'", folder.string());
-
-  EXPECT_EQ(abbe("model activate " + a + at).exit, 0);
-  EXPECT_EQ(abbe("model activate " + b + at).exit, 5);
-  EXPECT_EQ(abbe("model activate " + b + at + " --force").exit, 2);
-  EXPECT_EQ(abbe("model activate " + b + at + " --force --why checked-by-hand").exit, 0);
-  EXPECT_EQ(nlohmann::json::parse(abbe("model list --json" + at).out).size(), 2u);
-  EXPECT_THAT(abbe("model show active" + at).out,
-              AllOf(HasSubstr(b), HasSubstr("forced"), HasSubstr("EXX,-300,")));
-  EXPECT_EQ(abbe("model rollback" + at).exit, 0);
-  EXPECT_EQ(ModelStore::open(folder).value().active_id().value(), a);
-  EXPECT_EQ(abbe("model rollback" + at).exit, 5);
 }
 
 TEST_F(Cli, ReportsAMissingProgramOfItsOwn) {
@@ -603,38 +476,6 @@ TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
   const auto other =
       abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
   EXPECT_EQ(other.exit, 0) << other.err;
-}
-
-TEST_F(Cli, TheConfigurationNamesTheStore) {
-  const auto config =
-      write("daemon.toml", test::synthetic_machine_toml() + "[daemon]\ndata_dir = \"data\"\n");
-  auto store = ModelStore::open(folder_ / "data" / "models").value();
-  const StoreActor actor{"tester", "test", {}};
-  const auto id = store.add(test::synthetic_document(1), true, {}, actor).value();
-  const auto activated = abbe(fmt::format("model activate {} -c '{}'", id, config.string()));
-  EXPECT_EQ(activated.exit, 0) << activated.err;
-  EXPECT_EQ(store.active_id().value(), id);
-  EXPECT_THAT(abbe(fmt::format("model list -c '{}'", config.string())).out, HasSubstr(id));
-}
-
-TEST_F(Cli, EvaluatesAModelOfTheStoreByItsNameThere) {
-  const auto folder = folder_ / "evaluated";
-  auto store = ModelStore::open(folder).value();
-  const StoreActor actor{"tester", "test", {}};
-  const auto id = store.add(test::synthetic_document(2), true, {}, actor).value();
-  ASSERT_TRUE(store.activate(id, actor));
-  const auto points = write("one_point.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
-
-  const auto eval = [&](const std::string& model) {
-    return abbe(fmt::format("model eval '{}' --points '{}' --store '{}'", model, points.string(),
-                            folder.string()));
-  };
-
-  const auto by_file = eval(store.model_path(id).string());
-  ASSERT_EQ(by_file.exit, 0) << by_file.err;
-  EXPECT_EQ(eval("active").out, by_file.out);
-  EXPECT_EQ(eval(id.substr(0, 8)).out, by_file.out);
-  EXPECT_EQ(eval("ffff").exit, 2);
 }
 
 }  // namespace

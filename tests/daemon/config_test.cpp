@@ -2,8 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include <map>
-#include <set>
+#include <array>
+#include <chrono>
+#include <cstddef>
 #include <string>
 
 #include "abbe/config/unmeasured_air.hpp"
@@ -423,95 +424,6 @@ TEST(Config, NamesTheFileThatCannotBeRead) {
   EXPECT_EQ(config.error().code, ErrorCode::Io);
   EXPECT_THAT(config.error().text,
               AllOf(HasSubstr("/nonexistent/abbed.toml"), HasSubstr("No such file")));
-}
-
-TEST(Config, MachineHashFollowsGeometryNotNoise) {
-  const auto plain = parse_config(kMachine, "a.toml");
-  const auto noisier = parse_config(kMachine + "[tracker]\nsigma_range_um = 9\n", "b.toml");
-  auto text = kMachine;
-  text.replace(text.find("offset_mm = [20"), 15, "offset_mm = [21");
-  const auto longer = parse_config(text, "c.toml");
-  ASSERT_TRUE(plain && noisier && longer);
-  EXPECT_EQ(machine_hash(*plain), machine_hash(*noisier));
-  EXPECT_NE(machine_hash(*plain), machine_hash(*longer));
-}
-
-TEST(Config, MachineHashDependsOnTheSourceOfThePositions) {
-  const std::string axes =
-      R"({axis = "X", node = 1, step_nm = 10, offset_mm = 1}, {axis = "Y", node = 2},)";
-  const std::string head = kMachine + kCanBus;
-  const auto hash = [](const std::string& text) {
-    return machine_hash(parse_config(text, "a.toml").value());
-  };
-  const auto replaced = [](std::string text, const std::string& what, const std::string& by) {
-    return text.replace(text.find(what), what.size(), by);
-  };
-  const std::string plain = head + "nodes = [" + axes + R"({axis = "Z", node = 3}])";
-  std::set<std::string> hashes{hash(plain), hash(kMachine)};
-  for (const auto& [what, by] :
-       std::map<std::string, std::string>{{"step_nm = 10", "step_nm = 11"},
-                                          {"offset_mm = 1", "offset_mm = 1.001"},
-                                          {"node = 1", "invert = true, node = 1"},
-                                          {"node = 2", "node = 4"},
-                                          {"nodes", "axes_compensated = true\nnodes"}})
-    hashes.insert(hash(replaced(plain, what, by)));
-  EXPECT_THAT(hashes, SizeIs(7));  // each of them another
-}
-
-TEST(Config, MachineHashDoesNotDependOnTheTransport) {
-  const auto can = parse_config(kMachine + kCanBus + kNodes, "a.toml");
-  const auto udp = parse_config(
-      kMachine + "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 9\n" +
-          kNodes,
-      "a.toml");
-  ASSERT_TRUE(can && udp);
-  EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
-}
-
-const std::string kCardWithProbe = R"([counter_card]
-transport = "usbip"
-latch_channel = 6
-edge_channel = 7
-axes = [{axis = "X", channel = 0, step_nm = 10}, {axis = "Y", channel = 1, step_nm = 10},
-        {axis = "Z", channel = 2, step_nm = 10}]
-)";
-
-TEST(ConfigProbe, IsReadInSi) {
-  const auto config = parse_config(kMachine + kCardWithProbe +
-                                       "[probe]\nid = 4\ndelay_us = 2000\njitter_us = 20\n" +
-                                       "max_speed_mm_s = 8\nconfirm_ms = 4\n",
-                                   "abbed.toml");
-  ASSERT_TRUE(config) << config.error().details.front();
-  ASSERT_TRUE(config->of<ProbeConfig>());
-  EXPECT_EQ(config->of<ProbeConfig>()->delay.id, 4u);
-  EXPECT_EQ(config->of<ProbeConfig>()->delay.delay, std::chrono::milliseconds{2});
-  EXPECT_EQ(config->of<ProbeConfig>()->approach.max_speed_m_s, 0.008);
-  EXPECT_EQ(config->of<ProbeConfig>()->switching.confirm, std::chrono::milliseconds{4});
-}
-
-TEST(ConfigProbe, NeedsChannelsOfACounterCard) {
-  EXPECT_THAT(faults_of(kMachine + "[probe]\nid = 4\n"),
-              ElementsAre(HasSubstr("needs [counter_card]")));
-}
-
-TEST(ConfigProbe, RefusesImpossibleProbeValues) {
-  EXPECT_THAT(faults_of(kMachine + kCardWithProbe + "[probe]\nconfirm_ms = 1\nchatter_ms = 2\n"),
-              ElementsAre(HasSubstr("the chatter time must be below the confirmation")));
-}
-
-TEST(ConfigCmm, IsReadInSi) {
-  const auto config = parse_config(
-      kMachine + "[cmm]\nhost = \"10.0.0.9\"\ntool = \"ruby 4\"\nu_position_um = 0.9\n",
-      "abbed.toml");
-  ASSERT_TRUE(config && config->of<CmmConfig>());
-  EXPECT_EQ(config->of<CmmConfig>()->host, "10.0.0.9");
-  EXPECT_EQ(config->of<CmmConfig>()->port, 1294);
-  EXPECT_DOUBLE_EQ(config->of<CmmConfig>()->u_position_m, 0.9e-6);
-  EXPECT_FALSE(config->of<CmmConfig>()->home);
-}
-
-TEST(ConfigCmm, NeedsAHost) {
-  EXPECT_THAT(faults_of(kMachine + "[cmm]\nport = 1294\n"), ElementsAre(HasSubstr("cmm.host")));
 }
 
 TEST(Config, KeepsTheParticipantBehindTheHub) {

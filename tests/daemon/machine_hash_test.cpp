@@ -1,13 +1,19 @@
 // A stored model is only ACTIVE on a machine with its hash: a hash that changes with the program
 // would end every model. The values are those of earlier versions.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <set>
 #include <string>
 
 #include "abbe/config/config.hpp"
+#include "config_fixture.hpp"
 
 namespace abbe::daemon {
 namespace {
+
+using ::testing::SizeIs;
 
 const std::string kMill = R"([machine]
 name = "mill"
@@ -82,6 +88,49 @@ u_temperature_K = 0.2
 fixed_mm = -300
 )"),
             "be07aafbfa3d0fb94615b92fea982d1c40870ebbff8166ad6e25ccee2b07141e");
+}
+
+TEST(MachineHash, FollowsGeometryNotNoise) {
+  const auto plain = parse_config(kMachine, "a.toml");
+  const auto noisier = parse_config(kMachine + "[tracker]\nsigma_range_um = 9\n", "b.toml");
+  auto text = kMachine;
+  text.replace(text.find("offset_mm = [20"), 15, "offset_mm = [21");
+  const auto longer = parse_config(text, "c.toml");
+  ASSERT_TRUE(plain && noisier && longer);
+  EXPECT_EQ(machine_hash(*plain), machine_hash(*noisier));
+  EXPECT_NE(machine_hash(*plain), machine_hash(*longer));
+}
+
+TEST(MachineHash, DependsOnTheSourceOfThePositions) {
+  const std::string axes =
+      R"({axis = "X", node = 1, step_nm = 10, offset_mm = 1}, {axis = "Y", node = 2},)";
+  const std::string head = kMachine + kCanBus;
+  const auto hash = [](const std::string& text) {
+    return machine_hash(parse_config(text, "a.toml").value());
+  };
+  const auto replaced = [](std::string text, const std::string& what, const std::string& by) {
+    return text.replace(text.find(what), what.size(), by);
+  };
+  const std::string plain = head + "nodes = [" + axes + R"({axis = "Z", node = 3}])";
+  std::set<std::string> hashes{hash(plain), hash(kMachine)};
+  for (const auto& [what, by] :
+       std::map<std::string, std::string>{{"step_nm = 10", "step_nm = 11"},
+                                          {"offset_mm = 1", "offset_mm = 1.001"},
+                                          {"node = 1", "invert = true, node = 1"},
+                                          {"node = 2", "node = 4"},
+                                          {"nodes", "axes_compensated = true\nnodes"}})
+    hashes.insert(hash(replaced(plain, what, by)));
+  EXPECT_THAT(hashes, SizeIs(7));  // each of them another
+}
+
+TEST(MachineHash, DoesNotDependOnTheTransport) {
+  const auto can = parse_config(kMachine + kCanBus + kNodes, "a.toml");
+  const auto udp = parse_config(
+      kMachine + "[encoder]\ntransport = \"udp\"\npeer_host = \"10.0.0.8\"\npeer_port = 9\n" +
+          kNodes,
+      "a.toml");
+  ASSERT_TRUE(can && udp);
+  EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
 }
 
 }  // namespace

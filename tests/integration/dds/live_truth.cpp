@@ -14,13 +14,13 @@
 #include <cstdio>
 #include <cstring>
 #include <thread>
+#include <utility>
 
 namespace abbe::test {
 namespace {
 
 constexpr double kLongestHold_s = 1.5;
 constexpr double kReturn_s = 10.0;
-constexpr double kTolerance_ms = 1.0;
 constexpr HostNs kVectorClock_ns = 1'000'000'000'000;  // what the feeder's vectors are modulo of
 
 HostNs now_ns() {
@@ -74,7 +74,7 @@ void SubscriberRecord::note_apply(const std::string& machine, HostNs now, const 
   const HostNs age_ns = ((now - made_ns) % kVectorClock_ns + kVectorClock_ns) % kVectorClock_ns;
   const double understatement_ms = 1e-6 * static_cast<double>(age_ns) - claimed_ms;
   worst_ms_ = std::max(worst_ms_, understatement_ms);
-  understated_ += understatement_ms > kTolerance_ms;
+  understated_ += understatement_ms > tolerance_ms_;
 }
 
 void SubscriberRecord::forget() {
@@ -114,9 +114,12 @@ std::uint64_t SubscriberRecord::understated() const {
 // the rounds
 
 struct LiveTruth::Subscriber {
+  Subscriber(std::string its_name, std::vector<std::string> its_command, double tolerance_ms)
+      : name(std::move(its_name)), command(std::move(its_command)), record(tolerance_ms) {}
+
   std::string name;
   std::vector<std::string> command;
-  SubscriberRecord record{};
+  SubscriberRecord record;
   std::unique_ptr<Process> process{};
 
   void start() {
@@ -137,9 +140,7 @@ LiveTruth::LiveTruth(Parts parts) : parts_(std::move(parts)) {
     machines_.back()->feeder = parts_.start_machine(name);
   }
   const auto add = [&](const char* name, const std::vector<std::string>& command) {
-    subscribers_.push_back(std::make_unique<Subscriber>());
-    subscribers_.back()->name = name;
-    subscribers_.back()->command = command;
+    subscribers_.push_back(std::make_unique<Subscriber>(name, command, parts_.tolerance_ms));
     subscribers_.back()->start();
   };
   add("Fast DDS", parts_.fast_subscriber);
@@ -272,6 +273,31 @@ LiveTruthFigures LiveTruth::figures() const {
         std::max(all.worst_understatement_ms, s->record.worst_understatement_ms());
   }
   return all;
+}
+
+// -------------------------------------------------------------------------------------------------
+// the programs
+
+SubscriberCommands subscriber_commands(const std::string& domain, const std::filesystem::path& keys,
+                                       bool real_time) {
+  SubscriberCommands commands{{ABBE_STAMPED_FAST_SUBSCRIBER, domain, ABBE_LOOPBACK_PROFILE},
+                              {ABBE_STAMPED_CYCLONE_SUBSCRIBER, domain}};
+
+  if (!keys.empty()) {
+    commands.fast.push_back(keys / "subscriber-1");
+    commands.cyclone.push_back(keys / "subscriber-2");
+  }
+
+  for (auto* command : {&commands.fast, &commands.cyclone})
+    if (real_time) command->insert(command->begin(), {"/usr/bin/chrt", "-f", "10"});
+  return commands;
+}
+
+bool real_time_permitted() {
+  const sched_param ordinary{}, first{.sched_priority = 10};
+  const bool permitted = ::sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+  ::sched_setscheduler(0, SCHED_OTHER, &ordinary);
+  return permitted;
 }
 
 // -------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 /// rounds of kills, stops and outages it is put through.
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -20,6 +21,9 @@ using HostNs = std::int64_t;  ///< of CLOCK_MONOTONIC
 /// The record of one subscriber; filled by the thread that reads its lines.
 class SubscriberRecord {
  public:
+  /// `tolerance_ms`: of understated().
+  explicit SubscriberRecord(double tolerance_ms) : tolerance_ms_(tolerance_ms) {}
+
   void take(const std::string& line);
   void forget();
 
@@ -29,7 +33,8 @@ class SubscriberRecord {
   [[nodiscard]] HostNs last_apply(const std::string& machine) const;
   [[nodiscard]] double worst_understatement_ms() const;  ///< true age less the age it went by
   [[nodiscard]] std::uint64_t applied() const;
-  [[nodiscard]] std::uint64_t understated() const;  ///< applied vectors, by more than 1 ms
+  /// Applied vectors whose age was understated by more than the tolerance.
+  [[nodiscard]] std::uint64_t understated() const;
 
  private:
   struct OfMachine {
@@ -38,6 +43,7 @@ class SubscriberRecord {
   };
   void note_apply(const std::string& machine, HostNs now, const char* text);
 
+  const double tolerance_ms_;
   mutable std::mutex mutex_;
   std::map<std::string, OfMachine> machines_;
   double worst_ms_ = 0.0;
@@ -52,7 +58,8 @@ struct LiveTruthFigures {
   double longest_return_s = 0.0;
   int orphaned = 0;  ///< subscribers that did not apply again within 10 s
   double worst_understatement_ms = 0.0;
-  std::uint64_t applied = 0, understated = 0;
+  std::uint64_t applied = 0;
+  std::uint64_t understated = 0;  ///< by more than LiveTruth::Parts::tolerance_ms
   std::vector<std::string> failures;
 };
 
@@ -66,6 +73,7 @@ class LiveTruth {
     StartMachine start_machine;
     std::vector<std::string> fast_subscriber, cyclone_subscriber;  ///< commands
     bool has_network_of_its_own = false;                           ///< loopback may be switched off
+    double tolerance_ms = 0.0;  ///< an age that is understated by more is counted
   };
   explicit LiveTruth(Parts parts);
   ~LiveTruth();
@@ -89,6 +97,18 @@ class LiveTruth {
   std::vector<std::unique_ptr<Subscriber>> subscribers_;
   LiveTruthFigures figures_;
 };
+
+/// Commands of the two example subscribers, which stamp their lines.
+struct SubscriberCommands {
+  std::vector<std::string> fast, cyclone;
+};
+/// `keys`: folder with those of subscriber-1 and subscriber-2; empty: without keys. `real_time`: at
+/// SCHED_FIFO, so that nothing holds a subscriber up between its decision and the stamp of its line.
+[[nodiscard]] SubscriberCommands subscriber_commands(const std::string& domain,
+                                                     const std::filesystem::path& keys,
+                                                     bool real_time);
+/// True if this process may use SCHED_FIFO.
+[[nodiscard]] bool real_time_permitted();
 
 /// This thread and the processes it starts from now on have a network of their own, with loopback
 /// up. False: not permitted.

@@ -12,6 +12,7 @@
 
 #include "abbe/messages/dds_security.hpp"
 #include "domain_claim.hpp"
+#include "feeder_command.hpp"
 #include "process.hpp"
 #include "sample_messages.hpp"
 
@@ -36,12 +37,8 @@ class ShopFloor : public testing::Test {
 
   [[nodiscard]] std::unique_ptr<Process> feeder_of(
       const std::string& machine, const std::vector<std::string>& more = {}) const {
-    const std::string socket = directory_ / (machine + ".sock");
-    std::vector<std::string> command{ABBE_FEEDER_PROGRAM, socket,  machine,    ABBE_DDS_PROGRAM,
-                                     "--socket",          socket,  "--domain", domain_.text(),
-                                     "--profile",         profile_};
-    command.insert(command.end(), more.begin(), more.end());
-    return std::make_unique<Process>(std::move(command));
+    return std::make_unique<Process>(
+        feeder_command(directory_, machine, domain_.text(), profile_, more));
   }
 
   [[nodiscard]] std::vector<std::string> watch(std::vector<std::string> options) const {

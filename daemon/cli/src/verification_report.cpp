@@ -170,7 +170,7 @@ void add_ratio(HtmlReport& page, const verify::Comparison& c) {
   page.chart(Histogram{"R_resmag, as stated", "R_resmag", {{"as stated", stated}}});
 }
 
-/// 1, 2 or 5 times a power of ten, not above `x`.
+/// The largest number not above `x` (positive) that is 1, 2 or 5 times a power of ten.
 double round_number(double x) {
   const double ten = std::pow(10.0, std::floor(std::log10(x)));
   for (const double digit : {5.0, 2.0})

@@ -34,7 +34,8 @@ struct ConfigKind {
   /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
   /// kinds that precede this one in DeviceConfigs have been read already.
   void (*read)(Section& root, Config& out, StreamNames& names);
-  /// Adds a warning, as a fault, for each value that is possible but improbable.
+  /// Reports each value that is possible but improbable with Section::fault(). check_config() prints
+  /// these faults as warnings.
   void (*doubt)(Section& root, const Config& config) = nullptr;
   /// The lines about the devices of this kind in `abbed --check-config`, one for each device.
   std::vector<std::string> (*summary)(const Config& config);

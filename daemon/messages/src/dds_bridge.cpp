@@ -122,8 +122,9 @@ void DdsBridge::beat(WallTime at, WallTime now) {
 }
 
 void DdsBridge::publish(Topic topic, std::span<std::byte> payload, WallTime at, WallTime now) {
-  // Nothing is written while abbed seems silent, but only cycle() reports the silence: the beat
-  // that ends it may follow this payload in the socket.
+  // Nothing is written to DDS while abbed seems silent. Only cycle() publishes that the source is
+  // lost, not this function: a beat of abbed may follow this payload in the socket and show that
+  // abbed is not silent.
   const bool alive = state_->alive && !state_->silent(now);
   const auto key = payload_key(topic, payload);
   if (!key) {

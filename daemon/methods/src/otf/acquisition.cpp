@@ -272,8 +272,8 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
 }
 
 /// The run is complete when the machine stands still at the last vertex and is on the last leg, or
-/// on one from whose end the rest of the path is shorter than path_tolerance_m: the machine may
-/// have driven the last short legs between two points.
+/// on one from whose end the rest of the path is at most path_tolerance_m long: the machine may
+/// have driven the last short legs between two tracker points.
 bool OtfAcquisition::complete(HostTime now, const Vector3& q) const {
   return driven_at_m_.back() - driven_at_m_[leg_ + 1] <= options_.path_tolerance_m &&
          (q - path_.path().vertices_m.back()).norm() <= options_.vertex_tolerance_m &&

@@ -111,10 +111,11 @@ class ClockModel {
   double free_slope_ = 0.0;  ///< the slope before it is limited to max_skew
   double u_beyond_s_ = 0.0;  ///< excess of the free slope times the window; 0 unless beyond_
   bool beyond_ = false;      ///< the free slope exceeds max_skew significantly
-  // The free slope is that of the hull between these two device times, s: one quarter and three
-  // quarters of the observed span.
+  // Device times, s, at one quarter and at three quarters of the observed span. free_slope_ is the
+  // slope, between these two times, of the lower convex hull of the arrivals.
   double quarter_s_ = 0.0;
   double three_quarters_s_ = 0.0;
+
   double median_lateness_s_ = 0.0;
   double lowered_s_ = 0.0;  ///< estimated height of the line above the true envelope
   double u_touch_s_ = 0.0;  ///< standard uncertainty of the line at the point it touches

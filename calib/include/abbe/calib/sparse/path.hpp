@@ -33,8 +33,8 @@ struct PathOptions {
   std::vector<double> lambda{};
   double tolerance = 1e-4;  ///< relative to rms(y - mean); 1e-4 as in ncvreg
   long max_sweeps = 10000;  ///< of the whole path; 10000 as in ncvreg
-  /// The path ends after the first lambda with more nonzero coefficients than this; nullopt: no
-  /// limit.
+  /// The first lambda with more nonzero coefficients than this is the last one of the path;
+  /// nullopt: no limit.
   std::optional<Eigen::Index> max_nonzero{};
 };
 

@@ -18,7 +18,7 @@ struct Config;
 
 /// The device that delivers tracker points.
 struct TrackerSource {
-  /// The air for which the controller corrects its distances.
+  /// The air whose refractive index the tracker's controller uses to correct its distances.
   enum class Air {
     Measured,  ///< the controller measures the air
     Assumed,   ///< assumed_air()

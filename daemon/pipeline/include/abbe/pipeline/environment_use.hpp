@@ -75,9 +75,9 @@ class MeanEffect {
 /// measuring are not merged.
 class EnvironmentMerge {
  public:
-  /// A sample of an environment device is used only for instants later than its own by `lag`: by
-  /// then it has arrived, so that the order of arrival does not matter. The environment changes so
-  /// slowly that a delay of half a second is negligible.
+  /// A sample of an environment device is used only for instants at least `lag` later than its own.
+  /// The assembler's watermark as `lag`: by then the sample has arrived, so that the order of
+  /// arrival does not matter. The environment changes so slowly that the delay is negligible.
   EnvironmentMerge(const EnvironmentUseOptions& options, std::chrono::nanoseconds lag);
 
   void take(const Batch& batch);

@@ -24,8 +24,8 @@ struct RunRows {
   HyperParameters hyper;
   RigidFreeNorm norm;
 };
-/// The hyper-parameters are those of `solution` if it is bayes-pose without slow noise, else they are
-/// estimated: NotConverged if no starting point has a likelihood.
+/// The hyper-parameters are those of `solution` if it is bayes-pose without slow noise, else they
+/// are estimated: NotConverged if no starting point has a likelihood.
 [[nodiscard]] Result<RunRows> run_rows(const Observations&, const ScaledDesign&, const Solution&);
 
 /// Estimate with added columns. The columns of the array's own uncertainty are always added.

@@ -103,7 +103,8 @@ struct SubscriberCommands {
   std::vector<std::string> fast, cyclone;
 };
 /// `keys`: folder with those of subscriber-1 and subscriber-2; empty: without keys. `real_time`: at
-/// SCHED_FIFO, so that nothing holds a subscriber up between its decision and the stamp of its line.
+/// SCHED_FIFO, so that other programs do not delay a subscriber between its decision and the stamp
+/// of its line.
 [[nodiscard]] SubscriberCommands subscriber_commands(const std::string& domain,
                                                      const std::filesystem::path& keys,
                                                      bool real_time);

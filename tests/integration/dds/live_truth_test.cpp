@@ -24,8 +24,8 @@ namespace {
 
 class LiveTruthTest : public ShopFloor {
  protected:
-  /// Vectors wait longer than their validity while a program is stopped. An age that leaves out this
-  /// wait is understated by more than the validity, and the vector was applied although it had
+  /// While a program is stopped, vectors wait longer than their validity. An age that leaves out
+  /// this wait is understated by more than the validity: the vector is applied although it has
   /// expired.
   [[nodiscard]] LiveTruth::Parts parts() const {
     const double validity_ms = 1e-6 * static_cast<double>(compensation(1).validity_ns());

@@ -5,6 +5,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/moments.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -105,21 +106,25 @@ TEST_P(CaseAStream, IsWithinTheAskedError) {
   EXPECT_LE(grid_error(id_->solution.model).mean_m, GetParam().asked_mean_m);
 }
 
-/// Every sample of a block as two rows, with weights per sample.
-void append_samples(Observations& o, std::span<const TrackerObservation> samples,
-                    const Vector3& from, const Vector3& to, const RigidTransform& T) {
-  for (const TrackerObservation& sample : samples) {
-    const Vector3 q = T * sample.p_tracker_m - o.target_offset_m;
-    const LegPoint c = closest_on_leg(from, to, q);
-    if (c.along_m >= 0.010 && (to - from).norm() - c.along_m >= 0.010) {
-      const PathFrame frame = path_frame(to - from, T.R * sample.p_tracker_m, {});
-      append_rows(o, {0, 0, q - c.closest_m, c.closest_m, frame, 1.0}, std::array{c.closest_m});
-    }
-  }
+/// R^T R and R^T z are the prototype's normal equations of all samples, within rounding.
+void expect_prototype_normal_equations(const estimation::Information& all,
+                                       const std::filesystem::path& H_file,
+                                       const std::filesystem::path& g_file) {
+  EXPECT_EQ(all.rows(), 2u * 466068u);
+  const std::vector<double> H_values = read_binary<double>(H_file),
+                            g_values = read_binary<double>(g_file);
+  const Eigen::Map<const Eigen::MatrixXd> H(H_values.data(), 169, 169);
+  const Eigen::Map<const Eigen::VectorXd> g(g_values.data(), 169);
+  const Eigen::MatrixXd R = all.R();
+  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd difference =
+      scale.asDiagonal() * (R.transpose() * R - H) * scale.asDiagonal();
+
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((R.transpose() * all.z() - g).cwiseAbs().maxCoeff() / g.cwiseAbs().maxCoeff(), 1e-9);
 }
 
-/// Every sample as a row, weights per sample, the prototype's own alignment: the normal equations
-/// R^T R and R^T z agree to rounding.
+/// Every sample as two rows, weights per sample, the prototype's own alignment.
 TEST(CaseAInformation, OfAllSamplesHasThePrototypesNormalEquations) {
   const auto stream = big_file("caseA_stream_noisy.i32"),
              H_file = big_file("caseA_H_all_noisy.f64"), g_file = big_file("caseA_g_all_noisy.f64");
@@ -139,26 +144,42 @@ TEST(CaseAInformation, OfAllSamplesHasThePrototypesNormalEquations) {
 
   for (std::size_t block = 0; block < leg.size(); ++block) {
     append_samples(o, std::span(samples).subspan(100 * block, 100), path.vertices_m[leg[block]],
-                   path.vertices_m[leg[block] + 1], T);
+                   path.vertices_m[leg[block] + 1], T, {});
     if (block + 1 == leg.size() || leg[block + 1] != leg[block]) {
       all += information_of(o);
       o = none;
     }
   }
 
-  EXPECT_EQ(all.data.rows(), 2u * 466068u);
-  const std::vector<double> H_values = read_binary<double>(*H_file),
-                            g_values = read_binary<double>(*g_file);
-  const Eigen::Map<const Eigen::MatrixXd> H(H_values.data(), 169, 169);
-  const Eigen::Map<const Eigen::VectorXd> g(g_values.data(), 169);
-  const Eigen::MatrixXd R = all.data.R();
-  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd difference =
-      scale.asDiagonal() * (R.transpose() * R - H) * scale.asDiagonal();
+  expect_prototype_normal_equations(all.data, *H_file, *g_file);
+}
 
-  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((R.transpose() * all.data.z() - g).cwiseAbs().maxCoeff() / g.cwiseAbs().maxCoeff(),
-            1e-9);
+/// The same from the moments of each leg and cell.
+TEST(CaseAInformation, FromMomentsHasThePrototypesNormalEquations) {
+  const auto stream = big_file("caseA_stream_noisy.i32"),
+             H_file = big_file("caseA_H_all_noisy.f64"), g_file = big_file("caseA_g_all_noisy.f64");
+  if (!stream || !H_file || !g_file) {
+    GTEST_SKIP() << "caseA_H_all_noisy.f64 is not there: set ABBE_REF_DIR";
+  }
+
+  const std::vector<TrackerObservation> samples = read_stream(*stream);
+  const std::vector<std::size_t> leg = case_a_blocks().leg;
+  const Machine machine = case_a_machine();
+  const Path path = case_a_path();
+  auto moments = MomentAccumulator::of({*estimation::TableBasis::of(layout_of(machine)),
+                                        machine.target_offset_m, case_a_alignment(true), Noise{}});
+  ASSERT_TRUE(moments) << moments.error().text;
+
+  for (std::size_t block = 0; block < leg.size(); ++block) {
+    if (block == 0 || leg[block] != leg[block - 1]) {
+      moments->begin_leg(path.vertices_m[leg[block]], path.vertices_m[leg[block] + 1]);
+    }
+    for (std::size_t i = 100 * block; i < 100 * (block + 1); ++i) {
+      moments->add(samples[i].p_tracker_m);
+    }
+  }
+
+  expect_prototype_normal_equations(moments->information(), *H_file, *g_file);
 }
 
 }  // namespace

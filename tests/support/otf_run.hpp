@@ -3,10 +3,15 @@
 /// tracker, samples. Deterministic from its seed. Constant speed on every leg, a stop at every
 /// vertex.
 
+#include <array>
 #include <cmath>
 #include <random>
+#include <span>
 #include <vector>
 
+#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/path_frame.hpp"
+#include "abbe/calib/otf/polyline.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/calib/parameter_layout.hpp"
 #include "abbe/calib/rigid_body_model.hpp"
@@ -110,6 +115,23 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   }
 
   return run;
+}
+
+/// Every sample of a leg as two rows, with weights per sample; without the samples within 10 mm of
+/// the ends.
+inline void append_samples(calib::otf::Observations& o,
+                           std::span<const calib::otf::TrackerObservation> samples,
+                           const Vector3& from, const Vector3& to, const calib::RigidTransform& T,
+                           const calib::otf::Noise& noise) {
+  for (const calib::otf::TrackerObservation& sample : samples) {
+    const Vector3 q = T * sample.p_tracker_m - o.target_offset_m;
+    const calib::otf::LegPoint c = calib::otf::closest_on_leg(from, to, q);
+    if (c.along_m >= 0.010 && (to - from).norm() - c.along_m >= 0.010) {
+      const auto frame = calib::otf::path_frame(to - from, T.R * sample.p_tracker_m, noise);
+      calib::otf::append_rows(o, {0, 0, q - c.closest_m, c.closest_m, frame, 1.0},
+                              std::array{c.closest_m});
+    }
+  }
 }
 
 /// V of the truth minus V of a model on the grid of the nodes, rigid motion removed.

@@ -5,6 +5,7 @@
 
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/rigid_columns.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -44,17 +45,6 @@ class MeanColumns {
   std::vector<estimation::Column> sum_;
   std::size_t count_ = 0;
 };
-
-/// Columns of T and r of a target at p.
-void append_rigid_columns(estimation::ModelColumns& columns, std::size_t first, const Vector3& p) {
-  const Matrix3 rotation = rotation_effect(p);
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    columns.push(first++, Vector3::Unit(k));
-  }
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    columns.push(first++, rotation.col(k));
-  }
-}
 
 MeanColumns mean_columns(const estimation::TableBasis& basis, const Vector3& t,
                          std::span<const Vector3> sub_points_m) {

@@ -44,6 +44,11 @@ class Information {
   [[nodiscard]] Result<void> add(const Block&);
   /// Adds the prior U_unknown ~ N(value, u^2) as one row.
   void add_prior(std::size_t unknown, double value, double u);
+  /// Adds `rows` rows that no unknown can change, with the sum of squares `squares`.
+  void add_rest(double squares, std::size_t rows) {
+    rest_ += squares;
+    rows_ += rows;
+  }
   /// Adds independent observations of the same unknowns.
   Information& operator+=(const Information&);
   /// Adds independent observations of some of the unknowns. Unknown k of `part` is unknown at[k] of

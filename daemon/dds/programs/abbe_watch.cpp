@@ -1,5 +1,5 @@
 // abbe-watch: a subscriber. Shows the data that abbe publishes about a machine, and compares a
-// received model with known errors.
+// received model with known errors of the machine, such as those of abbe-sim.
 #include <fmt/format.h>
 #include <signal.h>
 

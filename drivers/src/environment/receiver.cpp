@@ -39,8 +39,8 @@ std::vector<EnvironmentReceiver::Spot> EnvironmentReceiver::spots_in(
 }
 
 bool is_refusal(const EnvironmentFailure& failure) noexcept {
-  // Modbus exceptions 1 to 3: the device does not know the function, address or value. Other
-  // exceptions may be temporary.
+  // Failures that a repetition of the request does not remove. With Modbus exceptions 1 to 3 the
+  // device does not know the function, address or value; other exceptions may be temporary.
   return failure.kind == Kind::Unproven || failure.kind == Kind::Implausible ||
          (failure.kind == Kind::Exception && failure.exception <= 3);
 }

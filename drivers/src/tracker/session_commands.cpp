@@ -78,7 +78,8 @@ TrackerAction TrackerSession::plan_done() {
       streaming();
       return TrackerNothing{};
     case Goal::Stay:
-      // If a result arrived during the plan, the next measurement is not yet started.
+      // A result that arrived during these requests has not started the next measurement: it is
+      // started here.
       return result_came_ && state_ == TrackerState::Streaming ? measure_again()
                                                                : TrackerAction{TrackerNothing{}};
     case Goal::SetUp:

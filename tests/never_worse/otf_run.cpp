@@ -62,45 +62,6 @@ Vector3 with_noise(OtfRun& run, const Vector3& p, Vector3& held, double dt) {
   return p + run.sigma_range_m * held.x() * er + across_m * (held.y() * e1 + held.z() * e2);
 }
 
-std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
-  sim::PathPlan plan{.feed_m_per_s = run.feed_m_per_s};
-  for (const Vector3& q : run.driven_m) {
-    plan.vertices.push_back({q, 0.0});
-  }
-
-  const sim::PathMotion motion = *sim::PathMotion::plan(plan);
-  constexpr double kStand_s = 0.4;
-  const double dt = 1.0 / run.rate_hz, end_s = motion.duration_s() + kStand_s;
-  std::vector<calib::otf::TrackerObservation> samples;
-  Vector3 held(normal(run.random), normal(run.random), normal(run.random));
-  const calib::Matrix3 R = run.T_machine_tracker.R.transpose();
-
-  for (double t = -kStand_s; t < end_s; t += dt) {
-    const double share = std::clamp(t / motion.duration_s(), 0.0, 1.0);
-    const sim::AxisMotion m = motion.at(t);
-    const sim::MachineCondition condition{m.direction, run.truth.thermal.heat_after(t)};
-    Vector3 p = sim::position_m(run.truth, m.q_m, condition) +
-                (run.scale - Vector3::Ones()).cwiseProduct(m.q_m);
-
-    if (run.moved) {
-      p = run.moved(share) * p;
-    }
-
-    Vector3 seen = R * (p - run.T_machine_tracker.t_m);
-    seen = with_noise(run, seen, held, dt);
-    seen *= run.range_scale + run.range_offset_m / seen.norm();
-
-    if (run.spikes > 0.0 && uniform(run.random, 0.0, 1.0) < run.spikes) {
-      seen += 2e-4 * Vector3(normal(run.random), normal(run.random), normal(run.random));
-    }
-
-    const bool lost = share > run.lost_from && share < run.lost_to;
-    samples.push_back({t + kStand_s, seen, !lost});
-  }
-
-  return samples;
-}
-
 void compare(Outcome& outcome, const OtfRun& run, const calib::VolumetricModel& model) {
   constexpr int kSteps = 8;
   std::vector<Vector3> points, truth, difference;
@@ -332,6 +293,52 @@ std::vector<Fault<OtfRun>> otf_faults() {
   };
 }
 
+std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
+  sim::PathPlan plan{.feed_m_per_s = run.feed_m_per_s, .dwell_s = run.dwell_s};
+  for (const Vector3& q : run.driven_m) {
+    plan.vertices.push_back({q, 0.0});
+  }
+
+  const sim::PathMotion motion = *sim::PathMotion::plan(plan);
+  const double stand_s = std::max(0.4, run.dwell_s);
+  const double dt = 1.0 / run.rate_hz, end_s = motion.duration_s() + stand_s;
+  std::vector<calib::otf::TrackerObservation> samples;
+  Vector3 held(normal(run.random), normal(run.random), normal(run.random));
+  const calib::Matrix3 R = run.T_machine_tracker.R.transpose();
+  const Vector3 shaken_m = run.vibration_m > 0.0 ? Vector3(run.vibration_m * direction(run.random))
+                                                 : Vector3(Vector3::Zero());
+  double lost_until_s = -stand_s;
+
+  for (double t = -stand_s; t < end_s; t += dt) {
+    const double share = std::clamp(t / motion.duration_s(), 0.0, 1.0);
+    const sim::AxisMotion m = motion.at(t);
+    const sim::MachineCondition condition{m.direction, run.truth.thermal.heat_after(t)};
+    Vector3 p = sim::position_m(run.truth, m.q_m, condition) +
+                (run.scale - Vector3::Ones()).cwiseProduct(m.q_m);
+
+    p += std::sin(2.0 * M_PI * run.vibration_hz * t) * shaken_m;
+    if (run.moved) {
+      p = run.moved(share) * p;
+    }
+
+    Vector3 seen = R * (p - run.T_machine_tracker.t_m);
+    seen = with_noise(run, seen, held, dt);
+    seen *= run.range_scale + run.range_offset_m / seen.norm();
+
+    if (run.spikes > 0.0 && uniform(run.random, 0.0, 1.0) < run.spikes) {
+      seen += 2e-4 * Vector3(normal(run.random), normal(run.random), normal(run.random));
+    }
+
+    if (run.breaks_per_s > 0.0 && uniform(run.random, 0.0, 1.0) < run.breaks_per_s * dt) {
+      lost_until_s = t + run.break_s;
+    }
+    const bool lost = t < lost_until_s || (share > run.lost_from && share < run.lost_to);
+    samples.push_back({t + stand_s, seen, !lost});
+  }
+
+  return samples;
+}
+
 Outcome identify_and_compare(OtfRun run) {
   const auto samples = measure(run);
   const calib::otf::Path path{run.path_m};
@@ -342,6 +349,8 @@ Outcome identify_and_compare(OtfRun run) {
   calib::otf::Options options;
   options.block_samples = calib::otf::suitable_block_samples(samples);
   options.orientation = run.evidence;
+  options.mode = run.mode;
+  options.standstill.u_repeatability_m = run.u_repeatability_m;
   const auto found = calib::otf::identify(samples, run.machine, path, run.noise, options);
 
   if (!found) {

@@ -34,7 +34,12 @@ struct OtfRun {
   double lost_from = 0.0, lost_to = 0.0;  ///< share of the run without a beam
   double spikes = 0.0;                    ///< share of the samples with an error of 0.2 mm
   double feed_m_per_s = 5.0 / 60.0, rate_hz = 100.0;
+  double dwell_s = 0.05;                          ///< before each leg
+  double vibration_m = 0.0, vibration_hz = 30.0;  ///< amplitude, in a random direction
+  double breaks_per_s = 0.0, break_s = 0.3;       ///< beam breaks at random times
   // the configuration
+  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
+  double u_repeatability_m = 0.0;  ///< of standstill mode
   calib::otf::Machine machine;
   std::vector<Vector3> path_m;
   calib::otf::Noise noise;
@@ -46,6 +51,13 @@ struct OtfRun {
 
 [[nodiscard]] OtfRun random_otf_run(std::uint64_t seed);
 
+/// The stream of the tracker.
+[[nodiscard]] std::vector<calib::otf::TrackerObservation> measure(OtfRun& run);
+
 [[nodiscard]] Outcome identify_and_compare(OtfRun run);
+
+/// The same machine with standstills of one second at 200 positions, 10 m/min between them.
+[[nodiscard]] OtfRun random_standstill_run(std::uint64_t seed);
+[[nodiscard]] std::vector<Fault<OtfRun>> standstill_faults();
 
 }  // namespace abbe::tests::never_worse

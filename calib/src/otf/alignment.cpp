@@ -7,6 +7,7 @@
 #include "abbe/calib/axis_mistakes.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/path_corrections.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -257,25 +258,17 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
                        : or_list(texts) + ", or with the tracker frame reflected";
 }
 
-/// Names the mistakes whose correction makes the points fit: "; they fit with the path driven
-/// backwards". Empty if no correction does.
-std::string fits_with(const BlockSeries& series, const Machine& machine, const Path& path,
-                      Options options) {
-  options.progress = {};
-  const auto fits = [&](const Path& other) {
-    if (options.stopped && options.stopped()) {
-      return false;
-    }
-    return align_as_given(series, machine, other, options).has_value();
-  };
+}  // namespace
 
+std::string corrections_that_fit(const Path& path, const MachineNodes& travel,
+                                 const std::function<bool(const Path&)>& fits) {
   std::vector<std::string> texts;
   if (fits({{path.vertices_m.rbegin(), path.vertices_m.rend()}})) {
     texts.emplace_back("the path driven backwards");
   }
 
   if (fits(times(Vector3(-1.0, 1.0, 1.0).asDiagonal(), path))) {
-    texts.push_back(reflections(path, machine.nodes));
+    texts.push_back(reflections(path, travel));
   }
 
   for (const UnitMistake& mistake : unit_mistakes()) {
@@ -290,15 +283,18 @@ std::string fits_with(const BlockSeries& series, const Machine& machine, const P
   return texts.empty() ? "" : "; they fit with " + or_list(texts);
 }
 
-}  // namespace
-
 Result<Alignment> align(const BlockSeries& series, const Machine& machine, const Path& path,
                         const Options& options) {
   Result<Alignment> a = align_as_given(series, machine, path, options);
   const bool stopped = options.stopped && options.stopped();
   if (!a && !stopped &&
       (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
-    a.error().text += fits_with(series, machine, path, options);
+    Options quiet = options;
+    quiet.progress = {};
+    a.error().text += corrections_that_fit(path, machine.nodes, [&](const Path& other) {
+      return !(options.stopped && options.stopped()) &&
+             align_as_given(series, machine, other, quiet).has_value();
+    });
   }
   return a;
 }

@@ -29,6 +29,15 @@ std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertic
   return all;
 }
 
+/// Direction of travel with which each leg was driven, or with which each position was reached.
+std::vector<std::array<int, 3>> directions_of(const Observations& o) {
+  std::vector<std::array<int, 3>> all = directions_of(o.vertices_m);
+  if (o.mode == Mode::Standstill) {
+    all.insert(all.begin(), std::array<int, 3>{});
+  }
+  return all;
+}
+
 std::string um(const Vector3& v_m) {
   return message("(", 1e6 * v_m.x(), ", ", 1e6 * v_m.y(), ", ", 1e6 * v_m.z(), ") um");
 }
@@ -36,7 +45,7 @@ std::string um(const Vector3& v_m) {
 }  // namespace
 
 AlternativeColumns::AlternativeColumns(const Observations& o)
-    : o_(o), direction_(directions_of(o.vertices_m)) {
+    : o_(o), direction_(directions_of(o)) {
   for (const Observation& row : o.rows) {
     centre_m_ += row.axis_position_m / static_cast<double>(o.rows.size());
   }
@@ -161,8 +170,10 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
     add(columns_of(0, Cause::Drift, 0, kDrift));
     add(columns_of(1, Cause::Backlash, 0, kBacklash));
     add(columns_of(2, Cause::RangeOffset, 0, 1));
-    add(columns_of(3, Cause::Vertex, row.leg, kShift));
-    add(columns_of(3, Cause::Vertex, row.leg + 1, kShift));
+    if (o_.mode == Mode::OnTheFly) {  // else a vertex is a position
+      add(columns_of(3, Cause::Vertex, row.leg, kShift));
+      add(columns_of(3, Cause::Vertex, row.leg + 1, kShift));
+    }
     add(columns_of(4, Cause::Leg, row.leg, kShift));
   }
 
@@ -172,14 +183,16 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
 
 std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& d) const {
   const Vector3 shift = d.size() >= 3 ? Vector3(d.head<3>()) : Vector3::Zero();
+  const bool stands = o_.mode == Mode::Standstill;
   switch (added.cause) {
     case Cause::Moved: {
       const auto at = std::find_if(o_.rows.begin(), o_.rows.end(), [&](const Observation& row) {
         return row.block >= added.place;
       });
       return message("the tracker or the machine moved by ", 1e6 * shift.norm(), " um and ",
-                     1e6 * d.segment<3>(3).norm(), " urad (at the centre of the path) on leg ",
-                     at == o_.rows.end() ? 0 : at->leg, " (block ", added.place, ")");
+                     1e6 * d.segment<3>(3).norm(), " urad (at the centre of the path) ",
+                     stands ? "before position " : "on leg ", at == o_.rows.end() ? 0 : at->leg,
+                     stands ? " (standstill " : " (block ", added.place, ")");
     }
     case Cause::Drift:
       return message("the tracker or the machine drifts: by ", 1e6 * shift.norm(), " um, ",
@@ -198,8 +211,8 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
       return message("vertex ", added.place, " was driven at ", um(shift),
                      " relative to the path file");
     case Cause::Leg:
-      return message("leg ", added.place, " was driven or measured at ", um(shift),
-                     " relative to the path file");
+      return message(stands ? "position " : "leg ", added.place, " was driven or measured at ",
+                     um(shift), " relative to the path file");
     case Cause::RangeOffset:
       return message("all ranges of the tracker have an offset of ", 1e6 * d(0),
                      " um: home position or reflector");

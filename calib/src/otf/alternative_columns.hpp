@@ -46,7 +46,7 @@ class AlternativeColumns {
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();
   double last_block_ = 1.0;
-  std::vector<std::array<int, 3>> direction_;  ///< per leg and axis: sign of the last motion
+  std::vector<std::array<int, 3>> direction_;  ///< per leg (or position), axis: sign of last motion
 };
 
 }  // namespace abbe::calib::otf

@@ -344,6 +344,7 @@ Result<Verdict> judge(const Observations& measured, const Solution& solution,
   }
 
   Verdict verdict = decide(solution.model, *figures, limits, active);
+  verdict.notes.insert(verdict.notes.end(), o.notes.begin(), o.notes.end());
   add_alternatives(verdict, *others);
   require_plausible_scale(verdict, common_scale_error(solution.model), limits.max_scale_error);
   require_orientation(verdict, {o.vertices_m}, o.layout().nodes(), o.target_offset_m,

@@ -28,7 +28,12 @@ constexpr double kCauses = 9.0;
 /// time of an adjustment.
 constexpr double kSuspicious = 2.0;
 
+/// End of the series of neighbouring points that begins with row `begin`: a leg, or all positions
+/// of a run with standstills.
 std::size_t series_end(const Observations& o, std::size_t begin) {
+  if (o.mode == Mode::Standstill) {
+    return o.rows.size();
+  }
   std::size_t end = begin;
   while (end < o.rows.size() && o.rows[end].leg == o.rows[begin].leg) {
     ++end;
@@ -36,11 +41,11 @@ std::size_t series_end(const Observations& o, std::size_t begin) {
   return end;
 }
 
-/// Whitened residuals of one leg along a2 or a3 (every second row).
+/// Whitened residuals of a series in one direction, for example along a2.
 std::vector<double> whitened(const Observations& o, std::span<const double> residual_m,
                              std::size_t begin, std::size_t end) {
   std::vector<double> w;
-  for (std::size_t i = begin; i < end; i += 2) {
+  for (std::size_t i = begin; i < end; i += o.rows_per_point()) {
     w.push_back(residual_m[i] / o.rows[i].sigma_m);
   }
   return w;
@@ -346,7 +351,7 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
 
   for (std::size_t begin = 0; begin < o.rows.size();) {
     const std::size_t end = series_end(o, begin);
-    for (const std::size_t first : {begin, begin + 1}) {
+    for (std::size_t first = begin; first < begin + o.rows_per_point(); ++first) {
       const std::vector<double> w = whitened(o, residual_m, first, end);
       for (std::size_t i = 0; i < w.size(); ++i) {
         for (std::size_t lag = 0; lag <= std::min(kLags, i); ++lag) {
@@ -456,14 +461,14 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   constexpr double kHalf = 0.5;
   if (fit.noise.correlation > kSuspicious && fit.noise.variance_factor() > kSuspicious &&
       (found.empty() || found.front().explained < kHalf)) {
-    found.insert(
-        found.begin(),
-        {.cause = Cause::CorrelatedNoise,
-         .text = message("the residuals are correlated over ", fit.noise.correlation,
-                         " blocks: air turbulence, vibration, or an effect that is not modelled"),
-         .explained = 1.0,
-         .bias_m = 0.0,
-         .u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor())});
+    found.insert(found.begin(),
+                 {.cause = Cause::CorrelatedNoise,
+                  .text = message("the residuals are correlated over ", fit.noise.correlation,
+                                  o.mode == Mode::Standstill ? " positions" : " blocks",
+                                  ": air turbulence, vibration, or an effect that is not modelled"),
+                  .explained = 1.0,
+                  .bias_m = 0.0,
+                  .u_m = fit.u_white_m * std::sqrt(fit.noise.variance_factor())});
   }
 
   return found;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/calib/otf/observe_standstills.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/rigid_columns.hpp"
@@ -58,35 +59,6 @@ MeanColumns mean_columns(const estimation::TableBasis& basis, const Vector3& t,
     mean.add(columns.span());
   }
   return mean;
-}
-
-Result<void> check(const Noise& noise) {
-  if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) ||
-      !std::isfinite(noise.sigma_range_m) || !std::isfinite(noise.sigma_angle_rad)) {
-    return failure(ErrorCode::BadInput,
-                   message("tracker noise: sigma_range ", noise.sigma_range_m, " m, sigma_angle ",
-                           noise.sigma_angle_rad, " rad: both must be positive"));
-  }
-
-  if (!(noise.u_scale >= 0) || !std::isfinite(noise.u_scale)) {
-    return failure(ErrorCode::BadInput,
-                   message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
-  }
-
-  if (!(noise.u_range_offset_m >= 0) || !std::isfinite(noise.u_range_offset_m)) {
-    return failure(ErrorCode::BadInput,
-                   message("tracker noise: u_range_offset ", noise.u_range_offset_m,
-                           " m: must not be negative"));
-  }
-
-  for (const double u : noise.u_axis_scale) {
-    if (!(u >= 0) || !std::isfinite(u)) {
-      return failure(ErrorCode::BadInput,
-                     message("scales: relative uncertainty ", u, ": must not be negative"));
-    }
-  }
-
-  return {};
 }
 
 /// Median travel from one usable block to the next; 0 without two such blocks.
@@ -199,19 +171,72 @@ std::string Observations::label(std::size_t unknown) const {
                                   : std::string(kNames.at(unknown - rigid_offset()));
 }
 
-void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m) {
+Result<void> check(const Noise& noise) {
+  if (!(noise.sigma_range_m > 0) || !(noise.sigma_angle_rad > 0) ||
+      !std::isfinite(noise.sigma_range_m) || !std::isfinite(noise.sigma_angle_rad)) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: sigma_range ", noise.sigma_range_m, " m, sigma_angle ",
+                           noise.sigma_angle_rad, " rad: both must be positive"));
+  }
+
+  if (!(noise.u_scale >= 0) || !std::isfinite(noise.u_scale)) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: u_scale ", noise.u_scale, ": must not be negative"));
+  }
+
+  if (!(noise.u_range_offset_m >= 0) || !std::isfinite(noise.u_range_offset_m)) {
+    return failure(ErrorCode::BadInput,
+                   message("tracker noise: u_range_offset ", noise.u_range_offset_m,
+                           " m: must not be negative"));
+  }
+
+  for (const double u : noise.u_axis_scale) {
+    if (!(u >= 0) || !std::isfinite(u)) {
+      return failure(ErrorCode::BadInput,
+                     message("scales: relative uncertainty ", u, ": must not be negative"));
+    }
+  }
+
+  return {};
+}
+
+void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m,
+                 std::span<const MeasuredComponent> components) {
   const MeanColumns columns = mean_columns(o.basis, o.target_offset_m, sub_points_m);
   const std::size_t first = o.sub_points_m.size();
   o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
-  const auto append = [&](const Vector3& a, double sigma_m) {
-    const double mean_sigma_m = sigma_m / std::sqrt(point.samples);
-    o.A.append(columns.along(a));
-    o.rows.push_back({a.dot(point.deviation_m), mean_sigma_m, 1.0 / (mean_sigma_m * mean_sigma_m),
-                      point.leg, point.block, a, point.axis_position_m, first,
+  for (const MeasuredComponent& c : components) {
+    o.A.append(columns.along(c.direction));
+    o.rows.push_back({c.direction.dot(point.deviation_m), c.sigma_m, 1.0 / (c.sigma_m * c.sigma_m),
+                      point.leg, point.block, c.direction, point.axis_position_m, first,
                       sub_points_m.size()});
-  };
-  append(point.frame.a2, point.frame.sigma2_m);
-  append(point.frame.a3, point.frame.sigma3_m);
+  }
+}
+
+void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m) {
+  const double root = std::sqrt(point.samples);
+  const PathFrame& frame = point.frame;
+  append_rows(o, point, sub_points_m,
+              std::array{MeasuredComponent{frame.a2, frame.sigma2_m / root},
+                         MeasuredComponent{frame.a3, frame.sigma3_m / root}});
+}
+
+Result<Observations> observations_without_rows(const Machine& machine, const Path& path,
+                                               const Noise& noise, Alignment alignment) {
+  Result<estimation::TableBasis> basis =
+      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
+          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
+  if (!basis) {
+    return tl::unexpected(basis.error());
+  }
+
+  return Observations{.basis = *std::move(basis),
+                      .target_offset_m = machine.target_offset_m,
+                      .alignment = std::move(alignment),
+                      .vertices_m = path.vertices_m,
+                      .u_scale = noise.u_scale,
+                      .u_axis_scale = noise.u_axis_scale,
+                      .u_range_offset_m = noise.u_range_offset_m};
 }
 
 double drow_drange_offset(const Observations& o, const Observation& row) {
@@ -251,6 +276,9 @@ Observations with_basis(const Observations& o, estimation::TableBasis basis) {
 
 Result<Observations> observe(std::span<const TrackerObservation> samples, const Machine& machine,
                              const Path& path, const Noise& noise, const Options& options) {
+  if (options.mode == Mode::Standstill) {
+    return observe_standstills(samples, machine, path, noise, options);
+  }
   const Result<BlockSeries> series = make_blocks(samples, options);
   if (!series) {
     return tl::unexpected(series.error());
@@ -264,12 +292,8 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   if (valid) {
     valid = check_travel(series, options);
   }
-
-  Result<estimation::TableBasis> basis =
-      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
-          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
-  if (!valid || !basis) {
-    return tl::unexpected(valid ? basis.error() : valid.error());
+  if (!valid) {
+    return tl::unexpected(valid.error());
   }
 
   Result<Alignment> alignment = align(series, machine, path, options);
@@ -277,13 +301,13 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
     return tl::unexpected(alignment.error());
   }
 
-  Observations o{.basis = *std::move(basis),
-                 .target_offset_m = machine.target_offset_m,
-                 .alignment = *std::move(alignment),
-                 .vertices_m = path.vertices_m,
-                 .u_scale = noise.u_scale,
-                 .u_axis_scale = noise.u_axis_scale,
-                 .u_range_offset_m = noise.u_range_offset_m};
+  Result<Observations> empty =
+      observations_without_rows(machine, path, noise, *std::move(alignment));
+  if (!empty) {
+    return empty;
+  }
+
+  Observations o = *std::move(empty);
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();

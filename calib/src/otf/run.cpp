@@ -2,6 +2,19 @@
 
 namespace abbe::calib::otf {
 
+std::string_view name(Mode mode) {
+  return mode == Mode::Standstill ? "standstill" : "on-the-fly";
+}
+
+std::optional<Mode> mode_named(std::string_view text) {
+  for (const Mode mode : {Mode::OnTheFly, Mode::Standstill}) {
+    if (text == name(mode)) {
+      return mode;
+    }
+  }
+  return std::nullopt;
+}
+
 std::string_view name(Stage stage) {
   switch (stage) {
     case Stage::Observe:

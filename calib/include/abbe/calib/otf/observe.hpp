@@ -2,7 +2,8 @@
 /// Stage one: computes weighted linear observations of the machine's errors from tracker points and
 /// path. Each used block gives two rows, along a2 and a3 of its path frame. The component along the
 /// direction of travel is not used: without synchronised clocks it carries no information (weight 0
-/// in [Sanders 2023] eq. (4)).
+/// in [Sanders 2023] eq. (4)). In standstill mode each position gives three rows, see
+/// observe_standstills.hpp; leg and block of a row are then its position and its standstill.
 
 #include <Eigen/Core>
 #include <array>
@@ -49,6 +50,7 @@ struct Observation {
 inline constexpr std::size_t kRigidUnknowns = 6;
 
 struct Observations {
+  Mode mode = Mode::OnTheFly;
   estimation::TableBasis basis;
   Vector3 target_offset_m = Vector3::Zero();
   SparseRows A{};  ///< unknowns() columns
@@ -64,7 +66,10 @@ struct Observations {
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
+  std::vector<std::string> notes{};  ///< for the verdict
 
+  /// Number of successive rows with one point: a2 and a3, or three directions of a standstill.
+  [[nodiscard]] std::size_t rows_per_point() const { return mode == Mode::Standstill ? 3 : 2; }
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the
   /// model.
@@ -83,10 +88,24 @@ struct PointOnPath {
   PathFrame frame;
   double samples = 1.0;  ///< number of samples in the mean
 };
+/// One row of a point: component along `direction`, standard uncertainty of the mean.
+struct MeasuredComponent {
+  Vector3 direction = Vector3::UnitX();
+  double sigma_m = 1.0;
+};
+/// Appends a row for each component of a point. `frame` and `samples` of the point are not used.
+void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m,
+                 std::span<const MeasuredComponent>);
 /// Appends the two rows of a point, along a2 and a3 of its path frame: design P M B and observed
 /// error P V of [Sanders 2023] eq. (6), not yet weighted. `sub_points_m` are the nominal axis
 /// positions over which the design matrix is averaged.
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m);
+
+/// BadInput for a noise that is not positive, or a negative uncertainty.
+[[nodiscard]] Result<void> check(const Noise&);
+/// Without rows: the tables of the machine and the uncertainties of the noise.
+[[nodiscard]] Result<Observations> observations_without_rows(const Machine&, const Path&,
+                                                             const Noise&, Alignment);
 
 /// Derivative of the row's y_m with respect to an offset common to all ranges of the tracker.
 [[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);

@@ -16,6 +16,7 @@
 #include "abbe/calib/axis_table.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
+#include "abbe/calib/otf/standstill_options.hpp"
 
 namespace abbe::calib::otf {
 
@@ -66,6 +67,15 @@ struct OrientationEvidence {
   bool accepted = false;               ///< the configuration accepts a path without evidence
 };
 
+/// OnTheFly: points during the motion, components across the direction of travel only.
+/// Standstill: the machine stops at every vertex of the path; all three components of the mean
+/// position of each standstill.
+enum class Mode { OnTheFly, Standstill };
+/// "on-the-fly", "standstill"
+[[nodiscard]] std::string_view name(Mode);
+/// nullopt for any other name.
+[[nodiscard]] std::optional<Mode> mode_named(std::string_view);
+
 enum class Stage { Observe, Align, Solve, Judge };
 [[nodiscard]] std::string_view name(Stage);
 /// Called in the calling thread with 0 <= fraction <= 1, ascending within a stage.
@@ -75,6 +85,8 @@ using Progress = std::function<void(Stage, double fraction)>;
 using Stopped = std::function<bool()>;
 
 struct Options {
+  Mode mode = Mode::OnTheFly;
+  StandstillOptions standstill;  ///< of Mode::Standstill
   /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.
   std::size_t block_samples = 100;

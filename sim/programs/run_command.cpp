@@ -121,6 +121,9 @@ Subcommand add_run(CLI::App& app) {
       ->type_name("FILE");
   sub->add_option("--feed", choices.feed_mm_per_min, "mm/min (default 2500)")
       ->check(CLI::PositiveNumber);
+  sub->add_option("--dwell", choices.dwell_s,
+                  "s of standstill at every vertex (default 0.05; standstill mode needs 0.3)")
+      ->check(CLI::NonNegativeNumber);
   sub->add_option("--speed", choices.speed,
                   "simulated seconds per second; the daemon must be given the same")
       ->check(CLI::Range(1e-3, 1e4));

@@ -58,6 +58,7 @@ void apply_choices(const SetupChoices& choices, SetupDraft& draft) {
   if (!choices.truth_file.empty()) draft.truth_file = choices.truth_file;
   if (choices.seed) draft.seed = static_cast<std::int64_t>(*choices.seed);
   if (choices.speed) draft.setup.speed = *choices.speed;
+  if (choices.dwell_s) simulation.path.dwell_s = *choices.dwell_s;
   if (choices.feed_mm_per_min) simulation.path.feed_m_per_s = *choices.feed_mm_per_min * kMmPerMin;
   if (choices.tracker_port) simulation.tracker_port = *choices.tracker_port;
   if (choices.can_port) simulation.bus->port = *choices.can_port;

@@ -27,6 +27,7 @@ struct SetupChoices {
   std::optional<std::uint64_t> seed;
   std::optional<double> speed;
   std::optional<double> feed_mm_per_min;
+  std::optional<double> dwell_s;
   std::optional<std::uint16_t> tracker_port;
   std::optional<std::uint16_t> can_port;
   std::optional<std::uint16_t> can_peer_port;

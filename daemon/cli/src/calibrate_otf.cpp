@@ -18,7 +18,7 @@ namespace {
 
 struct CalibrateOtfArguments {
   FollowOptions follow;
-  std::string path_file;
+  std::string path_file, mode;
 };
 
 int calibrate(const CalibrateOtfArguments& arguments) {
@@ -27,7 +27,9 @@ int calibrate(const CalibrateOtfArguments& arguments) {
     return report({ErrorCode::Usage, "calibrate otf: --path is required", {}});
   const auto path = read_path_csv(arguments.path_file);
   if (!path) return report(path.error());
-  return run_calibration(arguments.follow, to_json(OtfRequest{path->vertices_m}));
+  return run_calibration(
+      arguments.follow,
+      to_json(OtfRequest{path->vertices_m, calib::otf::mode_named(arguments.mode)}));
 }
 
 }  // namespace
@@ -41,6 +43,11 @@ void add_calibrate_otf(CLI::App& parent, int& exit) {
       "calibration continues. --cancel ends the calibration.");
   auto* path = command->add_option("--path", arguments->path_file,
                                    "path.csv: vertices of the path to drive: x_mm,y_mm,z_mm");
+  command
+      ->add_option("--mode", arguments->mode,
+                   "on-the-fly, or standstill: let the machine stop at every vertex for 0.3 s or\n"
+                   "longer; default: [otf] mode of the daemon")
+      ->check(CLI::IsMember({"on-the-fly", "standstill"}));
   add_follow_options(*command, arguments->follow, path);
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });
 }

@@ -38,7 +38,7 @@ namespace otf = calib::otf;
 constexpr double kPpmPer1 = 1e6;
 
 struct IdentifyOtfArguments {
-  std::string machine, path, tracker, encoder, recording, keep, out;
+  std::string machine, path, tracker, encoder, recording, keep, out, mode;
   std::string estimator = "two-step";
   std::size_t block_samples = 0;      // 0: blocks by travel
   std::optional<double> u_scale_ppm;  // without a value: that of the configured tracker
@@ -110,7 +110,8 @@ protocol::UtcTime now() {
 
 OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
                       std::vector<InputFile> sources) {
-  auto document = otf_document(candidate.solution, config, std::move(sources), now());
+  auto document =
+      otf_document(candidate.solution, candidate.mode, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
           std::move(candidate.solution.residuals),
@@ -164,6 +165,8 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
 
   otf::Options options =
       otf_options(files->tracker.points, files->config.machine, files->config.gate);
+  options.mode = otf::mode_named(arguments.mode).value_or(files->config.otf.mode);
+  options.standstill.u_repeatability_m = files->config.otf.u_repeatability_m;
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
@@ -173,6 +176,8 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   noise.u_scale = u_scale(arguments, files->config);
   auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
                              noise, options);
+  if (!found && options.mode == otf::Mode::Standstill)
+    found.error().text = fmt::format("{}: {}", arguments.tracker, found.error().text);
   if (!found) return tl::make_unexpected(error_of(found.error()));
 
   const auto other = comparison_model(active, files->config);
@@ -186,7 +191,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   if (auto air = unmeasured_air_text(files->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
-  return outcome_of({std::move(found->solution), std::move(*verdict)}, files->config,
+  return outcome_of({std::move(found->solution), std::move(*verdict), options.mode}, files->config,
                     std::move(files->sources));
 }
 
@@ -237,6 +242,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"model", (folder / "model.json").string()},
       {"id", model_id(outcome.document)},
       {"hash", model_hash(outcome.document)},
+      {"mode", outcome.document.mode},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
       {"blocks", outcome.blocks},
@@ -261,8 +267,9 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
   const auto& s = outcome.document.statistics;
   fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
              outcome.document.model.tables()->layout().tables().size(), outcome.document.machine);
-  fmt::print("samples     {}, {} lost; {} of {} blocks used\n", s.samples, s.lost_samples,
-             outcome.blocks_used, outcome.blocks);
+  const bool stands = outcome.document.mode == otf::name(otf::Mode::Standstill);
+  fmt::print("samples     {}, {} lost; {} of {} {} used\n", s.samples, s.lost_samples,
+             outcome.blocks_used, outcome.blocks, stands ? "standstills" : "blocks");
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
@@ -303,7 +310,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyOtfArguments>();
   auto* command = parent.add_subcommand(
       "otf",
-      "Identify a model from laser tracker points measured on the fly along a path.\n"
+      "Identify a model from laser tracker points measured along a path, on the fly or, with\n"
+      "--mode standstill, where the machine stood still at each vertex.\n"
       "Writes model.json, tables.csv and report.html to OUT and prints how well the model\n"
       "predicts legs that were not used in the fit. Exit code 5 if the gate would refuse the\n"
       "model, also if the recording is damaged before its end; the files are written in any case.");
@@ -340,7 +348,14 @@ void add_identify_otf(CLI::App& parent, int& exit) {
   path->needs(machine, tracker);
   tracker->needs(path);
   encoder->needs(path);
-  recording->excludes(path)->excludes(tracker)->excludes(encoder);
+  auto* mode =
+      command
+          ->add_option("--mode", arguments->mode,
+                       "on-the-fly: components across the path, during the motion;\n"
+                       "standstill: the machine stops at every vertex for 0.3 s or longer, "
+                       "all three\ncomponents; default: [otf] mode, or on-the-fly")
+          ->check(CLI::IsMember({"on-the-fly", "standstill"}));
+  recording->excludes(path)->excludes(tracker)->excludes(encoder)->excludes(mode);
   command->add_option(
       "--keep", arguments->keep,
       "also add the model to this store, and compare it with its active model; to activate it,\n"
@@ -350,7 +365,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->capture_default_str();
   command
       ->add_option("--block-samples", arguments->block_samples,
-                   "samples averaged in a block; default: blocks of 8.3 mm of travel")
+                   "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--json", arguments->json, "print the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")

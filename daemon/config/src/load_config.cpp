@@ -24,6 +24,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_recording(root, base, config);
   read_dds(root, base, config);
   read_gate(root, config);
+  read_otf(root, config.otf);
   read_evemu(root, config);
   read_control(root, base, config);
   root.close();

@@ -268,10 +268,9 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
       within("u_temperature_K", 0, 0.0, kHighest_K - kLowest_K)};
 }
 
-/// The recording gap of the model. The key is absent in models with a complete recording and in
-/// models of earlier versions.
-std::string read_recording_gap(Reader& in) {
-  const std::string key = "recording_gap";
+/// `recording_gap` is absent in models with a complete recording, `mode` in models of other
+/// methods; both are absent in models of earlier versions.
+std::string read_optional(Reader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
@@ -306,13 +305,14 @@ Result<ModelDocument> read_document(Reader& in) {
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);
-  const auto recording_gap = read_recording_gap(in);
+  const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{std::move(*model), method,     estimator, machine,  machine_hash,
-                         *created,          statistics, inputs,    artefact, recording_gap};
+  ModelDocument document{std::move(*model), method,        estimator,  machine,
+                         machine_hash,      *created,      statistics, inputs,
+                         artefact,          recording_gap, mode};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

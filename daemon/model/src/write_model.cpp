@@ -154,6 +154,7 @@ std::string to_json(const ModelDocument& document) {
   out.member("created", to_text(document.created));
   out.member("method", document.method);
   out.member("estimator", document.estimator);
+  if (!document.mode.empty()) out.member("mode", document.mode);
   out.member("machine", document.machine);
   out.member("machine_hash", document.machine_hash);
   out.member("chain", model.chain().text());

@@ -60,7 +60,9 @@ void add_model_origin(HtmlReport& page, const ModelDocument& document,
       {"machine", document.machine},
       {"kinematic chain (ISO 10791-6)", document.model.chain().text()},
       {"model", model_id(document)},
-      {"method", fmt::format("{}, {}", document.method, document.estimator)},
+      {"method",
+       fmt::format("{}{}, {}", document.method,
+                   document.mode.empty() ? "" : " (" + document.mode + ")", document.estimator)},
       {"gauge", std::string{calib::name(document.model.gauge())}},
       {"created (UTC)", to_text(document.created)}};
   facts.insert(facts.end(), more.begin(), more.end());

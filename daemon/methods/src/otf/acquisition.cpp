@@ -59,11 +59,13 @@ std::vector<RunPoint> RunPoints::joined() const {
   return all;
 }
 
-OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options)
+OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options,
+                               calib::otf::Mode mode)
     : path_m_(std::move(path_m)),
       path_(otf_path(path_m_)),
       driven_at_m_(calib::otf::lengths_to_vertices_m(path_.path())),
-      options_(std::move(options)) {
+      options_(std::move(options)),
+      mode_(mode) {
   reason_ =
       fmt::format("waiting for the machine to stand at {} for {:.1f} s with the tracker streaming",
                   text(path_.path().vertices_m.front()), in_seconds(options_.stand_before));

@@ -35,10 +35,14 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
 
 }  // namespace
 
-ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
-                           std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return {solution.model,       "otf",   std::string{calib::otf::kEstimator},   config.machine.name,
-          machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
+ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mode mode,
+                           const Config& config, std::vector<InputFile> inputs,
+                           protocol::UtcTime created) {
+  ModelDocument document{
+      solution.model,       "otf",   std::string{calib::otf::kEstimator},   config.machine.name,
+      machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
+  document.mode = calib::otf::name(mode);
+  return document;
 }
 
 }  // namespace abbe::daemon

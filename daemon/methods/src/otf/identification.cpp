@@ -31,13 +31,15 @@ double overall(calib::otf::Stage stage, double fraction) {
 
 }  // namespace
 
-Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine_config,
-                                  const GateConfig& gate, const calib::VolumetricModel* active,
+Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
+                                  const calib::VolumetricModel* active,
                                   const IdentificationWatch& watch) {
-  const auto machine = otf_machine(machine_config);
+  const auto machine = otf_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
-  calib::otf::Options options = otf_options(points, machine_config, gate);
+  calib::otf::Options options = otf_options(points, config.machine, config.gate);
+  options.mode = run.mode;
+  options.standstill.u_repeatability_m = config.otf.u_repeatability_m;
 
   // A live run has scale readings, and they were found to agree with the path at its vertices.
   options.orientation.scales_agree = true;
@@ -48,18 +50,19 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machin
   }
 
   options.stopped = watch.stopped;
-  calib::otf::Noise noise = otf_noise(machine_config);
+  calib::otf::Noise noise = otf_noise(config.machine);
   noise.u_scale = run.u_scale;
   noise.u_axis_scale = run.u_axis_scale;
   auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);
   if (!observations) return tl::unexpected(error_of(observations.error()));
   auto solution = calib::otf::solve(*observations, options);
   if (!solution) return tl::unexpected(error_of(solution.error()));
-  auto verdict = calib::otf::judge(*observations, *solution, active, gate_limits(gate), options);
+  auto verdict =
+      calib::otf::judge(*observations, *solution, active, gate_limits(config.gate), options);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
 
-  return OtfCandidate{std::move(*solution), std::move(*verdict)};
+  return OtfCandidate{std::move(*solution), std::move(*verdict), run.mode};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

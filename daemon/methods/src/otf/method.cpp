@@ -16,11 +16,29 @@ OtfMethod::Options OtfMethod::options(const Config& config) {
 }
 
 nlohmann::json OtfMethod::to_json(const Request& request) {
-  return {{"path_m", request.path_m}};
+  nlohmann::json object{{"path_m", request.path_m}};
+  if (request.mode) object["mode"] = calib::otf::name(*request.mode);
+  return object;
 }
 
-OtfMethod::Request OtfMethod::request_from(const nlohmann::json& object, const Config* /*config*/) {
-  return {object.at("path_m").get<std::vector<AxisPosition>>()};
+namespace {
+
+/// Throws like json::get() for a text that is no mode.
+std::optional<calib::otf::Mode> mode_of(const nlohmann::json& object, const Config* config) {
+  if (!object.contains("mode"))
+    return config != nullptr ? std::optional{config->otf.mode} : std::nullopt;
+  const auto text = object.at("mode").get<std::string>();
+  const auto mode = calib::otf::mode_named(text);
+  if (!mode)
+    throw nlohmann::json::other_error::create(
+        501, fmt::format("mode \"{}\": must be \"on-the-fly\" or \"standstill\"", text), &object);
+  return mode;
+}
+
+}  // namespace
+
+OtfMethod::Request OtfMethod::request_from(const nlohmann::json& object, const Config* config) {
+  return {object.at("path_m").get<std::vector<AxisPosition>>(), mode_of(object, config)};
 }
 
 Result<void> OtfMethod::check(const Request& request, const Config& config) {
@@ -35,7 +53,8 @@ Result<void> OtfMethod::check(const Request& request, const Config& config) {
 Result<OtfMethod::Acquisition> OtfMethod::acquire(Request&& request, const Options& options) {
   if (request.path_m.size() < 2)
     return fail(ErrorCode::BadInput, "calibrate otf: a path needs at least two vertices");
-  return OtfAcquisition{std::move(request.path_m), options};
+  return OtfAcquisition{std::move(request.path_m), options,
+                        request.mode.value_or(calib::otf::Mode::OnTheFly)};
 }
 
 OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
@@ -48,13 +67,14 @@ OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
           .points = acquisition.release(),
           .u_scale = effect.u_scale,
           .u_axis_scale = effect.u_expansion_factor,
-          .unmeasured_air = use.unmeasured_air};
+          .unmeasured_air = use.unmeasured_air,
+          .mode = acquisition.mode()};
 }
 
 Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& config,
                                                  const calib::VolumetricModel* active,
                                                  const IdentificationWatch& watch) {
-  return identify_run(run, config.machine, config.gate, active, watch);
+  return identify_run(run, config, active, watch);
 }
 
 std::vector<InputFile> OtfMethod::inputs_of(const Run& run) {
@@ -63,7 +83,7 @@ std::vector<InputFile> OtfMethod::inputs_of(const Run& run) {
 
 ModelDocument OtfMethod::document_of(const Candidate& candidate, const Config& config,
                                      std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return otf_document(candidate.solution, config, std::move(inputs), created);
+  return otf_document(candidate.solution, candidate.mode, config, std::move(inputs), created);
 }
 
 }  // namespace abbe::daemon

@@ -31,16 +31,16 @@ void add_origin(HtmlReport& page, const ModelDocument& document) {
 }
 
 void add_residuals(HtmlReport& page, const ModelStatistics& s,
-                   const calib::otf::Residuals& residuals) {
+                   const calib::otf::Residuals& residuals, std::string_view components) {
   page.heading("Residuals of the fit");
   const auto row = [](const char* what, const ResidualFigures& f) {
     return std::vector<std::string>{what, um(f.mean_abs_m), um(f.rms_m), um(f.max_abs_m)};
   };
   page.table({"", "mean", "rms", "largest"}, {row("before", s.before), row("after", s.after)});
-  page.chart(
-      Histogram{"before", "error across the path, um", {{"before", in_um(residuals.before_m)}}});
-  page.chart(
-      Histogram{"after", "residual across the path, um", {{"after", in_um(residuals.after_m)}}});
+  page.chart(Histogram{
+      "before", fmt::format("error {}, um", components), {{"before", in_um(residuals.before_m)}}});
+  page.chart(Histogram{
+      "after", fmt::format("residual {}, um", components), {{"after", in_um(residuals.after_m)}}});
 }
 
 /// Chart of the errors of one kind (rotations if `angles`, else displacements) along one axis.
@@ -95,9 +95,12 @@ void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
 
 std::string otf_report(const ModelDocument& document, const calib::otf::Residuals& residuals,
                        const calib::Verdict& verdict) {
-  HtmlReport page(fmt::format("{}: on-the-fly calibration", document.machine));
-  add_verdict(page, verdict, "legs", kDecimals);
-  add_residuals(page, document.statistics, residuals);
+  const bool stands = document.mode == calib::otf::name(calib::otf::Mode::Standstill);
+  HtmlReport page(
+      fmt::format("{}: {} calibration", document.machine, stands ? "standstill" : "on-the-fly"));
+  add_verdict(page, verdict, stands ? "positions" : "legs", kDecimals);
+  add_residuals(page, document.statistics, residuals,
+                stands ? "along and across the beam" : "across the path");
   add_tables(page, document.model);
   add_origin(page, document);
   return page.text();

@@ -18,6 +18,7 @@
 
 #include "abbe/base/error.hpp"
 #include "abbe/calib/environment/refractive_index.hpp"
+#include "abbe/calib/otf/run.hpp"
 #include "abbe/config/device_configs.hpp"
 #include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/real_time_mode.hpp"
@@ -166,6 +167,13 @@ struct GateConfig {
   [[nodiscard]] bool accepts(std::string_view name) const;
 };
 
+/// [otf]: calibration with a laser tracker along a path.
+struct OtfConfig {
+  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;  ///< unless a request names another one
+  /// See calib::otf::StandstillOptions.
+  double u_repeatability_m = calib::otf::StandstillOptions{}.u_repeatability_m;
+};
+
 /// [evemu] artefact_sensor or artefact_C: temperature of the ball array while it is touched.
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
@@ -214,6 +222,7 @@ struct Config {
   GateConfig gate;
   EvemuConfig evemu;
   ControlConfig control;
+  OtfConfig otf;
 
   /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
   template <class Kind>

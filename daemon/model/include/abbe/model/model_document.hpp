@@ -56,6 +56,9 @@ struct ModelDocument {
   /// recording was switched off. A gap does not affect the uncertainty of the model, but no replay
   /// can check such a model.
   std::string recording_gap{};
+  /// Of method otf: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
+  /// versions.
+  std::string mode{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);

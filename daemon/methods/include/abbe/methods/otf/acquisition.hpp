@@ -94,7 +94,8 @@ class OtfAcquisition {
 
   /// `path_m`: vertices of the polyline, at least two. All work that depends on the number n of
   /// vertices is done here, in O(n), except that of release().
-  explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {});
+  explicit OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options = {},
+                          calib::otf::Mode mode = calib::otf::Mode::OnTheFly);
 
   /// To be called before the first take(). Snapshots before `from` are ignored.
   void begin(protocol::HostTime from) noexcept { from_ = from; }
@@ -115,6 +116,7 @@ class OtfAcquisition {
   /// The path of the request; O(1).
   [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
   [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
+  [[nodiscard]] calib::otf::Mode mode() const noexcept { return mode_; }  ///< of the request
   /// Mean over the run of the effect of the environment (temperatures of the scales, air).
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
@@ -138,6 +140,7 @@ class OtfAcquisition {
   std::vector<double> driven_at_m_;  // length along the path up to each vertex
   protocol::HostTime from_{};
   AcquisitionOptions options_;
+  calib::otf::Mode mode_ = calib::otf::Mode::OnTheFly;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
   std::deque<RunPoint> before_;  // the last keep_before of the standstill at the first vertex

@@ -10,7 +10,8 @@
 
 namespace abbe::daemon {
 
-[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution, const Config& config,
+[[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution,
+                                         calib::otf::Mode mode, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
 }  // namespace abbe::daemon

@@ -31,18 +31,19 @@ struct OtfRun {
   /// Note in the verdict if the air was not measured: states the air for which the ranges were
   /// corrected. nullopt: the air was measured.
   std::optional<std::string> unmeasured_air;
+  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
 };
 
 struct OtfCandidate {
   calib::otf::Solution solution;
   calib::Verdict verdict;
+  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
 };
 
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there
 /// is none. An Error DataInsufficient names what is missing if the run does not determine the
 /// model.
-[[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const MachineConfig& machine,
-                                                const GateConfig& gate,
+[[nodiscard]] Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
                                                 const calib::VolumetricModel* active,
                                                 const IdentificationWatch& watch = {});
 

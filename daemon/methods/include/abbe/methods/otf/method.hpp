@@ -3,6 +3,7 @@
 /// method_list.hpp.
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -19,6 +20,7 @@ namespace abbe::daemon {
 
 struct OtfRequest {
   std::vector<AxisPosition> path_m;
+  std::optional<calib::otf::Mode> mode{};  ///< nullopt: that of the configuration
 };
 
 struct OtfMethod {
@@ -33,6 +35,7 @@ struct OtfMethod {
   [[nodiscard]] static Options options(const Config& config);
   [[nodiscard]] static nlohmann::json to_json(const Request& request);
   /// Throws nlohmann::json::exception for a member that is missing or of the wrong type.
+  /// Without a member "mode": that of [otf] of `config`; null: nullopt.
   [[nodiscard]] static Request request_from(const nlohmann::json& object, const Config* config);
   /// Refused if the tracker is configured for stationary mode; the other errors are those of
   /// check_otf_path().

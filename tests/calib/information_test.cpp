@@ -393,4 +393,17 @@ TEST(Spectrum, CountsAWeakCombination) {
   EXPECT_EQ(spectrum(of_rows(r)).rank, 5u);
 }
 
+TEST(Information, OfRowsWithTheSameFewDirectionsIsFinite) {
+  // Five directions of 40 unknowns, in every part: behind them remains rounding of rounding.
+  const Eigen::MatrixXd directions = random_rows(5, 40, 1).A;
+  Information sum(40);
+  for (unsigned part = 0; part < 5; ++part) {
+    const Rows mix = random_rows(30, 5, 2 + part);
+    sum += of_rows({mix.A * directions, mix.y});
+  }
+  EXPECT_TRUE(sum.R().allFinite());
+  EXPECT_TRUE(sum.z().allFinite());
+  EXPECT_EQ(spectrum(sum).rank, 5u);
+}
+
 }  // namespace

@@ -176,6 +176,7 @@ TEST_F(FilesPage, NamesEveryKeyOfAModel) {
   auto document = test::synthetic_document(1);
   document.artefact = calib::Expansion{};
   document.recording_gap = "damaged";
+  document.mode = "standstill";
   const auto json = nlohmann::json::parse(to_json(document));
   for (const auto& [key, value] : json.items())
     EXPECT_THAT(sections_.at("model.json").text, HasSubstr("`" + key + "`"));

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
 
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/recording/recorder.hpp"
@@ -19,7 +20,8 @@ inline std::string synthetic_recorded_toml() {
          "[daemon]\nsimulated = true\n";
 }
 
-inline std::filesystem::path record_synthetic_run(const std::filesystem::path& folder) {
+inline std::filesystem::path record_synthetic_run(
+    const std::filesystem::path& folder, std::optional<calib::otf::Mode> mode = std::nullopt) {
   using protocol::HostTime;
   constexpr HostTime kBegin{std::chrono::seconds{100}};
   RecorderOptions options;
@@ -29,7 +31,7 @@ inline std::filesystem::path record_synthetic_run(const std::filesystem::path& f
   auto recorder =
       Recorder::open(options, {.machine = "mill", .configuration = synthetic_recorded_toml()}, {});
   EXPECT_TRUE(recorder) << recorder.error().text;
-  OtfRequest request;
+  OtfRequest request{.path_m = {}, .mode = mode};
   for (const auto& q : synthetic_path_m()) request.path_m.push_back({q[0], q[1], q[2]});
   recorder->attach(to_attachment(CalibrationRequest{.task = std::move(request), .from = kBegin}),
                    kBegin);

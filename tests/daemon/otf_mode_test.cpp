@@ -93,7 +93,7 @@ TEST_F(OtfMode, ErrorsNameFileAndTime) {
   const Ran ran = test::run_abbe(folder_,
                                  "identify otf --mode standstill --machine machine.toml "
                                  "--path path.csv --tracker tracker.csv -o out");
-  EXPECT_EQ(ran.exit, 3) << ran.out << ran.err;
+  EXPECT_EQ(ran.exit, 1) << ran.out << ran.err;
   EXPECT_THAT(ran.err, AllOf(HasSubstr("tracker.csv: standstills:"), HasSubstr(" s at (")));
 }
 

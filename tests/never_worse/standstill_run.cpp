@@ -60,7 +60,7 @@ std::vector<Fault<OtfRun>> faults_of_both_modes() {
     }
     if (begins_with("vertex off")) fault.names = {{"leg"}};
     if (begins_with("last third") || begins_with("path mirrored")) {
-      fault.names.words = {"standstills"};
+      fault.names.words = {"standstills", "path"};
     }
     faults.push_back(std::move(fault));
   }

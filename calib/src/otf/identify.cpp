@@ -1,13 +1,66 @@
 #include "abbe/calib/otf/identify.hpp"
 
+#include <utility>
+
+#include "abbe/calib/otf/joint.hpp"
+
 namespace abbe::calib::otf {
+namespace {
+
+/// The share of the linearisation in the progress of Stage::Solve.
+constexpr double kLinearised = 0.6;
+
+Options after_linearisation(Options options) {
+  if (options.progress) {
+    options.progress = [report = std::move(options.progress)](Stage stage, double fraction) {
+      report(stage,
+             stage == Stage::Solve ? kLinearised + (1.0 - kLinearised) * fraction : fraction);
+    };
+  }
+  return options;
+}
+
+Result<Identification> joint(Observations of_alignment, const BlockSeries& series,
+                             const Noise& noise, const Options& options) {
+  Result<JointObservations> at_solution =
+      linearise_at_solution(std::move(of_alignment), series, noise, options);
+  if (!at_solution) {
+    return tl::unexpected(at_solution.error());
+  }
+
+  Result<Solution> solution = solve(at_solution->observations, after_linearisation(options));
+  if (!solution) {
+    return tl::unexpected(solution.error());
+  }
+
+  solution->estimator = Estimator::Joint;
+  solution->statistics.iterations = at_solution->adjustments;
+  return Identification{std::move(at_solution->observations), *std::move(solution)};
+}
+
+}  // namespace
 
 Result<Identification> identify(std::span<const TrackerObservation> samples, const Machine& machine,
                                 const Path& path, const Noise& noise, const Options& options) {
-  Result<Observations> observations = observe(samples, machine, path, noise, options);
+  const Result<BlockSeries> series = make_blocks(samples, options);
+  if (!series) {
+    return tl::unexpected(series.error());
+  }
+  return identify_blocks(*series, machine, path, noise, options);
+}
+
+Result<Identification> identify_blocks(const BlockSeries& series, const Machine& machine,
+                                       const Path& path, const Noise& noise,
+                                       const Options& options) {
+  Result<Observations> observations = observe_blocks(series, machine, path, noise, options);
   if (!observations) {
     return tl::unexpected(observations.error());
   }
+
+  if (options.estimator == Estimator::Joint) {
+    return joint(*std::move(observations), series, noise, options);
+  }
+
   Result<Solution> solution = solve(*observations, options);
   if (!solution) {
     return tl::unexpected(solution.error());

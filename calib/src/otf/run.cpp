@@ -15,6 +15,19 @@ std::optional<Mode> mode_named(std::string_view text) {
   return std::nullopt;
 }
 
+std::string_view name(Estimator estimator) {
+  return estimator == Estimator::Joint ? "joint" : "two-step";
+}
+
+std::optional<Estimator> estimator(std::string_view name) {
+  for (const Estimator one : {Estimator::TwoStep, Estimator::Joint}) {
+    if (name == otf::name(one)) {
+      return one;
+    }
+  }
+  return std::nullopt;
+}
+
 std::string_view name(Stage stage) {
   switch (stage) {
     case Stage::Observe:

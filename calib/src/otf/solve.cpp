@@ -116,6 +116,10 @@ void report(const Options& options, double fraction) {
 
 }  // namespace
 
+std::string_view stop_reason(Estimator estimator) {
+  return estimator == Estimator::Joint ? "converged" : "direct";
+}
+
 std::vector<double> residuals_m(const Observations& o, const Eigen::VectorXd& U) {
   std::vector<double> r(o.rows.size());
   for (std::size_t i = 0; i < r.size(); ++i) {
@@ -201,7 +205,8 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   }
 
   report(options, 1.0);
-  return Solution{.model = *std::move(model),
+  return Solution{.estimator = Estimator::TwoStep,
+                  .model = *std::move(model),
                   .rigid = a->U.segment<kRigidUnknowns>(n),
                   .covariance_with_rigid = a->covariance,
                   .adjustment = of_rows,

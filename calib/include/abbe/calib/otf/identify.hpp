@@ -1,6 +1,7 @@
 #pragma once
-/// observe() followed by solve(). The caller calls judge(), which also needs the active model and
-/// the limits of the gate.
+/// The estimate of Options::estimator: observe() followed by solve(); for Estimator::Joint the
+/// observations are linearised at the solution in between (joint.hpp). judge() is separate because
+/// it needs the active model and the limits.
 
 #include "abbe/calib/otf/judge.hpp"
 
@@ -13,5 +14,9 @@ struct Identification {
 /// Pure and deterministic: the same input gives bit-identical results.
 [[nodiscard]] Result<Identification> identify(std::span<const TrackerObservation>, const Machine&,
                                               const Path&, const Noise&, const Options& = {});
+/// The same, from blocks that are already averaged.
+[[nodiscard]] Result<Identification> identify_blocks(const BlockSeries&, const Machine&,
+                                                     const Path&, const Noise&,
+                                                     const Options& = {});
 
 }  // namespace abbe::calib::otf

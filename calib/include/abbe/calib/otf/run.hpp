@@ -76,6 +76,15 @@ enum class Mode { OnTheFly, Standstill };
 /// nullopt for any other name.
 [[nodiscard]] std::optional<Mode> mode_named(std::string_view);
 
+/// TwoStep: the alignment first, then one linear adjustment ([Sanders 2023]). The rotation that the
+/// alignment takes from the errors of the machine remains in the second order: 0.025 um for errors
+/// of 0.1 mm.
+/// Joint: alignment and errors together, by Gauss-Newton from the result of TwoStep (joint.hpp).
+enum class Estimator { TwoStep, Joint };
+/// In files and messages: "two-step", "joint".
+[[nodiscard]] std::string_view name(Estimator);
+[[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
+
 enum class Stage { Observe, Align, Solve, Judge };
 [[nodiscard]] std::string_view name(Stage);
 /// Called in the calling thread with 0 <= fraction <= 1, ascending within a stage.
@@ -87,6 +96,7 @@ using Stopped = std::function<bool()>;
 struct Options {
   Mode mode = Mode::OnTheFly;
   StandstillOptions standstill;  ///< of Mode::Standstill
+  Estimator estimator = Estimator::TwoStep;
   /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.
   std::size_t block_samples = 100;
@@ -120,6 +130,11 @@ struct Options {
   double max_alignment_distance_m = 3e-3;
   /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
   double max_length_mismatch = 0.05;
+  /// Joint: it stops when an adjustment changes the estimate by less than this fraction of its
+  /// standard uncertainty (root mean square over all combinations of the unknowns). Three
+  /// adjustments are usual; the second already changes it by a fifth of the uncertainty only.
+  double adjustment_tolerance = 1e-3;
+  int max_adjustments = 10;
   /// Weight of the gauge conditions in the adjustment (DatumOptions::weight). Any positive value
   /// gives the same solution (minimal constraints).
   double gauge_weight = 1.0;

@@ -39,10 +39,8 @@
 
 namespace abbe::calib::otf {
 
-/// Name of this estimator in files and messages: alignment first, then adjustment.
-inline constexpr std::string_view kEstimator = "two-step";
-/// Stop reason in files: the adjustment is a linear problem, solved without iteration.
-inline constexpr std::string_view kStopReason = "direct";
+/// In files: "direct", one linear adjustment without iteration, or "converged".
+[[nodiscard]] std::string_view stop_reason(Estimator);
 
 /// Information of a set of rows about the unknowns of Observations.
 struct RowInformation {
@@ -96,7 +94,7 @@ struct Statistics {
   double variance_factor = 1.0;
   ResidualStatistics before;  ///< of Residuals::before_m
   ResidualStatistics after;   ///< of Residuals::after_m
-  int iterations = 0;
+  int iterations = 0;         ///< adjustments
   int alignment_iterations = 0;
   double alignment_rms_m = 0.0;
 };
@@ -108,6 +106,7 @@ struct RangeOffset {
 };
 
 struct Solution {
+  Estimator estimator = Estimator::TwoStep;
   VolumetricModel model;            ///< gauge G1, without the rigid unknowns
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::MatrixXd covariance_with_rigid;

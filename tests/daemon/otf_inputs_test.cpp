@@ -32,9 +32,17 @@ TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
                              machine()));
 }
 
+TEST(OtfInputs, TheConfigurationNamesTheEstimator) {
+  using calib::otf::Estimator;
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+    const OtfConfig otf{.estimator = estimator};
+    EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).estimator, estimator);
+  }
+}
+
 TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   const GateConfig gate{.max_error_m = 2e-3, .max_gradient = 1e-2, .holdout_fraction = 0.1};
-  EXPECT_EQ(otf_options({}, machine(), gate).held_out_folds, 10u);
+  EXPECT_EQ(otf_options({}, {.machine = machine(), .gate = gate}).held_out_folds, 10u);
   EXPECT_EQ(gate_limits(gate).max_error_m, 2e-3);
   EXPECT_EQ(gate_limits(gate).max_gradient, 1e-2);
   EXPECT_FALSE(gate_limits(gate).accept_smaller_volume);

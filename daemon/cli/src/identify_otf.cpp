@@ -39,9 +39,9 @@ constexpr double kPpmPer1 = 1e6;
 
 struct IdentifyOtfArguments {
   std::string machine, path, tracker, encoder, recording, keep, out, mode;
-  std::string estimator = "two-step";
-  std::size_t block_samples = 0;      // 0: blocks by travel
-  std::optional<double> u_scale_ppm;  // without a value: that of the configured tracker
+  std::optional<std::string> estimator;  // without a value: that of [otf]
+  std::size_t block_samples = 0;         // 0: blocks by travel
+  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
 };
@@ -127,6 +127,13 @@ double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
   return tracker ? tracker->u_scale : 0.0;
 }
 
+/// The options of the command replace those of the configuration.
+void apply(const IdentifyOtfArguments& arguments, OtfConfig& otf) {
+  if (arguments.estimator)
+    otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
+  otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
+}
+
 /// Makes the checks of the path that the daemon makes before the machine drives. The message for a
 /// vertex outside the travel gives line and column.
 Result<void> check_path(const std::string& file, const PathFile& path,
@@ -152,6 +159,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
+  apply(arguments, files->config.otf);
   if (const auto valid =
           check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !valid)
@@ -163,10 +171,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   const auto machine = otf_machine(files->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
 
-  otf::Options options =
-      otf_options(files->tracker.points, files->config.machine, files->config.gate);
-  options.mode = otf::mode_named(arguments.mode).value_or(files->config.otf.mode);
-  options.standstill.u_repeatability_m = files->config.otf.u_repeatability_m;
+  otf::Options options = otf_options(files->tracker.points, files->config);
   if (arguments.accept_path_orientation) options.orientation.accepted = true;
   if (files->encoder) options.orientation.scales_agree = true;
   if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
@@ -211,8 +216,9 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ModelDocument>& active, ProgressBar& bar) {
-  const auto recording = open_recording(arguments.recording, arguments.machine);
+  auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
+  apply(arguments, recording->config.otf);
   if (const auto given = require_target(recording->config.machine); !given)
     return tl::make_unexpected(given.error());
   const auto other = comparison_model(active, recording->config);
@@ -243,6 +249,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"id", model_id(outcome.document)},
       {"hash", model_hash(outcome.document)},
       {"mode", outcome.document.mode},
+      {"estimator", outcome.document.estimator},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
       {"blocks", outcome.blocks},
@@ -270,8 +277,9 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
   const bool stands = outcome.document.mode == otf::name(otf::Mode::Standstill);
   fmt::print("samples     {}, {} lost; {} of {} {} used\n", s.samples, s.lost_samples,
              outcome.blocks_used, outcome.blocks, stands ? "standstills" : "blocks");
-  fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
-             s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
+  fmt::print(
+      "solution    {}: {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
+      outcome.document.estimator, s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
 
@@ -360,9 +368,12 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "--keep", arguments->keep,
       "also add the model to this store, and compare it with its active model; to activate it,\n"
       "use abbe model activate");
-  command->add_option("--estimator", arguments->estimator, "two-step: align, then adjust")
-      ->check(CLI::IsMember({"two-step"}))
-      ->capture_default_str();
+  command
+      ->add_option("--estimator", arguments->estimator,
+                   "two-step: align, then adjust;\n"
+                   "joint: alignment and errors together, by Gauss-Newton;\n"
+                   "default: that of [otf], or two-step")
+      ->check(CLI::IsMember({"two-step", "joint"}));
   command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")

@@ -17,7 +17,8 @@ double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-ModelStatistics model_statistics(const calib::otf::Statistics& s) {
+ModelStatistics model_statistics(const calib::otf::Solution& solution) {
+  const calib::otf::Statistics& s = solution.statistics;
   return {.samples = s.samples,
           .lost_samples = s.lost_samples,
           .observations = s.observations,
@@ -30,7 +31,7 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
           .before = document_figures(s.before),
           .after = document_figures(s.after),
           .iterations = s.iterations,
-          .stop_reason = std::string{calib::otf::kStopReason}};
+          .stop_reason = std::string{calib::otf::stop_reason(solution.estimator)}};
 }
 
 }  // namespace
@@ -38,9 +39,14 @@ ModelStatistics model_statistics(const calib::otf::Statistics& s) {
 ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mode mode,
                            const Config& config, std::vector<InputFile> inputs,
                            protocol::UtcTime created) {
-  ModelDocument document{
-      solution.model,       "otf",   std::string{calib::otf::kEstimator},   config.machine.name,
-      machine_hash(config), created, model_statistics(solution.statistics), std::move(inputs)};
+  ModelDocument document{solution.model,
+                         "otf",
+                         std::string{calib::otf::name(solution.estimator)},
+                         config.machine.name,
+                         machine_hash(config),
+                         created,
+                         model_statistics(solution),
+                         std::move(inputs)};
   document.mode = calib::otf::name(mode);
   return document;
 }

@@ -5,8 +5,7 @@
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
-#include "abbe/calib/otf/judge.hpp"
-#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/identify.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf/inputs.hpp"
@@ -37,9 +36,8 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
   const auto machine = otf_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
-  calib::otf::Options options = otf_options(points, config.machine, config.gate);
+  calib::otf::Options options = otf_options(points, config);
   options.mode = run.mode;
-  options.standstill.u_repeatability_m = config.otf.u_repeatability_m;
 
   // A live run has scale readings, and they were found to agree with the path at its vertices.
   options.orientation.scales_agree = true;
@@ -53,16 +51,14 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
   calib::otf::Noise noise = otf_noise(config.machine);
   noise.u_scale = run.u_scale;
   noise.u_axis_scale = run.u_axis_scale;
-  auto observations = calib::otf::observe(points, *machine, otf_path(run.path_m), noise, options);
-  if (!observations) return tl::unexpected(error_of(observations.error()));
-  auto solution = calib::otf::solve(*observations, options);
-  if (!solution) return tl::unexpected(error_of(solution.error()));
-  auto verdict =
-      calib::otf::judge(*observations, *solution, active, gate_limits(config.gate), options);
+  auto found = calib::otf::identify(points, *machine, otf_path(run.path_m), noise, options);
+  if (!found) return tl::unexpected(error_of(found.error()));
+  auto verdict = calib::otf::judge(found->observations, found->solution, active,
+                                   gate_limits(config.gate), options);
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
 
-  return OtfCandidate{std::move(*solution), std::move(*verdict), run.mode};
+  return OtfCandidate{std::move(found->solution), std::move(*verdict), run.mode};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

@@ -74,11 +74,15 @@ std::vector<calib::otf::TrackerObservation> otf_observations(std::span<const Run
 }
 
 calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> points,
-                                const MachineConfig& machine, const GateConfig& gate) {
+                                const Config& config) {
   calib::otf::Options options;
+  options.mode = config.otf.mode;
+  options.standstill.u_repeatability_m = config.otf.u_repeatability_m;
+  options.estimator = config.otf.estimator;
   options.block_samples = calib::otf::suitable_block_samples(points);
-  options.held_out_folds = static_cast<std::size_t>(std::lround(1.0 / gate.holdout_fraction));
-  options.orientation = orientation_evidence(machine, gate);
+  options.held_out_folds =
+      static_cast<std::size_t>(std::lround(1.0 / config.gate.holdout_fraction));
+  options.orientation = orientation_evidence(config.machine, config.gate);
   return options;
 }
 

@@ -172,6 +172,7 @@ struct OtfConfig {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;  ///< unless a request names another one
   /// See calib::otf::StandstillOptions.
   double u_repeatability_m = calib::otf::StandstillOptions{}.u_repeatability_m;
+  calib::otf::Estimator estimator = calib::otf::Estimator::TwoStep;  ///< of on-the-fly mode
 };
 
 /// [evemu] artefact_sensor or artefact_C: temperature of the ball array while it is touched.
@@ -220,9 +221,9 @@ struct Config {
   RecordingConfig recording;
   DdsConfig dds;
   GateConfig gate;
+  OtfConfig otf;
   EvemuConfig evemu;
   ControlConfig control;
-  OtfConfig otf;
 
   /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
   template <class Kind>

@@ -24,12 +24,11 @@ namespace abbe::daemon {
 /// Converts the points. Times are those of the tracker's clock, relative to the first point.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(
     std::span<const RunPoint> points);
-/// Options of fit and judgement for these points under [gate], used alike by the daemon, a replay
+/// Options of fit and judgement for these points under [otf] and [gate], used alike by the daemon, a replay
 /// and an identification from files. Of the evidence about the orientation of the path only the
 /// configured part is set; the caller sets orientation.scales_agree.
 [[nodiscard]] calib::otf::Options otf_options(
-    std::span<const calib::otf::TrackerObservation> points, const MachineConfig& machine,
-    const GateConfig& gate);
+    std::span<const calib::otf::TrackerObservation> points, const Config& config);
 [[nodiscard]] calib::GateLimits gate_limits(const GateConfig& gate);
 
 /// Options of an acquisition. At the configured point rate of the tracker, each required standstill

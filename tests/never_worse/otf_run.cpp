@@ -347,6 +347,7 @@ Outcome identify_and_compare(OtfRun run) {
   }
 
   calib::otf::Options options;
+  options.estimator = run.estimator;
   options.block_samples = calib::otf::suitable_block_samples(samples);
   options.orientation = run.evidence;
   options.mode = run.mode;

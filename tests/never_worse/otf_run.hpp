@@ -44,6 +44,7 @@ struct OtfRun {
   std::vector<Vector3> path_m;
   calib::otf::Noise noise;
   calib::otf::OrientationEvidence evidence;
+  calib::otf::Estimator estimator = calib::otf::Estimator::Joint;
   std::mt19937_64 random;
 };
 
@@ -51,7 +52,7 @@ struct OtfRun {
 
 [[nodiscard]] OtfRun random_otf_run(std::uint64_t seed);
 
-/// The stream of the tracker.
+/// The tracker's samples of the run. Draws from run.random.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> measure(OtfRun& run);
 
 [[nodiscard]] Outcome identify_and_compare(OtfRun run);

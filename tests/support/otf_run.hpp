@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "abbe/calib/gauge.hpp"
 #include "abbe/calib/otf/observe.hpp"
 #include "abbe/calib/otf/path_frame.hpp"
 #include "abbe/calib/otf/polyline.hpp"
@@ -34,6 +35,9 @@ struct MadeRunOptions {
   unsigned noise_seed = 1;    ///< of the tracker's noise: same machine, another run
   double noise_factor = 1.0;  ///< of the default noise model; 0: exact
   double error_scale_m = 30e-6;
+  /// Tables of gauge G1: no rotation r of their own, which would be r^2 / 2 of strain in a pose that
+  /// is not linear.
+  bool in_gauge = false;
   double speed_m_s = 0.4;
   double rate_hz = 250.0;
   std::string chain = "[w X' b Y Z (C1) t]";
@@ -105,6 +109,11 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   run.truth = random_tables(layout, wanted.error_scale_m, random);
   run.T_machine_tracker = case_a_alignment(true);
   const Vector3& t = run.machine.target_offset_m;
+  if (wanted.in_gauge) {
+    Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.fit_size()));
+    U.head(run.truth.size()) = run.truth;
+    run.truth = calib::to_gauge(calib::Gauge::G1, layout, std::array{t}, U)->head(run.truth.size());
+  }
 
   for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
     const Vector3 V =

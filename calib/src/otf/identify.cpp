@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "abbe/calib/otf/joint.hpp"
+#include "abbe/calib/otf/prewhitening.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -28,7 +29,11 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
     return tl::unexpected(at_solution.error());
   }
 
-  Result<Solution> solution = solve(at_solution->observations, after_linearisation(options));
+  Result<Solution> solution =
+      solve(at_solution->observations, at_solution->information, after_linearisation(options))
+          .and_then([&](Solution of_rows) {
+            return prewhitened(std::move(of_rows), at_solution->observations, options);
+          });
   if (!solution) {
     return tl::unexpected(solution.error());
   }
@@ -38,10 +43,24 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
   return Identification{std::move(at_solution->observations), *std::move(solution)};
 }
 
+Result<Identification> two_step(Observations observations, const Options& options) {
+  Result<Solution> solution = solve(observations, options);
+  if (!solution) {
+    return tl::unexpected(solution.error());
+  }
+  return Identification{std::move(observations), *std::move(solution)};
+}
+
 }  // namespace
 
 Result<Identification> identify(std::span<const TrackerObservation> samples, const Machine& machine,
                                 const Path& path, const Noise& noise, const Options& options) {
+  if (options.mode == Mode::Standstill) {
+    return observe(samples, machine, path, noise, options).and_then([&](Observations o) {
+      return two_step(std::move(o), options);
+    });
+  }
+
   const Result<BlockSeries> series = make_blocks(samples, options);
   if (!series) {
     return tl::unexpected(series.error());
@@ -61,11 +80,7 @@ Result<Identification> identify_blocks(const BlockSeries& series, const Machine&
     return joint(*std::move(observations), series, noise, options);
   }
 
-  Result<Solution> solution = solve(*observations, options);
-  if (!solution) {
-    return tl::unexpected(solution.error());
-  }
-  return Identification{*std::move(observations), *std::move(solution)};
+  return two_step(*std::move(observations), options);
 }
 
 }  // namespace abbe::calib::otf

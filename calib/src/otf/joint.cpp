@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "abbe/calib/otf/solve.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/gauge_of.hpp"
@@ -111,7 +110,8 @@ Observations linearised_at(Observations o, const Eigen::VectorXd& U, const Block
 Result<JointObservations> linearise_at_solution(Observations o, const BlockSeries& series,
                                                 const Noise& noise, const Options& options) {
   if (o.rows.size() <= o.unknowns()) {
-    return JointObservations{std::move(o), 0};
+    RowInformation information = information_of(o);
+    return JointObservations{std::move(o), std::move(information), 0};
   }
 
   const estimation::Datum gauge = gauge_of(o);
@@ -122,16 +122,17 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
       return tl::unexpected(running.error());
     }
 
-    const estimation::Information data = information_of(o).data;
+    RowInformation information = information_of(o);
     const Result<Eigen::VectorXd> U = gauge.estimate(
-        data, {.weight = options.gauge_weight, .label = [&](std::size_t i) { return o.label(i); }});
+        information.data,
+        {.weight = options.gauge_weight, .label = [&](std::size_t i) { return o.label(i); }});
     if (!U) {
       return tl::unexpected(U.error());
     }
 
-    change = size_of(*U - at, data);
+    change = size_of(*U - at, information.data);
     if (change < options.adjustment_tolerance) {
-      return JointObservations{std::move(o), adjustments};
+      return JointObservations{std::move(o), std::move(information), adjustments};
     }
 
     o = linearised_at(std::move(o), *U, series, noise);

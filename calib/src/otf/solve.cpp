@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
-#include "otf/added_columns.hpp"
 #include "otf/row_residuals.hpp"
+#include "otf/systematic_effects.hpp"
+#include "otf/whitened_rows.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -66,46 +67,14 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
   return s;
 }
 
-/// Change of U per relative change of all ranges, which displaces a point by its vector from the
-/// tracker. The part of this vector that is the same for all points changes only the rigid
-/// unknowns.
-Eigen::VectorXd dU_dscale(const Observations& o, const Adjustment& a) {
-  const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(a.U.size());
-  for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    const Observation& row = o.rows[i];
-    const double s_m = row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m);
-    for (const SparseRows::Entry& e : o.A.row(i)) {
-      g(static_cast<Eigen::Index>(e.column)) += row.weight * e.value * s_m;
-    }
+Result<void> check_enough(const Observations& o) {
+  const std::size_t needed = o.unknowns();
+  if (o.rows.size() <= needed) {
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("adjustment: ", o.rows.size(), " observations for ", needed, " unknowns"));
   }
-  return a.cofactor_Q * g;
-}
-
-/// Change of U per relative change of the scale of an axis: its positioning table changes with
-/// slope 1 and is zero at the reference.
-Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
-  const ParameterLayout& layout = o.layout();
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
-  const AxisNodes& nodes = layout.nodes()[index(axis)];
-  const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
-  for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
-    slope(static_cast<Eigen::Index>(positioning->offset + i)) =
-        nodes.nodes_m[i] - nodes.reference_m;
-  }
-  return slope;
-}
-
-/// Estimates the offset of the ranges in addition to the adjustment `a` with residuals
-/// `residual_m`.
-AddedColumns::Estimate range_offset(const Observations& o, const Adjustment& a,
-                                    std::span<const double> residual_m, double factor) {
-  AddedColumns sums(1, o.unknowns());
-  for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    const double c = drow_drange_offset(o, o.rows[i]);
-    sums.add(o.rows[i], o.A.row(i), residual_m[i], std::span(&c, 1));
-  }
-  return sums.estimate_with_prior(a.cofactor_Q, o.u_range_offset_m, factor);
+  return {};
 }
 
 void report(const Options& options, double fraction) {
@@ -143,17 +112,19 @@ double chi2(const Observations& o, std::span<const double> r) {
 }
 
 Result<Solution> solve(const Observations& o, const Options& options) {
-  const std::size_t needed = o.unknowns();
-  if (o.rows.size() <= needed) {
-    return failure(
-        ErrorCode::TooFewObservations,
-        message("adjustment: ", o.rows.size(), " observations for ", needed, " unknowns"));
+  if (Result<void> enough = check_enough(o); !enough) {
+    return tl::unexpected(enough.error());
+  }
+  report(options, 0.0);
+  return solve(o, information_of(o), options);
+}
+
+Result<Solution> solve(const Observations& o, const RowInformation& rows, const Options& options) {
+  if (Result<void> enough = check_enough(o); !enough) {
+    return tl::unexpected(enough.error());
   }
 
-  report(options, 0.0);
-  const RowInformation rows = information_of(o);
   report(options, 0.5);
-
   if (Result<void> running = check_stopped(options.stopped); !running) {
     return tl::unexpected(running.error());
   }
@@ -169,31 +140,25 @@ Result<Solution> solve(const Observations& o, const Options& options) {
   }
 
   const Adjustment of_rows = *a;
+  const WhitenedRows as_observed(o);
   Residuals residuals{residuals_m(o, {}), residuals_m(o, a->U)};
   Statistics figures = statistics(o, *a, residuals);
   RangeOffset offset;
   Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
 
   if (o.u_range_offset_m > 0.0) {
-    const auto e = range_offset(o, *a, residuals.after_m, figures.variance_factor);
-    offset = {e.d(0), e.u(0)};
-    root_of_offset = e.root_cov_dU;
-    a->U -= e.dU;
-    residuals.after_m = residuals_m(without_range_offset(o, offset.value_m), a->U);
+    WithRangeOffset with =
+        with_range_offset(o, as_observed, *a, residuals.after_m, figures.variance_factor);
+    offset = with.offset;
+    root_of_offset = std::move(with.root_of_covariance);
+    a->U = std::move(with.U);
+    residuals.after_m = std::move(with.residual_m);
     figures = statistics(o, *a, residuals);
   }
 
   a->covariance *= figures.variance_factor;
   a->covariance += root_of_offset * root_of_offset.transpose();
-  if (o.u_scale > 0.0) {
-    const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, *a);
-    a->covariance += moved * moved.transpose();
-  }
-
-  for (const Axis axis : kAllAxes) {
-    const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o, axis);
-    a->covariance += moved * moved.transpose();
-  }
+  add_scale_effects(a->covariance, o, as_observed, a->cofactor_Q);
 
   const auto n = static_cast<Eigen::Index>(o.basis.size());
   Result<VolumetricModel> model = VolumetricModel::from_vector(

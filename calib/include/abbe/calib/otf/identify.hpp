@@ -1,7 +1,8 @@
 #pragma once
 /// The estimate of Options::estimator: observe() followed by solve(); for Estimator::Joint the
-/// observations are linearised at the solution in between (joint.hpp). judge() is separate because
-/// it needs the active model and the limits.
+/// observations are linearised at the solution in between (joint.hpp), and correlated noise is
+/// prewhitened after it (prewhitening.hpp). judge() is separate because it needs the active model
+/// and the limits.
 
 #include "abbe/calib/otf/judge.hpp"
 

@@ -13,7 +13,7 @@
 /// whole U, and rigid unknowns near zero.
 
 #include "abbe/calib/otf/blocks.hpp"
-#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/solve.hpp"
 
 namespace abbe::calib::otf {
 
@@ -25,6 +25,7 @@ namespace abbe::calib::otf {
 /// Observations linearised at their own solution.
 struct JointObservations {
   Observations observations;
+  RowInformation information;  ///< of all rows
   int adjustments = 0;  ///< solved until the estimate did not change any more
 };
 /// NotConverged after Options::max_adjustments; RankDeficient as solve(). Observations that are too

@@ -79,7 +79,8 @@ enum class Mode { OnTheFly, Standstill };
 /// TwoStep: the alignment first, then one linear adjustment ([Sanders 2023]). The rotation that the
 /// alignment takes from the errors of the machine remains in the second order: 0.025 um for errors
 /// of 0.1 mm.
-/// Joint: alignment and errors together, by Gauss-Newton from the result of TwoStep (joint.hpp).
+/// Joint: alignment and errors together, by Gauss-Newton from the result of TwoStep (joint.hpp);
+/// correlated noise is prewhitened (prewhitening.hpp).
 enum class Estimator { TwoStep, Joint };
 /// In files and messages: "two-step", "joint".
 [[nodiscard]] std::string_view name(Estimator);
@@ -95,8 +96,8 @@ using Stopped = std::function<bool()>;
 
 struct Options {
   Mode mode = Mode::OnTheFly;
-  StandstillOptions standstill;  ///< of Mode::Standstill
-  Estimator estimator = Estimator::TwoStep;
+  StandstillOptions standstill;              ///< of Mode::Standstill
+  Estimator estimator = Estimator::TwoStep;  ///< of Mode::OnTheFly; standstills: always TwoStep
   /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.
   std::size_t block_samples = 100;

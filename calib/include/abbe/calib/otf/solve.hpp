@@ -29,6 +29,7 @@
 /// without the gauge.
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <optional>
 #include <string_view>
@@ -90,8 +91,12 @@ struct Statistics {
   double sigma0 = 0.0;       ///< sqrt(chi2_per_dof)
   double correlation = 1.0;  ///< see ResidualNoise::correlation
   /// Factor applied to the covariance [Birge 1932]: chi2_per_dof times `correlation` if this
-  /// product exceeds the 99.9 % quantile of chi2/dof for the stated uncertainties, else 1.
+  /// product exceeds the 99.9 % quantile of chi2/dof for the stated uncertainties, else 1. After
+  /// prewhitening both are of the prewhitened residuals.
   double variance_factor = 1.0;
+  /// Autocorrelation of the noise from block to block along a2 and a3 that prewhitening removed; 0
+  /// without it.
+  std::array<double, 2> noise_correlation{};
   ResidualStatistics before;  ///< of Residuals::before_m
   ResidualStatistics after;   ///< of Residuals::after_m
   int iterations = 0;         ///< adjustments
@@ -118,5 +123,7 @@ struct Solution {
 };
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});
+/// The same with information_of() all rows, where it is known.
+[[nodiscard]] Result<Solution> solve(const Observations&, const RowInformation&, const Options&);
 
 }  // namespace abbe::calib::otf

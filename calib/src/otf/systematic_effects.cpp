@@ -1,0 +1,79 @@
+#include "otf/systematic_effects.hpp"
+
+#include <optional>
+
+#include "otf/added_columns.hpp"
+#include "otf/row_residuals.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// Change of U per relative change of all ranges, which displaces a point by its vector from the
+/// tracker. The part of this vector that is the same for all points changes only the rigid
+/// unknowns.
+Eigen::VectorXd dU_dscale(const Observations& o, const WhitenedRows& rows,
+                          const Eigen::MatrixXd& Q) {
+  const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
+  const auto of_row = [&](std::size_t i) {
+    const Observation& row = o.rows[i];
+    return row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m);
+  };
+
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(Q.rows());
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const double s_m = rows.value(i, of_row);
+    for (const SparseRows::Entry& e : rows.row(i)) {
+      g(static_cast<Eigen::Index>(e.column)) += o.rows[i].weight * e.value * s_m;
+    }
+  }
+  return Q * g;
+}
+
+/// Change of U per relative change of the scale of an axis: its positioning table changes with
+/// slope 1 and is zero at the reference.
+Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
+  const ParameterLayout& layout = o.layout();
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
+  const AxisNodes& nodes = layout.nodes()[index(axis)];
+  const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
+  for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
+    slope(static_cast<Eigen::Index>(positioning->offset + i)) =
+        nodes.nodes_m[i] - nodes.reference_m;
+  }
+  return slope;
+}
+
+}  // namespace
+
+WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& rows,
+                                  const Adjustment& a, std::span<const double> residual_m,
+                                  double factor) {
+  AddedColumns sums(1, o.unknowns());
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    const double c =
+        rows.value(i, [&](std::size_t row) { return drow_drange_offset(o, o.rows[row]); });
+    const double r_m = rows.value(i, [&](std::size_t row) { return residual_m[row]; });
+    sums.add(o.rows[i], rows.row(i), r_m, std::span(&c, 1));
+  }
+
+  const AddedColumns::Estimate e =
+      sums.estimate_with_prior(a.cofactor_Q, o.u_range_offset_m, factor);
+  const RangeOffset offset{e.d(0), e.u(0)};
+  const Eigen::VectorXd U = a.U - e.dU;
+  return {offset, U, e.root_cov_dU, residuals_m(without_range_offset(o, offset.value_m), U)};
+}
+
+void add_scale_effects(Eigen::MatrixXd& covariance, const Observations& o, const WhitenedRows& rows,
+                       const Eigen::MatrixXd& Q) {
+  if (o.u_scale > 0.0) {
+    const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, rows, Q);
+    covariance += moved * moved.transpose();
+  }
+
+  for (const Axis axis : kAllAxes) {
+    const Eigen::VectorXd moved = o.u_axis_scale[index(axis)] * dU_daxis_scale(o, axis);
+    covariance += moved * moved.transpose();
+  }
+}
+
+}  // namespace abbe::calib::otf

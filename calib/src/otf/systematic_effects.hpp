@@ -1,0 +1,32 @@
+#pragma once
+/// Effects that all rows of a run have in common: an offset and a scale of the ranges, the scales
+/// of the axes.
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/solve.hpp"
+#include "otf/whitened_rows.hpp"
+
+namespace abbe::calib::otf {
+
+/// The estimate in which the range offset is one more unknown.
+struct WithRangeOffset {
+  RangeOffset offset;
+  Eigen::VectorXd U;
+  Eigen::MatrixXd root_of_covariance;  ///< what the offset adds to that of U: root root^T
+  std::vector<double> residual_m;      ///< of the rows without the offset
+};
+/// `a`: adjustment of `rows`, `residual_m`: y - A U of the observations' own rows, `factor`:
+/// variance of the rows relative to the stated one.
+[[nodiscard]] WithRangeOffset with_range_offset(const Observations&, const WhitenedRows& rows,
+                                                const Adjustment& a,
+                                                std::span<const double> residual_m, double factor);
+
+/// Adds the effect of Noise::u_scale and u_axis_scale to the covariance of U. `Q`: of the
+/// adjustment of `rows`.
+void add_scale_effects(Eigen::MatrixXd& covariance, const Observations&, const WhitenedRows& rows,
+                       const Eigen::MatrixXd& Q);
+
+}  // namespace abbe::calib::otf

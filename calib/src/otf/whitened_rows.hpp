@@ -1,0 +1,57 @@
+#pragma once
+/// Rows from which the noise that the previous rows of the leg predict is subtracted.
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/prewhitening.hpp"
+
+namespace abbe::calib::otf {
+
+/// Row i becomes the sum of `factor` times row over its terms: of itself and of the same direction
+/// of the blocks before it, as far as they are consecutive, used and on the same leg. Factors
+/// contain the ratio of the sigmas, so that the noise of the sum has the sigma of row i. `o` must
+/// outlive it.
+class WhitenedRows {
+ public:
+  struct Term {
+    std::size_t row = 0;
+    double factor = 1.0;
+  };
+
+  /// The rows as they are.
+  explicit WhitenedRows(const Observations& o) : o_(o) {}
+  WhitenedRows(const Observations& o, const NoiseFilter& filter);
+
+  [[nodiscard]] std::span<const SparseRows::Entry> row(std::size_t i) const {
+    return white_ ? o_.A.row(i) : A_.row(i);
+  }
+  /// `of_row`: function of a row's index.
+  template <class OfRow>
+  [[nodiscard]] double value(std::size_t i, OfRow of_row) const {
+    if (white_) {
+      return of_row(i);
+    }
+    double sum = 0.0;
+    for (std::size_t k = first_term_[i]; k < first_term_[i + 1]; ++k) {
+      sum += terms_[k].factor * of_row(terms_[k].row);
+    }
+    return sum;
+  }
+  [[nodiscard]] std::vector<double> values(std::span<const double> of_rows) const;
+
+ private:
+  const Observations& o_;
+  bool white_ = true;
+  SparseRows A_;
+  std::vector<Term> terms_;
+  std::vector<std::size_t> first_term_{0};
+};
+
+/// Number of rows of the same direction and leg directly before row i, at most `most`.
+[[nodiscard]] std::size_t rows_before(const Observations&, std::size_t i, std::size_t most);
+
+}  // namespace abbe::calib::otf

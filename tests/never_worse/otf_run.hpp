@@ -51,6 +51,9 @@ struct OtfRun {
 [[nodiscard]] std::vector<Fault<OtfRun>> otf_faults();
 
 [[nodiscard]] OtfRun random_otf_run(std::uint64_t seed);
+/// The tracker stands elsewhere; the errors of its ranges and of the scales are drawn again with
+/// their stated uncertainties.
+void set_up_again(OtfRun&);
 
 /// The tracker's samples of the run. Draws from run.random.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> measure(OtfRun& run);

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <iomanip>
+#include <sstream>
 
 #include "chi2_tail.hpp"
 #include "elementary.hpp"
@@ -221,6 +222,18 @@ ChiSquare rest_test(const WhitenedDifference& d, const Freed& freed, double limi
   return significance(freed.without(d.w).squaredNorm(), dof, limit, false).test;
 }
 
+/// " by 4.2 um at 300 mm (u 0.5 um)"; `before_u` is written before the uncertainty.
+std::string size_of(const TableChange& c, std::string_view before_u) {
+  constexpr double kMicro = 1e6, kMmPerM = 1e3;
+  const char* unit = c.is_angle ? " urad" : " um";
+  const std::string place = c.position_m ? message(" at ", kMmPerM * *c.position_m, " mm") : "";
+  // Three digits: more would pretend to a precision that neither value has.
+  std::ostringstream out;
+  out << std::setprecision(3) << " by " << kMicro * c.change << unit << place << " (" << before_u
+      << kMicro * c.u << unit << ")";
+  return out.str();
+}
+
 /// Takes the most significant table as changed, until no test exceeds its limit.
 std::vector<bool> find_drifted(const WhitenedDifference& d, const ParameterLayout& layout,
                                const Limits& limits, std::vector<Significance>& found) {
@@ -251,12 +264,9 @@ std::vector<bool> find_drifted(const WhitenedDifference& d, const ParameterLayou
 }  // namespace
 
 std::string text(const TableChange& c) {
-  constexpr double kMicro = 1e6, kMmPerM = 1e3;
-  const char* unit = c.is_angle ? " urad" : " um";
-  const std::string place = c.position_m ? message(" at ", kMmPerM * *c.position_m, " mm") : "";
-  return message(c.table, " changed by ", kMicro * c.change, unit, place, " (standard uncertainty ",
-                 kMicro * c.u, unit, "; chi-square ", c.test.statistic, " with ", c.test.dof,
-                 c.test.dof == 1 ? " degree" : " degrees", " of freedom, p ", c.test.p, ")");
+  return message(c.table, " changed", size_of(c, "standard uncertainty "), ": chi-square ",
+                 c.test.statistic, " with ", c.test.dof, c.test.dof == 1 ? " degree" : " degrees",
+                 " of freedom, p ", c.test.p);
 }
 
 std::vector<std::string> DriftTest::drifted_tables() const {
@@ -270,17 +280,27 @@ std::vector<std::string> DriftTest::drifted_tables() const {
 }
 
 std::string text(const DriftTest& drift) {
-  std::string all;
+  std::vector<const TableChange*> drifted;
   for (const TableChange& change : drift.tables) {
     if (change.drifted) {
-      all += (all.empty() ? "" : "; ") + text(change);
+      drifted.push_back(&change);
     }
   }
+  std::stable_sort(drifted.begin(), drifted.end(), [](const auto* a, const auto* b) {
+    return a->test.statistic > b->test.statistic;
+  });
 
-  if (drift.drifted && (all.empty() || drift.rest.p < drift.rest.limit)) {
-    all += message(all.empty() ? "" : "; ", "no single table explains the change of the machine",
-                   all.empty() ? "" : " beyond that", ": chi-square ", drift.rest.statistic,
-                   " with ", drift.rest.dof, " degrees of freedom");
+  constexpr std::size_t kMostNamed = 3;
+  std::string all;
+  for (std::size_t i = 0; i < std::min(kMostNamed, drifted.size()); ++i) {
+    all += message(i == 0 ? "" : ", ", drifted[i]->table, size_of(*drifted[i], "u "));
+  }
+  if (drifted.size() > kMostNamed) {
+    all += message(" and ", drifted.size() - kMostNamed, " more");
+  }
+  if (drift.drifted && drifted.empty()) {
+    all = message("no single table explains the change: chi-square ", drift.all.statistic, " with ",
+                  drift.all.dof, " degrees of freedom");
   }
   return all;
 }

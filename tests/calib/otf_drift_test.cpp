@@ -99,8 +99,21 @@ TEST(ModelDrift, StatesOneChangeInPlainNumbers) {
                            .position_m = 0.3,
                            .is_angle = true};
   EXPECT_EQ(text(change),
-            "EAX changed by 12 urad at 300 mm (standard uncertainty 2 urad; chi-square 40 with 1 "
-            "degree of freedom, p 2.5e-10)");
+            "EAX changed by 12 urad at 300 mm (standard uncertainty 2 urad): chi-square 40 with 1 "
+            "degree of freedom, p 2.5e-10");
+}
+
+TEST(ModelDrift, StatesTheMostSignificantChangesOfMany) {
+  DriftTest drift{.drifted = true};
+  for (const double chi2 : {50.0, 70.0, 90.0, 40.0}) {
+    drift.tables.push_back({.table = "EXX",
+                            .drifted = true,
+                            .test = {.statistic = chi2},
+                            .change = 1e-7 * chi2,
+                            .u = 1.23456e-6});
+  }
+  EXPECT_EQ(text(drift),
+            "EXX by 9 um (u 1.23 um), EXX by 7 um (u 1.23 um), EXX by 5 um (u 1.23 um) and 1 more");
 }
 
 TEST(ModelDrift, AnUnchangedMachineHasNoText) {

@@ -77,8 +77,8 @@ struct TableChange {
   std::optional<double> position_m{};  ///< its place on the axis; nullopt: squareness
   bool is_angle = false;
 };
-/// "EXX changed by 4.2 um at 300 mm (standard uncertainty 0.5 um; chi-square 70.6 with 1 degrees of
-/// freedom, p 4e-17)".
+/// "EXX changed by 4.2 um at 300 mm (standard uncertainty 0.5 um): chi-square 70.6 with 1 degree of
+/// freedom, p 4.4e-17".
 [[nodiscard]] std::string text(const TableChange&);
 
 struct DriftTest {
@@ -92,8 +92,8 @@ struct DriftTest {
 
   [[nodiscard]] std::vector<std::string> drifted_tables() const;
 };
-/// "EXX changed by ...; EC0Y changed by ...", or that the change has no single table. Empty without
-/// drift.
+/// "EXX by 4.2 um at 300 mm (u 0.5 um), EC0Y by -9 urad (u 1 urad)": the most significant changes,
+/// and how many more there are; or that no single table explains the change. Empty without drift.
 [[nodiscard]] std::string text(const DriftTest&);
 
 /// NotApplicable, with the first difference: one of the models is no table in gauge G1, or they have

@@ -87,6 +87,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "model",
                                     "model eval",
                                     "model compare",
+                                    "model drift",
                                     "model list",
                                     "model show",
                                     "model activate",

@@ -24,6 +24,7 @@ void add_verify(CLI::App& parent, int& exit);
 void add_example(CLI::App& parent, int& exit);
 void add_status(CLI::App& parent, int& exit);
 void add_model_compare(CLI::App& parent, int& exit);
+void add_model_drift(CLI::App& parent, int& exit);
 void add_model_eval(CLI::App& parent, int& exit);
 void add_model_list(CLI::App& parent, int& exit);
 void add_model_show(CLI::App& parent, int& exit);

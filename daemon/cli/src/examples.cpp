@@ -48,6 +48,7 @@ constexpr std::array kExamples{
     Example{"model", "list"},
     Example{"model eval", "active --points points.csv"},
     Example{"model compare", "active model.json"},
+    Example{"model drift", "active result/model.json"},
     Example{"model list", "--store /var/lib/abbe/models"},
     Example{"model show", "result/model.json"},
     Example{"model activate", "6ad1 --why \"verified with the step gauge\""},

@@ -90,6 +90,7 @@ void add_commands(CLI::App& app, int& exit) {
   model->require_subcommand(1);
   add_model_eval(*model, exit);
   add_model_compare(*model, exit);
+  add_model_drift(*model, exit);
   add_model_list(*model, exit);
   add_model_show(*model, exit);
   add_model_activate(*model, exit);

@@ -25,6 +25,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_dds(root, base, config);
   read_gate(root, config);
   read_otf(root, config.otf);
+  read_drift(root, config);
   read_evemu(root, config);
   read_control(root, base, config);
   root.close();

@@ -24,6 +24,7 @@ void read_recording(Section& root, const std::filesystem::path& base, Config& ou
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);
 void read_gate(Section& root, Config& out);
 void read_otf(Section& root, OtfConfig& out);
+void read_drift(Section& root, Config& out);
 void read_evemu(Section& root, Config& out);
 void read_control(Section& root, const std::filesystem::path& base, Config& out);
 

@@ -158,6 +158,19 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
   return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
 }
 
+Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& actor) {
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  StoreEvent event{StoreAction::Drifted, id, actor, false, {}};
+  const bool known =
+      std::find(state->events.begin(), state->events.end(), event) != state->events.end();
+  if (known || state->active() != id) return {};
+
+  return append(folder_, std::move(*state), std::move(event));
+}
+
 Result<std::string> ModelStore::rollback(const StoreActor& actor) {
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
@@ -231,6 +244,12 @@ StoreStamp ModelStore::stamp() const noexcept {
   constexpr std::int64_t kSecond_ns = 1'000'000'000;
   return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec,
           status.st_size};
+}
+
+Result<std::string> ModelStore::drift() const {
+  const auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+  return state->drift();
 }
 
 Result<ModelDocument> ModelStore::load(const std::string& id) const {

@@ -16,7 +16,12 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kSchema = "abbe/store/1";
-constexpr std::array<std::string_view, 4> kActions{"added", "activated", "forced", "rolled-back"};
+constexpr std::array<std::string_view, 5> kActions{"added", "activated", "forced", "rolled-back",
+                                                   "drifted"};
+
+bool is_activation(const StoreEvent& event) {
+  return event.action != StoreAction::Added && event.action != StoreAction::Drifted;
+}
 
 json to_json(const StoreEvent& event) {
   json object{{"action", kActions[static_cast<std::size_t>(event.action)]},
@@ -56,7 +61,7 @@ std::optional<StoreEvent> event_from(const json& object) {
 std::vector<std::string> StoreState::activations() const {
   std::vector<std::string> stack;
   for (const auto& event : events) {
-    if (event.action == StoreAction::Added) continue;
+    if (!is_activation(event)) continue;
     if (event.action == StoreAction::RolledBack)
       while (!stack.empty() && stack.back() != event.id) stack.pop_back();
     // A repeated activation of the active model does not count as a new activation.
@@ -73,13 +78,17 @@ std::optional<std::string> StoreState::active() const {
 std::optional<StoreEvent> StoreState::activation() const {
   const auto id = active();
   if (!id) return std::nullopt;
-  const auto last = std::find_if(events.rbegin(), events.rend(), [](const StoreEvent& event) {
-    return event.action != StoreAction::Added;
-  });
+  const auto last = std::find_if(events.rbegin(), events.rend(), is_activation);
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
   return event;
+}
+
+std::string StoreState::drift() const {
+  for (auto event = events.rbegin(); event != events.rend() && !is_activation(*event); ++event)
+    if (event->action == StoreAction::Drifted) return event->actor.why;
+  return {};
 }
 
 const StoreEvent* StoreState::last_added(std::string_view id) const {

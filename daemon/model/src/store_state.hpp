@@ -19,6 +19,8 @@ struct StoreState {
   /// The event that made the active model active; `accepted` is the verdict of the gate when the
   /// model was added.
   [[nodiscard]] std::optional<StoreEvent> activation() const;
+  /// Reason of the last Drifted event since the last activation; empty: there is none.
+  [[nodiscard]] std::string drift() const;
   /// null if the model was never added
   [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;
 };

@@ -189,8 +189,9 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   m.host_time_ns(ns(s.head.time));
   m.kind(v1::Quantity::QUANTITY_ERROR);
   const bool known = axes_known(s);
-  m.state(status == v1::ModelStatus::MODEL_ACTIVE && !known ? v1::ModelStatus::MODEL_STALE
-                                                            : status);
+  const bool in_use =
+      status == v1::ModelStatus::MODEL_ACTIVE || status == v1::ModelStatus::MODEL_DRIFT;
+  m.state(in_use && !known ? v1::ModelStatus::MODEL_STALE : status);
   m.position_m({s.position[0], s.position[1], s.position[2]});
   m.tool_offset_m(tool_offset_m);
 

@@ -30,6 +30,14 @@ std::string verdict_text(const calib::Verdict& verdict) {
   return fmt::format("refused: {} ({}{})", fmt::join(verdict.reasons, "; "), figures, notes);
 }
 
+/// Before the verdict on a model that is not activated because of [drift] hold.
+std::string held_text(const std::string& id) {
+  return fmt::format(
+      "not activated, because the machine has changed since the active model ([drift] hold): check "
+      "the machine, then `abbe model activate {}`; ",
+      id);
+}
+
 // Period of further attempts to store a model. It may be long, because a full disk or a lock
 // usually lasts until an operator acts.
 constexpr auto kStoreAgain = std::chrono::seconds{5};
@@ -171,9 +179,11 @@ std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Sn
   session_.tick(now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
   if (auto discarded = session_.take_discarded()) destroy_in_background(std::move(*discarded));
-  const bool ended = ready(task_);
+  const bool ended = ready(task_), known = to_keep_ != nullptr;
   follow_task(now);
-  if (ended) conclude(outcome_of(task_), now);
+  // The cycle that raises DRIFT publishes it, before another model becomes active.
+  const bool drift_is_new = !known && to_keep_ != nullptr && !to_keep_->beside.drift.empty();
+  if (ended && !drift_is_new) conclude(outcome_of(task_), now);
   if (to_keep_ && !task_.valid() && now >= store_again_at_)
     store_in_background(authority_.keeper(), now);
   report_stalled_store(now);
@@ -220,6 +230,8 @@ void CalibrationService::follow_task(HostTime now) {
   }
   storing_from_ = now;
   held_out_ = to_keep_->verdict.held_out;
+  if (const KeptBeside& beside = to_keep_->beside; !beside.drift.empty())
+    authority_.raise_drift(beside.drifted_model, beside.drift);
 }
 
 /// Stores a model again after an error.
@@ -227,7 +239,8 @@ void CalibrationService::store_in_background(ModelKeeper keeper, HostTime now) {
   storing_from_ = now;
   revision_before_storing_ = authority_.revision();
   task_ = run_abandonable([keeper = std::move(keeper), model = to_keep_, now]() mutable {
-    return keeper.keep(model->document, model->verdict, model->actor, now, &model->discarded);
+    return keeper.keep(model->document, model->verdict, model->actor, now, &model->discarded,
+                       model->beside);
   });
 }
 
@@ -256,7 +269,9 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
 
   if (kept->active) authority_.set_active(std::move(*kept->active), revision_before_storing_);
   const calib::Verdict& verdict = to_keep_->verdict;
-  session_.judged(kept->id, verdict.accepted, verdict_text(verdict), now);
+  const bool held = verdict.accepted && to_keep_->beside.hold;
+  session_.judged(kept->id, verdict.accepted && !held,
+                  (held ? held_text(kept->id) : std::string{}) + verdict_text(verdict), now);
   discard_unstored();
 }
 

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <ratio>
 #include <utility>
 
 #include "abbe/methods/calibration_run.hpp"
+#include "abbe/methods/drift.hpp"
 #include "abbe/service/calibration_service.hpp"
 
 namespace abbe::daemon {
@@ -40,6 +43,21 @@ void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
 }
 
+/// The document of an update: that of the run with the updated model. Its parents, the run and the
+/// previous model, are the last inputs, with the hashes of their content.
+ModelDocument updated_document(calib::VolumetricModel model, const ModelDocument& run,
+                               const PublishedModel& previous) {
+  ModelDocument document = run;
+  document.model = std::move(model);
+  document.estimator += ", update";
+  ModelDocument parent = run;
+  parent.model = previous.model;
+  parent.method = previous.method;
+  document.inputs.push_back({fmt::format("run, model {}", model_id(run)), model_hash(run)});
+  document.inputs.push_back({fmt::format("previous model {}", previous.id), model_hash(parent)});
+  return document;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
@@ -65,6 +83,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
                       .verdict = verdict_of(*candidate),
                       .actor = {.who = who, .why = std::move(why), .when = created}}};
   add_notes(*model);
+  if (active) compare_with_active(*model, run);
   return model;
 }
 
@@ -75,6 +94,37 @@ void IdentificationTask::add_notes(JudgedModel& model) const {
     notes.push_back(cannot_be_checked(gap));
 }
 
+/// Adds drift of the active model to the verdict. With [drift] continuous, an update of the active
+/// model takes the place of the model of the run, which is stored beside it.
+void IdentificationTask::compare_with_active(JudgedModel& model, const CalibrationRun& run) const {
+  const DriftConfig& drift = config->drift;
+  const DriftFinding finding =
+      find_drift(model.document.model, model.verdict, active->model, drift);
+  auto& notes = model.verdict.notes;
+  notes.insert(notes.end(), finding.notes.begin(), finding.notes.end());
+  model.beside = {.drifted_model = active->id,
+                  .drift = finding.state(),
+                  .hold = drift.hold && !finding.state().empty()};
+  if (!drift.continuous || !finding.test) return;
+
+  const std::chrono::duration<double, std::ratio<86400>> since =
+      model.document.created - active->created;
+  const auto options = update_options(run, finding, std::max(0.0, since.count()), drift);
+  auto updated = updated_model(model.document.model, model.verdict, active->model, *finding.test,
+                               options, config->gate);
+  if (!updated) {
+    notes.push_back(fmt::format("the active model was not updated: {}", updated.error().text));
+    return;
+  }
+
+  model.beside.run = model.document;
+  model.beside.run_accepted = model.verdict.accepted;
+  model.beside.run_reasons = model.verdict.reasons;
+  model.document = updated_document(std::move(updated->model), model.document, *active);
+  model.verdict = std::move(updated->verdict);
+  model.id = model_id(model.document);
+}
+
 Result<KeptModel> IdentificationTask::operator()() {
   auto judged = judged_model();
   if (!judged) return tl::unexpected(judged.error());
@@ -82,7 +132,8 @@ Result<KeptModel> IdentificationTask::operator()() {
   if (!state->begin_storing(model)) return fail(ErrorCode::Refused, "the model was discarded");
 
   if (state->stopped) keeper.set_lock_timeout(CalibrationService::kLastTry);
-  return keeper.keep(model->document, model->verdict, model->actor, state->now, &model->discarded);
+  return keeper.keep(model->document, model->verdict, model->actor, state->now, &model->discarded,
+                     model->beside);
 }
 
 }  // namespace abbe::daemon

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
 #include "abbe/service/model_keeper.hpp"
@@ -21,6 +22,7 @@ struct JudgedModel {
   ModelDocument document;
   calib::Verdict verdict;
   StoreActor actor;
+  KeptBeside beside{};  ///< drift of the active model; the run alone, if `document` is an update
   std::atomic<bool> discarded{false};  ///< the session was cancelled: do not store the model
 };
 
@@ -82,6 +84,7 @@ struct IdentificationTask {
  private:
   [[nodiscard]] Result<std::shared_ptr<JudgedModel>> judged_model();
   void add_notes(JudgedModel& model) const;
+  void compare_with_active(JudgedModel& model, const CalibrationRun& run) const;
 };
 
 }  // namespace abbe::daemon

@@ -32,6 +32,7 @@ std::string reason_of(const StoreEvent& activation) {
                                          : "rolled back to a model the gate did not accept,");
     case StoreAction::Added:
     case StoreAction::Activated:
+    case StoreAction::Drifted:
       break;
   }
 
@@ -73,6 +74,10 @@ void ModelAuthority::set_active(ActiveModel active, std::uint64_t since) {
     read_again_ = true;
     destroy_in_background(std::move(active));
   }
+}
+
+void ModelAuthority::raise_drift(const std::string& id, std::string drift) {
+  if (active_.model != nullptr && active_.model->id == id) active_.drift = std::move(drift);
 }
 
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
@@ -129,7 +134,8 @@ ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostT
   if (unknown && active_.model != nullptr) return report_look(std::move(look->active->fault));
   next_repair_ = now + kRepairPeriod;
 
-  if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault) {
+  if (same(look->active->activation, active_.activation) && look->active->fault == active_.fault &&
+      look->active->drift == active_.drift) {
     destroy_in_background(std::move(*look->active));
     return Following::Unchanged;
   }
@@ -167,6 +173,9 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
     s.reason = "no axis positions yet";
   } else if (now - *axes_known_at > patience) {
     s.reason = "no recent axis positions";
+  } else if (!active_.drift.empty()) {
+    s.status = v1::ModelStatus::MODEL_DRIFT;
+    s.reason = active_.drift;
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
     s.reason = reason_of(active_.activation);

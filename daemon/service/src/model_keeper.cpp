@@ -36,19 +36,29 @@ void ModelKeeper::tidy_store(protocol::HostTime now) {
 
 Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
                                     const StoreActor& actor, protocol::HostTime now,
-                                    const std::atomic<bool>* discarded) {
+                                    const std::atomic<bool>* discarded, const KeptBeside& beside) {
   const auto is_discarded = [discarded] { return discarded != nullptr && *discarded; };
   if (const auto made = store_.create(); !made) return tl::unexpected(made.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
+  if (const auto kept = keep_beside(beside, actor); !kept) return tl::unexpected(kept.error());
   const auto id = store_.add(document, verdict.accepted, verdict.reasons, actor);
   if (!id) return tl::unexpected(id.error());
   if (is_discarded()) return fail(ErrorCode::Refused, "the model was discarded");
-  if (!verdict.accepted) return KeptModel{*id, std::nullopt};
+  if (!verdict.accepted || beside.hold) return KeptModel{*id, std::nullopt};
   if (auto done = activate_once(*id, actor); !done) return tl::unexpected(done.error());
 
   auto active = active_after(*id, document, now);
   if (!active) return tl::unexpected(active.error());
   return KeptModel{*id, std::move(*active)};
+}
+
+Result<void> ModelKeeper::keep_beside(const KeptBeside& beside, const StoreActor& actor) {
+  if (beside.run) {
+    const auto run = store_.add(*beside.run, beside.run_accepted, beside.run_reasons, actor);
+    if (!run) return tl::unexpected(run.error());
+  }
+  if (beside.drift.empty()) return {};
+  return store_.add_drift(beside.drifted_model, {actor.who, beside.drift, actor.when});
 }
 
 /// The active model after `document` was activated. The model file in the store is read only if the
@@ -94,7 +104,13 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
   }
 
   auto document = store_.load((*activation)->id);
-  if (document) return active_of(**activation, std::move(*document), now);
+  const auto drift = store_.drift();
+  if (!drift) return tl::unexpected(drift.error());
+  if (document) {
+    active = active_of(**activation, std::move(*document), now);
+    active.drift = *drift;
+    return active;
+  }
 
   active.activation = **activation;
   active.fault = document.error().text;

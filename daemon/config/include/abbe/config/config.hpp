@@ -175,6 +175,20 @@ struct OtfConfig {
   calib::otf::Estimator estimator = calib::otf::Estimator::TwoStep;  ///< of on-the-fly mode
 };
 
+/// [drift]: comparison of the tables of a new run with those of the active model, and continuous
+/// calibration (calib/model_drift, calib/model_update).
+struct DriftConfig {
+  bool test = true;   ///< a table that changed by more than its uncertainty raises DRIFT
+  bool hold = false;  ///< a model of a run with drift is stored and not activated
+  /// An accepted run updates the active model instead of replacing it.
+  bool continuous = false;
+  double forgetting = 1.0;  ///< factor of the previous information per run
+  /// Process noise of every table: standard deviation of its change in a day.
+  double length_m_per_root_day = 0.5e-6;
+  double angle_rad_per_root_day = 1e-6;
+  std::map<std::string, double> of_tables{};  ///< of single tables, m or rad per root of a day
+};
+
 /// [evemu] artefact_sensor or artefact_C: temperature of the ball array while it is touched.
 struct ArtefactTemperatureConfig {
   std::optional<std::uint8_t> sensor;  ///< index into Config::temperatures
@@ -222,6 +236,7 @@ struct Config {
   DdsConfig dds;
   GateConfig gate;
   OtfConfig otf;
+  DriftConfig drift;
   EvemuConfig evemu;
   ControlConfig control;
 

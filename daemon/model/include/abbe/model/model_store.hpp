@@ -30,7 +30,8 @@ struct StoreActor {
   bool operator==(const StoreActor&) const = default;
 };
 
-enum class StoreAction { Added, Activated, Forced, RolledBack };
+/// Drifted: a run found that the machine has changed since the model, which was active.
+enum class StoreAction { Added, Activated, Forced, RolledBack, Drifted };
 
 struct StoreEvent {
   StoreAction action = StoreAction::Added;
@@ -96,6 +97,10 @@ class ModelStore {
   [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
                                       bool force = false);
 
+  /// Records that a run found drift against model `id`; `actor.why` states what changed. No effect
+  /// if another model is active, or if the same event is recorded already.
+  [[nodiscard]] Result<void> add_drift(const std::string& id, const StoreActor& actor);
+
   /// Activates the model that was active before the present one; returns its id. Refused if there
   /// was none.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor);
@@ -108,6 +113,8 @@ class ModelStore {
   /// The event that made the active model active; `accepted` is the verdict of the gate on that
   /// model. Reads state.json at every call. nullopt: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
+  /// What has drifted since the last activation, as add_drift() recorded it last; empty: nothing.
+  [[nodiscard]] Result<std::string> drift() const;
   [[nodiscard]] Result<ModelDocument> load(const std::string& id) const;
   /// True if the file of model `id` has exactly the bytes of to_json(document): load() would then
   /// give an equal document.

@@ -5,6 +5,8 @@
 ///
 /// - STALE: the model was made for another machine configuration (hash), the axes have not all been
 ///   seen since the start, or there are no recent axis positions.
+/// - DRIFT: a run after the activation found that tables changed by more than their uncertainty, and
+///   no model was activated since.
 /// - INVALID: the control itself corrects the axis readings, so the model would correct them twice.
 ///
 /// Not real-time; used by the hub's thread only.
@@ -43,6 +45,9 @@ class ModelAuthority {
   /// was `since`. If another model has become active since then, `active` may be the older one: it
   /// is not used, and the next follow_store() reads the store again.
   void set_active(ActiveModel active, std::uint64_t since);
+  /// Model `id` has drifted, if it is the active one: `drift` states what changed. For the time
+  /// until the store has recorded it, or a new model is active.
+  void raise_drift(const std::string& id, std::string drift);
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
   enum class Following : std::uint8_t { Unchanged, Reading, Replaced };

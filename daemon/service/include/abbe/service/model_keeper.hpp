@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "abbe/calib/gate.hpp"
 #include "abbe/config/config.hpp"
@@ -28,14 +29,27 @@ struct ActiveModel {
   ModelPublication publication;  ///< of `model`
   bool made_for_this_machine = false;
   std::string recording_gap;  ///< ModelDocument::recording_gap
+  std::string drift;  ///< ModelStore::drift(); empty: no drift was found since the activation
   std::string fault;
 };
 
 /// Result of storing a model.
 struct KeptModel {
   std::string id;
-  /// the model that is active after the call; nullopt: the gate refused the given model
+  /// the model that is active after the call; nullopt: the gate refused the given model, or it is
+  /// held ([drift] hold)
   std::optional<ActiveModel> active;
+};
+
+/// What is stored beside an identified model.
+struct KeptBeside {
+  /// The active model with which the run was compared, and what changed since; empty: no drift.
+  std::string drifted_model{}, drift{};
+  bool hold = false;  ///< do not activate the model, although the gate accepts it
+  /// The model of the run alone, if the identified model is an update with it.
+  std::optional<ModelDocument> run{};
+  bool run_accepted = false;
+  std::vector<std::string> run_reasons{};
 };
 
 class ModelKeeper {
@@ -56,12 +70,15 @@ class ModelKeeper {
   /// model of the store. Before the activation the store parses and checks the file that it wrote.
   /// The returned model is that of `document` if the file has the same bytes.
   ///
+  /// A drift is recorded before the activation.
+  ///
   /// After an error the call may be repeated with the same `actor`: entries that the store already
   /// has are not made twice. Stops with Refused as soon as `discarded` is true; `discarded` may be
   /// null.
   [[nodiscard]] Result<KeptModel> keep(const ModelDocument& document, const calib::Verdict& verdict,
                                        const StoreActor& actor, protocol::HostTime now,
-                                       const std::atomic<bool>* discarded = nullptr);
+                                       const std::atomic<bool>* discarded = nullptr,
+                                       const KeptBeside& beside = {});
   /// An error only if the store itself cannot be read; a damaged model is reported in
   /// ActiveModel::fault.
   [[nodiscard]] Result<ActiveModel> read_active(protocol::HostTime now) const;
@@ -80,6 +97,7 @@ class ModelKeeper {
                                                  const ModelDocument& document,
                                                  protocol::HostTime now) const;
   [[nodiscard]] Result<void> activate_once(const std::string& id, const StoreActor& actor);
+  [[nodiscard]] Result<void> keep_beside(const KeptBeside& beside, const StoreActor& actor);
 
   ModelStore store_;
   std::string machine_;

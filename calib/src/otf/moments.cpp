@@ -125,7 +125,8 @@ Result<MomentAccumulator> MomentAccumulator::of(Setup setup) {
 }
 
 MomentAccumulator::MomentAccumulator(Setup setup)
-    : setup_(std::move(setup)), in_R_(setup_.basis.size() + kRigidUnknowns) {
+    : setup_(std::move(setup)),
+      in_R_(setup_.basis.size() + kRigidUnknowns + (setup_.range_offset ? 1 : 0)) {
   state_.tool_offset_m = setup_.target_offset_m;
 }
 
@@ -224,10 +225,15 @@ std::vector<MomentAccumulator::PolynomialColumn> MomentAccumulator::columns_in(
     const double x = 0.5 * (static_cast<double>(i) - 1.0);
     estimation::MachineState state = state_;
     state.q_m = leg_.from_m + (cell.centre_m + x * cell.half_m) * leg_.direction;
-    at[i].resize(setup_.basis.most_columns() + kRigidUnknowns);
+    at[i].resize(setup_.basis.most_columns() + kRigidUnknowns + 1);
     estimation::ModelColumns columns(at[i]);
     setup_.basis.append_columns(state, columns);
-    append_rigid_columns(columns, setup_.basis.size(), state.q_m + setup_.target_offset_m);
+    const Vector3 p_m = state.q_m + setup_.target_offset_m;
+    append_rigid_columns(columns, setup_.basis.size(), p_m);
+    if (setup_.range_offset) {
+      const Vector3 beam_m = p_m - setup_.T_machine_tracker.t_m;
+      columns.push(setup_.basis.size() + kRigidUnknowns, beam_m.normalized());
+    }
     at[i].resize(columns.size());
   }
 
@@ -287,8 +293,19 @@ void MomentAccumulator::close(Cell& cell) {
   cell = {};
   if (waiting_.cells >= WaitingRows::kMostCells) {
     waiting_.add_to(in_R_);
+    within_R_.chi2 += waiting_.rest;
+    within_R_.rows += waiting_.removed_rows;
     waiting_ = {};
   }
+}
+
+MomentAccumulator::WithinCells MomentAccumulator::within_cells() const {
+  WaitingRows open;
+  for (const Cell& cell : cells_) {
+    append_rows(cell, open);
+  }
+  return {within_R_.chi2 + waiting_.rest + open.rest,
+          within_R_.rows + waiting_.removed_rows + open.removed_rows};
 }
 
 estimation::Information MomentAccumulator::information() const {

@@ -46,6 +46,10 @@ class MomentAccumulator {
     RigidTransform T_machine_tracker;
     Noise noise;              ///< of one sample
     double corner_m = 0.010;  ///< Options::corner_m
+    /// One more unknown behind the rigid ones: the offset common to all ranges
+    /// (Noise::u_range_offset_m). Its column is quadratic in x with an error of (half cell /
+    /// range)^3: 2e-5 of the offset for nodes 50 mm apart, 1 m from the tracker.
+    bool range_offset = false;
   };
   /// NotApplicable if the interpolation of an axis is not linear. BadInput if a sigma of the noise
   /// is not positive.
@@ -59,6 +63,14 @@ class MomentAccumulator {
 
   /// Number of samples that were not ignored.
   [[nodiscard]] std::size_t samples() const { return samples_; }
+  [[nodiscard]] std::size_t unknowns() const { return in_R_.unknowns(); }
+  /// The part of Information::rest() and rows() that no polynomial of degree 2 within a cell
+  /// changes: it shows the noise from sample to sample only.
+  struct WithinCells {
+    double chi2 = 0.0;
+    std::size_t rows = 0;
+  };
+  [[nodiscard]] WithinCells within_cells() const;
   /// Of all samples added so far; more can be added. Takes about as long as the adjustment of block
   /// means (otf/solve.hpp).
   [[nodiscard]] estimation::Information information() const;
@@ -113,6 +125,7 @@ class MomentAccumulator {
   std::array<Cell, 2> cells_;
   std::size_t current_ = 0, samples_ = 0;
   WaitingRows waiting_;
+  WithinCells within_R_;  ///< of the cells that are part of in_R_
   estimation::Information in_R_;
 };
 

@@ -182,7 +182,7 @@ TEST(Moments, KnowTheDirectionOfTravel) {
   const Eigen::MatrixXd R = moments.information().R();
   const Eigen::MatrixXd H = R.transpose() * R;
   // EYX has a backlash with the weight of its mean table; both directions cancel the coupling.
-  const auto EYX = static_cast<Eigen::Index>(basis.layout().find({Motion::EY, Axis::X})->offset);
+  const auto EYX = static_cast<Eigen::Index>(basis.layout().find({Motion::Y, Axis::X})->offset);
   const auto backlash = static_cast<Eigen::Index>(basis.size()) + 1;
   EXPECT_GT(H(backlash, backlash), 0.0);
   EXPECT_LT(std::abs(H(backlash, EYX)), 1e-9 * std::sqrt(H(backlash, backlash) * H(EYX, EYX)));

@@ -389,9 +389,9 @@ TEST_F(Cli, ExitsWith2OnUsage) {
   EXPECT_EQ(abbe("").exit, 2);
   EXPECT_EQ(abbe("identify otf").exit, 2);
   EXPECT_EQ(abbe("frobnicate").exit, 2);
-  const auto ran = identify(files_.path, files_.tracker, folder_ / "x", "--estimator joint");
+  const auto ran = identify(files_.path, files_.tracker, folder_ / "x", "--estimator three-step");
   EXPECT_EQ(ran.exit, 2);
-  EXPECT_THAT(ran.err, HasSubstr("joint"));
+  EXPECT_THAT(ran.err, HasSubstr("three-step"));
 }
 
 TEST_F(Cli, ExitsWith3OnABadFileAndListsItsFaults) {

@@ -104,6 +104,12 @@ NullSpace null_space(const Information& data) {
   // the null space of R.
   const auto qr = pivoted(data);
   const Eigen::Index n = qr.cols(), rank = qr.rank();
+  if (rank == n) {
+    return {.rank = static_cast<std::size_t>(rank),
+            .basis = Eigen::MatrixXd(n, 0),
+            .share = Eigen::VectorXd::Zero(n)};
+  }
+
   Eigen::MatrixXd null(n, n - rank);
   null.topRows(rank) = -qr.matrixQR()
                             .topLeftCorner(rank, rank)

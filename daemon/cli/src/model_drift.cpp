@@ -6,10 +6,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/error.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_drift.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/protocol/exit_codes.hpp"
 #include "commands.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
@@ -90,7 +90,7 @@ int run_model_drift(const ModelDriftArguments& arguments) {
   } else {
     print(*drift);
   }
-  return drift->drifted ? protocol::number(protocol::ExitCode::Refused) : 0;
+  return drift->drifted ? exit_code(ErrorCode::Refused) : 0;
 }
 
 }  // namespace

@@ -78,6 +78,24 @@ void move_table(OtfRun& run, const std::string& table, double by) {
   error = error.with_values(std::move(values));
 }
 
+/// The same values at the nodes, curved between them: no table represents these errors exactly.
+void curve_between_nodes(OtfRun& run) {
+  for (sim::AxisTruth& axis : run.truth.axes) {
+    for (sim::ErrorFunction& error : axis.error) {
+      error = sim::ErrorFunction({error.nodes_m().begin(), error.nodes_m().end()},
+                                 {error.values().begin(), error.values().end()}, sim::Shape::Cubic);
+    }
+  }
+}
+
+/// The same volume on other legs.
+void mirror_path_in_x(OtfRun& run) {
+  const auto& range = run.truth.axes[0].range;
+  for (std::vector<Vector3>* path : {&run.path_m, &run.driven_m}) {
+    for (Vector3& q : *path) q.x() = range.min_m + range.max_m - q.x();
+  }
+}
+
 /// Standard uncertainty of the difference of two such runs where move_table() changes most.
 double u_of_difference(const calib::VolumetricModel& active, const std::string& table) {
   double u = 0.0;
@@ -149,6 +167,7 @@ std::vector<Scenario> unexpected() {
          std::reverse(r.path_m.begin(), r.path_m.end());
          std::reverse(r.driven_m.begin(), r.driven_m.end());
        }},
+      {"another path: mirrored in X", mirror_path_in_x},
       {"another tool offset, 1 mm", [](OtfRun& r) { r.machine.target_offset_m.z() += 1e-3; }},
   };
 }
@@ -200,6 +219,21 @@ int run_drift_campaign(int machines, int unchanged, int moved, std::uint64_t fir
       run_of(moved / 4, s.put_in, fmt::format("machine {}: {}", m, s.name), "");
     }
     none = of_unchanged;
+
+    OtfRun curved = base;
+    curve_between_nodes(curved);
+    OtfRun first_of_curved = curved;
+    const auto of_curved = identified(first_of_curved, options);
+    if (!of_curved) continue;
+    Counts same_path, other_path;
+    for (int i = 0; i < unchanged / 5; ++i) {
+      same_path.count(next_run(curved, ++number, of_curved->solution.model), "");
+      OtfRun other = curved;
+      mirror_path_in_x(other);
+      other_path.count(next_run(other, ++number, of_curved->solution.model), "");
+    }
+    same_path.print(fmt::format("machine {}: curved between nodes", m));
+    other_path.print(fmt::format("machine {}: curved, another path", m));
   }
 
   print_figure("drift: unchanged runs that raise DRIFT", "0 of 100", "{} of {}", none.raised,

@@ -11,6 +11,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
+#include "abbe/config/capabilities.hpp"
 
 namespace abbe::daemon {
 namespace {

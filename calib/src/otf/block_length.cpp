@@ -8,8 +8,6 @@
 namespace abbe::calib::otf {
 namespace {
 
-constexpr double kBlockTravel_m = 8.33e-3;
-
 /// Upper quartile of the travel per sample, from chords over `chord` samples; nullopt: no chord.
 std::optional<double> travel_per_sample_m(std::span<const TrackerObservation> samples,
                                           std::size_t chord) {
@@ -33,7 +31,7 @@ std::optional<double> travel_per_sample_m(std::span<const TrackerObservation> sa
 }  // namespace
 
 std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) {
-  constexpr std::size_t kLargest = 1000, kUnknownTravel = 10;
+  constexpr std::size_t kUnknownTravel = 10;
   std::size_t chord = 50;
   std::optional<double> travel_m = travel_per_sample_m(samples, chord);
 
@@ -48,11 +46,16 @@ std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) 
     return kUnknownTravel;
   }
 
-  if (!(*travel_m * double{kLargest} > kBlockTravel_m)) {
+  return suitable_block_samples(*travel_m);
+}
+
+std::size_t suitable_block_samples(double travel_per_sample_m) {
+  constexpr std::size_t kLargest = 1000;
+  if (!(travel_per_sample_m * double{kLargest} > kBlockTravel_m)) {
     return kLargest;
   }
 
-  const auto suitable = static_cast<std::size_t>(std::lround(kBlockTravel_m / *travel_m));
+  const auto suitable = static_cast<std::size_t>(std::lround(kBlockTravel_m / travel_per_sample_m));
   return std::clamp<std::size_t>(suitable, 1, kLargest);
 }
 

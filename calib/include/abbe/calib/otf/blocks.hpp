@@ -32,6 +32,8 @@ struct BlockSeries {
   std::size_t lost_samples = 0;  ///< invalid samples, and samples missing in the time series
 };
 
+inline constexpr double kBlockTravel_m = 8.33e-3;
+
 /// Number of samples per block, 1 to 1000, for which the target travels 8.3 mm in a block. This
 /// length is small compared with nodes 50 mm apart; it is also the length used to re-evaluate
 /// [Sanders 2023] (100 samples at 500 Hz and 2500 mm/min). The travel per sample is computed from
@@ -39,6 +41,8 @@ struct BlockSeries {
 /// block, over fewer samples. The upper quartile of the chords is used, so that standstill and
 /// acceleration ramps have no influence.
 [[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
+/// The same for a known travel from one sample to the next.
+[[nodiscard]] std::size_t suitable_block_samples(double travel_per_sample_m);
 
 /// NotFinite if a valid sample contains NaN (the text names the sample). BadInput if time does not
 /// ascend, has a gap of more than one hour, or an option is 0. TooFewObservations for fewer than

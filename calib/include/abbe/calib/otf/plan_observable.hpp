@@ -1,0 +1,31 @@
+#pragma once
+/// Whether a run along a path determines the model, judged before the machine moves. Feed, noise
+/// and place of the tracker are of no importance: they change weights, not the rank. Pure.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/otf/run.hpp"
+
+namespace abbe::calib::otf {
+
+struct Observability {
+  /// Errors that the path leaves undetermined in gauge G1: "EXX", "EC0Y". Empty: the path is
+  /// sufficient.
+  std::vector<std::string> undetermined;
+  std::size_t rank = 0;    ///< of the legs that were evaluated
+  std::size_t needed = 0;  ///< unknowns less the conditions of the gauge
+};
+
+/// Rank of the data that the legs give: points 8.3 mm apart, without those near the ends of a leg
+/// (Options::corner_m), two directions across the leg. Legs are evaluated in groups and no further
+/// than necessary. The path is one that check(Path, MachineNodes) accepts; BadInput for a machine
+/// without a layout.
+[[nodiscard]] Result<Observability> observability(const Path&, const Machine&);
+
+/// RankDeficient if the path leaves errors undetermined. The text names them and the parts of the
+/// travel that the path does not reach.
+[[nodiscard]] Result<void> check_observable(const Path&, const Machine&);
+
+}  // namespace abbe::calib::otf

@@ -1,0 +1,129 @@
+#include "abbe/calib/otf/plan_prediction.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/otf/plan_observable.hpp"
+#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/calib/otf/solve.hpp"
+#include "message.hpp"
+#include "otf/plan_rows.hpp"
+#include "otf/plan_volume.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+TableUncertainty uncertainty_of(std::string name, const Eigen::MatrixXd& covariance,
+                                std::size_t first, std::size_t count) {
+  TableUncertainty u{.name = std::move(name)};
+  for (std::size_t i = first; i < first + count; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const double variance = std::max(covariance(k, k), 0.0);
+    u.rms_u += variance / static_cast<double>(count);
+    u.max_u = std::max(u.max_u, std::sqrt(variance));
+  }
+  u.rms_u = std::sqrt(u.rms_u);
+  return u;
+}
+
+std::vector<TableUncertainty> uncertainties_of(const ParameterLayout& layout,
+                                               const Eigen::MatrixXd& covariance) {
+  std::vector<TableUncertainty> all;
+  for (const Table& table : layout.tables()) {
+    all.push_back(uncertainty_of(name(table.motion), covariance, table.offset,
+                                 layout.node_count(table.motion.axis)));
+  }
+  for (std::size_t i = 0; i < kSquarenessNames.size(); ++i) {
+    all.push_back(uncertainty_of(std::string(kSquarenessNames[i]), covariance,
+                                 layout.squareness_offset() + i, 1));
+  }
+  return all;
+}
+
+std::vector<std::string> tables_left_out(const ParameterLayout& layout) {
+  std::vector<std::string> names;
+  for (const Axis axis : kAllAxes) {
+    for (const Motion motion : kAllMotions) {
+      if (!layout.find({motion, axis})) {
+        names.push_back(name(ErrorMotion{motion, axis}));
+      }
+    }
+  }
+  return names;
+}
+
+/// Evenly spaced places over the travel.
+std::vector<Vector3> map_places(const MachineNodes& travel) {
+  MachineNodes few;
+  for (const Axis a : kAllAxes) {
+    const double first_m = travel[index(a)].nodes_m.front(),
+                 last_m = travel[index(a)].nodes_m.back();
+    for (std::size_t i = 0; i < Prediction::kMapPlaces; ++i) {
+      few[index(a)].nodes_m.push_back(first_m + (last_m - first_m) * static_cast<double>(i) /
+                                                    double{Prediction::kMapPlaces - 1});
+    }
+  }
+  return tensor_grid(few);
+}
+
+Result<void> check_tracker_off_path(const Path& path, const PlannedRun& run) {
+  constexpr double kOffPath_m = 0.05;
+  const double distance_m = distance_to_path_m(path, run.tracker_m - run.machine.target_offset_m);
+  if (distance_m < kOffPath_m) {
+    return failure(
+        ErrorCode::BadInput,
+        message("plan: the tracker at ", mm_text(run.tracker_m), " is ", 1e3 * distance_m,
+                " mm from the path of the reflector, needs ", 1e3 * kOffPath_m, " mm"));
+  }
+  return {};
+}
+
+Result<void> check_all(const Path& path, const PlannedRun& run) {
+  if (Result<void> valid = check(path, run.machine.nodes); !valid) {
+    return valid;
+  }
+  if (Result<void> valid = check_tracker_off_path(path, run); !valid) {
+    return valid;
+  }
+  if (Result<void> valid = check(run); !valid) {
+    return valid;
+  }
+  return check_observable(path, run.machine);
+}
+
+}  // namespace
+
+Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t row_points) {
+  if (Result<void> valid = check_all(path, run); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  const Result<Observations> o = planned_observations(path, run, row_points);
+  if (!o) {
+    return tl::unexpected(o.error());
+  }
+  const Result<Adjustment> a = adjust(information_of(*o), *o);
+  if (!a) {
+    return tl::unexpected(a.error());
+  }
+
+  const RigidFreeVolume volume(o->layout(), run.machine.target_offset_m);
+  Prediction p{.rms_u_m = volume.rms_u_m(a->covariance),
+               .tables = uncertainties_of(o->layout(), a->covariance),
+               .left_out = tables_left_out(o->layout()),
+               .observations = o->rows.size(),
+               .unknowns = o->unknowns(),
+               .rank = a->rank,
+               .datum_defect = a->datum_defect,
+               .condition = a->condition,
+               .length_m = lengths_to_vertices_m(path).back(),
+               .duration_s = duration_s(path, run.drive)};
+  for (const Vector3& q : map_places(run.machine.nodes)) {
+    p.map.push_back({q, volume.u_m(q, a->covariance)});
+    p.max_u_m = std::max(p.max_u_m, p.map.back().u_m);
+  }
+  return p;
+}
+
+}  // namespace abbe::calib::otf

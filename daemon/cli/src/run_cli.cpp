@@ -74,6 +74,9 @@ void add_commands(CLI::App& app, int& exit) {
   add_calibrate_evemu(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
   add_calibrate_artefact(*calibrate, exit);
+  auto* plan = app.add_subcommand("plan", "Plan a calibration before the machine moves");
+  plan->require_subcommand(1);
+  add_plan_otf(*plan, exit);
   add_reference(app, exit);
   add_machine(app, exit);
   add_tracker(app, exit);

@@ -1,0 +1,384 @@
+/// `abbe plan otf`: computes a path for an on-the-fly calibration, or predicts one that exists.
+
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/plan.hpp"
+#include "abbe/calib/otf/polyline.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/capabilities.hpp"
+#include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/otf/path_plan.hpp"
+#include "abbe/methods/otf/path_program.hpp"
+#include "abbe/tables/input_files.hpp"
+#include "commands.hpp"
+#include "terminal.hpp"
+#include "vector_option.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace otf = calib::otf;
+
+constexpr double kMinute_s = 60.0;
+
+struct PlanOtfArguments {
+  std::string machine, path, out;
+  std::string chain = "[w b X Y Z t]", tool = "0,0,0";
+  std::vector<double> travel_mm;
+  double node_spacing_mm = 50.0;
+  std::vector<std::string> trackers, dialects;
+  double feed_mm_per_min = 2500.0;
+  std::optional<double> length_m, budget_min, points_per_s;
+  otf::Drive drive;
+  std::size_t lattice = otf::PlanOptions{}.lattice, exchanges = otf::PlanOptions{}.exchanges;
+  bool json = false;
+};
+
+/// A path with its prediction, and the tracker positions that were compared.
+struct PathPlan {
+  otf::PlannedRun run;
+  otf::Path path;
+  otf::Prediction prediction;
+  tl::expected<otf::Prediction, calib::Error> base;
+  std::vector<std::pair<calib::Vector3, double>> trackers;  ///< position, rms_u_m
+  std::size_t corners_not_reached = 0;
+};
+
+/// The configuration file that the options stand for, without tracker and devices.
+Result<Config> machine_of_options(const PlanOtfArguments& arguments) {
+  const auto tool_m = parse_mm("--tool", arguments.tool);
+  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  std::string text =
+      fmt::format("[machine]\nname = \"command line\"\nchain = \"{}\"\n", arguments.chain);
+  for (std::size_t k = 0; k < 3; ++k) {
+    text += fmt::format("[axes.{}]\nmin_mm = {:.17g}\nmax_mm = {:.17g}\n", "XYZ"[k],
+                        arguments.travel_mm[2 * k], arguments.travel_mm[2 * k + 1]);
+  }
+  text += fmt::format("[target]\noffset_mm = [{:.17g}, {:.17g}, {:.17g}]\n", (*tool_m)[0] * kMmPerM,
+                      (*tool_m)[1] * kMmPerM, (*tool_m)[2] * kMmPerM);
+  text += fmt::format("[model]\nnode_spacing_mm = {:.17g}\n", arguments.node_spacing_mm);
+  return parse_config(text, "options");
+}
+
+Result<std::vector<calib::Vector3>> trackers_of(const PlanOtfArguments& arguments,
+                                                const MachineConfig& machine) {
+  std::vector<calib::Vector3> trackers;
+  for (const auto& text : arguments.trackers) {
+    const auto at = parse_mm("--tracker-at", text);
+    if (!at) return tl::make_unexpected(at.error());
+    trackers.push_back(*at);
+  }
+  if (trackers.empty() && machine.tracker_position_m)
+    trackers.emplace_back(machine.tracker_position_m->data());
+  if (trackers.empty())
+    return fail(ErrorCode::Usage,
+                "plan otf: the position of the tracker is unknown: --tracker-at x,y,z in machine "
+                "coordinates, or [tracker] position_mm in the configuration");
+  return trackers;
+}
+
+Result<otf::PlannedRun> run_of(const PlanOtfArguments& arguments, const Config& config) {
+  if (auto given = require_target(config.machine); !given)
+    return tl::make_unexpected(given.error());
+  const auto machine = otf_machine(config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  otf::PlannedRun run{.machine = *machine, .noise = otf_noise(config.machine)};
+  run.drive = arguments.drive;
+  run.drive.feed_m_per_s = arguments.feed_mm_per_min / kMmPerM / kMinute_s;
+  if (const auto tracker = tracker_source(config); tracker)
+    run.points_per_s = tracker->point_rate_hz;
+  if (arguments.points_per_s) run.points_per_s = *arguments.points_per_s;
+  return run;
+}
+
+otf::PathBudget budget_of(const PlanOtfArguments& arguments, const otf::Machine& machine) {
+  otf::PathBudget budget;
+  if (arguments.length_m) budget.length_m = *arguments.length_m;
+  if (arguments.budget_min) budget.duration_s = *arguments.budget_min * kMinute_s;
+  if (!arguments.length_m && !arguments.budget_min)
+    budget.length_m = otf::lengths_to_vertices_m(otf::base_path(machine.nodes)).back();
+  return budget;
+}
+
+/// Compares the tracker positions by quick walks, and sets the best one in `run`.
+Result<std::vector<std::pair<calib::Vector3, double>>> compare_trackers(
+    otf::PlannedRun& run, const std::vector<calib::Vector3>& trackers,
+    const otf::PathBudget& budget) {
+  std::vector<std::pair<calib::Vector3, double>> compared;
+  for (const auto& tracker_m : trackers) {
+    run.tracker_m = tracker_m;
+    const auto quick = otf::plan(run, budget, {.lattice = 3, .exchanges = 0});
+    if (!quick) return tl::make_unexpected(error_of(quick.error()));
+    compared.emplace_back(tracker_m, quick->rms_u_m);
+  }
+  run.tracker_m = std::min_element(compared.begin(), compared.end(), [](auto& a, auto& b) {
+                    return a.second < b.second;
+                  })->first;
+  return compared;
+}
+
+Result<otf::Path> path_of_file(const std::string& file) {
+  const auto path = read_path_csv(file);
+  if (!path) return tl::make_unexpected(path.error());
+  return otf_path(path->vertices_m);
+}
+
+Result<PathPlan> planned(const PlanOtfArguments& arguments, ProgressBar& bar) {
+  const auto config =
+      arguments.machine.empty() ? machine_of_options(arguments) : load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto trackers = trackers_of(arguments, config->machine);
+  if (!trackers) return tl::make_unexpected(trackers.error());
+  auto run = run_of(arguments, *config);
+  if (!run) return tl::make_unexpected(run.error());
+
+  const otf::PathBudget budget = budget_of(arguments, run->machine);
+  PathPlan plan{.run = *run};
+  plan.run.tracker_m = trackers->front();
+  if (!arguments.path.empty()) {
+    auto path = path_of_file(arguments.path);
+    if (!path) return tl::make_unexpected(path.error());
+    plan.path = *std::move(path);
+  } else {
+    if (trackers->size() > 1) {
+      auto compared = compare_trackers(plan.run, *trackers, budget);
+      if (!compared) return tl::make_unexpected(compared.error());
+      plan.trackers = *std::move(compared);
+    }
+    const auto best = otf::plan(plan.run, budget,
+                                {.lattice = arguments.lattice,
+                                 .exchanges = arguments.exchanges,
+                                 .progress = [&](double share) { bar.show("planning", share); }});
+    if (!best) return tl::make_unexpected(error_of(best.error()));
+    plan.path = best->path;
+    plan.corners_not_reached = best->corners_not_reached;
+  }
+
+  const auto prediction = otf::predict(plan.path, plan.run);
+  if (!prediction) return tl::make_unexpected(error_of(prediction.error()));
+  plan.prediction = *prediction;
+  plan.base = otf::predict(otf::base_path(plan.run.machine.nodes), plan.run);
+  return plan;
+}
+
+std::vector<double> in_mm(const calib::Vector3& p_m) {
+  return {p_m[0] * kMmPerM, p_m[1] * kMmPerM, p_m[2] * kMmPerM};
+}
+
+nlohmann::json plan_json(const PathPlan& plan, const PlanOtfArguments& arguments) {
+  nlohmann::json trackers = nlohmann::json::array();
+  for (const auto& [tracker_m, rms_u_m] : plan.trackers)
+    trackers.push_back({{"position_mm", in_mm(tracker_m)}, {"rms_u_um", rms_u_m * kUmPerM}});
+  return {{"legs", plan.path.vertices_m.size() - 1},
+          {"feed_mm_per_min", arguments.feed_mm_per_min},
+          {"points_per_s", plan.run.points_per_s},
+          {"tracker_mm", in_mm(plan.run.tracker_m)},
+          {"corners_not_reached", plan.corners_not_reached},
+          {"prediction", prediction_json(plan.prediction)},
+          {"base_path", plan.base ? prediction_json(*plan.base) : nlohmann::json{}},
+          {"trackers_compared", trackers}};
+}
+
+/// Standstill before and after the run: twice what the session needs.
+double stand_s(const otf::PlannedRun& run) {
+  constexpr double kLeast_s = 2.0, kPoints = 120.0;
+  return std::max(kLeast_s, kPoints / run.points_per_s);
+}
+
+Result<std::vector<std::string>> write_plan(const PathPlan& plan,
+                                            const PlanOtfArguments& arguments) {
+  const std::filesystem::path folder = arguments.out;
+  if (auto made = create_folder(folder, NewFolder::OfTheCaller); !made)
+    return tl::make_unexpected(made.error());
+  std::vector<std::pair<std::string, std::string>> files{
+      {"path.csv", to_path_csv(plan.path, plan.run.drive.feed_m_per_s)},
+      {"map.csv", to_map_csv(plan.prediction)},
+      {"plan.json", plan_json(plan, arguments).dump(1) + "\n"}};
+  for (const auto& named : arguments.dialects) {
+    if (const auto dialect = dialect_named(named))
+      files.emplace_back(fmt::format("path{}", extension(*dialect)),
+                         path_program(plan.path, plan.run.drive, stand_s(plan.run), *dialect));
+  }
+
+  std::vector<std::string> written;
+  for (const auto& [name, text] : files) {
+    if (auto done = replace_file(folder / name, text); !done)
+      return tl::make_unexpected(done.error());
+    written.push_back(name);
+  }
+  return written;
+}
+
+void print_prediction(const char* what, const otf::Prediction& p) {
+  fmt::print("{:<11} {:.4f} um rms, {:.4f} um largest; {:.2f} m, {:.1f} min, condition {:.3g}\n",
+             what, p.rms_u_m * kUmPerM, p.max_u_m * kUmPerM, p.length_m, p.duration_s / kMinute_s,
+             p.condition);
+}
+
+void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
+                const std::string& folder) {
+  for (const auto& [tracker_m, rms_u_m] : plan.trackers) {
+    fmt::print("tracker     at {:.6g}, {:.6g}, {:.6g} mm: {:.4f} um rms with a quick path{}\n",
+               tracker_m[0] * kMmPerM, tracker_m[1] * kMmPerM, tracker_m[2] * kMmPerM,
+               rms_u_m * kUmPerM, tracker_m == plan.run.tracker_m ? " (chosen)" : "");
+  }
+  fmt::print("standard uncertainty of V without the rigid motion, from white noise alone:\n");
+  print_prediction("path", plan.prediction);
+  if (plan.base)
+    print_prediction("base path", *plan.base);
+  else
+    fmt::print("base path   {}\n", plan.base.error().text);
+
+  fmt::print("rank        {} of {} unknowns, {} fixed by the gauge\n", plan.prediction.rank,
+             plan.prediction.unknowns, plan.prediction.datum_defect);
+  fmt::print("no table    {} (one target does not show them)\n",
+             fmt::join(plan.prediction.left_out, ", "));
+  for (const auto& table : plan.prediction.tables) {
+    const bool angle = table.name[1] >= 'A' && table.name[1] <= 'C';
+    fmt::print("{:<11} u {:.4g} {} rms, {:.4g} largest\n", table.name, table.rms_u * kUmPerM,
+               angle ? "urad" : "um", table.max_u * kUmPerM);
+  }
+  if (plan.corners_not_reached > 0)
+    fmt::print(
+        "note        {} corners of the travel are not reached: the model is not valid "
+        "there\n",
+        plan.corners_not_reached);
+  if (!written.empty()) fmt::print("written     {} in {}\n", fmt::join(written, ", "), folder);
+}
+
+int run(const PlanOtfArguments& arguments) {
+  ProgressBar bar(!arguments.json);
+  const auto plan = planned(arguments, bar);
+  bar.clear();
+  if (!plan) return report(plan.error());
+  std::vector<std::string> written;
+  if (!arguments.out.empty()) {
+    auto files = write_plan(*plan, arguments);
+    if (!files) return report(files.error());
+    written = *std::move(files);
+  }
+  if (arguments.json)
+    fmt::print("{}\n", plan_json(*plan, arguments).dump(1));
+  else
+    print_plan(*plan, written, arguments.out);
+  return 0;
+}
+
+void add_machine_options(CLI::App& command, PlanOtfArguments& arguments) {
+  auto* machine = command.add_option("--machine,-c", arguments.machine,
+                                     "machine.toml or the daemon's abbed.toml");
+  auto* travel = command
+                     .add_option("--travel-mm", arguments.travel_mm,
+                                 "instead of --machine, the travel: XMIN,XMAX,YMIN,YMAX,ZMIN,ZMAX")
+                     ->delimiter(',')
+                     ->expected(6);
+  auto* chain = command.add_option("--chain", arguments.chain, "with --travel-mm: kinematic chain")
+                    ->capture_default_str();
+  auto* tool = command
+                   .add_option("--tool", arguments.tool,
+                               "with --travel-mm: x,y,z, centre of the reflector relative to "
+                               "the tool reference point, mm")
+                   ->capture_default_str();
+  auto* nodes = command
+                    .add_option("--node-spacing-mm", arguments.node_spacing_mm,
+                                "with --travel-mm: distance of the nodes of the tables")
+                    ->check(CLI::PositiveNumber)
+                    ->capture_default_str();
+  machine->excludes(travel);
+  for (auto* option : {chain, tool, nodes}) option->needs(travel);
+}
+
+void add_drive_options(CLI::App& command, PlanOtfArguments& arguments) {
+  command
+      .add_option("--feed,--feed-mm-per-min", arguments.feed_mm_per_min, "feed on each leg, mm/min")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      .add_option("--acceleration-m-per-s2", arguments.drive.acceleration_m_per_s2,
+                  "of the machine along a leg")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--dwell-s", arguments.drive.dwell_s, "standstill before each leg")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      .add_option("--points-per-s", arguments.points_per_s,
+                  "of the tracker; default: that of the configured tracker, or 500")
+      ->check(CLI::PositiveNumber);
+}
+
+}  // namespace
+
+void add_plan_otf(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<PlanOtfArguments>();
+  auto* command = parent.add_subcommand(
+      "otf",
+      "Plan the path of an on-the-fly calibration: the path with the smallest predicted "
+      "uncertainty\n"
+      "for its length, beside the usual path of edges and diagonals. Writes path.csv, map.csv,\n"
+      "plan.json and programs for the control to OUT. White noise alone is predicted; turbulence\n"
+      "adds to it.");
+  add_machine_options(*command, *arguments);
+  command
+      ->add_option(
+          "--tracker-at", arguments->trackers,
+          "x,y,z: centre of the tracker, machine coordinates, mm; several times: they are\n"
+          "compared, and the best one is used; default: [tracker] position_mm")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  auto* length = command
+                     ->add_option("--length,--length-m", arguments->length_m,
+                                  "longest path, m; default: the length of the base path")
+                     ->check(CLI::PositiveNumber);
+  auto* budget =
+      command->add_option("--budget,--budget-min", arguments->budget_min, "longest duration, min")
+          ->check(CLI::PositiveNumber);
+  add_drive_options(*command, *arguments);
+  command
+      ->add_option("--lattice", arguments->lattice,
+                   "turning points for each axis of the first walk")
+      ->check(CLI::Range(3, 7))
+      ->capture_default_str();
+  command
+      ->add_option("--exchanges", arguments->exchanges,
+                   "attempts to improve the first walk, about 2 ms each; 0: the walk alone")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  auto* path = command->add_option("--path", arguments->path,
+                                   "path.csv: predict this path instead of planning one");
+  path->excludes(length)->excludes(budget);
+  std::vector<std::string> names;
+  for (const Dialect dialect : kDialects) names.emplace_back(name(dialect));
+  command
+      ->add_option("--dialect", arguments->dialects,
+                   "also write a program for this control: path.ngc, path.mpf, path.h")
+      ->check(CLI::IsMember(names))
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_flag("--json", arguments->json, "print the figures as one JSON object");
+  command->add_option("-o,--out", arguments->out, "folder for the results; created if needed");
+
+  command->callback([arguments, &exit] {
+    exit = arguments->machine.empty() && arguments->travel_mm.empty()
+               ? report({ErrorCode::Usage, "plan otf needs --machine or --travel-mm"})
+               : run(*arguments);
+  });
+}
+
+}  // namespace abbe::daemon

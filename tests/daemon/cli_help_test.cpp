@@ -65,6 +65,8 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "calibrate evemu",
                                     "calibrate probe",
                                     "calibrate artefact",
+                                    "plan",
+                                    "plan otf",
                                     "reference",
                                     "machine",
                                     "machine where",

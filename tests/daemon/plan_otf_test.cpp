@@ -63,8 +63,9 @@ TEST_F(PlanOtf, PredictsAPathOfAFileAsItWasPlanned) {
 }
 
 TEST_F(PlanOtf, ComparesPositionsOfTheTracker) {
-  const auto ran = plan(std::string(kQuick) +
-                        "--exchanges 0 --tracker-at=-5000,-5000,-100 --tracker-at=-700,-600,-100");
+  const auto ran = plan(
+      "--lattice 3 --exchanges 0 --length 8 --tracker-at=-5000,-5000,-100 "
+      "--tracker-at=-700,-600,-100");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("tracker     at -5000, -5000, -100 mm"),
                              HasSubstr("with a quick path (chosen)"), HasSubstr("base path")));
@@ -79,12 +80,13 @@ struct BadPlan {
 
 TEST_F(PlanOtf, RefusesWhatCannotBePlanned) {
   const std::string tracker = "--tracker-at=-700,-600,-100 ";
-  for (const BadPlan& bad : {BadPlan{tracker + "--lattice 3 --length 1", 3, "budget is too short"},
-                             BadPlan{"--tracker-at=0,0,-200", 3, "inside the volume"},
-                             BadPlan{tracker + "--dialect fanuc", 2, "linuxcnc"},
-                             BadPlan{"", 2, "position of the tracker is unknown"},
-                             BadPlan{tracker + "--length 0", 2, "length"},
-                             BadPlan{"--tracker-at 1,2", 2, "must be x,y,z"}}) {
+  for (const BadPlan& bad :
+       {BadPlan{tracker + "--lattice 3 --length 0.3", 3, "budget is too short"},
+        BadPlan{"--tracker-at=0,0,-200", 3, "inside the volume"},
+        BadPlan{tracker + "--dialect fanuc", 2, "linuxcnc"},
+        BadPlan{"", 2, "position of the tracker is unknown"},
+        BadPlan{tracker + "--length 0", 2, "length"},
+        BadPlan{"--tracker-at 1,2", 2, "must be x,y,z"}}) {
     const auto ran = plan(bad.arguments);
     EXPECT_EQ(ran.exit, bad.exit) << bad.arguments << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(bad.what)) << bad.arguments;

@@ -17,24 +17,24 @@ using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr const char* kMachine =
+constexpr const char* kPlannedMachine =
     "--travel-mm=-150,150,-100,100,-200,0 --node-spacing-mm 100 --tool 20,-15,-120 "
     "--chain '[w b X Y Z t]' ";
-constexpr const char* kQuick = "--lattice 3 --exchanges 300 --length 8 ";
+constexpr const char* kQuickPlan = "--lattice 3 --exchanges 300 --length 8 ";
 
 class PlanOtf : public ::testing::Test {
  protected:
   void SetUp() override { fs::create_directories(folder_); }
   void TearDown() override { fs::remove_all(folder_); }
   [[nodiscard]] test::Ran plan(const std::string& more) const {
-    return test::run_abbe(folder_, std::string("plan otf ") + kMachine + more);
+    return test::run_abbe(folder_, std::string("plan otf ") + kPlannedMachine + more);
   }
 
   const fs::path folder_ = fs::path(::testing::TempDir()) / fmt::format("plan_{}", ::getpid());
 };
 
 TEST_F(PlanOtf, WritesAPathThatIsBetterThanTheBasePath) {
-  const auto ran = plan(std::string(kQuick) +
+  const auto ran = plan(std::string(kQuickPlan) +
                         "--tracker-at=-700,-600,-100 --json -o out "
                         "--dialect linuxcnc --dialect heidenhain");
   ASSERT_EQ(ran.exit, 0) << ran.err;
@@ -56,7 +56,7 @@ TEST_F(PlanOtf, WritesAPathThatIsBetterThanTheBasePath) {
 
 TEST_F(PlanOtf, PredictsAPathOfAFileAsItWasPlanned) {
   const std::string tracker = "--tracker-at=-700,-600,-100 --json ";
-  const auto planned = plan(kQuick + tracker + "-o out");
+  const auto planned = plan(kQuickPlan + tracker + "-o out");
   const auto predicted = plan(tracker + "--path out/path.csv");
   ASSERT_EQ(predicted.exit, 0) << predicted.err;
   EXPECT_EQ(json::parse(predicted.out)["prediction"], json::parse(planned.out)["prediction"]);
@@ -64,7 +64,7 @@ TEST_F(PlanOtf, PredictsAPathOfAFileAsItWasPlanned) {
 
 TEST_F(PlanOtf, ComparesPositionsOfTheTracker) {
   const auto ran = plan(
-      "--lattice 3 --exchanges 0 --length 8 --tracker-at=-5000,-5000,-100 "
+      "--lattice 3 --exchanges 0 --length 20 --tracker-at=-5000,-5000,-100 "
       "--tracker-at=-700,-600,-100");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("tracker     at -5000, -5000, -100 mm"),

@@ -46,10 +46,10 @@ std::size_t suitable_block_samples(std::span<const TrackerObservation> samples) 
     return kUnknownTravel;
   }
 
-  return suitable_block_samples(*travel_m);
+  return block_samples_for_travel(*travel_m);
 }
 
-std::size_t suitable_block_samples(double travel_per_sample_m) {
+std::size_t block_samples_for_travel(double travel_per_sample_m) {
   constexpr std::size_t kLargest = 1000;
   if (!(travel_per_sample_m * double{kLargest} > kBlockTravel_m)) {
     return kLargest;

@@ -75,7 +75,7 @@ void append_block(Observations& o, const PlannedLeg& leg, std::span<const double
 void append_leg(Observations& o, const PlannedLeg& leg, const PlannedRun& run,
                 std::size_t row_points) {
   const double corner_m = Options{}.corner_m;
-  const std::size_t samples = suitable_block_samples(run.drive.feed_m_per_s / run.points_per_s);
+  const std::size_t samples = block_samples_for_travel(run.drive.feed_m_per_s / run.points_per_s);
   const std::vector<double> along_m = points_along_m(leg.length_m, run);
   // Blocks are counted from the beginning of the run. One that extends over a vertex is not used.
   o.samples += static_cast<std::size_t>(run.drive.dwell_s * run.points_per_s);

@@ -41,8 +41,8 @@ inline constexpr double kBlockTravel_m = 8.33e-3;
 /// block, over fewer samples. The upper quartile of the chords is used, so that standstill and
 /// acceleration ramps have no influence.
 [[nodiscard]] std::size_t suitable_block_samples(std::span<const TrackerObservation>);
-/// The same for a known travel from one sample to the next.
-[[nodiscard]] std::size_t suitable_block_samples(double travel_per_sample_m);
+/// The same for a known travel from one sample to the next. 1000 if it is 0 or not a number.
+[[nodiscard]] std::size_t block_samples_for_travel(double travel_per_sample_m);
 
 /// NotFinite if a valid sample contains NaN (the text names the sample). BadInput if time does not
 /// ascend, has a gap of more than one hour, or an option is 0. TooFewObservations for fewer than

@@ -19,6 +19,13 @@ constexpr bool kGuided = requires(Acquisition& acquisition) {
   acquisition.take_notes();
 };
 
+/// True if the method has tables while the machine moves.
+template <class Acquisition>
+constexpr bool kLive = requires(Acquisition& acquisition) {
+  acquisition.take_news();
+  acquisition.remaining();
+};
+
 std::optional<calib::evemu::NextTouch> next_of(const Acquisition& acquisition) {
   return std::visit(
       [](const auto& of_method) -> std::optional<calib::evemu::NextTouch> {
@@ -93,9 +100,10 @@ void CalibrationSession::tick(HostTime now) {
 
 void CalibrationSession::follow_acquisition(HostTime now) {
   const auto [phase, reason] = std::visit(
-      [this](const auto& a) {
+      [this](auto& a) {
         status_.progress = a.progress();
         status_.points = a.points();
+        if constexpr (kLive<decltype(a)>) status_.remaining = a.remaining();
         return std::pair{a.phase(), a.reason()};
       },
       *acquisition_);
@@ -146,6 +154,17 @@ void CalibrationSession::follow_guidance(Guided& acquisition, HostTime now) {
     enter(status_.state, acquisition.reason(), now);
 }
 
+std::optional<RunNews> CalibrationSession::take_news() {
+  if (status_.state != SessionState::Acquiring) return std::nullopt;
+  return std::visit(
+      [](auto& a) -> std::optional<RunNews> {
+        if constexpr (kLive<decltype(a)>)
+          if (a.has_live_tables()) return a.take_news();
+        return std::nullopt;
+      },
+      *acquisition_);
+}
+
 std::optional<Acquisition> CalibrationSession::take_run() {
   if (status_.state != SessionState::Identifying || !acquisition_) return std::nullopt;
   status_.progress = 0.0;
@@ -185,6 +204,7 @@ std::vector<SessionEvent> CalibrationSession::take_events() {
 void CalibrationSession::enter(SessionState state, std::string reason, HostTime now) {
   status_.state = state;
   status_.reason = std::move(reason);
+  if (state != SessionState::Acquiring) status_.remaining.reset();
   if (state == SessionState::Active || state == SessionState::Refused) {
     status_.progress = 1.0;
     status_.next.reset();

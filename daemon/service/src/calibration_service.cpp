@@ -57,6 +57,7 @@ CalibrationService::CalibrationService(const Config& config, ModelAuthority& aut
       recorder_(recorder),
       utc_(utc),
       session_(Methods::options(config)),
+      live_tables_(shared_config_),
       state_(std::make_shared<IdentificationState>()) {}
 
 CalibrationService::~CalibrationService() {
@@ -177,6 +178,7 @@ std::vector<SessionEvent> CalibrationService::cycle(std::span<const protocol::Sn
   state_->now = now;
   for (const auto& snapshot : snapshots) session_.take(snapshot);
   session_.tick(now);
+  live_tables_.cycle(session_, now);
   if (auto run = session_.take_run()) begin_identification(std::move(*run));
   if (auto discarded = session_.take_discarded()) destroy_in_background(std::move(*discarded));
   const bool ended = ready(task_), known = to_keep_ != nullptr;
@@ -278,6 +280,7 @@ void CalibrationService::conclude(Result<KeptModel> kept, HostTime now) {
 SessionStatus CalibrationService::status() const {
   SessionStatus s = session_.status();
   if (s.state == SessionState::Identifying) s.progress = state_->share;
+  if (session_.running()) s.live = live_tables_.latest();
   return s;
 }
 

@@ -52,6 +52,35 @@ json next_json(const calib::evemu::NextTouch& next) {
           {"points", next.points}};
 }
 
+/// JSON has no NaN: null in its place.
+json number_or_null(double value) {
+  return std::isnan(value) ? json{} : json(value);
+}
+
+/// Rounded to 0.1 nm or 0.1 nrad, so that the reply stays short.
+json rounded(const std::vector<double>& values) {
+  constexpr double kPerUnit = 1e10;
+  json out = json::array();
+  for (const double value : values)
+    out.push_back(number_or_null(std::round(value * kPerUnit) / kPerUnit));
+  return out;
+}
+
+json live_json(const LiveTables& live) {
+  json tables = json::array();
+  for (const LiveTable& table : live.tables) {
+    json& out = tables.emplace_back(json{{"table", table.name},
+                                         {"unit", table.is_angle ? "rad" : "m"},
+                                         {"determined", table.determined()},
+                                         {"value", rounded(table.value)},
+                                         {"u", rounded(table.u)}});
+    if (!table.at_m.empty()) out["at_m"] = rounded(table.at_m);
+  }
+  return {{"samples", live.samples},
+          {"variance_factor", live.variance_factor},
+          {"tables", std::move(tables)}};
+}
+
 json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigures>& held_out) {
   json out{{"id", s.id},
            {"state", name(s.state)},
@@ -64,6 +93,8 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
            {"noted", s.noted}};
   if (s.state == SessionState::Refused) out["code"] = code_name(s.refused_as);
   if (s.next) out["next"] = next_json(*s.next);
+  if (s.remaining) out["remaining_s"] = in_seconds(*s.remaining);
+  if (s.live) out["live"] = live_json(*s.live);
 
   if (held_out) {
     out["held_out_rms_um"] = {{"candidate", held_out->candidate_rms_m * 1e6},
@@ -96,11 +127,6 @@ json model_json(const SeenModel& model) {
     out["recording_sha256"] = model.recording_sha256;
   }
   return out;
-}
-
-/// JSON has no NaN: null in its place.
-json number_or_null(double value) {
-  return std::isnan(value) ? json{} : json(value);
 }
 
 json environment_json(const protocol::Snapshot& live, const Config& config) {

@@ -22,7 +22,9 @@ using protocol::Snapshot;
 // the beam was interrupted when the machine passed the corner. For a shorter time, a change in the
 // mapping of the tracker's clock can cause such a distance.
 constexpr auto kCornerMissed = std::chrono::milliseconds{500};
-constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
+constexpr auto kMarkEvery = std::chrono::seconds{2};
+// A machine that is slower than this over half a minute stands.
+constexpr double kSlowest_m_per_s = 0.1e-3;
 
 std::string text(const Vector3& q) {
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", q[0] * 1e3, q[1] * 1e3, q[2] * 1e3);
@@ -40,23 +42,27 @@ RunPoint run_point(const Snapshot& s) {
 }  // namespace
 
 void RunPoints::push_back(const RunPoint& point) {
-  if (blocks_.empty() || blocks_.back().size() == kPointsInBlock)
-    blocks_.emplace_back().reserve(kPointsInBlock);
-  blocks_.back().push_back(point);
+  if (size_ == blocks_.size() * kPointsInBlock)
+    blocks_.push_back(std::make_shared<RunPoint[]>(kPointsInBlock));
+  blocks_[size_ / kPointsInBlock][size_ % kPointsInBlock] = point;
   ++size_;
-}
-
-void RunPoints::pop_back() noexcept {
-  blocks_.back().pop_back();
-  if (blocks_.back().empty()) blocks_.pop_back();
-  --size_;
 }
 
 std::vector<RunPoint> RunPoints::joined() const {
   std::vector<RunPoint> all;
   all.reserve(size_);
-  for (const auto& block : blocks_) all.insert(all.end(), block.begin(), block.end());
+  for (std::size_t i = 0; i < full_blocks(); ++i)
+    all.insert(all.end(), blocks_[i].get(), blocks_[i].get() + kPointsInBlock);
+  const std::vector<RunPoint> last = tail();
+  all.insert(all.end(), last.begin(), last.end());
   return all;
+}
+
+std::vector<RunPoint> RunPoints::tail() const {
+  const std::size_t count = size_ % kPointsInBlock;
+  if (count == 0) return {};
+  const RunPoint* first = blocks_[full_blocks()].get();
+  return {first, first + count};
 }
 
 OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOptions options,
@@ -74,6 +80,40 @@ OtfAcquisition::OtfAcquisition(std::vector<AxisPosition> path_m, AcquisitionOpti
 double OtfAcquisition::progress() const noexcept {
   if (phase_ == Phase::Complete) return 1.0;
   return driven_at_m_.back() > 0.0 ? std::min(driven_m_ / driven_at_m_.back(), 1.0) : 0.0;
+}
+
+std::optional<std::chrono::nanoseconds> OtfAcquisition::remaining() const noexcept {
+  if (phase_ != Phase::Running || marked_ < 2) return std::nullopt;
+  const Mark& oldest = marks_[marked_ > marks_.size() ? marked_ % marks_.size() : 0];
+  const double speed_m_per_s = (driven_m_ - oldest.driven_m) / in_seconds(on_leg_at_ - oldest.time);
+  if (!(speed_m_per_s > kSlowest_m_per_s)) return std::nullopt;
+  const std::chrono::duration<double> left{(driven_at_m_.back() - driven_m_) / speed_m_per_s};
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(left);
+}
+
+void OtfAcquisition::mark_way(HostTime time) {
+  if (marked_ > 0 && time - marks_[(marked_ - 1) % marks_.size()].time < kMarkEvery) return;
+  marks_[marked_ % marks_.size()] = {time, driven_m_};
+  ++marked_;
+}
+
+void OtfAcquisition::begin_leg(const RunPoint& point, const Vector3& q) {
+  begun_leg_ = leg_;
+  legs_.push_back({.leg = leg_,
+                   .from_m = path_m_[leg_],
+                   .to_m = path_m_[leg_ + 1],
+                   .first_point = points_.size() - 1,
+                   .q_m = {q[0], q[1], q[2]},
+                   .p_tracker_m = point.p_tracker_m});
+}
+
+RunNews OtfAcquisition::take_news() {
+  RunNews news{.blocks = {}, .tail = points_.tail(), .legs = {}, .environment = environment()};
+  for (; blocks_taken_ < points_.full_blocks(); ++blocks_taken_)
+    news.blocks.push_back(points_.full_block(blocks_taken_));
+  news.legs.assign(legs_.begin(), legs_.end());
+  legs_.clear();
+  return news;
 }
 
 void OtfAcquisition::take(const Snapshot& snapshot) {
@@ -209,6 +249,7 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
     reason_ = "driving the path";
     on_leg_at_ = point.time;
     points_.push_back(point);
+    begin_leg(point, q);
     return;
   }
 
@@ -269,8 +310,10 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
     here = on_leg(leg_);
   }
 
+  if (begun_leg_ != leg_) begin_leg(point, q);
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;
+  mark_way(point.time);
 }
 
 /// The run is complete when the machine stands still at the last vertex and is on the last leg, or

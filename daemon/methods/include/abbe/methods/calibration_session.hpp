@@ -70,6 +70,9 @@ class CalibrationSession {  // NOLINT(bugprone-exception-escape): a defaulted mo
   /// only: in a replay the run is incomplete without it and gives no model either.
   void tick(protocol::HostTime now);
 
+  /// What was added to the run since the last call, for tables while the machine moves. nullopt: the
+  /// session is not acquiring, or its method has no such tables. Has no influence on the session.
+  [[nodiscard]] std::optional<RunNews> take_news();
   /// The acquired run, available in the state Identifying; nullopt in other states and after it was
   /// returned once.
   [[nodiscard]] std::optional<Acquisition> take_run();

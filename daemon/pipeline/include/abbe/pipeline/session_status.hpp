@@ -1,8 +1,10 @@
 #pragma once
 /// State of a calibration session, as recorded, published and shown. Pure data.
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,6 +31,26 @@ enum class SessionState : std::uint8_t {
   return state == SessionState::Warming || state == SessionState::Acquiring;
 }
 
+/// A table of the model, as far as the run determines it.
+struct LiveTable {
+  std::string name;          ///< "EXX", "EC0Y"
+  bool is_angle = false;     ///< values in rad, else in m
+  std::vector<double> at_m;  ///< nodes; empty: squareness, which has one value
+  /// One per node; NaN where the run does not determine it yet.
+  std::vector<double> value, u;
+
+  [[nodiscard]] bool determined() const noexcept;  ///< at every node
+  /// Index of the value with the largest magnitude; the table must be determined.
+  [[nodiscard]] std::size_t largest() const noexcept;
+};
+
+/// The tables of a run that is not complete; u: standard uncertainty.
+struct LiveTables {
+  std::vector<LiveTable> tables;
+  std::size_t samples = 0;  ///< tracker points used
+  double variance_factor = 1.0;
+};
+
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
@@ -38,6 +60,11 @@ struct SessionStatus {
   ErrorCode refused_as = ErrorCode::DataInsufficient;
   double progress = 0.0;  ///< of the work in this state, 0 to 1
   std::size_t points = 0;
+  /// in state Acquiring: estimated time to its end, in host time
+  std::optional<std::chrono::nanoseconds> remaining{};
+  /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
+  /// write; never changed.
+  std::shared_ptr<const LiveTables> live{};
   std::string model_id;                         ///< the model of this session, active or refused
   std::optional<calib::evemu::NextTouch> next;  ///< touch requested by a guided acquisition
   std::vector<std::string> notes;               ///< remarks on touches, the latest kMostNotes

@@ -25,6 +25,7 @@
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
+#include "abbe/service/live_tables_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 
 namespace abbe::daemon {
@@ -112,6 +113,7 @@ class CalibrationService {
   RecorderThread* recorder_;
   protocol::UtcOffset utc_;
   CalibrationSession session_;
+  LiveTablesWatch live_tables_;
   std::string who_;
   std::future<Result<KeptModel>> task_;         // identifies and stores, or stores again
   std::shared_ptr<IdentificationState> state_;  // of the last identification

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -37,17 +38,46 @@ struct RunPoint {
 /// Points of a run, stored in blocks: push_back() never copies earlier points.
 class RunPoints {
  public:
+  static constexpr std::size_t kPointsInBlock = 1024;  // 56 KiB: a second of a fast tracker
+  /// Shared, because the live tables read full blocks on another thread: these are not changed
+  /// while the run goes on.
+  using Block = std::shared_ptr<RunPoint[]>;
+
   void push_back(const RunPoint& point);
-  void pop_back() noexcept;
-  [[nodiscard]] const RunPoint& back() const noexcept { return blocks_.back().back(); }
-  [[nodiscard]] bool empty() const noexcept { return blocks_.empty(); }
+  void pop_back() noexcept { --size_; }
+  [[nodiscard]] const RunPoint& back() const noexcept { return at(size_ - 1); }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// All points in one vector; O(n).
   [[nodiscard]] std::vector<RunPoint> joined() const;
 
+  [[nodiscard]] std::size_t full_blocks() const noexcept { return size_ / kPointsInBlock; }
+  [[nodiscard]] const Block& full_block(std::size_t i) const { return blocks_[i]; }
+  /// The points behind the full blocks.
+  [[nodiscard]] std::vector<RunPoint> tail() const;
+
  private:
-  std::vector<std::vector<RunPoint>> blocks_;  // none is empty
+  [[nodiscard]] const RunPoint& at(std::size_t i) const noexcept {
+    return blocks_[i / kPointsInBlock][i % kPointsInBlock];
+  }
+  std::vector<Block> blocks_;
   std::size_t size_ = 0;
+};
+
+/// The machine has reached a leg of the path.
+struct LegBegun {
+  std::size_t leg = 0;                ///< number in the path
+  AxisPosition from_m{}, to_m{};      ///< vertices of the request
+  std::size_t first_point = 0;        ///< number of the point in the run
+  AxisPosition q_m{}, p_tracker_m{};  ///< readings and tracker at this point
+};
+
+/// What was added to a run since the last call of OtfAcquisition::take_news().
+struct RunNews {
+  std::vector<RunPoints::Block> blocks;  ///< full ones
+  std::vector<RunPoint> tail;            ///< copy of all points behind the full blocks
+  std::vector<LegBegun> legs;
+  EnvironmentEffect environment;  ///< mean of the run so far
 };
 
 struct AcquisitionOptions {
@@ -111,6 +141,15 @@ class OtfAcquisition {
   [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
   [[nodiscard]] double progress() const noexcept;  ///< driven fraction of the path length, 0 to 1
   [[nodiscard]] std::size_t points() const noexcept { return points_.size(); }
+  /// Time to the end of the path at the speed of the last half minute; nullopt if the machine does
+  /// not move.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> remaining() const noexcept;
+  /// False in standstill mode: its observations are the stops, not the points in motion.
+  [[nodiscard]] bool has_live_tables() const noexcept {
+    return mode_ == calib::otf::Mode::OnTheFly;
+  }
+  /// Takes the same time for a long run as for a short one.
+  [[nodiscard]] RunNews take_news();
   /// The points of the run; O(n).
   [[nodiscard]] std::vector<RunPoint> release() { return std::exchange(points_, {}).joined(); }
   /// The path of the request; O(1).
@@ -129,6 +168,8 @@ class OtfAcquisition {
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
   void follow_path(const RunPoint& point, const calib::Vector3& q);
+  void begin_leg(const RunPoint& point, const calib::Vector3& q);
+  void mark_way(protocol::HostTime time);
   /// Fails the run if the scale readings at a vertex differ from the path.
   void compare_with_path(const protocol::Snapshot& snapshot, const calib::Vector3& q);
   [[nodiscard]] bool complete(protocol::HostTime now, const calib::Vector3& q) const;
@@ -156,6 +197,15 @@ class OtfAcquisition {
   std::size_t leg_ = 0;             // leg on which the machine is, or which it is about to enter
   protocol::HostTime on_leg_at_{};  // time of the last point on this leg
   double driven_m_ = 0.0;           // length along the path up to the machine
+  struct Mark {
+    protocol::HostTime time{};
+    double driven_m = 0.0;
+  };
+  std::array<Mark, 16> marks_{};  // ring, one every kMarkEvery
+  std::size_t marked_ = 0;        // number of all marks
+  std::deque<LegBegun> legs_;     // not yet taken by take_news()
+  std::size_t begun_leg_ = 0;     // the last that was added to legs_
+  std::size_t blocks_taken_ = 0;  // by take_news()
   protocol::HostTime axes_known_at_{};
   protocol::HostTime last_time_{};
   std::optional<protocol::DeviceTime> last_device_time_;

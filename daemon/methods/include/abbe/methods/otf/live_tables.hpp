@@ -1,0 +1,45 @@
+#pragma once
+/// Tables of an on-the-fly run while the machine moves (calib/otf/running_estimate.hpp). The run's
+/// points are read where the acquisition keeps them, so that a better pose of the tracker can
+/// accumulate them again. Nothing here influences points, model or hash of the run. Not for the RT
+/// path and not for the hub: tables() takes up to a second. Used by one thread at a time.
+
+#include <cstddef>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/calib/otf/running_estimate.hpp"
+#include "abbe/config/config.hpp"
+#include "abbe/methods/otf/acquisition.hpp"
+#include "abbe/pipeline/session_status.hpp"
+
+namespace abbe::daemon {
+
+class OtfLiveTables {
+ public:
+  /// BadInput for a machine without tables.
+  [[nodiscard]] static Result<OtfLiveTables> of(const Config& config);
+
+  /// What the acquisition has added since the last call. O(1) per point.
+  void take(RunNews&& news);
+  /// DataInsufficient until three vertices that span a plane are reached.
+  [[nodiscard]] Result<LiveTables> tables();
+
+ private:
+  OtfLiveTables(const Config& config, calib::otf::Machine machine,
+                calib::otf::RunningEstimate estimate);
+  void add_points();
+  void add(const RunPoint& point);
+  [[nodiscard]] const RunPoint& point(std::size_t i) const;
+
+  EnvironmentUseOptions environment_use_;
+  EnvironmentEffect environment_;
+  calib::MachineNodes nodes_;
+  calib::otf::RunningEstimate estimate_;
+  std::vector<RunPoints::Block> blocks_;
+  std::vector<RunPoint> tail_;
+  std::vector<LegBegun> legs_;
+  std::size_t next_point_ = 0, next_leg_ = 0;  // that the estimate does not contain
+};
+
+}  // namespace abbe::daemon

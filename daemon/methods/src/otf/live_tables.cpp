@@ -1,0 +1,118 @@
+#include "abbe/methods/otf/live_tables.hpp"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
+#include "abbe/methods/otf/inputs.hpp"
+#include "abbe/pipeline/environment_use.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// A pose that is corrected twice is exact to the noise; more corrections mean a path that does not
+/// fit, which the identification reports.
+constexpr int kMostCorrections = 2;
+
+calib::Vector3 vector_of(const AxisPosition& q_m) {
+  return {q_m[0], q_m[1], q_m[2]};
+}
+
+void append(LiveTable& table, const calib::otf::NodeSoFar& node) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  table.value.push_back(node.determined ? node.value : kNone);
+  table.u.push_back(node.determined ? node.u : kNone);
+}
+
+LiveTables live_tables(const calib::otf::TablesSoFar& found, const calib::MachineNodes& nodes) {
+  LiveTables live{.tables = {}, .samples = found.samples, .variance_factor = found.variance_factor};
+  for (const auto& table : found.tables) {
+    LiveTable& out =
+        live.tables.emplace_back(LiveTable{.name = name(table.motion),
+                                           .is_angle = is_rotation(table.motion.motion),
+                                           .at_m = nodes[index(table.motion.axis)].nodes_m});
+    for (const auto& node : table.nodes) append(out, node);
+  }
+
+  constexpr std::array kSquareness{"EA0Z", "EB0Z", "EC0Y"};
+  for (std::size_t i = 0; i < kSquareness.size(); ++i)
+    append(live.tables.emplace_back(LiveTable{.name = kSquareness[i], .is_angle = true}),
+           found.squareness[i]);
+  return live;
+}
+
+}  // namespace
+
+Result<OtfLiveTables> OtfLiveTables::of(const Config& config) {
+  auto machine = otf_machine(config.machine);
+  if (!machine) return tl::unexpected(machine.error());
+  auto estimate =
+      calib::otf::RunningEstimate::of({.machine = *machine, .noise = otf_noise(config.machine)});
+  if (!estimate) return tl::unexpected(error_of(estimate.error()));
+  return OtfLiveTables(config, std::move(*machine), std::move(*estimate));
+}
+
+OtfLiveTables::OtfLiveTables(const Config& config, calib::otf::Machine machine,
+                             calib::otf::RunningEstimate estimate)
+    : environment_use_(environment_use(config)),
+      nodes_(std::move(machine.nodes)),
+      estimate_(std::move(estimate)) {}
+
+void OtfLiveTables::take(RunNews&& news) {
+  std::ranges::move(news.blocks, std::back_inserter(blocks_));
+  tail_ = std::move(news.tail);
+  environment_ = news.environment;
+  for (const LegBegun& leg : news.legs) {
+    estimate_.add_pair(vector_of(leg.q_m), vector_of(leg.p_tracker_m));
+    legs_.push_back(leg);
+  }
+}
+
+const RunPoint& OtfLiveTables::point(std::size_t i) const {
+  const std::size_t block = i / RunPoints::kPointsInBlock;
+  return block < blocks_.size() ? blocks_[block][i % RunPoints::kPointsInBlock]
+                                : tail_[i - blocks_.size() * RunPoints::kPointsInBlock];
+}
+
+void OtfLiveTables::add(const RunPoint& point) {
+  const calib::Vector3 p_m = vector_of(point.p_tracker_m);
+  if (point.usable && p_m.allFinite()) estimate_.add(p_m);
+}
+
+/// The vertices of a leg are corrected by the mean temperature of the scales up to the time of its
+/// accumulation, those of the identification by the mean of the run.
+void OtfLiveTables::add_points() {
+  const std::size_t end = blocks_.size() * RunPoints::kPointsInBlock + tail_.size();
+  for (; next_point_ < end; ++next_point_) {
+    if (next_leg_ < legs_.size() && legs_[next_leg_].first_point <= next_point_) {
+      const LegBegun& leg = legs_[next_leg_++];
+      estimate_.begin_leg(vector_of(at_temperature(leg.from_m, environment_, environment_use_)),
+                          vector_of(at_temperature(leg.to_m, environment_, environment_use_)));
+    }
+    add(point(next_point_));
+  }
+}
+
+Result<LiveTables> OtfLiveTables::tables() {
+  if (estimate_.update_pose()) next_point_ = next_leg_ = 0;
+  if (!estimate_.has_pose())
+    return fail(ErrorCode::DataInsufficient, "the vertices reached so far do not span a plane");
+  add_points();
+  estimate_.set_scale(environment_.u_scale, environment_.u_expansion_factor);
+  auto found = estimate_.tables();
+
+  for (int i = 0; found && i < kMostCorrections && estimate_.correct_pose(*found); ++i) {
+    next_point_ = next_leg_ = 0;
+    add_points();
+    found = estimate_.tables();
+  }
+
+  if (!found) return tl::unexpected(error_of(found.error()));
+  return live_tables(*found, nodes_);
+}
+
+}  // namespace abbe::daemon

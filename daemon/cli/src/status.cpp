@@ -6,6 +6,8 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numbers>
 #include <string>
@@ -94,6 +96,38 @@ void print_next(const json& next) {
              next["touched"].get<std::size_t>(), next["points"].get<std::size_t>());
 }
 
+/// "EXX  12.3 um at 150 mm (u 0.4)"; "EXX  not yet determined (4 of 13 nodes)".
+std::string live_table_text(const json& table) {
+  const json &value = table["value"], &u = table["u"];
+  const std::string name = table["table"];
+  const auto count = static_cast<std::size_t>(
+      std::ranges::count_if(value, [](const json& each) { return each.is_number(); }));
+  if (!table["determined"].get<bool>())
+    return fmt::format(
+        "{}  not yet determined{}", name,
+        value.size() > 1 ? fmt::format(" ({} of {} nodes)", count, value.size()) : std::string{});
+
+  std::size_t largest = 0;
+  double largest_u = 0.0;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (std::abs(value[i].get<double>()) > std::abs(value[largest].get<double>())) largest = i;
+    largest_u = std::max(largest_u, u[i].get<double>());
+  }
+  return fmt::format(
+      "{}  {:.2f} {}{}, u {:.2f}, largest u {:.2f}", name, value[largest].get<double>() * kUmPerM,
+      table["unit"] == "rad" ? "urad" : "um",
+      table.contains("at_m")
+          ? fmt::format(" at {:.0f} mm", table["at_m"][largest].get<double>() * kMmPerM)
+          : "",
+      u[largest].get<double>() * kUmPerM, largest_u * kUmPerM);
+}
+
+void print_live(const json& live) {
+  fmt::print("tables     of {} points so far: largest value of each and its standard uncertainty\n",
+             live["samples"].get<std::size_t>());
+  for (const json& table : live["tables"]) fmt::print("           {}\n", live_table_text(table));
+}
+
 void print_release_awaited(const json& awaited) {
   fmt::print(
       "{}    {}\n           the machine does not move before a person has checked it and run: {}\n",
@@ -133,7 +167,10 @@ void print_status(const json& status) {
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
+  if (session.contains("remaining_s"))
+    fmt::print("           about {:.1f} min left\n", session["remaining_s"].get<double>() / 60.0);
   if (session.contains("next")) print_next(session["next"]);
+  if (session.contains("live")) print_live(session["live"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());
   print_positions(status);
   if (status.contains("reference")) print_reference(status["reference"]);

@@ -18,8 +18,10 @@ TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
   const std::vector<AxisPosition> outside{
       {0, 0, 0}, {0.05, 0, 0}, {0.05, 0.07, 0}};  // travel: 60 mm
   const std::vector<AxisPosition> on_a_line{{0, 0, 0}, {0.01, 0, 0}, {0.05, 0, 0}};
+  const std::vector<AxisPosition> two_legs{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.06, 0}};
   for (const auto& [path, what] :
-       {std::pair{outside, "axis travels"}, std::pair{on_a_line, "on a line"}}) {
+       {std::pair{outside, "axis travels"}, std::pair{on_a_line, "on a line"},
+        std::pair{two_legs, "does not determine EXX, EYX"}}) {
     const auto refused = check_otf_path(path, machine());
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
@@ -28,8 +30,10 @@ TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
 }
 
 TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
-  EXPECT_TRUE(check_otf_path(std::vector<AxisPosition>{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.06, 0}},
-                             machine()));
+  std::vector<AxisPosition> path_m;
+  for (const auto& q : test::synthetic_path_m()) path_m.push_back({q[0], q[1], q[2]});
+  const auto taken = check_otf_path(path_m, machine());
+  EXPECT_TRUE(taken) << taken.error().text;
 }
 
 TEST(OtfInputs, TheConfigurationNamesTheEstimator) {

@@ -9,6 +9,7 @@
 
 #include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/orientation.hpp"
+#include "abbe/calib/otf/plan_observable.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/capabilities.hpp"
@@ -55,7 +56,9 @@ Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineC
   if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
-  const auto valid = calib::otf::check(otf_path(path_m), known->nodes);
+  const calib::otf::Path path = otf_path(path_m);
+  auto valid = calib::otf::check(path, known->nodes);
+  if (valid) valid = calib::otf::check_observable(path, *known);
   if (!valid) return fail(ErrorCode::BadInput, "calibrate otf: " + valid.error().text);
   return {};
 }

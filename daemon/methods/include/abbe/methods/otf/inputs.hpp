@@ -18,7 +18,8 @@ namespace abbe::daemon {
 [[nodiscard]] calib::otf::Noise otf_noise(const MachineConfig& machine);
 [[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
 /// Checks a path before it is driven. BadInput if no run along the path could be identified: too
-/// few vertices, vertices on one line or outside the travel, or no [target].
+/// few vertices, vertices on one line or outside the travel, tables that the path does not determine
+/// (named in the text), or no [target].
 [[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m,
                                           const MachineConfig& machine);
 /// Converts the points. Times are those of the tracker's clock, relative to the first point.

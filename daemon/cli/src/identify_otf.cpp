@@ -136,12 +136,12 @@ void apply(const IdentifyOtfArguments& arguments, OtfConfig& otf) {
 
 /// Makes the checks of the path that the daemon makes before the machine drives. The message for a
 /// vertex outside the travel gives line and column.
-Result<void> check_path(const std::string& file, const PathFile& path,
-                        const MachineConfig& machine) {
-  if (auto inside = check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, machine);
+Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {
+  if (auto inside =
+          check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
       !inside)
     return inside;
-  auto valid = check_otf_path(path.vertices_m, machine);
+  auto valid = check_otf_path(path.vertices_m, config.machine, config.otf.mode);
   if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
   return valid;
 }
@@ -164,7 +164,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
           check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !valid)
     return tl::make_unexpected(valid.error());
-  if (const auto valid = check_path(arguments.path, files->path, files->config.machine); !valid)
+  if (const auto valid = check_path(arguments.path, files->path, files->config); !valid)
     return tl::make_unexpected(valid.error());
   const auto compared = vertices_compared(arguments, *files);
   if (!compared) return tl::make_unexpected(compared.error());

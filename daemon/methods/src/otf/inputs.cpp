@@ -52,13 +52,15 @@ calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
   return path;
 }
 
-Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine) {
+Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine,
+                            calib::otf::Mode mode) {
   if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
   const calib::otf::Path path = otf_path(path_m);
   auto valid = calib::otf::check(path, known->nodes);
-  if (valid) valid = calib::otf::check_observable(path, *known);
+  if (valid && mode == calib::otf::Mode::OnTheFly)
+    valid = calib::otf::check_observable(path, *known);
   if (!valid) return fail(ErrorCode::BadInput, "calibrate otf: " + valid.error().text);
   return {};
 }

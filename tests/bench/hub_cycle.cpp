@@ -27,6 +27,7 @@
 #include <thread>
 
 #include "abbe/calib/interpolation_grid.hpp"
+#include "abbe/calib/otf/plan.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/drivers/status_board.hpp"
 #include "abbe/service/background_tasks.hpp"
@@ -149,6 +150,7 @@ void run_periodically(const std::atomic<bool>& stop, Longest& longest,
 
 /// A path of rows along X with a distance of 25 mm, in layers, with 0.6 mm from vertex to vertex.
 /// The coordinates have more digits than necessary, so that the request has the maximum length.
+/// The last legs are long: without them the path would determine nothing and be refused.
 std::vector<std::array<double, 3>> long_path() {
   constexpr std::size_t kInRow = 668, kRows = 17;
   constexpr double kStep_m = 0.6e-3, kRow_m = 25e-3, kLayer_m = 30e-3, kDigit_m = 1e-8;
@@ -159,9 +161,13 @@ std::vector<std::array<double, 3>> long_path() {
     return kDigit_m * (std::round(p_m / kDigit_m) + digits(random));
   };
 
+  const auto base = calib::otf::base_path({*calib::equidistant_nodes(-0.3, 0.3),
+                                           *calib::equidistant_nodes(-0.25, 0.25),
+                                           *calib::equidistant_nodes(-0.4, -0.1)});
+  const std::size_t in_rows = kVertices - base.vertices_m.size();
   std::vector<std::array<double, 3>> path;
-  for (std::size_t row = 0; path.size() < kVertices; ++row) {
-    for (std::size_t i = 0; i < kInRow && path.size() < kVertices; ++i) {
+  for (std::size_t row = 0; path.size() < in_rows; ++row) {
+    for (std::size_t i = 0; i < kInRow && path.size() < in_rows; ++i) {
       const std::size_t along = row % 2 == 0 ? i : kInRow - 1 - i;
       const std::size_t layer = row / kRows,
                         beside = layer % 2 == 0 ? row % kRows : kRows - 1 - row % kRows;
@@ -170,6 +176,7 @@ std::vector<std::array<double, 3>> long_path() {
                       rounded(-0.38 + kLayer_m * static_cast<double>(layer))});
     }
   }
+  for (const auto& q : base.vertices_m) path.push_back({q.x(), q.y(), q.z()});
 
   return path;
 }

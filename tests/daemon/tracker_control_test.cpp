@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/calib/otf/plan.hpp"
 #include "abbe/service/abbed.hpp"
 #include "abbe/sim/tracker_server.hpp"
 #include "abbe_command.hpp"
@@ -155,10 +156,15 @@ class TrackerControl : public ::testing::Test {
   static json set_reflector(const std::string& name) {
     return {{"do", "tracker"}, {"order", "reflector set"}, {"reflector", name}};
   }
-  static inline const json kCalibrate{
-      {"do", "calibrate"},
-      {"method", "otf"},
-      {"path_m", {{0.1, 0.1, 0.1}, {0.2, 0.1, 0.1}, {0.2, 0.2, 0.2}}}};
+  /// A path that determines the model of half_metre_mill().
+  static json calibrate() {
+    const auto nodes = *calib::equidistant_nodes(0.0, 0.5);
+    json path = json::array();
+    for (const auto& q : calib::otf::base_path({nodes, nodes, nodes}).vertices_m)
+      path.push_back({q.x(), q.y(), q.z()});
+    return {{"do", "calibrate"}, {"method", "otf"}, {"path_m", path}};
+  }
+  static inline const json kCalibrate = calibrate();
 
   TemporaryFolder folder_;
   std::filesystem::path socket_;

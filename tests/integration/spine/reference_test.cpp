@@ -45,7 +45,7 @@ TEST_F(ReferenceRun, FindsThePositionsAtWhichTheCountersStarted) {
   ASSERT_NO_FATAL_FAILURE(start_both(second_card()));
   ASSERT_TRUE(eventually([&] { return samples("counter_card") > 100; })) << status().dump(1);
   EXPECT_FALSE(status()["reference"]["axes"][0]["known"].get<bool>());
-  write("path.csv", "x_mm,y_mm,z_mm\n0,0,-50\n50,0,-50\n50,50,-50\n50,50,-80\n20,10,-90\n");
+  write_path("path.csv", path());
   const auto too_early =
       run({ABBE_PROGRAM, "calibrate", "otf", "-c", file("abbed.toml"), "--path", file("path.csv")});
   EXPECT_EQ(too_early.code, 5);

@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
   const calib::otf::Path path = ref::case_a_path();
   const std::size_t vertices = brief ? path.vertices_m.size() / 4 : path.vertices_m.size();
   const auto snapshots = snapshots_of(path, ref::case_a_machine().target_offset_m, vertices);
-  std::vector<AxisPosition> path_m;
+  std::vector<daemon::AxisPosition> path_m;
   for (std::size_t i = 0; i < vertices; ++i)
     path_m.push_back({path.vertices_m[i][0], path.vertices_m[i][1], path.vertices_m[i][2]});
 

@@ -67,12 +67,7 @@ void convert_path(const fs::path& path_m, const fs::path& csv) {
 }
 
 void write_machine(const fs::path& toml) {
-  std::ofstream(toml) << to_toml(config_tables::Machine{.name = "case A",
-                                                        .x = {-300, 300},
-                                                        .y = {-250, 250},
-                                                        .z = {-400, 0},
-                                                        .target_offset_mm = {{20, -15, -120}},
-                                                        .node_spacing_mm = 50})
+  std::ofstream(toml) << to_toml(config_tables::case_a())
                       << "[tracker]\nsigma_range_um = 2\nsigma_angle_urad = 3\n"
                          "[gate]\naccept = [\"path-orientation\"]\n";
 }

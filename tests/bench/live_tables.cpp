@@ -17,6 +17,7 @@
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/methods/otf/live_tables.hpp"
 #include "abbe/methods/otf/method.hpp"
+#include "config_tables.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -28,24 +29,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kAskedHandOver_us = 1000.0, kAskedSolution_ms = 100.0;
 constexpr double kSpeed_m_s = 2.5 / 60.0, kRate_hz = 500.0;
-constexpr const char* kMachine = R"(
-[machine]
-name = "case A"
-chain = "[w X' b Y Z (C1) t]"
-[axes.X]
-min_mm = -300
-max_mm = 300
-[axes.Y]
-min_mm = -250
-max_mm = 250
-[axes.Z]
-min_mm = -400
-max_mm = 0
-[target]
-offset_mm = [20, -15, -120]
-[model]
-node_spacing_mm = 50
-)";
 
 std::vector<protocol::Snapshot> snapshots_of(const calib::otf::Path& path,
                                              const calib::Vector3& target_m, std::size_t vertices) {
@@ -90,7 +73,8 @@ double ns_per_point(daemon::OtfAcquisition& acquisition,
 
 int main(int argc, char** argv) {
   const bool brief = argc > 1 && std::strcmp(argv[1], "--short") == 0;
-  const auto config = daemon::parse_config(kMachine, "machine.toml").value();
+  const auto config =
+      daemon::parse_config(to_toml(config_tables::case_a()), "machine.toml").value();
   const calib::otf::Path path = ref::case_a_path();
   const std::size_t vertices = brief ? path.vertices_m.size() / 4 : path.vertices_m.size();
   const auto snapshots = snapshots_of(path, ref::case_a_machine().target_offset_m, vertices);

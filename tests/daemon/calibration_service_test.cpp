@@ -17,12 +17,6 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostTime;
 
-std::vector<AxisPosition> path_m() {
-  std::vector<AxisPosition> path;
-  for (const auto& q : test::synthetic_path_m()) path.push_back({q[0], q[1], q[2]});
-  return path;
-}
-
 class CalibrationServiceTest : public ::testing::Test {
  protected:
   CalibrationServiceTest()
@@ -32,7 +26,7 @@ class CalibrationServiceTest : public ::testing::Test {
   }
   /// The machine drives the path at 100 mm/s; a point every 5 ms.
   void drive() {
-    const auto path = path_m();
+    const auto path = test::synthetic_request_path_m();
     stand(path.front(), 1s);
     for (std::size_t leg = 1; leg < path.size(); ++leg) {
       const auto &from = path[leg - 1], &to = path[leg];
@@ -75,7 +69,8 @@ class CalibrationServiceTest : public ::testing::Test {
 
 TEST_F(CalibrationServiceTest, KeepsTheVerdictsOfEndedSessionsByTheirNumber) {
   for (std::uint64_t id = 1; id <= 7; ++id) {
-    const auto started = service_->start(OtfRequest{path_m()}, "anna", now_);
+    const auto started =
+        service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_);
     ASSERT_TRUE(started) << started.error().text;
     EXPECT_EQ(*started, id);
     ASSERT_TRUE(service_->cancel("anna", now_));
@@ -86,13 +81,14 @@ TEST_F(CalibrationServiceTest, KeepsTheVerdictsOfEndedSessionsByTheirNumber) {
 }
 
 TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndTheNextCanStart) {
-  ASSERT_TRUE(service_->start(OtfRequest{path_m()}, "anna", now_));
+  ASSERT_TRUE(service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_));
   drive();
   ASSERT_EQ(state(), SessionState::Identifying) << service_->status().reason;
   ASSERT_TRUE(service_->cancel("anna", now_));
   EXPECT_EQ(state(), SessionState::Refused);
-  auto again = service_->start(OtfRequest{path_m()}, "anna", now_);
-  for (; !again; again = service_->start(OtfRequest{path_m()}, "anna", now_)) {
+  auto again = service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_);
+  for (; !again;
+       again = service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_)) {
     EXPECT_NE(again.error().text.find("is still ending"), std::string::npos) << again.error().text;
     std::this_thread::yield();
     cycle();
@@ -101,7 +97,7 @@ TEST_F(CalibrationServiceTest, AnIdentificationIsCancelledAndTheNextCanStart) {
 }
 
 TEST_F(CalibrationServiceTest, EndsWhileAnIdentificationRuns) {
-  ASSERT_TRUE(service_->start(OtfRequest{path_m()}, "anna", now_));
+  ASSERT_TRUE(service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_));
   drive();
   ASSERT_EQ(state(), SessionState::Identifying);
   service_.reset();

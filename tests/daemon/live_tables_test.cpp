@@ -23,12 +23,6 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostTime;
 
-std::vector<AxisPosition> live_path_m() {
-  std::vector<AxisPosition> path;
-  for (const auto& q : test::synthetic_path_m()) path.push_back({q[0], q[1], q[2]});
-  return path;
-}
-
 Config live_config() {
   return parse_config(test::synthetic_machine_toml(), "machine.toml").value();
 }
@@ -68,7 +62,7 @@ class LiveRun {
     take();
   }
 
-  OtfAcquisition acquisition{live_path_m()};
+  OtfAcquisition acquisition{test::synthetic_request_path_m()};
   OtfLiveTables live = OtfLiveTables::of(live_config()).value();
 
  private:
@@ -145,7 +139,7 @@ TEST(LiveTables, OfFewLegsHaveNoNumberForATableThatIsNotDetermined) {
 
 TEST(OtfAcquisition, EstimatesTheRemainingTime) {
   const auto snapshots = live_snapshots();
-  OtfAcquisition acquisition{live_path_m()};
+  OtfAcquisition acquisition{test::synthetic_request_path_m()};
   for (const auto& snapshot : snapshots) {
     acquisition.take(snapshot);
     if (acquisition.progress() < 0.5) continue;
@@ -155,6 +149,7 @@ TEST(OtfAcquisition, EstimatesTheRemainingTime) {
     EXPECT_NEAR(in_seconds(*left), in_seconds(true_left), 0.25 * in_seconds(true_left));
     return;
   }
+  FAIL() << "the run ended at " << acquisition.progress() << ": " << acquisition.reason();
 }
 
 TEST(LiveTables, AreInTheStatusOfTheSessionWhileTheMachineMoves) {
@@ -163,7 +158,7 @@ TEST(LiveTables, AreInTheStatusOfTheSessionWhileTheMachineMoves) {
   ModelAuthority authority =
       ModelAuthority::open(folder.path() / "models", config, {}, HostTime{1s});
   CalibrationService service{config, authority, nullptr, protocol::UtcOffset{}};
-  ASSERT_TRUE(service.start(OtfRequest{live_path_m()}, "anna", HostTime{10s}));
+  ASSERT_TRUE(service.start(OtfRequest{test::synthetic_request_path_m()}, "anna", HostTime{10s}));
   HostTime now{};
   for (const auto& snapshot : live_snapshots()) {
     now = snapshot.head.time;

@@ -168,9 +168,7 @@ class DriftingMachine : public ::testing::Test {
   /// Drives the path and follows the session to its end. Returns the states of the active model
   /// that were seen, without repetition.
   std::vector<ModelStatus> calibrate() {
-    std::vector<AxisPosition> path;
-    for (const auto& q : test::synthetic_path_m()) path.push_back({q[0], q[1], q[2]});
-    EXPECT_TRUE(service_->start(OtfRequest{path}, "anna", now_));
+    EXPECT_TRUE(service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_));
     drive();
     std::vector<ModelStatus> seen;
     for (SessionState s = service_->status().state;; s = service_->status().state) {

@@ -30,9 +30,7 @@ TEST(OtfPath, IsRefusedBeforeTheMachineDrivesIt) {
 }
 
 TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
-  std::vector<AxisPosition> path_m;
-  for (const auto& q : test::synthetic_path_m()) path_m.push_back({q[0], q[1], q[2]});
-  const auto taken = check_otf_path(path_m, machine());
+  const auto taken = check_otf_path(test::synthetic_request_path_m(), machine());
   EXPECT_TRUE(taken) << taken.error().text;
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/axis_position.hpp"
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/truth_machine.hpp"
 #include "text_files.hpp"
@@ -51,6 +52,13 @@ inline std::vector<Eigen::Vector3d> synthetic_path_m() {
         kHalfTravel_m * Eigen::Vector3d(place(random), place(random), place(random));
     if (next != path.back()) path.push_back(next);
   }
+  return path;
+}
+
+/// The same path as a calibration request contains it.
+inline std::vector<AxisPosition> synthetic_request_path_m() {
+  std::vector<AxisPosition> path;
+  for (const auto& q : synthetic_path_m()) path.push_back({q[0], q[1], q[2]});
   return path;
 }
 

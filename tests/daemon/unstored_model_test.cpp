@@ -36,9 +36,7 @@ class UnstoredModel : public ::testing::Test {
   void start(RecorderThread* recorder = nullptr) {
     authority_.emplace(ModelAuthority::open(folder_ / "models", config_, {}, now_));
     service_.emplace(config_, *authority_, recorder, protocol::UtcOffset{});
-    OtfRequest request;
-    for (const auto& q : test::synthetic_path_m()) request.path_m.push_back({q[0], q[1], q[2]});
-    ASSERT_TRUE(service_->start(std::move(request), "anna", now_));
+    ASSERT_TRUE(service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_));
   }
   void drive() {
     for (const auto& point : test::synthetic_points(0.4, 2.0)) {
@@ -170,9 +168,8 @@ TEST_F(UnstoredModel, CancelDiscardsAModelWhileTheStoreDoesNotRespond) {
   EXPECT_THAT(service_->status().reason,
               HasSubstr("cancelled by anna; the store does not answer and may still"));
   EXPECT_THAT(service_->not_stored(), IsEmpty());
-  OtfRequest next;
-  for (const auto& q : test::synthetic_path_m()) next.path_m.push_back({q[0], q[1], q[2]});
-  EXPECT_TRUE(service_->start(std::move(next), "anna", now_)) << "the next calibration";
+  const OtfRequest next{test::synthetic_request_path_m()};
+  EXPECT_TRUE(service_->start(next, "anna", now_)) << "the next calibration";
 
   ::close(lock);
   while (background_tasks_running()) std::this_thread::yield();

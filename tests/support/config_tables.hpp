@@ -37,6 +37,16 @@ inline Machine mill() {
           .node_spacing_mm = 50};
 }
 
+/// The machine of reference case A (otf_reference.hpp).
+inline Machine case_a() {
+  return {.name = "case A",
+          .x = {-300, 300},
+          .y = {-250, 250},
+          .z = {-400, 0},
+          .target_offset_mm = {{20, -15, -120}},
+          .node_spacing_mm = 50};
+}
+
 /// Travels of 500 mm.
 inline Machine half_metre_mill() {
   return {.x = {0, 500}, .y = {0, 500}, .z = {0, 500}, .target_offset_mm = {{0, 0, 0}}};

@@ -16,9 +16,4 @@ bool LiveTable::determined() const noexcept {
   return std::ranges::none_of(u, [](double each) { return std::isnan(each); });
 }
 
-std::size_t LiveTable::largest() const noexcept {
-  const auto at = std::ranges::max_element(value, {}, [](double each) { return std::abs(each); });
-  return static_cast<std::size_t>(at - value.begin());
-}
-
 }  // namespace abbe::daemon

@@ -99,8 +99,7 @@ void OtfAcquisition::mark_way(HostTime time) {
 
 void OtfAcquisition::begin_leg(const RunPoint& point, const Vector3& q) {
   begun_leg_ = leg_;
-  legs_.push_back({.leg = leg_,
-                   .from_m = path_m_[leg_],
+  legs_.push_back({.from_m = path_m_[leg_],
                    .to_m = path_m_[leg_ + 1],
                    .first_point = points_.size() - 1,
                    .q_m = {q[0], q[1], q[2]},

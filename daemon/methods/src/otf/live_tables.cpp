@@ -1,15 +1,17 @@
 #include "abbe/methods/otf/live_tables.hpp"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "abbe/calib/error_parameters.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
+#include "otf/vector_of.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -17,10 +19,6 @@ namespace {
 /// A pose that is corrected twice is exact to the noise; more corrections mean a path that does not
 /// fit, which the identification reports.
 constexpr int kMostCorrections = 2;
-
-calib::Vector3 vector_of(const AxisPosition& q_m) {
-  return {q_m[0], q_m[1], q_m[2]};
-}
 
 void append(LiveTable& table, const calib::otf::NodeSoFar& node) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -38,9 +36,9 @@ LiveTables live_tables(const calib::otf::TablesSoFar& found, const calib::Machin
     for (const auto& node : table.nodes) append(out, node);
   }
 
-  constexpr std::array kSquareness{"EA0Z", "EB0Z", "EC0Y"};
-  for (std::size_t i = 0; i < kSquareness.size(); ++i)
-    append(live.tables.emplace_back(LiveTable{.name = kSquareness[i], .is_angle = true}),
+  for (std::size_t i = 0; i < calib::kSquarenessNames.size(); ++i)
+    append(live.tables.emplace_back(
+               LiveTable{.name = std::string(calib::kSquarenessNames[i]), .is_angle = true}),
            found.squareness[i]);
   return live;
 }

@@ -8,6 +8,7 @@
 
 #include "abbe/methods/otf/acquisition.hpp"
 #include "abbe/pipeline/vertex_readings.hpp"
+#include "otf/vector_of.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -17,10 +18,6 @@ using calib::Vector3;
 /// A vertex is reached if the machine comes within this distance; the same as in a live run.
 const double kNear_m = AcquisitionOptions{}.vertex_tolerance_m;
 
-Vector3 vector(const AxisPosition& q) {
-  return {q[0], q[1], q[2]};
-}
-
 /// The reading closest to a vertex that is not reached yet.
 struct Closest {
   double distance_m = std::numeric_limits<double>::infinity();
@@ -28,7 +25,7 @@ struct Closest {
   Vector3 reading_m = Vector3::Zero();
 
   void take(const EncoderRow& row, const Vector3& vertex_m) {
-    const Vector3 q_m = vector(row.reading_m);
+    const Vector3 q_m = vector_of(row.reading_m);
     const double d_m = (q_m - vertex_m).norm();
     if (d_m < distance_m) *this = {d_m, row.time_s, q_m};
   }
@@ -36,7 +33,7 @@ struct Closest {
 
 double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
   const std::size_t before = i > 0 ? i - 1 : i, after = i > 0 ? i : i + 1;
-  const Vector3 way = vector(readings[after].reading_m) - vector(readings[before].reading_m);
+  const Vector3 way = vector_of(readings[after].reading_m) - vector_of(readings[before].reading_m);
   return way.norm() / (readings[after].time_s - readings[before].time_s);
 }
 
@@ -44,7 +41,7 @@ double speed_m_per_s(std::span<const EncoderRow> readings, std::size_t i) {
 /// vertices the machine is.
 bool is_isolated(std::span<const AxisPosition> path_m, std::size_t i) {
   const auto far = [&](std::size_t a, std::size_t b) {
-    return (vector(path_m[a]) - vector(path_m[b])).norm() > 2.0 * kNear_m;
+    return (vector_of(path_m[a]) - vector_of(path_m[b])).norm() > 2.0 * kNear_m;
   };
   return (i == 0 || far(i - 1, i)) && (i + 1 == path_m.size() || far(i, i + 1));
 }
@@ -77,23 +74,23 @@ Result<std::size_t> compare_with_path(const std::string& file, std::span<const E
   Closest closest;
 
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    const Vector3 q_m = vector(readings[i].reading_m);
+    const Vector3 q_m = vector_of(readings[i].reading_m);
     if (next < path_m.size()) {
-      closest.take(readings[i], vector(path_m[next]));
+      closest.take(readings[i], vector_of(path_m[next]));
       if (closest.distance_m <= kNear_m) {
         ++next;
         closest = {};
       }
     }
     const std::size_t vertex = next - 1;
-    if (next == 0 || (q_m - vector(path_m[vertex])).norm() > kNear_m ||
+    if (next == 0 || (q_m - vector_of(path_m[vertex])).norm() > kNear_m ||
         !is_isolated(path_m, vertex))
       continue;
     const double speed = speed_m_per_s(readings, i);
     if (speed <= VertexReadings::kStands_m_per_s) stood.insert(vertex);
     const VertexReading reading{.vertex = vertex,
                                 .reading_m = q_m,
-                                .path_m = vector(path_m[vertex]),
+                                .path_m = vector_of(path_m[vertex]),
                                 .speed_m_per_s = speed};
     if (const auto contradiction = at_vertices.take(reading)) return refuse(*contradiction);
   }

@@ -40,8 +40,6 @@ struct LiveTable {
   std::vector<double> value, u;
 
   [[nodiscard]] bool determined() const noexcept;  ///< at every node
-  /// Index of the value with the largest magnitude; the table must be determined.
-  [[nodiscard]] std::size_t largest() const noexcept;
 };
 
 /// The tables of a run that is not complete; u: standard uncertainty.

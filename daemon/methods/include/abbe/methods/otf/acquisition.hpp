@@ -66,7 +66,6 @@ class RunPoints {
 
 /// The machine has reached a leg of the path.
 struct LegBegun {
-  std::size_t leg = 0;                ///< number in the path
   AxisPosition from_m{}, to_m{};      ///< vertices of the request
   std::size_t first_point = 0;        ///< number of the point in the run
   AxisPosition q_m{}, p_tracker_m{};  ///< readings and tracker at this point

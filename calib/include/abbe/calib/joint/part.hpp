@@ -1,0 +1,99 @@
+#pragma once
+/// Parts of a joint identification: what one method (or one run of it) states about the tables of a
+/// machine. Every part is an Information about the same unknowns,
+/// 1. the parameters U of the common tables in gauge G1 (the conditions of the gauge are exact),
+/// 2. effects: errors of instruments, artefacts and scales, each with the prior N(0, 1). Effects of
+///    the same name are the same error in several parts.
+/// Nuisances of one part (pose of the tracker, poses of the array) are already eliminated.
+///
+/// Tools. The 14 tables of one target include the effect of its tool offset t on the rotations that
+/// they leave out (parameter_layout.hpp): of the axis nearest to the tool, and of the middle axis
+/// about its direction. A part with another tool t + d sees in addition
+///     phi_a(q_a) x d      for every rotation phi_a that was left out.
+/// These rotations are nuisances of the part, one table each, without prior: the part then states
+/// less about the translations of these axes, and as much about everything else.
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/estimation/information.hpp"
+#include "abbe/calib/estimation/table_basis.hpp"
+#include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/volumetric_model.hpp"
+
+namespace abbe::calib::joint {
+
+/// The tables that all parts describe, and the tool for which they hold.
+struct CommonTables {
+  estimation::TableBasis basis;
+  Vector3 tool_offset_m = Vector3::Zero();
+};
+/// The tables of a model. NotApplicable unless it has tables in gauge G1 for one tool, without
+/// dependence on the direction of travel.
+[[nodiscard]] Result<CommonTables> tables_of(const VolumetricModel&);
+
+/// The same observations under the hypothesis of a mistake in the part.
+struct Mistake {
+  std::string text;  ///< "the errors have X and Y swapped"
+  estimation::Information information;
+};
+
+struct Part {
+  std::string name;    ///< for messages: "run 1"
+  std::string method;  ///< "otf", "evemu"
+  /// about the parameters of the common tables, then `effects`; without the priors of the effects
+  estimation::Information information;
+  std::vector<std::string> effects{};
+  /// The covariance of the part was multiplied by a variance estimated from its own residuals with
+  /// these degrees of freedom; 0: the uncertainties were stated.
+  double dof_of_noise = 0.0;
+  std::vector<Vector3> covered_m{};  ///< axis positions; their hull is the validity volume
+  /// Mistakes of the method; called only if the part contradicts another one. May be empty.
+  std::function<std::vector<Mistake>()> mistakes{};
+};
+
+/// Standard uncertainties that parts may have in common.
+struct CommonEffects {
+  /// Relative, of the scale of the ranges (otf::Noise::u_scale). Parts with the same `ranges_of` had
+  /// the same tracker.
+  double u_ranges = 0.0;
+  std::string ranges_of = "tracker";
+  /// Relative, of the length of the scales of X, Y, Z (otf::Noise::u_axis_scale): the same in all
+  /// parts.
+  std::array<double, 3> u_axis_scale{};
+};
+
+/// The part of an on-the-fly run: its model with its covariance, which contains all effects of the
+/// run. `effects` are those that the covariance contains and that other parts share; an effect that
+/// cannot be separated from the covariance (in rounding) remains in it.
+/// NotApplicable for other nodes, tables or axes than the common ones, or another gauge.
+[[nodiscard]] Result<Part> part_of_run(std::string name, const VolumetricModel&,
+                                       const CommonTables&, const CommonEffects& = {});
+
+struct ArrayOptions {
+  /// Standard deviation of a ball centre per coordinate. 0: estimated from the residuals of the
+  /// part alone, with the tables and the errors of the array free.
+  double s_m = 0.0;
+  /// Largest estimated s. Centres of balls touched at five points scatter by 1 to 8 um; a larger
+  /// scatter is an error of the array, its files or the machine that the tables do not contain.
+  double most_s_m = 10e-6;
+  /// Parts with the same name had the same array, with the same errors of its calibration.
+  std::string array = "array";
+  CommonEffects effects{};  ///< of the scales; an array has no ranges
+  /// Parameters of the common tables at which the poses are computed; empty: zero.
+  Eigen::VectorXd linearised_at{};
+};
+/// The part of a ball array (evemu/pose_blocks.hpp). NotApplicable for another order of the axes.
+/// TooFewObservations if s is to be estimated from fewer than 20 degrees of freedom; BadInput if it
+/// is larger than `most_s_m`, naming the mistakes without which it is not.
+[[nodiscard]] Result<Part> part_of_array(std::string name, const evemu::Observations&,
+                                         const CommonTables&, const ArrayOptions& = {});
+
+/// Effect of a relative change of the scale of each axis on the parameters: the positioning table
+/// has slope 1 and is zero at the reference. One column each for X, Y, Z.
+[[nodiscard]] Eigen::MatrixX3d axis_scale_columns(const ParameterLayout&);
+
+}  // namespace abbe::calib::joint

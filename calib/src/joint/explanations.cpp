@@ -1,0 +1,237 @@
+#include "joint/explanations.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+#include "chi2_tail.hpp"
+#include "elementary.hpp"
+#include "message.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::joint {
+namespace {
+
+/// An explanation must leave a disagreement that occurs more often than this.
+constexpr double kLikely = 1e-3;
+constexpr std::size_t kMostExplanations = 3, kMostTables = 3;
+
+bool agrees(const Disagreement& d) {
+  return d.dof == 0 || d.log_p > natural_logarithm(kLikely);
+}
+
+struct Hypothesis {
+  std::string text;
+  Disagreement left;
+};
+
+DeterminingRows with_reversed_sign(DeterminingRows rows) {
+  rows.z = -rows.z;
+  return rows;
+}
+
+DeterminingRows with_reversed_table(DeterminingRows rows, const GaugeGroup& group) {
+  rows.A.middleCols(group.first, group.size) *= -1.0;
+  return rows;
+}
+
+/// True values = factor * given ones, noise too.
+DeterminingRows with_unit(DeterminingRows rows, double factor) {
+  rows.A /= factor;
+  return rows;
+}
+
+/// Mistakes that no unknown describes.
+class Hypotheses {
+ public:
+  Hypotheses(const PairProblem& pair, const Part& i, const Part& j) : pair_(pair), i_(i), j_(j) {}
+
+  void add_signs(const GaugeCoordinates& c) {
+    test("the sign of V is reversed in " + i_.name + " or in " + j_.name, pair_.of_i(),
+         with_reversed_sign(pair_.of_j()));
+    for (const GaugeGroup& group : c.groups) {
+      if (group.size > 0) {
+        test("the sign of " + group.name + " is reversed in " + i_.name + " or in " + j_.name,
+             pair_.of_i(), with_reversed_table(pair_.of_j(), group));
+      }
+    }
+  }
+
+  void add_units() {
+    constexpr std::array<double, 4> kFactors{1e3, 1e-3, 25.4, 1.0 / 25.4};
+    for (const double factor : kFactors) {
+      test(message("the errors of ", i_.name, " are too small by a factor of ", factor, " (unit)"),
+           with_unit(pair_.of_i(), factor), pair_.of_j());
+      test(message("the errors of ", j_.name, " are too small by a factor of ", factor, " (unit)"),
+           pair_.of_i(), with_unit(pair_.of_j(), factor));
+    }
+  }
+
+  void add_mistakes_of_methods() {
+    for (const Mistake& m : i_.mistakes ? i_.mistakes() : std::vector<Mistake>{}) {
+      test(i_.name + ": " + m.text, pair_.rows(i_, m.information), pair_.of_j());
+    }
+    for (const Mistake& m : j_.mistakes ? j_.mistakes() : std::vector<Mistake>{}) {
+      test(j_.name + ": " + m.text, pair_.of_i(), pair_.rows(j_, m.information));
+    }
+  }
+
+  /// The likely ones, most likely first.
+  [[nodiscard]] std::vector<std::string> texts() {
+    std::stable_sort(found_.begin(), found_.end(), [](const Hypothesis& a, const Hypothesis& b) {
+      return a.left.log_p > b.left.log_p;
+    });
+    std::vector<std::string> texts;
+    for (std::size_t k = 0; k < std::min(kMostExplanations, found_.size()); ++k) {
+      texts.push_back(found_[k].text);
+    }
+    return texts;
+  }
+
+ private:
+  void test(std::string text, const DeterminingRows& i, const DeterminingRows& j) {
+    const Disagreement left = pair_.disagreement(i, j);
+    if (agrees(left)) {
+      found_.push_back({std::move(text), left});
+    }
+  }
+
+  const PairProblem& pair_;
+  const Part &i_, &j_;
+  std::vector<Hypothesis> found_;
+};
+
+/// All lengths of j larger than those of i by one factor.
+void explain_by_length(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
+                       const GaugeCoordinates& c, const ParameterLayout& layout) {
+  const Eigen::VectorXd column = c.N.transpose() * axis_scale_columns(layout).rowwise().sum();
+  const PairProblem::Freed freed = pair.freed(column);
+  if (freed.drop_dof == 1 && agrees(freed.left)) {
+    test.explanations.push_back(
+        message("lengths of ", j.name, " are larger than those of ", i.name, " by ",
+                freed.d(0) * kUmPerM, " um/m (u ", freed.root_cov_d.norm() * kUmPerM,
+                " um/m): temperature, expansion or unit of a length, ranges of the tracker"));
+  }
+}
+
+TableDifference difference_of(const GaugeGroup& group, const GaugeCoordinates& c,
+                              const PairProblem::Freed& freed, Eigen::Index first,
+                              const ParameterLayout& layout) {
+  TableDifference result{.table = group.name, .is_angle = group.is_angle()};
+  const Eigen::MatrixXd N = c.N.block(group.offset, group.first, group.count, group.size);
+  const Eigen::VectorXd values = N * freed.d.segment(first, group.size);
+  const Eigen::MatrixXd root = N * freed.root_cov_d.middleRows(first, group.size);
+  Eigen::Index at = 0;
+  values.cwiseAbs().maxCoeff(&at);
+  result.difference = values(at);
+  result.u = root.row(at).norm();
+  if (group.motion) {
+    result.position_m =
+        layout.nodes()[index(group.motion->axis)].nodes_m[static_cast<std::size_t>(at)];
+  }
+  return result;
+}
+
+/// Columns of the coordinates of the tables.
+Eigen::MatrixXd columns_of(const std::vector<const GaugeGroup*>& tables, Eigen::Index m) {
+  Eigen::Index size = 0;
+  for (const GaugeGroup* group : tables) {
+    size += group->size;
+  }
+  Eigen::MatrixXd free = Eigen::MatrixXd::Zero(m, size);
+  Eigen::Index at = 0;
+  for (const GaugeGroup* group : tables) {
+    free.block(group->first, at, group->size, group->size).setIdentity();
+    at += group->size;
+  }
+  return free;
+}
+
+/// The table whose freedom decreases X2 most significantly, with those already free.
+const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoordinates& c,
+                                         const std::vector<const GaugeGroup*>& already,
+                                         ChiSquare& best_test) {
+  const Eigen::Index m = c.N.cols();
+  const PairProblem::Freed before = pair.freed(columns_of(already, m));
+  const GaugeGroup* best = nullptr;
+  double best_log_p = 0.0;
+
+  for (const GaugeGroup& group : c.groups) {
+    if (group.size == 0 || std::find(already.begin(), already.end(), &group) != already.end()) {
+      continue;
+    }
+    std::vector<const GaugeGroup*> tables = already;
+    tables.push_back(&group);
+    const PairProblem::Freed with = pair.freed(columns_of(tables, m));
+    const double drop = with.drop - before.drop;
+    const std::size_t dof = with.drop_dof - std::min(with.drop_dof, before.drop_dof);
+    const double log_p = dof > 0 ? log_chi2_tail(drop, dof) : 0.0;
+    if (best == nullptr || log_p < best_log_p) {
+      best = &group;
+      best_log_p = log_p;
+      best_test = {drop, dof, exponential(log_p), kLikely};
+    }
+  }
+  return best;
+}
+
+void explain_by_tables(PairTest& test, const PairProblem& pair, const GaugeCoordinates& c,
+                       const ParameterLayout& layout) {
+  std::vector<const GaugeGroup*> tables;
+  std::vector<ChiSquare> tests;
+  bool explained = false;
+  while (!explained && tables.size() < kMostTables) {
+    ChiSquare of_table;
+    const GaugeGroup* next = most_significant_table(pair, c, tables, of_table);
+    if (next == nullptr || of_table.p > kLikely) {
+      break;
+    }
+    tables.push_back(next);
+    tests.push_back(of_table);
+    explained = agrees(pair.freed(columns_of(tables, c.N.cols())).left);
+  }
+  if (tables.empty()) {
+    return;
+  }
+
+  const PairProblem::Freed freed = pair.freed(columns_of(tables, c.N.cols()));
+  std::string names;
+  Eigen::Index first = 0;
+  for (std::size_t k = 0; k < tables.size(); ++k) {
+    test.tables.push_back(difference_of(*tables[k], c, freed, first, layout));
+    test.tables.back().test = tests[k];
+    names += (k == 0 ? "" : ", ") + text(test.tables.back());
+    first += tables[k]->size;
+  }
+  if (explained) {
+    test.explanations.push_back("they differ in " + names);
+  }
+}
+
+}  // namespace
+
+std::string text(const TableDifference& d) {
+  const char* unit = d.is_angle ? " urad" : " um";
+  const std::string place = d.position_m ? message(" at ", kMmPerM * *d.position_m, " mm") : "";
+  std::ostringstream out;
+  out << std::setprecision(3) << d.table << " by " << kUmPerM * d.difference << unit << place
+      << " (u " << kUmPerM * d.u << unit << ")";
+  return out.str();
+}
+
+void explain(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
+             const GaugeCoordinates& c, const ParameterLayout& layout) {
+  Hypotheses mistakes(pair, i, j);
+  mistakes.add_signs(c);
+  mistakes.add_units();
+  mistakes.add_mistakes_of_methods();
+  test.explanations = mistakes.texts();
+  explain_by_length(test, pair, i, j, c, layout);
+  explain_by_tables(test, pair, c, layout);
+}
+
+}  // namespace abbe::calib::joint

@@ -1,0 +1,198 @@
+#include "abbe/calib/joint/identify.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "abbe/calib/estimation/datum.hpp"
+#include "elementary.hpp"
+#include "gauge_coordinates.hpp"
+#include "joint/determining_rows.hpp"
+#include "joint/explanations.hpp"
+#include "joint/pair_problem.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::joint {
+namespace {
+
+Result<void> check_parts(std::span<const Part> parts, const CommonTables& common,
+                         std::size_t least) {
+  std::set<std::string> names;
+  for (const Part& part : parts) {
+    if (part.information.unknowns() != common.basis.size() + part.effects.size()) {
+      return failure(
+          ErrorCode::BadInput,
+          message("joint identification: ", part.name, " has ", part.information.unknowns(),
+                  " unknowns, not those of ", common.basis.size(), " parameters and ",
+                  part.effects.size(), " effects"));
+    }
+    if (!names.insert(part.name).second) {
+      return failure(ErrorCode::BadInput,
+                     message("joint identification: two parts have the name ", part.name));
+    }
+  }
+  if (parts.size() < least) {
+    return failure(ErrorCode::BadInput,
+                   message("joint identification: ", parts.size(), " parts, needs ", least));
+  }
+  return {};
+}
+
+/// The union of the effects, in the order in which parts name them.
+std::vector<std::string> all_effects(std::span<const Part> parts) {
+  std::vector<std::string> all;
+  for (const Part& part : parts) {
+    for (const std::string& name : part.effects) {
+      if (std::find(all.begin(), all.end(), name) == all.end()) {
+        all.push_back(name);
+      }
+    }
+  }
+  return all;
+}
+
+/// Name of the table of a coordinate, or of an effect.
+std::string label_of(std::size_t unknown, const GaugeCoordinates& c,
+                     const std::vector<std::string>& effects) {
+  const auto at = static_cast<Eigen::Index>(unknown);
+  for (const GaugeGroup& group : c.groups) {
+    if (at >= group.first && at < group.first + group.size) {
+      return group.name;
+    }
+  }
+  return effects[unknown - static_cast<std::size_t>(c.N.cols())];
+}
+
+std::string text_of(const PairTest& t, std::span<const Part> parts) {
+  std::string text =
+      message(parts[t.i].name, " and ", parts[t.j].name, " contradict each other: chi-square ",
+              t.all.statistic, " with ", t.all.dof, " degrees of freedom, p ", t.all.p);
+  if (t.explanations.empty()) {
+    text += "; no known mistake and no three tables explain it";
+    for (std::size_t k = 0; k < t.tables.size(); ++k) {
+      text += (k == 0 ? "; largest differences: " : ", ") + joint::text(t.tables[k]);
+    }
+  }
+  for (std::size_t k = 0; k < t.explanations.size(); ++k) {
+    text += (k == 0 ? "; they agree if: " : "; or: ") + t.explanations[k];
+  }
+  return text;
+}
+
+/// Without the interior points of large parts.
+Result<ValidityVolume> validity_of(std::span<const Part> parts) {
+  std::vector<Vector3> covered;
+  for (const Part& part : parts) {
+    covered.insert(covered.end(), part.covered_m.begin(), part.covered_m.end());
+  }
+  return ValidityVolume::hull_of(covered);
+}
+
+}  // namespace
+
+Result<std::vector<PairTest>> test_pairs(std::span<const Part> parts, const CommonTables& common,
+                                         const JointOptions& options) {
+  if (Result<void> valid = check_parts(parts, common, 2); !valid) {
+    return tl::unexpected(valid.error());
+  }
+  if (!(options.false_alarm > 0.0 && options.false_alarm < 1.0)) {
+    return failure(ErrorCode::BadInput, message("joint identification: false-alarm probability ",
+                                                options.false_alarm, " must be in (0, 1)"));
+  }
+
+  const GaugeCoordinates c = gauge_coordinates(common.basis);
+  const double pairs = 0.5 * static_cast<double>(parts.size() * (parts.size() - 1));
+  const double limit = options.false_alarm / pairs;
+  std::vector<PairTest> tests;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (std::size_t j = i + 1; j < parts.size(); ++j) {
+      const PairProblem pair(parts[i], parts[j], c);
+      const Disagreement d = pair.disagreement();
+      PairTest test{.i = i, .j = j, .all = {d.statistic, d.dof, exponential(d.log_p), limit}};
+      test.contradiction = d.log_p < natural_logarithm(limit);
+      if (test.contradiction) {
+        explain(test, pair, parts[i], parts[j], c, common.basis.layout());
+      }
+      tests.push_back(std::move(test));
+    }
+  }
+  return tests;
+}
+
+Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& common) {
+  if (Result<void> valid = check_parts(parts, common, 1); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  const GaugeCoordinates c = gauge_coordinates(common.basis);
+  const std::vector<std::string> effects = all_effects(parts);
+  const Eigen::Index m = c.N.cols();
+  estimation::Information sum(static_cast<std::size_t>(m) + effects.size());
+  for (const Part& part : parts) {
+    const DeterminingRows rows = in_coordinates(part.information, part.effects, c.N, effects);
+    sum.add_rows(rows.A, rows.z);
+  }
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    sum.add_prior(static_cast<std::size_t>(m) + k, 0.0, 1.0);
+  }
+
+  // The coordinates satisfy the conditions of the gauge: no other condition is left.
+  const estimation::Datum no_conditions(
+      Eigen::MatrixXd(0, static_cast<Eigen::Index>(sum.unknowns())));
+  const Result<estimation::DatumSolution> solved = no_conditions.solve(
+      sum, {.label = [&](std::size_t unknown) { return label_of(unknown, c, effects); }});
+  if (!solved) {
+    return failure(solved.error().code, "joint identification: " + solved.error().text);
+  }
+
+  Result<ValidityVolume> validity = validity_of(parts);
+  if (!validity) {
+    return tl::unexpected(validity.error());
+  }
+  const Eigen::VectorXd U = c.N * solved->U.head(m);
+  const Eigen::MatrixXd of_e = solved->covariance.topLeftCorner(m, m);
+  const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
+  Result<VolumetricModel> model = VolumetricModel::from_vector(
+      common.basis.layout(), Gauge::G1, std::array{common.tool_offset_m}, U,
+      0.5 * (C + C.transpose()), *std::move(validity));
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+
+  JointModel joint{.model = *std::move(model),
+                   .effects = {},
+                   .rank = solved->rank,
+                   .condition = solved->condition};
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const Eigen::Index at = m + static_cast<Eigen::Index>(k);
+    joint.effects.push_back(
+        {effects[k], solved->U(at), std::sqrt(std::max(0.0, solved->covariance(at, at)))});
+  }
+  return joint;
+}
+
+Result<JointIdentification> identify(std::span<const Part> parts, const CommonTables& common,
+                                     const JointOptions& options) {
+  Result<std::vector<PairTest>> pairs = test_pairs(parts, common, options);
+  if (!pairs) {
+    return tl::unexpected(pairs.error());
+  }
+
+  JointIdentification result{.pairs = *std::move(pairs), .joint = {}, .contradictions = {}};
+  for (const PairTest& pair : result.pairs) {
+    if (pair.contradiction) {
+      result.contradictions.push_back(text_of(pair, parts));
+    }
+  }
+  if (!result.contradictions.empty()) {
+    return result;
+  }
+
+  Result<JointModel> joint = joint_model(parts, common);
+  if (!joint) {
+    return tl::unexpected(joint.error());
+  }
+  result.joint = *std::move(joint);
+  return result;
+}
+
+}  // namespace abbe::calib::joint

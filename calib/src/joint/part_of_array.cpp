@@ -1,0 +1,250 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "abbe/calib/axis_mistakes.hpp"
+#include "abbe/calib/evemu/pose_blocks.hpp"
+#include "abbe/calib/joint/part.hpp"
+#include "joint/determining_rows.hpp"
+#include "joint/left_out_rotations.hpp"
+#include "message.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::joint {
+namespace {
+
+/// The unknowns of the blocks: parameters, effects of the scales, left-out rotations, errors of the
+/// array.
+struct ArrayUnknowns {
+  const CommonTables& common;
+  const LeftOutRotations& left_out;
+  Eigen::MatrixXd scales;  ///< columns of the effects of the scales
+
+  [[nodiscard]] std::size_t model() const { return common.basis.size(); }
+  [[nodiscard]] std::size_t first_left_out() const {
+    return model() + static_cast<std::size_t>(scales.cols());
+  }
+  [[nodiscard]] std::size_t first_error() const { return first_left_out() + left_out.size(); }
+
+  [[nodiscard]] evemu::VolumetricDesign design(const Vector3& tool_offset_m) const {
+    const evemu::VolumetricDesign of_tables =
+        evemu::design_of(estimation::ModelBasis(common.basis), tool_offset_m);
+    return {first_error(), [this, of_tables](const Vector3& reading_m) {
+              const Eigen::Matrix3Xd B = of_tables.B(reading_m);
+              Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(first_error()));
+              all << B, B * scales, left_out.B(reading_m);
+              return all;
+            }};
+  }
+};
+
+std::vector<std::size_t> counted(std::size_t first, std::size_t end) {
+  std::vector<std::size_t> all(end - first);
+  std::iota(all.begin(), all.end(), first);
+  return all;
+}
+
+/// Information of all blocks about all unknowns, with s = `s_m`.
+Result<estimation::Information> information_of_array(const evemu::Observations& o,
+                                                     const ArrayUnknowns& unknowns, double s_m,
+                                                     const Eigen::VectorXd& U) {
+  evemu::PoseBlockOptions options{.s_m = s_m};
+  const estimation::ModelBasis basis(unknowns.common.basis);
+  if (U.size() > 0) {
+    options.V_at_m = [&](const Vector3& reading_m) {
+      return basis.V_m({.q_m = reading_m, .tool_offset_m = o.machine.tool_offset_m},
+                       {U.data(), basis.size()});
+    };
+  }
+
+  const auto blocks = evemu::pose_blocks(o, unknowns.design(o.machine.tool_offset_m), options);
+  if (!blocks) {
+    return tl::unexpected(blocks.error());
+  }
+  estimation::Information sum(blocks->front().unknowns.size());
+  for (const estimation::Block& block : *blocks) {
+    if (Result<void> added = sum.add(block); !added) {
+      return tl::unexpected(added.error());
+    }
+  }
+  return sum;
+}
+
+struct ArrayNoise {
+  double s_m = 0.0, dof = 0.0;
+};
+/// s from the residuals that neither tables nor errors of the array explain.
+Result<ArrayNoise> residual_noise_of_array(const estimation::Information& with_s_1,
+                                           double most_s_m) {
+  constexpr double kLeastDof = 20.0;  // s is then known to 16 %
+  const DeterminingRows rows = determining_rows(with_s_1);
+  const double dof = static_cast<double>(with_s_1.rows()) - static_cast<double>(rows.rank());
+  if (dof < kLeastDof) {
+    return failure(ErrorCode::TooFewObservations,
+                   message(dof,
+                           " degrees of freedom are left to estimate the noise of the ball "
+                           "centres, needs ",
+                           kLeastDof, ": state it, or touch more positions"));
+  }
+
+  const ArrayNoise noise{std::sqrt(rows.rest / dof), dof};
+  if (noise.s_m > most_s_m) {
+    return failure(ErrorCode::BadInput, message("the ball centres scatter by ", noise.s_m * kUmPerM,
+                                                " um about the tables that fit them best, limit ",
+                                                most_s_m * kUmPerM, " um"));
+  }
+  return noise;
+}
+
+evemu::Observations with_changed_errors(evemu::Observations o, const Matrix3& of_reading,
+                                        const Matrix3& of_V) {
+  // Touched points belong to the readings as given: the changed ones use ball centres.
+  o.seen.clear();
+  o.artefact.reset();
+  for (evemu::BallError& row : o.rows) {
+    row.reading_m = of_reading * row.reading_m;
+    row.V_m = of_V * row.V_m;
+  }
+  return o;
+}
+
+bool all_inside_travel(const evemu::Observations& o, const MachineNodes& nodes) {
+  std::vector<Vector3> readings;
+  for (const evemu::BallError& row : o.rows) {
+    readings.push_back(row.reading_m);
+  }
+  constexpr double kBeyond_m = 0.05;
+  return outside_travel(readings, nodes, kBeyond_m).empty();
+}
+
+struct ChangedArray {
+  std::string text;
+  evemu::Observations observations;
+};
+
+/// What is often wrong with errors of balls: axes of V, or of readings and V; the stylus.
+std::vector<ChangedArray> changed_arrays(const evemu::Observations& o, const CommonTables& common) {
+  std::vector<ChangedArray> changed;
+  for (const AxisMistake& mistake : axis_mistakes()) {
+    changed.push_back({"the errors have " + mistake.text,
+                       with_changed_errors(o, Matrix3::Identity(), mistake.M)});
+    evemu::Observations both = with_changed_errors(o, mistake.M, mistake.M);
+    if (all_inside_travel(both, common.basis.layout().nodes())) {
+      changed.push_back({"readings and errors have " + mistake.text, std::move(both)});
+    }
+  }
+
+  const Vector3& t = o.machine.tool_offset_m;
+  for (const Vector3& other : {Vector3(-t), Vector3(Vector3::Zero()), common.tool_offset_m}) {
+    if ((other - t).norm() > VolumetricModel::kToolTolerance_m) {
+      evemu::Observations with_tool = o;
+      with_tool.machine.tool_offset_m = other;
+      changed.push_back({message("the tool offset is ", mm_text(other), ", not ", mm_text(t)),
+                         std::move(with_tool)});
+    }
+  }
+  return changed;
+}
+
+/// The information of a part about parameters, effects of the scales and errors of the array; the
+/// left-out rotations may have any value.
+Result<Part> array_part(const evemu::Observations& o, const CommonTables& common,
+                        const ArrayOptions& options, double s_m) {
+  const LeftOutRotations left_out(common, o.machine.tool_offset_m - common.tool_offset_m);
+  const Eigen::MatrixX3d of_axis = axis_scale_columns(common.basis.layout());
+  ArrayUnknowns unknowns{common, left_out, Eigen::MatrixXd(of_axis.rows(), 0)};
+  std::vector<std::string> effects;
+  for (const Axis a : kAllAxes) {
+    if (const double u = options.effects.u_axis_scale[index(a)]; u > 0.0) {
+      unknowns.scales.conservativeResize(Eigen::NoChange, unknowns.scales.cols() + 1);
+      unknowns.scales.rightCols<1>() = u * of_axis.col(static_cast<Eigen::Index>(index(a)));
+      effects.push_back(message("scale of ", letter(a)));
+    }
+  }
+
+  double dof = 0.0;
+  if (!(s_m > 0.0)) {
+    const Result<ArrayNoise> noise = information_of_array(o, unknowns, 1.0, options.linearised_at)
+                                         .and_then([&](const estimation::Information& i) {
+                                           return residual_noise_of_array(i, options.most_s_m);
+                                         });
+    if (!noise) {
+      return tl::unexpected(noise.error());
+    }
+    s_m = noise->s_m, dof = noise->dof;
+  }
+
+  Result<estimation::Information> all =
+      information_of_array(o, unknowns, s_m, options.linearised_at);
+  if (!all) {
+    return tl::unexpected(all.error());
+  }
+  const std::size_t errors = all->unknowns() - unknowns.first_error();
+  for (std::size_t k = 0; k < errors; ++k) {
+    effects.push_back(message("error ", k + 1, " of ", options.array));
+  }
+  return Part{.method = "evemu",
+              .information =
+                  all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error())),
+              .effects = std::move(effects),
+              .dof_of_noise = dof};
+}
+
+/// The information with columns of zeros for effects at the end that it does not have.
+estimation::Information with_all_effects(const estimation::Information& some,
+                                         std::size_t unknowns) {
+  estimation::Information all(unknowns);
+  all.add(some, counted(0, some.unknowns()));
+  return all;
+}
+
+std::vector<Mistake> mistakes_of_array(const evemu::Observations& o, const CommonTables& common,
+                                       const ArrayOptions& options, std::size_t unknowns) {
+  std::vector<Mistake> mistakes;
+  for (ChangedArray& changed : changed_arrays(o, common)) {
+    // Under another hypothesis the residuals are others: the noise is estimated again.
+    if (Result<Part> part = array_part(changed.observations, common, options, options.s_m)) {
+      mistakes.push_back({std::move(changed.text), with_all_effects(part->information, unknowns)});
+    }
+  }
+  return mistakes;
+}
+
+}  // namespace
+
+Result<Part> part_of_array(std::string name, const evemu::Observations& o,
+                           const CommonTables& common, const ArrayOptions& options) {
+  const auto in_this_part = [&](const Error& e) {
+    return Error{e.code, message("joint identification: ", name, ": ", e.text)};
+  };
+  if (o.machine.chain.order_w_to_t() != common.basis.layout().chain().order_w_to_t()) {
+    return failure(ErrorCode::NotApplicable,
+                   message("joint identification: ", name, " has the axes ", o.machine.chain.text(),
+                           ", the common tables ", common.basis.layout().chain().text()));
+  }
+
+  Result<Part> part = array_part(o, common, options, options.s_m);
+  if (!part) {
+    Error error = in_this_part(part.error());
+    std::vector<std::string> without;
+    for (ChangedArray& changed : changed_arrays(o, common)) {
+      if (part.error().code == ErrorCode::BadInput &&
+          array_part(changed.observations, common, options, options.s_m)) {
+        without.push_back(std::move(changed.text));
+      }
+    }
+    error.text += without.empty() ? "" : "; not if " + or_list(without);
+    return tl::unexpected(std::move(error));
+  }
+
+  for (const evemu::BallError& row : o.rows) {
+    part->covered_m.push_back(row.reading_m);
+  }
+  part->name = std::move(name);
+  part->mistakes = [o, common, options, unknowns = part->information.unknowns()] {
+    return mistakes_of_array(o, common, options, unknowns);
+  };
+  return part;
+}
+
+}  // namespace abbe::calib::joint

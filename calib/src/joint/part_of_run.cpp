@@ -1,0 +1,139 @@
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "abbe/calib/joint/part.hpp"
+#include "gauge_coordinates.hpp"
+#include "joint/left_out_rotations.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::joint {
+namespace {
+
+/// Columns of the effects that a run shares with other parts, one standard uncertainty each.
+struct SharedColumns {
+  Eigen::MatrixXd G;
+  std::vector<std::string> names;
+};
+
+SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects& e) {
+  const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
+  SharedColumns shared{Eigen::MatrixXd(of_axis.rows(), 4), {}};
+  Eigen::Index columns = 0;
+  const auto add = [&](const Eigen::VectorXd& column, std::string name) {
+    if (column.squaredNorm() > 0.0) {
+      shared.G.col(columns++) = column;
+      shared.names.push_back(std::move(name));
+    }
+  };
+
+  // A relative error of the ranges enlarges the whole machine.
+  add(e.u_ranges * of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
+  for (const Axis a : kAllAxes) {
+    add(e.u_axis_scale[index(a)] * of_axis.col(static_cast<Eigen::Index>(index(a))),
+        message("scale of ", letter(a)));
+  }
+  shared.G.conservativeResize(Eigen::NoChange, columns);
+  return shared;
+}
+
+Result<void> check_same_layout(const std::string& name, const VolumetricModel& model,
+                               const CommonTables& common) {
+  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
+  const Result<CommonTables> own = tables_of(model);
+  if (!own) {
+    return failure(own.error().code, message(name, ": ", own.error().text));
+  }
+
+  const ParameterLayout &a = own->basis.layout(), &b = common.basis.layout();
+  bool same = a.chain().order_w_to_t() == b.chain().order_w_to_t() &&
+              std::equal(a.tables().begin(), a.tables().end(), b.tables().begin(), b.tables().end(),
+                         [](const Table& s, const Table& t) { return s.motion == t.motion; });
+  for (const Axis axis : kAllAxes) {
+    const AxisNodes &x = a.nodes()[index(axis)], &y = b.nodes()[index(axis)];
+    const auto near = [](double p, double q) { return std::abs(p - q) < kSame_m; };
+    same =
+        same &&
+        std::equal(x.nodes_m.begin(), x.nodes_m.end(), y.nodes_m.begin(), y.nodes_m.end(), near) &&
+        near(x.reference_m, y.reference_m) &&
+        own->basis.interpolation(axis).kind() == common.basis.interpolation(axis).kind();
+  }
+  if (!same) {
+    return failure(ErrorCode::NotApplicable,
+                   message("joint identification: ", name,
+                           " has other axes, tables, nodes or references than the first part"));
+  }
+  return {};
+}
+
+/// Triangle of a covariance scaled to its diagonal; nullopt if it is not positive definite.
+struct ScaledTriangle {
+  Eigen::VectorXd scale;
+  Eigen::LLT<Eigen::MatrixXd> factor;
+};
+std::optional<ScaledTriangle> scaled_triangle(const Eigen::MatrixXd& C) {
+  ScaledTriangle t{C.diagonal().unaryExpr([](double v) { return v > 0.0 ? std::sqrt(v) : 1.0; }),
+                   {}};
+  const Eigen::VectorXd inverse = t.scale.cwiseInverse();
+  t.factor.compute(inverse.asDiagonal() * C * inverse.asDiagonal());
+  if (t.factor.info() != Eigen::Success) {
+    return std::nullopt;
+  }
+  return t;
+}
+
+/// W M with W^T W = C^-1.
+Eigen::MatrixXd whitened_by(const ScaledTriangle& t, const Eigen::MatrixXd& M) {
+  return t.factor.matrixL().solve(t.scale.cwiseInverse().asDiagonal() * M);
+}
+
+}  // namespace
+
+Result<Part> part_of_run(std::string name, const VolumetricModel& model, const CommonTables& common,
+                         const CommonEffects& effects) {
+  if (Result<void> same = check_same_layout(name, model, common); !same) {
+    return tl::unexpected(same.error());
+  }
+
+  const Eigen::MatrixXd N = gauge_coordinates(common.basis).N;
+  SharedColumns shared = shared_columns(common.basis.layout(), effects);
+  const Eigen::MatrixXd C = N.transpose() * model.covariance() * N;
+  const Eigen::MatrixXd G = N.transpose() * shared.G;
+  std::optional<ScaledTriangle> triangle = scaled_triangle(C - G * G.transpose());
+  if (!triangle) {
+    shared.names.clear();
+    triangle = scaled_triangle(C);
+  }
+  if (!triangle) {
+    return failure(ErrorCode::NotApplicable,
+                   message("joint identification: the covariance of ", name,
+                           " leaves a combination of its parameters without uncertainty"));
+  }
+
+  const LeftOutRotations left_out(common, model.tool_offsets_m().front() - common.tool_offset_m);
+  const Result<Eigen::MatrixXd> of_rotations = left_out.of_parameters();
+  if (!of_rotations) {
+    return failure(of_rotations.error().code, message(name, ": ", of_rotations.error().text));
+  }
+
+  const auto n = static_cast<Eigen::Index>(common.basis.size()), own = std::ssize(shared.names);
+  Eigen::MatrixXd A(N.cols(), n + own + of_rotations->cols());
+  A << N.transpose(), G.leftCols(own), N.transpose() * *of_rotations;
+  estimation::Information information(static_cast<std::size_t>(A.cols()));
+  information.add_rows(whitened_by(*triangle, A),
+                       whitened_by(*triangle, N.transpose() * model.U()));
+
+  std::vector<std::size_t> eliminated(left_out.size());
+  std::iota(eliminated.begin(), eliminated.end(), static_cast<std::size_t>(n + own));
+  const std::span<const Vector3> hull = model.validity().vertices_m();
+  return Part{.name = std::move(name),
+              .method = "otf",
+              .information = eliminated.empty() ? std::move(information)
+                                                : information.without_unknowns(eliminated),
+              .effects = std::move(shared.names),
+              .covered_m = {hull.begin(), hull.end()}};
+}
+
+}  // namespace abbe::calib::joint

@@ -79,6 +79,10 @@ PairProblem::Freed PairProblem::freed(const Eigen::MatrixXd& free) const {
   result.drop = std::max(0.0, fixed.sum.rest() - with.sum.rest()) / noise_factor_;
   result.drop_dof = with.rank - std::min(with.rank, fixed.rank);
 
+  if (free.cols() == 0) {
+    return result;
+  }
+
   // The last rows of R contain d alone.
   const Eigen::MatrixXd R = with.sum.R().bottomRightCorner(free.cols(), free.cols());
   const Eigen::VectorXd z = with.sum.z().tail(free.cols());

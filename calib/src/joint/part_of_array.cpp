@@ -73,12 +73,17 @@ Result<estimation::Information> information_of_array(const evemu::Observations& 
 struct ArrayNoise {
   double s_m = 0.0, dof = 0.0;
 };
-/// s from the residuals that neither tables nor errors of the array explain.
-Result<ArrayNoise> residual_noise_of_array(const estimation::Information& with_s_1,
-                                           double most_s_m) {
+/// s from the residuals of an adjustment with s = `s_m` and the priors of the errors of the array.
+/// Without the priors a common scale of tables and array, which no data determine, would multiply
+/// the noise of the readings in the design and reproduce the residuals.
+Result<ArrayNoise> residual_noise_of_array(estimation::Information with_s, std::size_t first_error,
+                                           double s_m, double most_s_m) {
   constexpr double kLeastDof = 20.0;  // s is then known to 16 %
-  const DeterminingRows rows = determining_rows(with_s_1);
-  const double dof = static_cast<double>(with_s_1.rows()) - static_cast<double>(rows.rank());
+  for (std::size_t k = first_error; k < with_s.unknowns(); ++k) {
+    with_s.add_prior(k, 0.0, 1.0);
+  }
+  const DeterminingRows rows = determining_rows(with_s);
+  const double dof = static_cast<double>(with_s.rows()) - static_cast<double>(rows.rank());
   if (dof < kLeastDof) {
     return failure(ErrorCode::TooFewObservations,
                    message(dof,
@@ -87,7 +92,7 @@ Result<ArrayNoise> residual_noise_of_array(const estimation::Information& with_s
                            kLeastDof, ": state it, or touch more positions"));
   }
 
-  const ArrayNoise noise{std::sqrt(rows.rest / dof), dof};
+  const ArrayNoise noise{s_m * std::sqrt(rows.rest / dof), dof};
   if (noise.s_m > most_s_m) {
     return failure(ErrorCode::BadInput, message("the ball centres scatter by ", noise.s_m * kUmPerM,
                                                 " um about the tables that fit them best, limit ",
@@ -164,14 +169,20 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
 
   double dof = 0.0;
   if (!(s_m > 0.0)) {
-    const Result<ArrayNoise> noise = information_of_array(o, unknowns, 1.0, options.linearised_at)
-                                         .and_then([&](const estimation::Information& i) {
-                                           return residual_noise_of_array(i, options.most_s_m);
-                                         });
-    if (!noise) {
-      return tl::unexpected(noise.error());
+    constexpr int kRepeats = 3;  // s and the errors of the array are separated by their priors
+    s_m = 1e-6;
+    for (int i = 0; i < kRepeats; ++i) {
+      const Result<ArrayNoise> noise =
+          information_of_array(o, unknowns, s_m, options.linearised_at)
+              .and_then([&](const estimation::Information& information) {
+                return residual_noise_of_array(information, unknowns.first_error(), s_m,
+                                               options.most_s_m);
+              });
+      if (!noise) {
+        return tl::unexpected(noise.error());
+      }
+      s_m = noise->s_m, dof = noise->dof;
     }
-    s_m = noise->s_m, dof = noise->dof;
   }
 
   Result<estimation::Information> all =
@@ -183,9 +194,11 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
   for (std::size_t k = 0; k < errors; ++k) {
     effects.push_back(message("error ", k + 1, " of ", options.array));
   }
+  if (left_out.size() > 0) {
+    all = all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error()));
+  }
   return Part{.method = "evemu",
-              .information =
-                  all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error())),
+              .information = *std::move(all),
               .effects = std::move(effects),
               .dof_of_noise = dof};
 }

@@ -25,9 +25,18 @@ namespace abbe::calib::otf {
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
+/// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each run.
+[[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
+                                              const VolumetricModel* active, const Options& = {});
+
 /// Runs held_out(), decide() and alternatives(). The model is also refused if an alternative
 /// changes it by more than its uncertainty, or if the uncertainty is more than half the correction.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
+                                    const VolumetricModel* active, const GateLimits& = {},
+                                    const Options& = {});
+/// The same for the joint adjustment of several runs (targets.hpp): one solution per run, all with
+/// the same model.
+[[nodiscard]] Result<Verdict> judge(std::span<const Observations>, std::span<const Solution>,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {});
 

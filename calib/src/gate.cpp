@@ -11,12 +11,12 @@
 namespace abbe::calib {
 namespace {
 
-/// Points at which decide() evaluates V. Tables: the whole grid of nodes. Polynomials: only inside
+/// Points at which decide() evaluates V. Tables: the whole grid of nodes(). Polynomials: only inside
 /// the validity volume. There the nodes alone are not sufficient, because a thin or tilted hull can
 /// pass between them; vertices and midpoints are added.
 std::vector<Vector3> evaluation_points(const VolumetricModel& model) {
   std::vector<Vector3> found = tensor_grid(model.nodes());
-  if (model.linear_between_nodes()) {
+  if (model.tables() != nullptr) {
     return found;
   }
   std::erase_if(found, [&](const Vector3& q) { return !model.validity().contains(q); });
@@ -52,7 +52,7 @@ double max_slope(const VolumetricModel& model, const std::vector<Vector3>& at, c
   return most;
 }
 
-/// Largest |dV/dq| of tables. V is linear between nodes along an axis and multilinear in the other
+/// Largest |dV/dq| of linear tables. V is linear between nodes along an axis and multilinear in the other
 /// two axes, so that its derivative is largest on the grid lines.
 double max_slope_of_tables(const VolumetricModel& model, const Vector3& t) {
   double most = 0.0;

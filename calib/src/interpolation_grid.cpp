@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "abbe/calib/model_comparison.hpp"
+
 namespace abbe::calib {
 namespace {
 
@@ -87,9 +89,38 @@ std::array<std::size_t, 3> counts_for(const std::array<double, 3>& midpoint_erro
   return count;
 }
 
-InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_nodes) {
-  const evemu::ReadingBox box = evemu::bounding_box(model.validity().vertices_m());
-  const std::array<std::size_t, 3> count = counts_for(midpoint_error_m(model, box), most_nodes);
+/// For each axis, the largest error of linear interpolation at the midpoint of a cell over the whole
+/// range, |d^2V/dq^2| length^2 / 8. Along an axis the second derivative is linear between the nodes
+/// of its tables, across it linear in the other axes: it is largest at a node and at ends of the
+/// other axes.
+std::array<double, 3> midpoint_error_of_cubic_m(const VolumetricModel& model) {
+  const MachineNodes& nodes = model.tables()->layout().nodes();
+  const Vector3& t = model.tool_offsets_m().front();
+  std::array<double, 3> most{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto k = static_cast<Eigen::Index>(a);
+    const std::vector<double>& along = nodes[a].nodes_m;
+    const double length_m = along.back() - along.front();
+    MachineNodes places;
+    for (std::size_t b = 0; b < 3; ++b) {
+      places[b].nodes_m = {nodes[b].nodes_m.front(), nodes[b].nodes_m.back()};
+    }
+    places[a].nodes_m = along;
+
+    const double step_m = 1e-2 * length_m / static_cast<double>(along.size() - 1);
+    const Vector3 step = step_m * Vector3::Unit(k);
+    for (const Vector3& q : tensor_grid(places)) {
+      const Vector3 second =
+          model.V_at(q + step, t) - 2 * model.V_at(q, t) + model.V_at(q - step, t);
+      most[a] = std::max(most[a], second.norm() / (step_m * step_m) * length_m * length_m / 8.0);
+    }
+  }
+  return most;
+}
+
+/// Equidistant nodes over a box.
+InterpolationGrid equidistant(const evemu::ReadingBox& box,
+                              const std::array<std::size_t, 3>& count) {
   InterpolationGrid grid;
   for (std::size_t a = 0; a < 3; ++a) {
     const auto k = static_cast<Eigen::Index>(a);
@@ -100,6 +131,20 @@ InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_
     }
   }
   return grid;
+}
+
+InterpolationGrid of_polynomials(const VolumetricModel& model, std::size_t most_nodes) {
+  const evemu::ReadingBox box = evemu::bounding_box(model.validity().vertices_m());
+  return equidistant(box, counts_for(midpoint_error_m(model, box), most_nodes));
+}
+
+InterpolationGrid of_cubic_tables(const VolumetricModel& model, std::size_t most_nodes) {
+  const MachineNodes& nodes = model.nodes();
+  const std::array ends{
+      Vector3(nodes[0].nodes_m.front(), nodes[1].nodes_m.front(), nodes[2].nodes_m.front()),
+      Vector3(nodes[0].nodes_m.back(), nodes[1].nodes_m.back(), nodes[2].nodes_m.back())};
+  return equidistant(evemu::bounding_box(ends),
+                     counts_for(midpoint_error_of_cubic_m(model), most_nodes));
 }
 
 /// Interpolation error halfway between `q` and its neighbour node at `beside_m` along axis `a`.
@@ -114,8 +159,11 @@ Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Inde
 }  // namespace
 
 InterpolationGrid interpolation_grid(const VolumetricModel& model, std::size_t most_nodes) {
-  return model.linear_between_nodes() ? of_tables(model.nodes(), most_nodes)
-                                      : of_polynomials(model, most_nodes);
+  if (model.linear_between_nodes()) {
+    return of_tables(model.nodes(), most_nodes);
+  }
+  return model.tables() != nullptr ? of_cubic_tables(model, most_nodes)
+                                   : of_polynomials(model, most_nodes);
 }
 
 Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGrid& grid,

@@ -321,8 +321,13 @@ Result<void> check_same_parameters(const VolumetricModel& a, const VolumetricMod
                                   ": other axes, tables or nodes"));
   }
 
+  if (a.interpolation() != b.interpolation()) {
+    return not_comparable("the tables of one of them are linear, those of the other cubic");
+  }
+
   for (const Axis axis : kAllAxes) {
-    if (!same_nodes(a.nodes()[index(axis)], b.nodes()[index(axis)])) {
+    const std::size_t i = index(axis);
+    if (!same_nodes(a.tables()->layout().nodes()[i], b.tables()->layout().nodes()[i])) {
       return not_comparable(
           message("axis ", letter(axis), " has other nodes or another reference"));
     }

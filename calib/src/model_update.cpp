@@ -174,7 +174,8 @@ Result<VolumetricModel> update_model(const VolumetricModel& previous, const Volu
 
   return VolumetricModel::from_vector(
       layout, Gauge::G1, run.tool_offsets_m(), U, covariance,
-      options.renewed.empty() ? previous.validity() : run.validity());
+      options.renewed.empty() ? previous.validity() : run.validity(),
+      run.tables()->interpolation(Axis::X).kind());
 }
 
 }  // namespace abbe::calib

@@ -6,16 +6,15 @@
 #include <cmath>
 #include <limits>
 
+#include "abbe/calib/estimation/cell_form.hpp"
+#include "checked_nodes.hpp"
 #include "message.hpp"
+#include "tool_span.hpp"
 
 namespace abbe::calib {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// Largest number of columns at one position: two nodes of each of 18 tables, and squareness.
-/// Arrays of this size are on the stack.
-constexpr std::size_t kMostColumns = 18 * 2 + 3;
 
 /// Covariance of V: sum_ij v_i C_ij v_j^T over the non-zero columns v_i = dV/dU_i, C: covariance of
 /// the parameters U.
@@ -57,33 +56,6 @@ Result<void> check_shape(const Eigen::MatrixXd& C, std::size_t parameters) {
   }
 
   return {};
-}
-
-/// The tools for which a model is valid: any tool, tools on a line, or (line zero) one tool.
-struct ToolSpan {
-  bool any = false;
-  Vector3 line = Vector3::Zero();
-};
-
-/// Offsets closer to each other than kToolTolerance_m count as one offset; offsets closer than
-/// kToolTolerance_m to a line count as on the line.
-ToolSpan tool_span(std::span<const Vector3> offsets_m) {
-  const Vector3& first = offsets_m.front();
-  Vector3 along = Vector3::Zero();
-  for (const Vector3& t : offsets_m) {
-    along = (t - first).norm() > along.norm() ? Vector3(t - first) : along;
-  }
-
-  if (!(along.norm() > VolumetricModel::kToolTolerance_m)) {
-    return {};
-  }
-
-  const Vector3 line = along.normalized();
-  const bool beside = std::any_of(offsets_m.begin(), offsets_m.end(), [&](const Vector3& t) {
-    return (t - first - line * line.dot(t - first)).norm() > VolumetricModel::kToolTolerance_m;
-  });
-
-  return {beside, line};
 }
 
 /// The tables to which the stored parameters belong, in the order of the parameters.
@@ -227,7 +199,8 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
                                                      std::span<const Vector3> tool_offsets_m,
                                                      const Eigen::VectorXd& U,
                                                      const Eigen::MatrixXd& covariance,
-                                                     ValidityVolume validity) {
+                                                     ValidityVolume validity,
+                                                     estimation::Interpolation interpolation) {
   if (U.size() != static_cast<Eigen::Index>(layout.model_size())) {
     return failure(ErrorCode::BadInput, message("model: ", U.size(), " values for ",
                                                 layout.model_size(), " parameters"));
@@ -256,12 +229,21 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
     }
   }
 
-  Result<estimation::TableBasis> basis = estimation::TableBasis::of(layout);
+  const bool cubic = interpolation == estimation::Interpolation::NaturalCubic;
+  if (!cubic && interpolation != estimation::Interpolation::Linear) {
+    return failure(ErrorCode::BadInput,
+                   message("model: the tables are ", estimation::name(interpolation), ", must be ",
+                           kLinearBasis, " or ", kCubicBasis));
+  }
+
+  Result<estimation::TableBasis> basis =
+      estimation::TableBasis::of(layout, estimation::TableOptions::all_axes(interpolation));
   if (!basis) {
     return tl::unexpected(basis.error());
   }
 
-  VolumetricModel model(*std::move(basis), layout.nodes());
+  VolumetricModel model(*std::move(basis),
+                        cubic ? checked_nodes_of_cubic(layout.nodes()) : layout.nodes());
   model.gauge_ = gauge;
   model.tool_offsets_m_.assign(tool_offsets_m.begin(), tool_offsets_m.end());
   const ToolSpan tools = tool_span(tool_offsets_m);
@@ -270,6 +252,10 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
   model.U_ = U;
   model.covariance_ = covariance;
   model.validity_ = std::move(validity);
+  if (cubic) {
+    model.Z_ = estimation::with_curvatures(*model.tables(), U);
+    model.cov_Z_ = estimation::covariance_with_curvatures(*model.tables(), covariance);
+  }
 
   return model;
 }
@@ -378,7 +364,8 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
     return tl::unexpected(validity.error());
   }
 
-  return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity));
+  return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity),
+                     d.interpolation);
 }
 
 bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
@@ -415,15 +402,23 @@ VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,
     return e;
   }
 
-  std::array<estimation::Column, kMostColumns> memory;
+  std::array<estimation::Column, estimation::kMostCellColumns> memory;
   estimation::ModelColumns columns(memory);
-  tables()->append_columns({.q_m = axis_position_m, .tool_offset_m = lever_offset_m(tool_offset_m)},
-                           columns);
-  for (const estimation::Column& c : columns.span()) {
-    e.V_m += c.dV_dU * U_(static_cast<Eigen::Index>(c.parameter));
+  const estimation::MachineState state{.q_m = axis_position_m,
+                                       .tool_offset_m = lever_offset_m(tool_offset_m)};
+  const bool linear = linear_between_nodes();
+  if (linear) {
+    tables()->append_columns(state, columns);
+  } else {
+    estimation::append_cell_columns(*tables(), state, columns);
   }
 
-  e.cov_V_m2 = propagate(columns.span(), covariance_);
+  const Eigen::VectorXd& U = linear ? U_ : Z_;
+  for (const estimation::Column& c : columns.span()) {
+    e.V_m += c.dV_dU * U(static_cast<Eigen::Index>(c.parameter));
+  }
+
+  e.cov_V_m2 = propagate(columns.span(), linear ? covariance_ : cov_Z_);
   return e;
 }
 
@@ -482,7 +477,8 @@ const KinematicChain& VolumetricModel::chain() const {
 ModelDescription VolumetricModel::description() const {
   ModelDescription d;
   d.chain = chain();
-  d.nodes = nodes_;
+  d.nodes = tables() == nullptr ? nodes_ : tables()->layout().nodes();
+  d.interpolation = interpolation().value_or(estimation::Interpolation::Linear);
   d.gauge = gauge_;
   d.tool_offsets_m = tool_offsets_m_;
   d.parameters = parameters();

@@ -41,6 +41,7 @@ struct MadeRunOptions {
   double speed_m_s = 0.4;
   double rate_hz = 250.0;
   std::string chain = "[w X' b Y Z (C1) t]";
+  calib::estimation::Interpolation interpolation = calib::estimation::Interpolation::Linear;
 };
 
 inline calib::otf::Machine coarse_machine(const std::string& chain) {
@@ -103,6 +104,7 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
   MadeRun run;
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
+  run.machine.interpolation = wanted.interpolation;
   run.options.block_samples = 10;  // 16 mm
   run.options.orientation.scales_agree = true;
   const calib::ParameterLayout layout = layout_of(run.machine);
@@ -115,9 +117,11 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
     run.truth = calib::to_gauge(calib::Gauge::G1, layout, std::array{t}, U)->head(run.truth.size());
   }
 
+  const auto basis = *calib::estimation::TableBasis::of(
+      layout, calib::estimation::TableOptions::all_axes(wanted.interpolation));
   for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
     const Vector3 V =
-        calib::volumetric_error(layout, {run.truth.data(), layout.model_size()}, q, t);
+        basis.V_m({.q_m = q, .tool_offset_m = t}, {run.truth.data(), layout.model_size()});
     const Vector3 p = run.T_machine_tracker.R.transpose() * (q + t + V - run.T_machine_tracker.t_m);
     run.samples.push_back({static_cast<double>(run.samples.size()) / wanted.rate_hz,
                            with_noise(p, run.noise, wanted.noise_factor, noise), true});

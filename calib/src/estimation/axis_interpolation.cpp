@@ -108,11 +108,20 @@ std::string_view name(Interpolation kind) {
     case Interpolation::Linear:
       break;
     case Interpolation::NaturalCubic:
-      return "natural-cubic";
+      return kCubicBasis;
     case Interpolation::NotAKnotCubic:
       return "not-a-knot-cubic";
   }
   return kLinearBasis;
+}
+
+std::optional<Interpolation> table_interpolation(std::string_view text) {
+  for (const Interpolation kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
+    if (text == name(kind)) {
+      return kind;
+    }
+  }
+  return std::nullopt;
 }
 
 Result<AxisInterpolation> AxisInterpolation::of(std::span<const double> nodes_m,

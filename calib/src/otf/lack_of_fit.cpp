@@ -75,7 +75,8 @@ std::vector<Vector3> sparse_grid(const MachineNodes& nodes) {
   return tensor_grid(few);
 }
 
-/// Norm for the parameters U of tables, evaluated on sparse_grid().
+/// Norm for the parameters U of tables, evaluated on sparse_grid(): at its nodes, linear and cubic
+/// tables have the same V.
 RigidFreeNorm rigid_free_norm(const ParameterLayout& layout, const Vector3& t) {
   const std::vector<Vector3> at = sparse_grid(layout.nodes());
   Eigen::MatrixXd D =
@@ -227,8 +228,9 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
                                                 Result<ParameterLayout> layout, Cause cause,
                                                 std::string text, const Options& options) {
   constexpr std::size_t kMostUnknowns = 800;  // the adjustment then takes one second
-  Result<estimation::TableBasis> basis =
-      std::move(layout).and_then([](ParameterLayout l) { return estimation::TableBasis::of(l); });
+  Result<estimation::TableBasis> basis = std::move(layout).and_then([&](ParameterLayout l) {
+    return estimation::TableBasis::of(std::move(l), fit.o.basis.options());
+  });
   if (!basis || basis->size() > kMostUnknowns) {
     return std::nullopt;
   }

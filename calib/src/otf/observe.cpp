@@ -225,7 +225,10 @@ Result<Observations> observations_without_rows(const Machine& machine, const Pat
                                                const Noise& noise, Alignment alignment) {
   Result<estimation::TableBasis> basis =
       ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
-          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
+          .and_then([&](ParameterLayout layout) {
+            return estimation::TableBasis::of(
+                std::move(layout), estimation::TableOptions::all_axes(machine.interpolation));
+          });
   if (!basis) {
     return tl::unexpected(basis.error());
   }

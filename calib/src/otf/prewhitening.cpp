@@ -158,7 +158,7 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   const auto n = static_cast<Eigen::Index>(o.basis.size());
   Result<VolumetricModel> model = VolumetricModel::from_vector(
       o.layout(), Gauge::G1, std::array{o.target_offset_m}, w->U.head(n),
-      w->covariance.topLeftCorner(n, n), s.model.validity());
+      w->covariance.topLeftCorner(n, n), s.model.validity(), o.basis.interpolation(Axis::X).kind());
   if (!model) {
     return tl::unexpected(model.error());
   }

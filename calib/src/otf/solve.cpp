@@ -9,6 +9,7 @@
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/row_residuals.hpp"
+#include "otf/run_statistics.hpp"
 #include "otf/systematic_effects.hpp"
 #include "otf/whitened_rows.hpp"
 
@@ -29,9 +30,8 @@ ResidualStatistics residual_statistics(const Observations& o, std::span<const do
   return s;
 }
 
-/// Factor for the covariance, from the residuals. Turbulence, vibration, a tracker worse than its
-/// data sheet and effects that are not modelled increase the residuals; the stated uncertainty must
-/// increase with them. Residuals smaller than the stated noise do not reduce the uncertainty.
+}  // namespace
+
 double variance_factor(const ResidualNoise& noise, std::size_t dof) {
   // 99.9 % quantile; chi2/dof has standard deviation sqrt(2/dof)
   constexpr double kNormal999 = 3.090;
@@ -66,6 +66,8 @@ Statistics statistics(const Observations& o, const Adjustment& a, const Residual
 
   return s;
 }
+
+namespace {
 
 Result<void> check_enough(const Observations& o) {
   const std::size_t needed = o.unknowns();
@@ -161,9 +163,10 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   add_scale_effects(a->covariance, o, as_observed, a->cofactor_Q);
 
   const auto n = static_cast<Eigen::Index>(o.basis.size());
-  Result<VolumetricModel> model = VolumetricModel::from_vector(
-      o.layout(), Gauge::G1, std::array{o.target_offset_m}, a->U.head(n),
-      a->covariance.topLeftCorner(n, n), *std::move(validity));
+  Result<VolumetricModel> model =
+      VolumetricModel::from_vector(o.layout(), Gauge::G1, std::array{o.target_offset_m},
+                                   a->U.head(n), a->covariance.topLeftCorner(n, n),
+                                   *std::move(validity), o.basis.interpolation(Axis::X).kind());
 
   if (!model) {
     return tl::unexpected(model.error());

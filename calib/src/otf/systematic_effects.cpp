@@ -6,31 +6,23 @@
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
-namespace {
-
-/// Change of U per relative change of all ranges, which displaces a point by its vector from the
-/// tracker. The part of this vector that is the same for all points changes only the rigid
-/// unknowns.
-Eigen::VectorXd dU_dscale(const Observations& o, const WhitenedRows& rows,
-                          const Eigen::MatrixXd& Q) {
+Eigen::VectorXd dg_drange_scale(const Observations& o, const WhitenedRows& rows) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
   const auto of_row = [&](std::size_t i) {
     const Observation& row = o.rows[i];
     return row.direction.dot(row.axis_position_m + o.target_offset_m - tracker_m);
   };
 
-  Eigen::VectorXd g = Eigen::VectorXd::Zero(Q.rows());
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
   for (std::size_t i = 0; i < o.rows.size(); ++i) {
     const double s_m = rows.value(i, of_row);
     for (const SparseRows::Entry& e : rows.row(i)) {
       g(static_cast<Eigen::Index>(e.column)) += o.rows[i].weight * e.value * s_m;
     }
   }
-  return Q * g;
+  return g;
 }
 
-/// Change of U per relative change of the scale of an axis: its positioning table changes with
-/// slope 1 and is zero at the reference.
 Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
   const ParameterLayout& layout = o.layout();
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
@@ -42,8 +34,6 @@ Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
   }
   return slope;
 }
-
-}  // namespace
 
 WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& rows,
                                   const Adjustment& a, std::span<const double> residual_m,
@@ -66,7 +56,7 @@ WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& row
 void add_scale_effects(Eigen::MatrixXd& covariance, const Observations& o, const WhitenedRows& rows,
                        const Eigen::MatrixXd& Q) {
   if (o.u_scale > 0.0) {
-    const Eigen::VectorXd moved = o.u_scale * dU_dscale(o, rows, Q);
+    const Eigen::VectorXd moved = o.u_scale * (Q * dg_drange_scale(o, rows));
     covariance += moved * moved.transpose();
   }
 

@@ -24,6 +24,14 @@ struct WithRangeOffset {
                                                 const Adjustment& a,
                                                 std::span<const double> residual_m, double factor);
 
+/// Change of g = A^T W^2 y per relative change of all ranges, which displaces a point by its vector
+/// from the tracker: U changes by Q g. The part of this vector that is the same for all points
+/// changes only the rigid unknowns.
+[[nodiscard]] Eigen::VectorXd dg_drange_scale(const Observations&, const WhitenedRows& rows);
+/// Change of U per relative change of the scale of an axis: its positioning table changes with
+/// slope 1 and is zero at the reference.
+[[nodiscard]] Eigen::VectorXd dU_daxis_scale(const Observations&, Axis);
+
 /// Adds the effect of Noise::u_scale and u_axis_scale to the covariance of U. `Q`: of the
 /// adjustment of `rows`.
 void add_scale_effects(Eigen::MatrixXd& covariance, const Observations&, const WhitenedRows& rows,

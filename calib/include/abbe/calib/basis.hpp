@@ -1,7 +1,7 @@
 #pragma once
-/// Linear interpolation of an error table between its nodes. Any other interpolation (natural
-/// cubic) would also have to reproduce constants and straight lines exactly, because the gauge
-/// conditions (gauge.hpp) rely on this property.
+/// Linear interpolation of an error table between its nodes. The other interpolations
+/// (estimation/axis_interpolation.hpp) also reproduce constants and straight lines exactly, because
+/// the gauge conditions (gauge.hpp) rely on this property.
 
 #include <cstddef>
 #include <span>
@@ -11,7 +11,9 @@
 
 namespace abbe::calib {
 
-inline constexpr std::string_view kLinearBasis = "linear";  ///< in files and messages
+// Interpolation of tables in configurations, files and messages.
+inline constexpr std::string_view kLinearBasis = "linear";
+inline constexpr std::string_view kCubicBasis = "cubic";  ///< natural cubic
 
 /// Value f of a table at position q, U: values of the table at its nodes,
 ///     f(q) = weight[0] U[first] + weight[1] U[first + 1].

@@ -15,14 +15,15 @@ using GridAxes = std::array<std::vector<double>, 3>;
 
 struct InterpolationGrid {
   GridAxes axes_m;
-  bool every_node = false;  ///< all nodes of the tables are used: linear interpolation is exact
+  bool every_node = false;  ///< all nodes of linear tables are used: linear interpolation is exact
 };
 
 /// A grid of at most `most_nodes` (>= 8) nodes.
-/// - Tables: the nodes of the tables. While there are too many, one node is removed from the axis
-///   with the most nodes.
-/// - Polynomials: equidistant nodes over the bounding box of the validity hull, more of them on
-///   axes along which V has a larger second derivative.
+/// - Linear tables: the nodes of the tables. While there are too many, one node is removed from the
+///   axis with the most nodes.
+/// - Polynomials and cubic tables: equidistant nodes, more of them on axes along which V has a
+///   larger second derivative; over the bounding box of the validity hull, for tables over their
+///   whole range.
 [[nodiscard]] InterpolationGrid interpolation_grid(const VolumetricModel&, std::size_t most_nodes);
 
 /// Second moment of the linear interpolation error in the cells around node (i, j, k), averaged

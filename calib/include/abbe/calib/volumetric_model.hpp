@@ -9,9 +9,10 @@
 /// A rigid motion of the whole volume is not estimable and not part of a model; neither are errors
 /// outside the validity volume.
 ///
-/// A model has one of two forms: tables with nodes (rigid-body model), or polynomials without
-/// tables (equivalent model of a ball array). Gate, grid, comparison and export treat both forms
-/// alike: nodes() and linear_between_nodes() describe both. Values and uncertainties refer to the
+/// A model has one of two forms: tables with nodes (rigid-body model; linear or natural cubic
+/// between the nodes), or polynomials without tables (equivalent model of a ball array). Gate,
+/// grid, comparison and export treat all forms alike: nodes() and linear_between_nodes() describe
+/// them. Values and uncertainties refer to the
 /// gauge of the model; compare two models with rigid_free_difference().
 
 #include <Eigen/Core>
@@ -71,6 +72,8 @@ struct ModelDescription {
   /// If set, `parameters` are the coefficients of the scaled design [m]; nodes and basis are
   /// ignored.
   std::optional<PolynomialForm> polynomials{};
+  /// of the tables of all axes, between `nodes`: Linear or NaturalCubic
+  estimation::Interpolation interpolation = estimation::Interpolation::Linear;
 };
 
 /// Immutable value; all member functions are const and may be called from any thread.
@@ -85,19 +88,19 @@ class VolumetricModel {
   /// BadInput or NotFinite if the parameters are wrong (unknown or repeated name, missing node,
   /// wrong size); the text names the first wrong parameter.
   [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
-  /// `U`: the model_size() parameters of the layout; `covariance`: their covariance.
-  [[nodiscard]] static Result<VolumetricModel> from_vector(const ParameterLayout&, Gauge,
-                                                           std::span<const Vector3> tool_offsets_m,
-                                                           const Eigen::VectorXd& U,
-                                                           const Eigen::MatrixXd& covariance,
-                                                           ValidityVolume);
+  /// `U`: the model_size() parameters of the layout; `covariance`: their covariance;
+  /// `interpolation`: of all tables, Linear or NaturalCubic, else BadInput.
+  [[nodiscard]] static Result<VolumetricModel> from_vector(
+      const ParameterLayout&, Gauge, std::span<const Vector3> tool_offsets_m,
+      const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,
+      estimation::Interpolation interpolation = estimation::Interpolation::Linear);
 
   /// A polynomial model, valid for one tool. Gauge Ball1 or Ball1Blocks.
   [[nodiscard]] static Result<VolumetricModel> from_polynomials(evemu::EvemuModel, Gauge,
                                                                 const Vector3& tool_offset_m,
                                                                 ValidityVolume);
 
-  /// V with its covariance. Takes about 1 us. No allocation.
+  /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m) const;
   /// V alone, about four times faster. NaN for a tool for which the model is not valid.
@@ -110,11 +113,19 @@ class VolumetricModel {
 
   [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
   [[nodiscard]] const KinematicChain& chain() const;
-  /// Positions at which the model is checked, compared and published. Tables: their nodes;
-  /// polynomials: a grid over the bounding box of the validity volume.
+  /// Positions at which the model is checked, compared and published. Linear tables: their nodes;
+  /// cubic tables: their nodes and the middles of the cells between them; polynomials: a grid over
+  /// the bounding box of the validity volume. The nodes of any tables are in tables()->layout().
   [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
   /// V is linear between nodes() along each axis.
-  [[nodiscard]] bool linear_between_nodes() const { return tables() != nullptr; }
+  [[nodiscard]] bool linear_between_nodes() const {
+    return interpolation() == estimation::Interpolation::Linear;
+  }
+  /// Of the tables; nullopt for a model of polynomials.
+  [[nodiscard]] std::optional<estimation::Interpolation> interpolation() const {
+    return tables() == nullptr ? std::nullopt
+                               : std::optional(tables()->interpolation(Axis::X).kind());
+  }
   /// Null for a model of polynomials.
   [[nodiscard]] const estimation::TableBasis* tables() const {
     return std::get_if<estimation::TableBasis>(&form_);
@@ -144,6 +155,9 @@ class VolumetricModel {
   Vector3 tool_line_ = Vector3::Zero();  ///< unit vector; zero: the model is valid for one tool
   Eigen::VectorXd U_;
   Eigen::MatrixXd covariance_;
+  /// Cubic tables: U and covariance with the second derivatives (estimation/cell_form.hpp).
+  Eigen::VectorXd Z_;
+  Eigen::MatrixXd cov_Z_;
   ValidityVolume validity_;
 };
 

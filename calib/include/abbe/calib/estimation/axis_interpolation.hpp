@@ -17,6 +17,7 @@
 /// Outside the nodes, the formula of the nearest cell is extrapolated.
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -26,7 +27,11 @@
 namespace abbe::calib::estimation {
 
 enum class Interpolation { Linear, NaturalCubic, NotAKnotCubic };
+/// "linear", "cubic" (natural), "not-a-knot-cubic".
 [[nodiscard]] std::string_view name(Interpolation);
+/// The interpolation of the tables of a model by its name, "linear" or "cubic"; nullopt for any
+/// other text.
+[[nodiscard]] std::optional<Interpolation> table_interpolation(std::string_view name);
 
 /// Weights of the nodes at one position. Points into the AxisInterpolation that returned it and
 /// must not outlive that object.
@@ -39,6 +44,16 @@ class NodeWeights {
     const double near = i == cell_ ? a_ : (i == cell_ + 1 ? b_ : 0.0);
     return below_ == nullptr ? near : near + curve_a_ * below_[i] + curve_b_ * above_[i];
   }
+
+  /// The same as a sum of four terms of the cell [k, k + 1]:
+  ///     f = value[0] U_k + value[1] U_k+1 + curvature[0] U''_k + curvature[1] U''_k+1
+  /// Linear: curvature is zero.
+  struct OfCell {
+    std::size_t k = 0;
+    double value[2] = {1.0, 0.0};
+    double curvature[2] = {0.0, 0.0};
+  };
+  [[nodiscard]] OfCell of_cell() const { return {first_ + cell_, {a_, b_}, {curve_a_, curve_b_}}; }
 
  private:
   friend class AxisInterpolation;
@@ -62,6 +77,13 @@ class AxisInterpolation {
   /// Largest number of nodes that have a weight at one position.
   [[nodiscard]] std::size_t most_weights() const {
     return kind_ == Interpolation::Linear ? 2 : size();
+  }
+
+  /// Row of M for a node: U'' there is the product of this row and U. Empty for linear
+  /// interpolation, whose U'' is zero.
+  [[nodiscard]] std::span<const double> curvature_row(std::size_t node) const {
+    return curvature_.empty() ? std::span<const double>{}
+                              : std::span(curvature_).subspan(node * size(), size());
   }
 
   /// No allocation.

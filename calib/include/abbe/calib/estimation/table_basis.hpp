@@ -25,6 +25,11 @@ enum class TravelDependence { None, Backlash, Tables };
 struct TableOptions {
   std::array<Interpolation, 3> interpolation{};  ///< of the tables of X, Y, Z
   TravelDependence travel = TravelDependence::None;
+
+  /// The same interpolation for all axes, no dependence on travel.
+  [[nodiscard]] static TableOptions all_axes(Interpolation kind) {
+    return {.interpolation = {kind, kind, kind}};
+  }
 };
 
 /// Immutable value.
@@ -36,6 +41,10 @@ class TableBasis {
   [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
   [[nodiscard]] const AxisInterpolation& interpolation(Axis a) const { return axis_[index(a)]; }
   [[nodiscard]] TravelDependence travel() const { return travel_; }
+  /// The options with which the basis was made.
+  [[nodiscard]] TableOptions options() const {
+    return {{axis_[0].kind(), axis_[1].kind(), axis_[2].kind()}, travel_};
+  }
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Largest number of columns at one state.
   [[nodiscard]] std::size_t most_columns() const { return most_columns_; }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "abbe/calib/axis_table.hpp"
+#include "abbe/calib/estimation/axis_interpolation.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
 #include "abbe/calib/otf/standstill_options.hpp"
@@ -25,6 +26,10 @@ struct Machine {
   MachineNodes nodes;  ///< axis ranges, nodes, references
   /// vector from the tool reference point to the reflector centre in this run
   Vector3 target_offset_m = Vector3::Zero();
+  /// Interpolation of the tables that are identified, Linear or NaturalCubic. A cubic reproduces
+  /// smooth errors with a fraction of the error of linear tables, but needs a path that determines
+  /// every node well.
+  estimation::Interpolation interpolation = estimation::Interpolation::Linear;
 };
 
 /// Polyline of the path; a vertex is an axis position (scale readings) in m with an exact stop, a

@@ -1,0 +1,389 @@
+#include "abbe/calib/otf/targets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/joint.hpp"
+#include "check_stopped.hpp"
+#include "message.hpp"
+#include "otf/added_columns.hpp"
+#include "otf/row_residuals.hpp"
+#include "otf/run_statistics.hpp"
+#include "otf/run_unknowns.hpp"
+#include "otf/systematic_effects.hpp"
+#include "tool_span.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+/// Observations of all runs, and the blocks they are made of (empty in standstill mode).
+struct ObservedRuns {
+  std::vector<Observations> observations;
+  std::vector<BlockSeries> series;
+};
+
+tl::unexpected<Error> error_of_run(std::size_t run, const Error& error) {
+  return failure(error.code, message("run ", run + 1, ": ", error.text));
+}
+
+Result<void> check_targets(std::span<const TargetRun> runs) {
+  std::vector<Vector3> offsets_m;
+  for (const TargetRun& run : runs) {
+    if (!run.target_offset_m.allFinite()) {
+      return failure(ErrorCode::NotFinite, "targets: an offset is not a number");
+    }
+    offsets_m.push_back(run.target_offset_m);
+  }
+
+  if (offsets_m.empty() || !tool_span(offsets_m).any) {
+    return failure(ErrorCode::DegenerateGeometry,
+                   message("targets: the offsets of the ", offsets_m.size(),
+                           " runs are on a line; 18 tables need three offsets that are not on a "
+                           "line"));
+  }
+  return {};
+}
+
+Result<estimation::TableBasis> basis_of_all_tables(const Machine& machine) {
+  return ParameterLayout::all_tables(machine.chain, machine.nodes)
+      .and_then([&](ParameterLayout layout) {
+        return estimation::TableBasis::of(
+            std::move(layout), estimation::TableOptions::all_axes(machine.interpolation));
+      });
+}
+
+Result<Observations> observe_run(const TargetRun& run, Machine machine, const Noise& noise,
+                                 const Options& options, std::vector<BlockSeries>& series) {
+  machine.target_offset_m = run.target_offset_m;
+  if (options.mode == Mode::Standstill) {
+    return observe(run.samples, machine, run.path, noise, options);
+  }
+  return make_blocks(run.samples, options).and_then([&](BlockSeries blocks) {
+    series.push_back(std::move(blocks));
+    return observe_blocks(series.back(), machine, run.path, noise, options);
+  });
+}
+
+Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs, const Machine& machine,
+                                  const Noise& noise, const Options& options) {
+  const Result<estimation::TableBasis> basis = basis_of_all_tables(machine);
+  if (!basis) {
+    return tl::unexpected(basis.error());
+  }
+
+  ObservedRuns all;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const Result<Observations> o = observe_run(runs[k], machine, noise, options, all.series);
+    if (!o) {
+      return error_of_run(k, o.error());
+    }
+    all.observations.push_back(with_basis(*o, *basis));
+  }
+  return all;
+}
+
+std::size_t rows_of_runs(std::span<const Observations> runs) {
+  std::size_t rows = 0;
+  for (const Observations& o : runs) {
+    rows += o.rows.size();
+  }
+  return rows;
+}
+
+estimation::Information information_of_runs(std::span<const Observations> runs) {
+  const RunUnknowns unknowns(runs);
+  estimation::Information all(unknowns.size());
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    all.add(information_of(runs[k]).data, unknowns.of_run(k));
+  }
+  return all;
+}
+
+estimation::DatumOptions datum_options(std::span<const Observations> runs, const Options& options) {
+  return {.weight = options.gauge_weight, .label = [runs](std::size_t unknown) {
+            return RunUnknowns(runs).label(runs.front(), unknown);
+          }};
+}
+
+/// Size of a change of the estimate in units of its standard uncertainty.
+double change_in_u(const Eigen::VectorXd& change, const estimation::Information& data) {
+  const Eigen::VectorXd whitened = data.R() * change;
+  return whitened.norm() / std::sqrt(static_cast<double>(change.size()));
+}
+
+/// Linearises the runs at their common solution; returns the number of adjustments.
+Result<int> linearise_runs(ObservedRuns& runs, const Noise& noise, const Options& options) {
+  const RunUnknowns unknowns(runs.observations);
+  const estimation::Datum gauge = gauge_of_runs(runs.observations.front().basis, unknowns.size());
+  Eigen::VectorXd at = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(unknowns.size()));
+
+  for (int adjustments = 1; adjustments <= options.max_adjustments; ++adjustments) {
+    if (Result<void> running = check_stopped(options.stopped); !running) {
+      return tl::unexpected(running.error());
+    }
+
+    const estimation::Information data = information_of_runs(runs.observations);
+    const Result<Eigen::VectorXd> U =
+        gauge.estimate(data, datum_options(runs.observations, options));
+    if (!U) {
+      return tl::unexpected(U.error());
+    }
+    if (change_in_u(*U - at, data) < options.adjustment_tolerance) {
+      return adjustments;
+    }
+
+    for (std::size_t k = 0; k < runs.series.size(); ++k) {
+      Observations& o = runs.observations[k];
+      o = linearised_at(std::move(o), unknowns.part(*U, k), runs.series[k], noise);
+    }
+    at = *U;
+    at.tail(at.size() - static_cast<Eigen::Index>(unknowns.model())).setZero();
+  }
+
+  return failure(ErrorCode::NotConverged,
+                 message("joint adjustment of ", runs.observations.size(),
+                         " runs: no convergence after ", options.max_adjustments,
+                         " adjustments; check that paths, points and target offsets belong "
+                         "together"));
+}
+
+std::vector<Residuals> residuals_of_runs(std::span<const Observations> runs,
+                                         const Eigen::VectorXd& U) {
+  const RunUnknowns unknowns(runs);
+  std::vector<Residuals> all;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    all.push_back({residuals_m(runs[k], {}), residuals_m(runs[k], unknowns.part(U, k))});
+  }
+  return all;
+}
+
+/// The adjustment of all runs for the unknowns of one. Its rank is the share of its rows.
+Adjustment adjustment_of_run(const Adjustment& of_all, std::span<const Observations> runs,
+                             std::size_t run) {
+  const RunUnknowns unknowns(runs);
+  const double share =
+      static_cast<double>(runs[run].rows.size()) / static_cast<double>(rows_of_runs(runs));
+  Adjustment part = of_all;
+  part.U = unknowns.part(of_all.U, run);
+  part.covariance = unknowns.block(of_all.covariance, run);
+  part.cofactor_Q = unknowns.block(of_all.cofactor_Q, run);
+  part.rank = static_cast<std::size_t>(std::lround(share * static_cast<double>(of_all.rank)));
+  return part;
+}
+
+ResidualStatistics statistics_joined(std::span<const Statistics> runs,
+                                     ResidualStatistics Statistics::*which) {
+  ResidualStatistics all;
+  double rows = 0.0;
+  for (const Statistics& s : runs) {
+    const auto n = static_cast<double>(s.observations);
+    const ResidualStatistics& r = s.*which;
+    all.mean_abs_m += n * r.mean_abs_m;
+    all.rms_m += n * r.rms_m * r.rms_m;
+    all.weighted_rms += n * r.weighted_rms * r.weighted_rms;
+    all.max_abs_m = std::max(all.max_abs_m, r.max_abs_m);
+    rows += n;
+  }
+  all.mean_abs_m /= rows;
+  all.rms_m = std::sqrt(all.rms_m / rows);
+  all.weighted_rms = std::sqrt(all.weighted_rms / rows);
+  return all;
+}
+
+Statistics statistics_of_all(std::span<const Statistics> runs, const Adjustment& a,
+                             std::size_t unknowns) {
+  Statistics s;
+  for (const Statistics& run : runs) {
+    s.samples += run.samples;
+    s.lost_samples += run.lost_samples;
+    s.blocks += run.blocks;
+    s.blocks_used += run.blocks_used;
+    s.observations += run.observations;
+    s.chi2 += run.chi2;
+    s.correlation = std::max(s.correlation, run.correlation);
+    s.variance_factor = std::max(s.variance_factor, run.variance_factor);
+    s.alignment_iterations = std::max(s.alignment_iterations, run.alignment_iterations);
+    s.alignment_rms_m = std::max(s.alignment_rms_m, run.alignment_rms_m);
+  }
+
+  s.unknowns = unknowns;
+  s.rank = a.rank;
+  s.gauge_conditions = a.datum_defect;
+  s.condition = a.condition;
+  s.degrees_of_freedom = s.observations - s.rank;
+  s.chi2_per_dof = s.chi2 / static_cast<double>(s.degrees_of_freedom);
+  s.sigma0 = std::sqrt(s.chi2_per_dof);
+  s.variance_factor = std::max(
+      s.variance_factor,
+      variance_factor({.sigma0 = s.sigma0, .correlation = s.correlation}, s.degrees_of_freedom));
+  s.before = statistics_joined(runs, &Statistics::before);
+  s.after = statistics_joined(runs, &Statistics::after);
+  return s;
+}
+
+std::vector<Statistics> statistics_of_runs(std::span<const Observations> runs, const Adjustment& a,
+                                           std::span<const Residuals> residuals) {
+  std::vector<Statistics> all;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    all.push_back(statistics(runs[k], adjustment_of_run(a, runs, k), residuals[k]));
+  }
+  return all;
+}
+
+/// The entries of a row at their places among the unknowns of all runs.
+std::vector<SparseRows::Entry> entries_at(std::span<const SparseRows::Entry> row,
+                                          std::span<const std::size_t> at) {
+  std::vector<SparseRows::Entry> entries(row.begin(), row.end());
+  for (SparseRows::Entry& e : entries) {
+    e.column = at[e.column];
+  }
+  return entries;
+}
+
+/// The offset common to all ranges of all runs, with its prior.
+AddedColumns::Estimate estimate_offset(std::span<const Observations> runs, const Adjustment& a,
+                                       std::span<const Residuals> residuals, double factor) {
+  const RunUnknowns unknowns(runs);
+  AddedColumns sums(1, unknowns.size());
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const Observations& o = runs[k];
+    const std::vector<std::size_t> at = unknowns.of_run(k);
+    for (std::size_t i = 0; i < o.rows.size(); ++i) {
+      const double c = drow_drange_offset(o, o.rows[i]);
+      sums.add(o.rows[i], entries_at(o.A.row(i), at), residuals[k].after_m[i], std::span(&c, 1));
+    }
+  }
+  return sums.estimate_with_prior(a.cofactor_Q, runs.front().u_range_offset_m, factor);
+}
+
+void subtract_offset(std::vector<Residuals>& residuals, std::span<const Observations> runs,
+                     const Eigen::VectorXd& U, double offset_m) {
+  const RunUnknowns unknowns(runs);
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    residuals[k].after_m =
+        residuals_m(without_range_offset(runs[k], offset_m), unknowns.part(U, k));
+  }
+}
+
+void add_scales_of_runs(Eigen::MatrixXd& covariance, std::span<const Observations> runs,
+                        const Eigen::MatrixXd& Q) {
+  const RunUnknowns unknowns(runs);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(Q.rows());
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    g(unknowns.of_run(k)) += dg_drange_scale(runs[k], WhitenedRows(runs[k]));
+  }
+  const Eigen::VectorXd of_ranges = runs.front().u_scale * (Q * g);
+  covariance += of_ranges * of_ranges.transpose();
+
+  for (const Axis axis : kAllAxes) {
+    Eigen::VectorXd of_axis = Eigen::VectorXd::Zero(Q.rows());
+    of_axis(unknowns.of_run(0)) =
+        runs.front().u_axis_scale[index(axis)] * dU_daxis_scale(runs.front(), axis);
+    covariance += of_axis * of_axis.transpose();
+  }
+}
+
+Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const Adjustment& a) {
+  std::vector<Vector3> covered_m, tools_m;
+  for (const Observations& o : runs) {
+    covered_m.insert(covered_m.end(), o.covered_m.begin(), o.covered_m.end());
+    tools_m.push_back(o.target_offset_m);
+  }
+
+  const estimation::TableBasis& basis = runs.front().basis;
+  const auto n = static_cast<Eigen::Index>(basis.size());
+  return ValidityVolume::hull_of(covered_m).and_then([&](ValidityVolume validity) {
+    return VolumetricModel::from_vector(basis.layout(), Gauge::G1, tools_m, a.U.head(n),
+                                        a.covariance.topLeftCorner(n, n), std::move(validity),
+                                        basis.interpolation(Axis::X).kind());
+  });
+}
+
+Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adjustments,
+                                         const Options& options) {
+  const RunUnknowns unknowns(runs);
+  if (rows_of_runs(runs) <= unknowns.size()) {
+    return failure(ErrorCode::TooFewObservations,
+                   message("adjustment of ", runs.size(), " runs: ", rows_of_runs(runs),
+                           " observations for ", unknowns.size(), " unknowns"));
+  }
+
+  Result<Adjustment> a = gauge_of_runs(runs.front().basis, unknowns.size())
+                             .solve(information_of_runs(runs), datum_options(runs, options));
+  if (!a) {
+    return tl::unexpected(a.error());
+  }
+
+  const Adjustment of_rows = *a;
+  std::vector<Residuals> residuals = residuals_of_runs(runs, a->U);
+  std::vector<Statistics> of_runs = statistics_of_runs(runs, *a, residuals);
+  Statistics all = statistics_of_all(of_runs, *a, unknowns.size());
+  RangeOffset offset;
+  Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+
+  if (runs.front().u_range_offset_m > 0.0) {
+    const AddedColumns::Estimate e = estimate_offset(runs, *a, residuals, all.variance_factor);
+    offset = {e.d(0), e.u(0)};
+    a->U -= e.dU;
+    root_of_offset = e.root_cov_dU;
+    subtract_offset(residuals, runs, a->U, offset.value_m);
+    of_runs = statistics_of_runs(runs, *a, residuals);
+    all = statistics_of_all(of_runs, *a, unknowns.size());
+  }
+
+  a->covariance *= all.variance_factor;
+  a->covariance += root_of_offset * root_of_offset.transpose();
+  add_scales_of_runs(a->covariance, runs, a->cofactor_Q);
+  all.iterations = adjustments;
+
+  const Result<VolumetricModel> model = model_of_runs(runs, *a);
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+
+  TargetsIdentification found{.observations = {}, .solutions = {}, .statistics = all};
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const auto rigid = static_cast<Eigen::Index>(unknowns.rigid_offset(k));
+    found.solutions.push_back({.estimator = options.estimator,
+                               .model = *model,
+                               .rigid = a->U.segment<kRigidUnknowns>(rigid),
+                               .covariance_with_rigid = unknowns.block(a->covariance, k),
+                               .adjustment = adjustment_of_run(of_rows, runs, k),
+                               .T_machine_tracker = runs[k].alignment.T_machine_tracker,
+                               .statistics = of_runs[k],
+                               .residuals = std::move(residuals[k]),
+                               .range_offset = offset});
+  }
+  found.observations = std::move(runs);
+  return found;
+}
+
+}  // namespace
+
+Result<TargetsIdentification> identify_targets(std::span<const TargetRun> runs,
+                                               const Machine& machine, const Noise& noise,
+                                               const Options& options) {
+  if (Result<void> valid = check_targets(runs); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  Result<ObservedRuns> observed = observe_runs(runs, machine, noise, options);
+  if (!observed) {
+    return tl::unexpected(observed.error());
+  }
+
+  int adjustments = 1;
+  if (options.estimator == Estimator::Joint && options.mode == Mode::OnTheFly) {
+    const Result<int> linearised = linearise_runs(*observed, noise, options);
+    if (!linearised) {
+      return tl::unexpected(linearised.error());
+    }
+    adjustments = *linearised;
+  }
+
+  return solve_runs(std::move(observed->observations), adjustments, options);
+}
+
+}  // namespace abbe::calib::otf

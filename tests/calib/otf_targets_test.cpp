@@ -1,0 +1,248 @@
+#include "abbe/calib/otf/targets.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/model_comparison.hpp"
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::otf;
+using namespace abbe::tests::otf;
+using estimation::Interpolation;
+using testing::HasSubstr;
+
+const std::vector<Vector3> kThreeTargets{
+    {0.02, -0.015, -0.12}, {0.17, -0.015, -0.12}, {0.02, 0.135, -0.17}};
+
+struct MadeTargetsOptions {
+  unsigned seed = 1;
+  double noise_factor = 1.0, error_scale_m = 10e-6, range_offset_m = 0.0;
+  std::string chain = "[w X' b Y Z (C1) t]";
+  Interpolation interpolation = Interpolation::Linear;
+  std::vector<Vector3> targets_m = kThreeTargets;
+};
+
+/// Runs of one machine with 18 random tables; the tracker stands elsewhere in each.
+struct MadeTargets {
+  Machine machine;
+  Options options;
+  Noise noise;
+  Eigen::VectorXd truth;  ///< gauge G1
+  std::vector<std::vector<TrackerObservation>> samples;
+  std::vector<TargetRun> runs;
+
+  [[nodiscard]] estimation::TableBasis basis() const {
+    return *estimation::TableBasis::of(*ParameterLayout::all_tables(machine.chain, machine.nodes),
+                                       estimation::TableOptions::all_axes(machine.interpolation));
+  }
+  [[nodiscard]] Vector3 V_m(const Vector3& q, const Vector3& t) const {
+    return basis().V_m({.q_m = q, .tool_offset_m = t},
+                       {truth.data(), static_cast<std::size_t>(truth.size())});
+  }
+};
+
+RigidTransform turned_tracker(std::size_t run) {
+  RigidTransform T = case_a_alignment(true);
+  const double angle = 0.4 * static_cast<double>(run);
+  Matrix3 R;
+  R << std::cos(angle), -std::sin(angle), 0.0, std::sin(angle), std::cos(angle), 0.0, 0.0, 0.0, 1.0;
+  return {R * T.R, R * T.t_m};
+}
+
+MadeTargets make_targets(const MadeTargetsOptions& wanted) {
+  std::mt19937_64 random(wanted.seed);
+  MadeTargets made;
+  made.machine = coarse_machine(wanted.chain);
+  made.machine.interpolation = wanted.interpolation;
+  made.options.block_samples = 10;
+  made.options.orientation.scales_agree = true;
+  const estimation::TableBasis basis = made.basis();
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(basis.size() + 6));
+  const auto n = static_cast<Eigen::Index>(basis.size());
+  U.head(n) = random_tables(basis.layout(), wanted.error_scale_m, random);
+  made.truth = to_gauge(Gauge::G1, basis.layout(), kThreeTargets, U)->head(n);
+
+  constexpr double kRate_hz = 250.0, kSpeed_m_s = 0.4;
+  for (std::size_t k = 0; k < wanted.targets_m.size(); ++k) {
+    const RigidTransform T = turned_tracker(k);
+    const Vector3& t = wanted.targets_m[k];
+    std::vector<TrackerObservation>& samples = made.samples.emplace_back();
+    for (const Vector3& q : drive(case_a_path(), kSpeed_m_s, kRate_hz)) {
+      const Vector3 V =
+          basis.V_m({.q_m = q, .tool_offset_m = t}, {made.truth.data(), basis.size()});
+      const Vector3 p = T.R.transpose() * (q + t + V - T.t_m);
+      samples.push_back({static_cast<double>(samples.size()) / kRate_hz,
+                         with_noise(p * (1.0 + wanted.range_offset_m / p.norm()), made.noise,
+                                    wanted.noise_factor, random),
+                         true});
+    }
+  }
+  for (std::size_t k = 0; k < wanted.targets_m.size(); ++k) {
+    made.runs.push_back({made.samples[k], case_a_path(), wanted.targets_m[k]});
+  }
+  return made;
+}
+
+Result<TargetsIdentification> identified(const MadeTargets& made) {
+  return identify_targets(made.runs, made.machine, made.noise, made.options);
+}
+
+TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
+  for (const char* chain : {"[w X' b Y Z (C1) t]", "[w b Z X Y (C1) t]"}) {
+    MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6, .chain = chain});
+    made.options.estimator = Estimator::Joint;
+    const auto found = identified(made);
+    ASSERT_TRUE(found) << found.error().text;
+    EXPECT_EQ(found->statistics.unknowns - found->statistics.rank, 24u);
+    EXPECT_EQ(found->statistics.gauge_conditions, 24u);
+    EXPECT_LT((found->model().U() - made.truth).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+TEST(SeveralTargets, GiveAModelForAToolThatWasNotMeasured) {
+  MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6});
+  made.options.estimator = Estimator::Joint;
+  const auto found = identified(made);
+  ASSERT_TRUE(found) << found.error().text;
+  const Vector3 other(-0.2, 0.3, 0.1);
+  EXPECT_TRUE(found->model().holds_for_tool(other));
+  for (const Vector3& q : tensor_grid(made.machine.nodes)) {
+    EXPECT_LT((found->model().V_at(q, other) - made.V_m(q, other)).norm(), 1e-9);
+  }
+}
+
+TEST(SeveralTargets, AreJoinedWithCubicTablesToo) {
+  MadeTargets made = make_targets(
+      {.noise_factor = 0.0, .error_scale_m = 30e-6, .interpolation = Interpolation::NaturalCubic});
+  made.options.estimator = Estimator::Joint;
+  const auto found = identified(made);
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(found->model().interpolation(), Interpolation::NaturalCubic);
+  // The gauge of the truth is that of linear tables: V differs by a rigid motion.
+  const Vector3 other(-0.2, 0.3, 0.1);
+  std::vector<Vector3> points, left;
+  for (const Vector3& q : tensor_grid(found->model().nodes())) {
+    points.push_back(q + other);
+    left.push_back(found->model().V_at(q, other) - made.V_m(q, other));
+  }
+  EXPECT_LT(rigid_free(points, left)->rigid_free.max_m, 1e-9);
+}
+
+/// (error / standard uncertainty)^2, summed over the independent combinations of the parameters.
+struct ChiSquareOfErrors {
+  double squares = 0.0;
+  double combinations = 0.0;
+
+  void add(const VolumetricModel& model, const Eigen::VectorXd& truth) {
+    const Eigen::VectorXd scale = model.covariance().diagonal().unaryExpr(
+        [](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+        scale.asDiagonal() * model.covariance() * scale.asDiagonal());
+    const Eigen::VectorXd along =
+        eigen.eigenvectors().transpose() * scale.asDiagonal() * (model.U() - truth);
+    constexpr double kFixed = 1e-9;  // relative variance of a combination that the gauge fixes
+    for (Eigen::Index i = 0; i < along.size(); ++i) {
+      if (const double variance = eigen.eigenvalues()(i); variance > kFixed) {
+        squares += along(i) * along(i) / variance;
+        combinations += 1.0;
+      }
+    }
+  }
+};
+
+TEST(SeveralTargets, HaveTheErrorsThatTheyState) {
+  ChiSquareOfErrors all;
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    const MadeTargets made = make_targets({.seed = seed});
+    const auto found = identified(made);
+    ASSERT_TRUE(found) << found.error().text;
+    EXPECT_NEAR(found->statistics.sigma0, 1.0, 0.05);
+    all.add(found->model(), made.truth);
+  }
+
+  // chi-square of n combinations: mean 1 after division by n, standard deviation sqrt(2 / n)
+  EXPECT_GT(all.combinations, 150.0);
+  EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+}
+
+TEST(SeveralTargets, OnALineAreRefused) {
+  const Vector3 step(0.1, 0.0, 0.05);
+  for (const auto& targets :
+       {std::vector{kThreeTargets[0]}, std::vector{kThreeTargets[0], kThreeTargets[1]},
+        std::vector<Vector3>{kThreeTargets[0], kThreeTargets[0] + step,
+                             kThreeTargets[0] - 2.0 * step}}) {
+    const auto found = identified(make_targets({.targets_m = targets}));
+    ASSERT_FALSE(found) << targets.size();
+    EXPECT_EQ(found.error().code, ErrorCode::DegenerateGeometry);
+    EXPECT_THAT(found.error().text, HasSubstr("three offsets that are not on a line"));
+  }
+}
+
+TEST(SeveralTargets, EstimateTheOffsetThatAllRangesShare) {
+  MadeTargets made = make_targets({.range_offset_m = 15e-6});
+  made.noise.u_range_offset_m = 20e-6;
+  const auto found = identified(made);
+  ASSERT_TRUE(found) << found.error().text;
+  const RangeOffset& offset = found->solutions.back().range_offset;
+  EXPECT_NEAR(offset.value_m, 15e-6, 3.0 * offset.u_m);
+  EXPECT_LT(offset.u_m, 5e-6);
+  EXPECT_NEAR(found->statistics.sigma0, 1.0, 0.05);
+}
+
+TEST(SeveralTargets, StateTheUncertaintyOfScalesOnceForAllRuns) {
+  MadeTargets made = make_targets({});
+  const auto without = identified(made);
+  made.noise.u_scale = 1e-6;
+  made.noise.u_axis_scale = {0.0, 2e-6, 0.0};
+  const auto with = identified(made);
+  ASSERT_TRUE(without && with);
+  const auto variance_at = [](const TargetsIdentification& found, const Vector3& q) {
+    return found.model().error_at(q, kThreeTargets[0]).cov_V_m2(1, 1);
+  };
+  // Along Y, from the reference at 0: 1 ppm of the ranges and 2 ppm of the axis over 0.25 m.
+  const Vector3 q(0.0, 0.25, 0.0);
+  EXPECT_NEAR(variance_at(*with, q) - variance_at(*without, q), 0.25e-6 * 0.25e-6 * 5.0, 1e-15);
+}
+
+TEST(SeveralTargets, AreJudgedTogether) {
+  const MadeTargets made = make_targets({.seed = 3, .error_scale_m = 30e-6});
+  const auto found = identified(made);
+  ASSERT_TRUE(found) << found.error().text;
+  const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
+  EXPECT_LT(verdict->held_out.candidate, 1.1);
+  std::size_t rows = 0;
+  for (const Observations& o : found->observations) {
+    rows += o.rows.size();
+  }
+  EXPECT_EQ(verdict->held_out.observations + verdict->held_out.not_held_out, rows);
+}
+
+/// A wrong offset in the configuration by a constant is only a rigid motion of its run; one that
+/// belongs to another run is a contradiction.
+TEST(SeveralTargets, WithExchangedOffsetsDoNotFit) {
+  MadeTargets made = make_targets({.seed = 3, .error_scale_m = 100e-6});
+  std::swap(made.runs[0].target_offset_m, made.runs[1].target_offset_m);
+  const auto found = identified(made);
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_GT(found->statistics.sigma0, 1.5);
+}
+
+TEST(SeveralTargets, NameTheRunThatDoesNotFitItsPath) {
+  MadeTargets made = make_targets({});
+  made.runs[1].path.vertices_m.resize(20);
+  const auto found = identified(made);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().text, HasSubstr("run 2: "));
+}
+
+}  // namespace

@@ -64,6 +64,7 @@ class BlockCutter {
   void add(const TrackerObservation& sample) {
     if (sample.valid) {
       in_block_.push_back(&sample.p_tracker_m);
+      times_s_.push_back(sample.time_s);
     } else {
       ++series_.lost_samples;
     }
@@ -97,6 +98,16 @@ class BlockCutter {
       block.mean_tracker_m /= static_cast<double>(block.samples);
     }
 
+    if (block.samples > 0) {
+      // relative to the first: the sum of absolute times would lose digits
+      for (const double time_s : times_s_) {
+        block.time_s += time_s - times_s_.front();
+      }
+      block.time_s = times_s_.front() + block.time_s / static_cast<double>(block.samples);
+      block.first_s = times_s_.front();
+      block.last_s = times_s_.back();
+    }
+
     block.usable = block.samples > 0 && 2 * block.samples >= options_.block_samples;
     block.first_sub_point = series_.sub_points_tracker_m.size();
     if (block.usable) {
@@ -105,6 +116,7 @@ class BlockCutter {
 
     series_.blocks.push_back(block);
     in_block_.clear();
+    times_s_.clear();
     ticks_ = 0;
   }
 
@@ -127,6 +139,7 @@ class BlockCutter {
   const Options& options_;
   BlockSeries series_;
   std::vector<const Vector3*> in_block_;
+  std::vector<double> times_s_;  ///< of the samples in_block_
   std::size_t ticks_ = 0;
 };
 
@@ -201,6 +214,8 @@ Result<BlockSeries> make_blocks(std::span<const TrackerObservation> samples,
   series.start_tracker_m = *start;
   series.end_tracker_m = *end;
   series.samples = samples.size();
+  series.first_time_s = samples.front().time_s;
+  series.period_s = tick_s;
 
   return series;
 }

@@ -30,7 +30,7 @@ struct Remainder {
 Vector6 rigid_row(const Observations& o, std::size_t row) {
   Vector6 r = Vector6::Zero();
   for (const SparseRows::Entry& e : o.A.row(row)) {
-    if (e.column >= o.rigid_offset()) {
+    if (e.column >= o.rigid_offset() && e.column < o.clock_offset()) {
       r(static_cast<Eigen::Index>(e.column - o.rigid_offset())) = e.value;
     }
   }
@@ -175,7 +175,7 @@ struct HeldOutFold {
 /// held-out rows.
 Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fold,
                              std::size_t folds, const Options& options) {
-  const RunUnknowns unknowns(runs.front().o.basis.size(), runs.size());
+  const RunUnknowns unknowns(runs.front().o, runs.size());
   estimation::Information training(unknowns.size());
   std::vector<std::vector<bool>> needed;
 

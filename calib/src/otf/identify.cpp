@@ -4,6 +4,7 @@
 
 #include "abbe/calib/otf/joint.hpp"
 #include "abbe/calib/otf/prewhitening.hpp"
+#include "otf/synchronised.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -22,9 +23,9 @@ Options after_linearisation(Options options) {
 }
 
 Result<Identification> joint(Observations of_alignment, const BlockSeries& series,
-                             const Noise& noise, const Options& options) {
+                             const Noise& noise, const Options& options, AlongRows* along) {
   Result<JointObservations> at_solution =
-      linearise_at_solution(std::move(of_alignment), series, noise, options);
+      linearise_at_solution(std::move(of_alignment), series, noise, options, along);
   if (!at_solution) {
     return tl::unexpected(at_solution.error());
   }
@@ -49,6 +50,15 @@ Result<Identification> two_step(Observations observations, const Options& option
     return tl::unexpected(solution.error());
   }
   return Identification{std::move(observations), *std::move(solution)};
+}
+
+Result<Identification> estimated(Observations across, const BlockSeries& series, const Noise& noise,
+                                 const Options& options, AlongRows* along) {
+  if (options.estimator == Estimator::Joint) {
+    return joint(std::move(across), series, noise, options, along);
+  }
+  return two_step(along != nullptr ? along->added_to(across, series, noise) : std::move(across),
+                  options);
 }
 
 }  // namespace
@@ -76,11 +86,13 @@ Result<Identification> identify_blocks(const BlockSeries& series, const Machine&
     return tl::unexpected(observations.error());
   }
 
-  if (options.estimator == Estimator::Joint) {
-    return joint(*std::move(observations), series, noise, options);
+  if (options.encoders != nullptr) {
+    return identify_synchronised(*observations, series, noise, options, [&](AlongRows* along) {
+      return estimated(*observations, series, noise, options, along);
+    });
   }
 
-  return two_step(*std::move(observations), options);
+  return estimated(*std::move(observations), series, noise, options, nullptr);
 }
 
 }  // namespace abbe::calib::otf

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "check_stopped.hpp"
@@ -108,36 +109,46 @@ Observations linearised_at(Observations o, const Eigen::VectorXd& U, const Block
 }
 
 Result<JointObservations> linearise_at_solution(Observations o, const BlockSeries& series,
-                                                const Noise& noise, const Options& options) {
+                                                const Noise& noise, const Options& options,
+                                                AlongRows* along) {
   if (o.rows.size() <= o.unknowns()) {
     RowInformation information = information_of(o);
     return JointObservations{std::move(o), std::move(information), 0};
   }
 
-  const estimation::Datum gauge = gauge_of(o);
-  Eigen::VectorXd at = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
+  std::optional<Observations> with_along;
+  Eigen::VectorXd at;
   double change = 0.0;
   for (int adjustments = 1; adjustments <= options.max_adjustments; ++adjustments) {
     if (Result<void> running = check_stopped(options.stopped); !running) {
       return tl::unexpected(running.error());
     }
 
-    RowInformation information = information_of(o);
-    const Result<Eigen::VectorXd> U = gauge.estimate(
+    if (along != nullptr) {
+      with_along = along->added_to(o, series, noise);
+    }
+    Observations& rows = with_along ? *with_along : o;
+    at.conservativeResizeLike(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.unknowns())));
+
+    RowInformation information = information_of(rows);
+    const Result<Eigen::VectorXd> U = gauge_of(rows).estimate(
         information.data,
-        {.weight = options.gauge_weight, .label = [&](std::size_t i) { return o.label(i); }});
+        {.weight = options.gauge_weight, .label = [&](std::size_t i) { return rows.label(i); }});
     if (!U) {
       return tl::unexpected(U.error());
     }
 
     change = size_of(*U - at, information.data);
     if (change < options.adjustment_tolerance) {
-      return JointObservations{std::move(o), std::move(information), adjustments};
+      return JointObservations{std::move(rows), std::move(information), adjustments};
     }
 
     o = linearised_at(std::move(o), *U, series, noise);
+    if (along != nullptr) {
+      along->correct_clock(U->tail(static_cast<Eigen::Index>(along->clock_unknowns())));
+    }
     at = *U;
-    at.tail<kRigidUnknowns>().setZero();
+    at.tail(at.size() - static_cast<Eigen::Index>(o.rigid_offset())).setZero();
   }
 
   return failure(ErrorCode::NotConverged,

@@ -43,10 +43,12 @@ std::size_t series_end(const Observations& o, std::size_t begin) {
 
 /// Whitened residuals of a series in one direction, for example along a2.
 std::vector<double> whitened(const Observations& o, std::span<const double> residual_m,
-                             std::size_t begin, std::size_t end) {
+                             std::size_t begin, std::size_t end, std::size_t component) {
   std::vector<double> w;
-  for (std::size_t i = begin; i < end; i += o.rows_per_point()) {
-    w.push_back(residual_m[i] / o.rows[i].sigma_m);
+  for (std::size_t i = begin; i < end; ++i) {
+    if (o.rows[i].component == component) {
+      w.push_back(residual_m[i] / o.rows[i].sigma_m);
+    }
   }
   return w;
 }
@@ -346,15 +348,15 @@ double ResidualNoise::variance_factor() const {
 }
 
 ResidualNoise residual_noise(const Observations& o, std::span<const double> residual_m,
-                             std::size_t degrees_of_freedom) {
+                             std::size_t degrees_of_freedom, std::optional<std::size_t> of) {
   constexpr std::size_t kLags = 200;
   std::vector<double> products(kLags + 1, 0.0), second_differences;
   std::vector<std::size_t> pairs(kLags + 1, 0);
 
   for (std::size_t begin = 0; begin < o.rows.size();) {
     const std::size_t end = series_end(o, begin);
-    for (std::size_t first = begin; first < begin + o.rows_per_point(); ++first) {
-      const std::vector<double> w = whitened(o, residual_m, first, end);
+    for (std::size_t c = of ? *of : 0; c <= (of ? *of : kAlong); ++c) {
+      const std::vector<double> w = whitened(o, residual_m, begin, end, c);
       for (std::size_t i = 0; i < w.size(); ++i) {
         for (std::size_t lag = 0; lag <= std::min(kLags, i); ++lag) {
           products[lag] += w[i] * w[i - lag];

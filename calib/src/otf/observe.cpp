@@ -166,7 +166,8 @@ std::span<const SparseRows::Entry> SparseRows::row(std::size_t i) const {
 }
 
 std::string Observations::label(std::size_t unknown) const {
-  constexpr std::array<std::string_view, kRigidUnknowns> kNames{"tx", "ty", "tz", "rx", "ry", "rz"};
+  constexpr std::array<std::string_view, kRigidUnknowns + kClockUnknowns> kNames{
+      "tx", "ty", "tz", "rx", "ry", "rz", "offset of the clocks", "drift of the clocks"};
   return unknown < rigid_offset() ? basis.label(unknown)
                                   : std::string(kNames.at(unknown - rigid_offset()));
 }
@@ -205,11 +206,14 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
   const MeanColumns columns = mean_columns(o.basis, o.target_offset_m, sub_points_m);
   const std::size_t first = o.sub_points_m.size();
   o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
+  std::size_t component = 0;
   for (const MeasuredComponent& c : components) {
-    o.A.append(columns.along(c.direction));
+    std::vector<SparseRows::Entry> row = columns.along(c.direction);
+    row.insert(row.end(), c.clock.begin(), c.clock.end());
+    o.A.append(row);
     o.rows.push_back({c.direction.dot(point.deviation_m), c.sigma_m, 1.0 / (c.sigma_m * c.sigma_m),
                       point.leg, point.block, c.direction, point.axis_position_m, first,
-                      sub_points_m.size()});
+                      sub_points_m.size(), component++});
   }
 }
 
@@ -271,7 +275,13 @@ Observations with_basis(const Observations& o, estimation::TableBasis basis) {
           mean_columns(other.basis, o.target_offset_m,
                        std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
     }
-    other.A.append(columns.along(row.direction));
+    std::vector<SparseRows::Entry> entries = columns.along(row.direction);
+    for (const SparseRows::Entry& e : o.A.row(i)) {
+      if (e.column >= o.clock_offset()) {
+        entries.push_back({e.column - o.clock_offset() + other.clock_offset(), e.value});
+      }
+    }
+    other.A.append(entries);
   }
 
   return other;

@@ -17,20 +17,26 @@ namespace {
 
 constexpr std::size_t kLags = Autoregression::kMostOrder;
 
-/// Autocorrelations of the whitened residuals of every second row from `first` on.
+/// Autocorrelations of the whitened residuals of the rows of one component.
 struct Autocorrelation {
   std::array<double, kLags + 1> coefficient{1.0};  ///< by lag, in blocks
   double pairs = 0.0;                              ///< of neighbours
 };
 
 Autocorrelation autocorrelation(const Observations& o, std::span<const double> residual_m,
-                                std::size_t first) {
+                                std::size_t component) {
   std::array<double, kLags + 1> products{}, pairs{};
   const auto w = [&](std::size_t i) { return residual_m[i] / o.rows[i].sigma_m; };
-  for (std::size_t i = first; i < o.rows.size(); i += 2) {
-    const std::size_t before = rows_before(o, i, kLags);
-    for (std::size_t lag = 0; lag <= before; ++lag) {
-      products[lag] += w(i) * w(i - 2 * lag);
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (o.rows[i].component != component) {
+      continue;
+    }
+    products[0] += w(i) * w(i);
+    pairs[0] += 1.0;
+    std::size_t lag = 0;
+    for (const std::size_t before : rows_before(o, i, kLags)) {
+      ++lag;
+      products[lag] += w(i) * w(before);
       pairs[lag] += 1.0;
     }
   }
@@ -135,7 +141,8 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
 
 NoiseFilter noise_filter(const Observations& o, std::span<const double> residual_m) {
   return {{autoregression(autocorrelation(o, residual_m, 0)),
-           autoregression(autocorrelation(o, residual_m, 1))}};
+           autoregression(autocorrelation(o, residual_m, 1)),
+           autoregression(autocorrelation(o, residual_m, kAlong))}};
 }
 
 Result<Solution> prewhitened(Solution s, const Observations& o, const Options& options) {
@@ -165,6 +172,7 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
 
   s.model = *std::move(model);
   s.rigid = w->U.segment<kRigidUnknowns>(n);
+  s.clock = w->U.tail(static_cast<Eigen::Index>(o.clock_unknowns));
   s.covariance_with_rigid = std::move(w->covariance);
   s.statistics.variance_factor = w->variance_factor;
   s.statistics.noise_correlation = {filter.of_direction[0].lag_1(), filter.of_direction[1].lag_1()};

@@ -1,6 +1,6 @@
 #pragma once
-/// Unknowns of several runs with the same tables: the parameters of the model, then the six rigid
-/// unknowns of each run.
+/// Unknowns of several runs with the same tables: the parameters of the model, then the rigid and
+/// clock unknowns of each run. All runs have clock unknowns, or none has.
 
 #include <cstddef>
 #include <span>
@@ -15,21 +15,22 @@ namespace abbe::calib::otf {
 
 class RunUnknowns {
  public:
-  RunUnknowns(std::size_t model, std::size_t runs) : model_(model), runs_(runs) {}
+  RunUnknowns(const Observations& of_any_run, std::size_t runs)
+      : model_(of_any_run.basis.size()), per_run_(of_any_run.unknowns() - model_), runs_(runs) {}
   explicit RunUnknowns(std::span<const Observations> runs)
-      : RunUnknowns(runs.front().basis.size(), runs.size()) {}
+      : RunUnknowns(runs.front(), runs.size()) {}
 
   [[nodiscard]] std::size_t model() const { return model_; }
-  [[nodiscard]] std::size_t size() const { return model_ + kRigidUnknowns * runs_; }
+  [[nodiscard]] std::size_t size() const { return model_ + per_run_ * runs_; }
   [[nodiscard]] std::size_t rigid_offset(std::size_t run) const {
-    return model_ + kRigidUnknowns * run;
+    return model_ + per_run_ * run;
   }
 
   /// For each unknown of the observations of a run, its place among the unknowns of all runs.
   [[nodiscard]] std::vector<std::size_t> of_run(std::size_t run) const {
     std::vector<std::size_t> at;
-    for (std::size_t i = 0; i < model_ + kRigidUnknowns; ++i) {
-      at.push_back(i < model_ ? i : i + kRigidUnknowns * run);
+    for (std::size_t i = 0; i < model_ + per_run_; ++i) {
+      at.push_back(i < model_ ? i : i + per_run_ * run);
     }
     return at;
   }
@@ -48,13 +49,13 @@ class RunUnknowns {
     if (unknown < model_ || runs_ == 1) {
       return of_any_run.label(unknown);
     }
-    const std::size_t rigid = unknown - model_;
-    return of_any_run.label(model_ + rigid % kRigidUnknowns) + " of run " +
-           std::to_string(rigid / kRigidUnknowns + 1);
+    const std::size_t place = unknown - model_;
+    return of_any_run.label(model_ + place % per_run_) + " of run " +
+           std::to_string(place / per_run_ + 1);
   }
 
  private:
-  std::size_t model_ = 0, runs_ = 0;
+  std::size_t model_ = 0, per_run_ = 0, runs_ = 0;
 };
 
 /// The conditions of gauge G1 for `unknowns` unknowns, of which the first are those of the basis.

@@ -176,6 +176,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   return Solution{.estimator = Estimator::TwoStep,
                   .model = *std::move(model),
                   .rigid = a->U.segment<kRigidUnknowns>(n),
+                  .clock = a->U.tail(static_cast<Eigen::Index>(o.clock_unknowns)),
                   .covariance_with_rigid = a->covariance,
                   .adjustment = of_rows,
                   .T_machine_tracker = o.alignment.T_machine_tracker,

@@ -6,9 +6,6 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Rows come in pairs: along a2 and a3 of one block.
-constexpr std::size_t kRowsPerBlock = 2;
-
 /// factor times row, added to `sum`; columns ascend in both.
 void add_row(std::vector<SparseRows::Entry>& sum, std::span<const SparseRows::Entry> row,
              double factor) {
@@ -26,15 +23,25 @@ void add_row(std::vector<SparseRows::Entry>& sum, std::span<const SparseRows::En
 
 }  // namespace
 
-std::size_t rows_before(const Observations& o, std::size_t i, std::size_t most) {
-  std::size_t found = 0;
-  while (found < most) {
-    const std::size_t distance = kRowsPerBlock * (found + 1);
-    if (i < distance || o.rows[i - distance].leg != o.rows[i].leg ||
-        o.rows[i - distance].block + found + 1 != o.rows[i].block) {
+std::optional<std::size_t> row_before(const Observations& o, std::size_t i) {
+  const Observation& row = o.rows[i];
+  while (i > 0 && o.rows[i - 1].leg == row.leg && o.rows[i - 1].block + 1 >= row.block) {
+    --i;
+    if (o.rows[i].component == row.component) {
+      return o.rows[i].block + 1 == row.block ? std::optional(i) : std::nullopt;
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<std::size_t> rows_before(const Observations& o, std::size_t i, std::size_t most) {
+  std::vector<std::size_t> found;
+  while (found.size() < most) {
+    const std::optional<std::size_t> before = row_before(o, i);
+    if (!before) {
       break;
     }
-    ++found;
+    found.push_back(i = *before);
   }
   return found;
 }
@@ -43,8 +50,9 @@ WhitenedRows::WhitenedRows(const Observations& o, const NoiseFilter& filter)
     : o_(o), white_(filter.is_white()) {
   std::vector<SparseRows::Entry> sum;
   for (std::size_t i = 0; !white_ && i < o.rows.size(); ++i) {
-    const Autoregression& noise = filter.of_direction[i % kRowsPerBlock];
-    const std::size_t order = rows_before(o, i, noise.order);
+    const Autoregression& noise = filter.of_direction[o.rows[i].component];
+    const std::vector<std::size_t> before = rows_before(o, i, noise.order);
+    const std::size_t order = before.size();
     const double scale = 1.0 / std::sqrt(noise.variance[order]);
     const auto add = [&](std::size_t row, double factor) {
       terms_.push_back({row, factor});
@@ -54,9 +62,8 @@ WhitenedRows::WhitenedRows(const Observations& o, const NoiseFilter& filter)
     sum.clear();
     add(i, scale);
     for (std::size_t lag = 1; lag <= order; ++lag) {
-      const std::size_t before = i - kRowsPerBlock * lag;
-      const double ratio = o.rows[i].sigma_m / o.rows[before].sigma_m;
-      add(before, -scale * noise.coefficient[order][lag - 1] * ratio);
+      const double ratio = o.rows[i].sigma_m / o.rows[before[lag - 1]].sigma_m;
+      add(before[lag - 1], -scale * noise.coefficient[order][lag - 1] * ratio);
     }
 
     A_.append(sum);

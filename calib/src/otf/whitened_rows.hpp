@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -51,7 +52,11 @@ class WhitenedRows {
   std::vector<std::size_t> first_term_{0};
 };
 
-/// Number of rows of the same direction and leg directly before row i, at most `most`.
-[[nodiscard]] std::size_t rows_before(const Observations&, std::size_t i, std::size_t most);
+/// The row of the same component in the block directly before that of row i, if this block is used
+/// and on the same leg.
+[[nodiscard]] std::optional<std::size_t> row_before(const Observations&, std::size_t i);
+/// At most `most` rows of the same component in the used blocks directly before, latest first.
+[[nodiscard]] std::vector<std::size_t> rows_before(const Observations&, std::size_t i,
+                                                   std::size_t most);
 
 }  // namespace abbe::calib::otf

@@ -18,6 +18,8 @@ struct Block {
   /// Index of the first sub-point in BlockSeries::sub_points_tracker_m. A usable block has
   /// BlockSeries::sub_points of them.
   std::size_t first_sub_point = 0;
+  /// Tracker clock: mean, first and last time of the samples in the mean; 0 without times.
+  double time_s = 0.0, first_s = 0.0, last_s = 0.0;
 };
 
 /// Blocks of equal duration, in the order of time.
@@ -30,6 +32,8 @@ struct BlockSeries {
   Vector3 end_tracker_m = Vector3::Zero();    ///< mean of the standstill at the last vertex
   std::size_t samples = 0;
   std::size_t lost_samples = 0;  ///< invalid samples, and samples missing in the time series
+  double first_time_s = 0.0;     ///< of the first sample, tracker clock
+  double period_s = 0.0;         ///< from sample to sample (median); 0: blocks without times
 };
 
 inline constexpr double kBlockTravel_m = 8.33e-3;

@@ -12,6 +12,7 @@
 /// same form as that of observe(), and solve() and judge() use both alike: the adjustment yields the
 /// whole U, and rigid unknowns near zero.
 
+#include "abbe/calib/otf/along_rows.hpp"
 #include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/solve.hpp"
 
@@ -26,11 +27,13 @@ namespace abbe::calib::otf {
 struct JointObservations {
   Observations observations;
   RowInformation information;  ///< of all rows
-  int adjustments = 0;  ///< solved until the estimate did not change any more
+  int adjustments = 0;         ///< solved until the estimate did not change any more
 };
 /// NotConverged after Options::max_adjustments; RankDeficient as solve(). Observations that are too
-/// few are returned as they are: solve() reports them.
+/// few are returned as they are: solve() reports them. With `along`, each linearisation also adds
+/// the rows along the direction of travel, and each adjustment corrects its clock.
 [[nodiscard]] Result<JointObservations> linearise_at_solution(Observations, const BlockSeries&,
-                                                              const Noise&, const Options&);
+                                                              const Noise&, const Options&,
+                                                              AlongRows* along = nullptr);
 
 }  // namespace abbe::calib::otf

@@ -36,9 +36,11 @@ struct ResidualNoise {
   /// Factor for the covariance computed with the stated, white noise; at least 1.
   [[nodiscard]] double variance_factor() const;
 };
-/// `residual_m`: one residual per row. `degrees_of_freedom`: rows - rank.
+/// `residual_m`: one residual per row. `degrees_of_freedom`: rows - rank. `of`: only the rows of
+/// this component.
 [[nodiscard]] ResidualNoise residual_noise(const Observations&, std::span<const double> residual_m,
-                                           std::size_t degrees_of_freedom);
+                                           std::size_t degrees_of_freedom,
+                                           std::optional<std::size_t> of = {});
 
 /// Root mean squares of V and of its standard uncertainty over the nodes, after removal of the
 /// best-fit rigid motion.

@@ -2,8 +2,9 @@
 /// Stage one: computes weighted linear observations of the machine's errors from tracker points and
 /// path. Each used block gives two rows, along a2 and a3 of its path frame. The component along the
 /// direction of travel is not used: without synchronised clocks it carries no information (weight 0
-/// in [Sanders 2023] eq. (4)). In standstill mode each position gives three rows, see
-/// observe_standstills.hpp; leg and block of a row are then its position and its standstill.
+/// in [Sanders 2023] eq. (4)). With scale readings along_rows.hpp adds it. In standstill mode each
+/// position gives three rows, see observe_standstills.hpp; leg and block of a row are then its
+/// position and its standstill.
 
 #include <Eigen/Core>
 #include <array>
@@ -43,11 +44,15 @@ struct Observation {
   Vector3 axis_position_m = Vector3::Zero();  ///< closest nominal axis position
   std::size_t first_sub_point = 0;            ///< index in Observations::sub_points_m
   std::size_t sub_points = 0;
+  std::size_t component = 0;  ///< 0: a2, 1: a3, kAlong: along the travel; x, y, z of a standstill
 };
+inline constexpr std::size_t kAlong = 2;
 
 /// Number of unknowns of the rigid motion of the tracker station, translation T and rotation r:
 ///     measured error = V + T + r x p,   p = axis position + target offset
 inline constexpr std::size_t kRigidUnknowns = 6;
+/// Offset [s] and drift of the machine's clock, with scale readings only (along_rows.hpp).
+inline constexpr std::size_t kClockUnknowns = 2;
 
 struct Observations {
   Mode mode = Mode::OnTheFly;
@@ -66,15 +71,16 @@ struct Observations {
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
+  std::size_t clock_unknowns = 0;    ///< kClockUnknowns with scale readings and unknown clocks
   std::vector<std::string> notes{};  ///< for the verdict
 
-  /// Number of successive rows with one point: a2 and a3, or three directions of a standstill.
-  [[nodiscard]] std::size_t rows_per_point() const { return mode == Mode::Standstill ? 3 : 2; }
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the
   /// model.
   [[nodiscard]] std::size_t rigid_offset() const { return basis.size(); }
-  [[nodiscard]] std::size_t unknowns() const { return basis.size() + kRigidUnknowns; }
+  /// Index of the clock unknowns, which follow the rigid unknowns.
+  [[nodiscard]] std::size_t clock_offset() const { return basis.size() + kRigidUnknowns; }
+  [[nodiscard]] std::size_t unknowns() const { return clock_offset() + clock_unknowns; }
   /// Name of an unknown for messages: "EXX at -0.300 m", "EC0Y", "rx".
   [[nodiscard]] std::string label(std::size_t unknown) const;
 };
@@ -92,6 +98,7 @@ struct PointOnPath {
 struct MeasuredComponent {
   Vector3 direction = Vector3::UnitX();
   double sigma_m = 1.0;
+  std::span<const SparseRows::Entry> clock{};  ///< entries of the clock unknowns
 };
 /// Appends a row for each component of a point. `frame` and `samples` of the point are not used.
 void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub_points_m,

@@ -34,9 +34,9 @@ struct Autoregression {
 };
 
 struct NoiseFilter {
-  std::array<Autoregression, 2> of_direction;  ///< a2, a3
+  std::array<Autoregression, 3> of_direction;  ///< a2, a3, along (white without such rows)
   [[nodiscard]] bool is_white() const {
-    return of_direction[0].order == 0 && of_direction[1].order == 0;
+    return of_direction[0].order == 0 && of_direction[1].order == 0 && of_direction[2].order == 0;
   }
 };
 /// `residual_m`: one residual per row.

@@ -17,6 +17,7 @@
 #include "abbe/calib/estimation/axis_interpolation.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
+#include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/standstill_options.hpp"
 
 namespace abbe::calib::otf {
@@ -147,6 +148,10 @@ struct Options {
   /// Number of folds of the cross-validation; the observations are assigned to folds by leg.
   std::size_t held_out_folds = 5;
   OrientationEvidence orientation;
+  /// Scale readings beside the tracker's points, for Mode::OnTheFly: identify() then also uses the
+  /// component along the direction of travel (along_rows.hpp). Null: it is not used. Must outlive
+  /// the computation.
+  const EncoderLog* encoders = nullptr;
   Progress progress;  ///< may be empty
   Stopped stopped;    ///< may be empty: the computation is never stopped
 };

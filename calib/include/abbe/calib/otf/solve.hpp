@@ -35,6 +35,7 @@
 #include <string_view>
 
 #include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/observe.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
@@ -110,16 +111,30 @@ struct RangeOffset {
   double u_m = 0.0;
 };
 
+/// What the scale readings contributed (along_rows.hpp).
+struct Synchronisation {
+  ClockMap clock;
+  double u_offset_s = 0.0;  ///< 0: the clocks are known
+  double u_drift = 0.0;
+  std::size_t rows = 0;  ///< along the direction of travel
+  /// Along these rows, with their stated uncertainties.
+  double chi2_per_dof = 0.0;
+  /// Factor of the stated standard uncertainties with which the rows were used; at least 1.
+  double sigma_factor = 1.0;
+};
+
 struct Solution {
   Estimator estimator = Estimator::TwoStep;
   VolumetricModel model;            ///< gauge G1, without the rigid unknowns
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
-  Eigen::MatrixXd covariance_with_rigid;
-  Adjustment adjustment;  ///< of the rows alone: white noise, no range offset
+  Eigen::VectorXd clock{};  ///< corrections of the clock unknowns, if the observations have them
+  Eigen::MatrixXd covariance_with_rigid;  ///< of model, rigid and clock unknowns
+  Adjustment adjustment;                  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
   Residuals residuals;  ///< after_m: model and effect of the range offset subtracted
   RangeOffset range_offset;
+  std::optional<Synchronisation> synchronisation{};  ///< with scale readings
 };
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});

@@ -8,13 +8,13 @@
 namespace abbe::calib::otf {
 namespace {
 
-struct Leg {
+struct AssignableLeg {
   Vector3 from_m, direction;
   double length_m = 0.0;
 };
 
-std::vector<Leg> legs_of(const Path& path) {
-  std::vector<Leg> legs;
+std::vector<AssignableLeg> legs_of(const Path& path) {
+  std::vector<AssignableLeg> legs;
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
     const Vector3 d = path.vertices_m[i + 1] - path.vertices_m[i];
     legs.push_back({path.vertices_m[i], d.normalized(), d.norm()});
@@ -30,7 +30,7 @@ Vector3 chord(std::span<const Vector3> points, std::size_t i) {
   return length > 0 ? Vector3(c / length) : Vector3(Vector3::Zero());
 }
 
-double squared_distance(const Leg& leg, const Vector3& p) {
+double squared_distance(const AssignableLeg& leg, const Vector3& p) {
   const Vector3 r = p - leg.from_m;
   const double along = std::clamp(leg.direction.dot(r), 0.0, leg.length_m);
   return (r - along * leg.direction).squaredNorm();
@@ -38,7 +38,7 @@ double squared_distance(const Leg& leg, const Vector3& p) {
 
 /// Cost of a block on a leg. A lost block costs nothing on any leg; a block without direction of
 /// travel costs only its squared distance.
-double cost(const Leg& leg, const Vector3& p, const Vector3& travel, double direction_m) {
+double cost(const AssignableLeg& leg, const Vector3& p, const Vector3& travel, double direction_m) {
   if (!p.allFinite()) {
     return 0.0;
   }
@@ -51,7 +51,7 @@ double cost(const Leg& leg, const Vector3& p, const Vector3& travel, double dire
 
 Result<std::vector<std::size_t>> assign_legs(std::span<const Vector3> points_m, const Path& path,
                                              double direction_m) {
-  const std::vector<Leg> legs = legs_of(path);
+  const std::vector<AssignableLeg> legs = legs_of(path);
   const std::size_t n = points_m.size(), m = legs.size();
   if (m == 0 || n < m) {
     return failure(ErrorCode::TooFewObservations,

@@ -25,26 +25,78 @@
 #include "abbe/tables/travel_faults.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
+#include "identify_otf.hpp"
 #include "opened_recording.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 
-namespace {
-
 namespace otf = calib::otf;
+
+namespace {
 
 constexpr double kPpmPer1 = 1e6;
 
-struct IdentifyOtfArguments {
-  std::string machine, path, tracker, encoder, recording, keep, out, mode;
-  std::optional<std::string> estimator;  // without a value: that of [otf]
-  std::size_t block_samples = 0;         // 0: blocks by travel
-  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
-  bool scales_corrected = false, accept_path_orientation = false;
-  bool json = false;
-};
+protocol::UtcTime now() {
+  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+}
+
+}  // namespace
+
+std::string_view words(otf::Stage stage) {
+  switch (stage) {
+    case otf::Stage::Observe:
+      return "averaging blocks";
+    case otf::Stage::Align:
+      return "aligning";
+    case otf::Stage::Solve:
+      return "solving";
+    case otf::Stage::Judge:
+      return "judging";
+  }
+  return "";
+}
+
+OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
+                      std::vector<InputFile> sources) {
+  auto document =
+      otf_document(candidate.solution, candidate.mode, config, std::move(sources), now());
+  const auto& s = candidate.solution.statistics;
+  return {std::move(document),
+          std::move(candidate.solution.residuals),
+          std::move(candidate.verdict),
+          s.blocks,
+          s.blocks_used,
+          candidate.solution.range_offset};
+}
+
+double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config) {
+  if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
+  const auto tracker = tracker_source(config);
+  return tracker ? tracker->u_scale : 0.0;
+}
+
+void apply(const IdentifyOtfArguments& arguments, Config& config) {
+  OtfConfig& otf = config.otf;
+  if (arguments.estimator)
+    otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
+  otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
+  config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
+                                     .value_or(config.machine.interpolation);
+}
+
+Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {
+  if (auto inside =
+          check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
+      !inside)
+    return inside;
+  auto valid = check_otf_path(path.vertices_m, config.machine, config.otf.mode);
+  if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
+  return valid;
+}
+
+namespace {
 
 struct Files {
   Config config;
@@ -52,14 +104,6 @@ struct Files {
   TrackerFile tracker;
   std::optional<EncoderFile> encoder;
   std::vector<InputFile> sources;
-};
-
-struct OtfOutcome {
-  ModelDocument document;
-  otf::Residuals residuals;
-  calib::Verdict verdict;
-  std::size_t blocks = 0, blocks_used = 0;
-  otf::RangeOffset range_offset;
 };
 
 Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
@@ -90,62 +134,6 @@ Result<Files> read_files(const IdentifyOtfArguments& arguments, ProgressBar& bar
                std::move(sources)};
 }
 
-std::string_view words(otf::Stage stage) {
-  switch (stage) {
-    case otf::Stage::Observe:
-      return "averaging blocks";
-    case otf::Stage::Align:
-      return "aligning";
-    case otf::Stage::Solve:
-      return "solving";
-    case otf::Stage::Judge:
-      return "judging";
-  }
-  return "";
-}
-
-protocol::UtcTime now() {
-  return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-}
-
-OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
-                      std::vector<InputFile> sources) {
-  auto document =
-      otf_document(candidate.solution, candidate.mode, config, std::move(sources), now());
-  const auto& s = candidate.solution.statistics;
-  return {std::move(document),
-          std::move(candidate.solution.residuals),
-          std::move(candidate.verdict),
-          s.blocks,
-          s.blocks_used,
-          candidate.solution.range_offset};
-}
-
-double u_scale(const IdentifyOtfArguments& arguments, const Config& config) {
-  if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
-  const auto tracker = tracker_source(config);
-  return tracker ? tracker->u_scale : 0.0;
-}
-
-/// The options of the command replace those of the configuration.
-void apply(const IdentifyOtfArguments& arguments, OtfConfig& otf) {
-  if (arguments.estimator)
-    otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
-  otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
-}
-
-/// Makes the checks of the path that the daemon makes before the machine drives. The message for a
-/// vertex outside the travel gives line and column.
-Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {
-  if (auto inside =
-          check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
-      !inside)
-    return inside;
-  auto valid = check_otf_path(path.vertices_m, config.machine, config.otf.mode);
-  if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
-  return valid;
-}
-
 /// Compares the readings of the scales with the path at every vertex where the machine stood still.
 /// Returns the number of these vertices; 0 without an encoder file. An error if readings contradict
 /// the path.
@@ -159,7 +147,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
-  apply(arguments, files->config.otf);
+  apply(arguments, files->config);
   if (const auto valid =
           check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !valid)
@@ -178,7 +166,7 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   options.progress = [&](otf::Stage stage, double fraction) { bar.show(words(stage), fraction); };
 
   otf::Noise noise = otf_noise(files->config.machine);
-  noise.u_scale = u_scale(arguments, files->config);
+  noise.u_scale = u_scale_of(arguments, files->config);
   auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
                              noise, options);
   if (!found && options.mode == otf::Mode::Standstill)
@@ -218,7 +206,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
-  apply(arguments, recording->config.otf);
+  apply(arguments, recording->config);
   if (const auto given = require_target(recording->config.machine); !given)
     return tl::make_unexpected(given.error());
   const auto other = comparison_model(active, recording->config);
@@ -250,6 +238,7 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"hash", model_hash(outcome.document)},
       {"mode", outcome.document.mode},
       {"estimator", outcome.document.estimator},
+      {"tables", calib::estimation::name(*outcome.document.model.interpolation())},
       {"samples", s.samples},
       {"lost_samples", s.lost_samples},
       {"blocks", outcome.blocks},
@@ -272,8 +261,10 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
 
 void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
-  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
-             outcome.document.model.tables()->layout().tables().size(), outcome.document.machine);
+  fmt::print("model       {}  ({} {} tables, tool and machine \"{}\")\n",
+             model_id(outcome.document), outcome.document.model.tables()->layout().tables().size(),
+             calib::estimation::name(*outcome.document.model.interpolation()),
+             outcome.document.machine);
   const bool stands = outcome.document.mode == otf::name(otf::Mode::Standstill);
   fmt::print("samples     {}, {} lost; {} of {} {} used\n", s.samples, s.lost_samples,
              outcome.blocks_used, outcome.blocks, stands ? "standstills" : "blocks");
@@ -293,6 +284,7 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
 Result<OtfOutcome> identify(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
   const auto active = active_model(arguments.keep);
   if (!active) return tl::make_unexpected(active.error());
+  if (!arguments.targets.empty()) return from_targets(arguments, *active, bar);
   return arguments.recording.empty() ? from_files(arguments, *active, bar)
                                      : from_recording(arguments, *active, bar);
 }
@@ -353,7 +345,17 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                         "do not refuse the model because the path might be rotated by 180 degrees "
                         "(two signs\nreversed); as [gate] accept = [\"path-orientation\"]");
   recording->excludes(u_scale)->excludes(corrected)->excludes(orientation);
-  path->needs(machine, tracker);
+  auto* targets = command->add_option(
+      "--target", arguments->targets,
+      "instead of --tracker, three times or more: X,Y,Z=FILE, target offset in mm and tracker.csv "
+      "of\na run of the path with it. Offsets that are not on a line give all 18 tables, valid for "
+      "any\ntool; the tracker may stand elsewhere in each run");
+  targets->allow_extra_args(false)
+      ->needs(machine, path)
+      ->excludes(tracker)
+      ->excludes(recording)
+      ->excludes(encoder);
+  path->needs(machine);
   tracker->needs(path);
   encoder->needs(path);
   auto* mode =
@@ -375,6 +377,11 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                    "default: that of [otf], or two-step")
       ->check(CLI::IsMember({"two-step", "joint"}));
   command
+      ->add_option("--tables", arguments->tables,
+                   "interpolation of the tables between their nodes: linear, or cubic (natural,\n"
+                   "for smooth errors); default: [model] basis, or linear")
+      ->check(CLI::IsMember({calib::kLinearBasis, calib::kCubicBasis}));
+  command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
@@ -383,10 +390,12 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->required();
 
   command->callback([arguments, &exit] {
-    exit = arguments->tracker.empty() && arguments->recording.empty()
-               ? report({ErrorCode::Usage,
-                         "identify otf needs --machine, --path and --tracker, or --recording"})
-               : run(*arguments);
+    exit =
+        arguments->tracker.empty() && arguments->recording.empty() && arguments->targets.empty()
+            ? report({ErrorCode::Usage,
+                      "identify otf needs --machine, --path and --tracker (or several --target), "
+                      "or --recording"})
+            : run(*arguments);
   });
 }
 

@@ -27,6 +27,7 @@ Result<calib::otf::Machine> otf_machine(const MachineConfig& machine) {
 
   out.target_offset_m = {machine.target_offset_m[0], machine.target_offset_m[1],
                          machine.target_offset_m[2]};
+  out.interpolation = machine.interpolation;
   return out;
 }
 

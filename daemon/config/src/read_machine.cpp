@@ -104,9 +104,20 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
     nodes_m = equidistant->nodes_m;
 }
 
+void check_cubic_nodes(Section& model, const MachineConfig& config) {
+  if (config.interpolation == calib::estimation::Interpolation::Linear) return;
+  constexpr std::size_t kMost = calib::estimation::AxisInterpolation::kMostCubicNodes;
+  for (const auto& [axis, nodes_m] : config.nodes_m)
+    if (nodes_m.size() > kMost)
+      model.fault("basis", fmt::format("axis {} has {} nodes, cubic tables have at most {}", axis,
+                                       nodes_m.size(), kMost));
+}
+
 void read_model(Section model, const toml::node* spacing_node, MachineConfig& out) {
-  bool is_linear = true;  // no other basis is implemented: any other word is a fault
-  model.get_word<bool>("basis", is_linear, {{calib::kLinearBasis, true}});
+  using calib::estimation::Interpolation;
+  model.get_word<Interpolation>("basis", out.interpolation,
+                                {{calib::kLinearBasis, Interpolation::Linear},
+                                 {calib::kCubicBasis, Interpolation::NaturalCubic}});
   Section nodes = model.child("nodes_mm");
   std::optional<Section> spacing;
   if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");
@@ -115,6 +126,7 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
       read_axis_nodes(model, nodes, spacing ? &*spacing : nullptr, axis, out);
   nodes.close();
   if (spacing) spacing->close();
+  check_cubic_nodes(model, out);
   model.close();
 }
 

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "abbe/calib/error_parameters.hpp"
+#include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::daemon {
 
@@ -15,6 +16,17 @@ inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a polyn
 inline constexpr int kMm = 3;
 inline constexpr int kMicroUnit = 6;          // um, urad
 inline constexpr int kMicroUnitSquared = 12;  // their products
+
+/// `basis.kind` of model.json: "linear" or "cubic" for tables, else kLegendre.
+[[nodiscard]] inline std::string_view basis_kind(const calib::VolumetricModel& model) {
+  const auto interpolation = model.interpolation();
+  return interpolation ? calib::estimation::name(*interpolation) : kLegendre;
+}
+
+/// Tables: their nodes; polynomials: the grid at which they are checked.
+[[nodiscard]] inline const calib::MachineNodes& stored_nodes(const calib::VolumetricModel& model) {
+  return model.tables() == nullptr ? model.nodes() : model.tables()->layout().nodes();
+}
 
 [[nodiscard]] inline std::string_view unit_of(const calib::Parameter& p) {
   return p.is_angle() ? "urad" : "um";

@@ -44,20 +44,18 @@ class Canonical {
 
 void add_frame(Canonical& out, const calib::VolumetricModel& model) {
   out.text(model.chain().text());
-  for (const auto& axis : model.nodes()) {
+  for (const auto& axis : stored_nodes(model)) {
     out.count(axis.nodes_m.size());
     for (const double node_m : axis.nodes_m) out.number(node_m);
     out.number(axis.reference_m);
   }
 
+  out.text(basis_kind(model));
   if (const auto* polynomials = model.polynomials()) {
-    out.text(kLegendre);
     out.count(static_cast<std::size_t>(polynomials->design().equivalent().order()));
     out.vector(polynomials->design().box().centre_m);
     out.vector(polynomials->design().box().half_width_m);
     out.vector(polynomials->ball1_m());
-  } else {
-    out.text(calib::kLinearBasis);
   }
 
   out.text(name(model.gauge()));

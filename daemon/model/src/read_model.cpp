@@ -133,8 +133,14 @@ void read_basis(Reader& in, calib::ModelDescription& out) {
   if (basis == nullptr) return;
   const Json* kind = in.find(*basis, "basis", "kind");
   if (kind != nullptr && *kind == kLegendre) return read_polynomials(in, *basis, out);
-  if (kind != nullptr && *kind != calib::kLinearBasis)
-    in.fault("basis.kind", fmt::format("must be \"linear\" or \"{}\"", kLegendre));
+  const auto interpolation = kind != nullptr && kind->is_string()
+                                 ? calib::estimation::table_interpolation(kind->get<std::string>())
+                                 : std::nullopt;
+  if (kind != nullptr && !interpolation)
+    in.fault("basis.kind",
+             fmt::format("is {}, must be \"{}\", \"{}\" or \"{}\"; another kind needs a newer abbe",
+                         kind->dump(), calib::kLinearBasis, calib::kCubicBasis, kLegendre));
+  out.interpolation = interpolation.value_or(out.interpolation);
   const Json* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;
 

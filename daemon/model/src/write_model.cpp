@@ -60,11 +60,11 @@ void write_polynomials(JsonText& out, const calib::evemu::EvemuModel& model) {
                   vector_mm(design.box().half_width_m), vector_mm(model.ball1_m())));
 }
 
-void write_axes(JsonText& out, const calib::MachineNodes& machine_nodes) {
+void write_axes(JsonText& out, const calib::VolumetricModel& model) {
   out.key("basis");
-  out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", calib::kLinearBasis));
+  out.raw(fmt::format("{{\"kind\": \"{}\", \"axes\": {{", basis_kind(model)));
   for (const auto axis : calib::kAllAxes) {
-    const auto& nodes = machine_nodes[index(axis)];
+    const auto& nodes = stored_nodes(model)[index(axis)];
     out.raw(fmt::format("{}\n    \"{}\": {{\"nodes_mm\": {}, \"reference_mm\": {}}}",
                         index(axis) > 0 ? "," : "", letter(axis), numbers(nodes.nodes_m, kMm),
                         to_decimal(nodes.reference_m, kMm)));
@@ -165,7 +165,7 @@ std::string to_json(const ModelDocument& document) {
   if (const auto* polynomials = model.polynomials())
     write_polynomials(out, *polynomials);
   else
-    write_axes(out, model.nodes());
+    write_axes(out, model);
   write_statistics(out, document.statistics);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);

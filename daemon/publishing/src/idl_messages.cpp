@@ -100,7 +100,8 @@ v1::ErrorModel model_message(const PublishedModel& active, const Stamp& stamp) {
   m.estimator(active.estimator);
   m.gauge(std::string{calib::name(active.model.gauge())});
   m.chain(active.model.chain().text());
-  m.basis(active.model.polynomials() == nullptr ? "linear" : "legendre");
+  const auto interpolation = active.model.interpolation();
+  m.basis(interpolation ? std::string{calib::estimation::name(*interpolation)} : "legendre");
   m.squareness("travel");
   m.tool_offset_m(array(active.model.tool_offsets_m().front()));
 

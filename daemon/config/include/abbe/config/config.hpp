@@ -53,6 +53,8 @@ struct MachineConfig {
   bool target_given = false;
   /// Nodes of every linear axis, ascending, from one end of travel to the other.
   std::map<std::string, std::vector<double>> nodes_m;
+  /// [model] basis, of the tables that on-the-fly calibration identifies.
+  calib::estimation::Interpolation interpolation = calib::estimation::Interpolation::Linear;
   double sigma_range_m = 2e-6;  ///< standard deviation of one tracker range
   /// Standard deviation of one tracker direction, perpendicular to the beam.
   double sigma_angle_rad = 3e-6;

@@ -1,0 +1,57 @@
+#pragma once
+/// What `abbe identify otf` has in common for one run, a recording, and several targets.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/config/config.hpp"
+#include "abbe/methods/otf/identification.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tables/input_files.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+struct IdentifyOtfArguments {
+  std::string machine, path, tracker, encoder, recording, keep, out, mode, tables;
+  std::optional<std::string> estimator;  // without a value: that of [otf]
+  std::size_t block_samples = 0;         // 0: blocks by travel
+  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
+  bool scales_corrected = false, accept_path_orientation = false;
+  bool json = false;
+  std::vector<std::string> targets;  // X,Y,Z=FILE, one per run
+};
+
+struct OtfOutcome {
+  ModelDocument document;
+  calib::otf::Residuals residuals;
+  calib::Verdict verdict;
+  std::size_t blocks = 0, blocks_used = 0;
+  calib::otf::RangeOffset range_offset;
+};
+
+/// Words of the progress bar.
+[[nodiscard]] std::string_view words(calib::otf::Stage stage);
+
+[[nodiscard]] OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
+                                    std::vector<InputFile> sources);
+
+/// --u-scale-ppm, or that of the configured tracker; 0 without both.
+[[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
+
+/// The options of the command replace those of the configuration.
+void apply(const IdentifyOtfArguments& arguments, Config& config);
+
+/// Makes the checks of the path that the daemon makes before the machine drives. The message for a
+/// vertex outside the travel gives line and column.
+[[nodiscard]] Result<void> check_path(const std::string& file, const PathFile& path,
+                                      const Config& config);
+
+/// Identifies all 18 tables from the runs of --target.
+[[nodiscard]] Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
+                                              const std::optional<ModelDocument>& active,
+                                              ProgressBar& bar);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,144 @@
+// `abbe identify otf --target ...`: several runs, each with another target offset.
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <filesystem>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/targets.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/calibration_machine.hpp"
+#include "abbe/config/unmeasured_air.hpp"
+#include "abbe/methods/otf/inputs.hpp"
+#include "identified_model.hpp"
+#include "identify_otf.hpp"
+#include "scales_corrected.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct TargetPoints {
+  calib::Vector3 offset_m;
+  TrackerFile tracker;
+};
+
+struct TargetRuns {
+  Config config;
+  PathFile path;
+  std::vector<TargetPoints> runs;
+  std::vector<InputFile> sources;
+};
+
+Error not_a_target(const std::string& text) {
+  return {ErrorCode::Usage,
+          fmt::format("--target {}: must be X,Y,Z=FILE, for example 20,-15,-120=tracker1.csv; "
+                      "X, Y, Z in mm",
+                      text)};
+}
+
+/// "20,-15,-120=tracker1.csv": the offset, and the name of the file behind '='.
+Result<std::pair<calib::Vector3, std::string>> parse_target(const std::string& text) {
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  calib::Vector3 offset_m;
+  for (int i = 0; i < 3; ++i) {
+    double value_mm = 0.0;
+    const auto [behind, error] = std::from_chars(at, end, value_mm);
+    const char separator = i < 2 ? ',' : '=';
+    if (error != std::errc{} || behind == end || *behind != separator)
+      return tl::make_unexpected(not_a_target(text));
+    offset_m[i] = value_mm / kMmPerM;
+    at = behind + 1;
+  }
+  if (at == end) return tl::make_unexpected(not_a_target(text));
+  return std::pair{offset_m, std::string(at, end)};
+}
+
+Result<TargetRuns> read_runs(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
+  auto config = load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  auto path = read_path_csv(arguments.path);
+  if (!path) return tl::make_unexpected(path.error());
+
+  TargetRuns all{std::move(*config), std::move(*path), {}, {}};
+  all.sources = {{std::filesystem::path(arguments.machine).filename().string(), *hash},
+                 all.path.source};
+  for (const auto& text : arguments.targets) {
+    const auto target = parse_target(text);
+    if (!target) return tl::make_unexpected(target.error());
+    auto tracker = read_tracker_csv(target->second, [&](double fraction) {
+      bar.show(fmt::format("reading {}", target->second), fraction);
+    });
+    if (!tracker) return tl::make_unexpected(tracker.error());
+    all.sources.push_back(tracker->source);
+    all.runs.push_back({target->first, std::move(*tracker)});
+  }
+  return all;
+}
+
+Result<void> check_runs(const IdentifyOtfArguments& arguments, TargetRuns& all) {
+  if (const auto valid =
+          check_scales("identify otf", "a path", all.config, arguments.scales_corrected);
+      !valid)
+    return valid;
+  all.config.machine.target_given = true;  // by --target
+  return check_path(arguments.path, all.path, all.config);
+}
+
+/// One solution with the statistics and residuals of all runs.
+calib::otf::Solution of_all_runs(calib::otf::TargetsIdentification found) {
+  calib::otf::Solution all = std::move(found.solutions.front());
+  all.statistics = found.statistics;
+  for (std::size_t k = 1; k < found.solutions.size(); ++k) {
+    const calib::otf::Residuals& more = found.solutions[k].residuals;
+    auto& to = all.residuals;
+    to.before_m.insert(to.before_m.end(), more.before_m.begin(), more.before_m.end());
+    to.after_m.insert(to.after_m.end(), more.after_m.begin(), more.after_m.end());
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
+                                const std::optional<ModelDocument>& active, ProgressBar& bar) {
+  auto all = read_runs(arguments, bar);
+  if (!all) return tl::make_unexpected(all.error());
+  apply(arguments, all->config);
+  if (const auto valid = check_runs(arguments, *all); !valid)
+    return tl::make_unexpected(valid.error());
+  const auto machine = otf_machine(all->config.machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+
+  calib::otf::Options options = otf_options(all->runs.front().tracker.points, all->config);
+  if (arguments.accept_path_orientation) options.orientation.accepted = true;
+  if (arguments.block_samples > 0) options.block_samples = arguments.block_samples;
+  options.progress = [&](calib::otf::Stage stage, double fraction) {
+    bar.show(words(stage), fraction);
+  };
+  calib::otf::Noise noise = otf_noise(all->config.machine);
+  noise.u_scale = u_scale_of(arguments, all->config);
+
+  std::vector<calib::otf::TargetRun> runs;
+  for (const auto& run : all->runs)
+    runs.push_back({run.tracker.points, otf_path(all->path.vertices_m), run.offset_m});
+  auto found = calib::otf::identify_targets(runs, *machine, noise, options);
+  if (!found) return tl::make_unexpected(error_of(found.error()));
+
+  const auto other = comparison_model(active, all->config);
+  auto verdict = calib::otf::judge(found->observations, found->solutions, other.model,
+                                   gate_limits(all->config.gate), options);
+  if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
+  other.add_note(*verdict);
+  if (auto air = unmeasured_air_text(all->config, noise.u_scale))
+    verdict->notes.push_back(*std::move(air));
+
+  return outcome_of({of_all_runs(std::move(*found)), std::move(*verdict), options.mode},
+                    all->config, std::move(all->sources));
+}
+
+}  // namespace abbe::daemon

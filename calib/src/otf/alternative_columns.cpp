@@ -62,6 +62,12 @@ void AlternativeColumns::rigid(const Observation& row, Values& v) const {
 
 std::size_t AlternativeColumns::values(const Added& added, const Observation& row,
                                        Values& v) const {
+  // A row along the travel compares the point with the scale readings, not with the path.
+  const bool compares_with_path = o_.mode == Mode::Standstill || row.component != kAlong;
+  if (!compares_with_path && (added.cause == Cause::Vertex || added.cause == Cause::Leg)) {
+    return 0;
+  }
+
   switch (added.cause) {
     case Cause::Moved:
       rigid(row, v);

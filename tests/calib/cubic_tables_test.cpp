@@ -18,15 +18,15 @@ using namespace abbe::tests::otf;
 using estimation::Interpolation;
 using testing::HasSubstr;
 
-const Vector3 kTool(0.02, -0.015, -0.12);
+const Vector3 kCubicTool(0.02, -0.015, -0.12);
 
-Vector3 three_of(const std::vector<double>& v, std::size_t from) {
+Vector3 vector_from(const std::vector<double>& v, std::size_t from) {
   return {v.at(from), v.at(from + 1), v.at(from + 2)};
 }
 
 VolumetricModel table_model(const ParameterLayout& layout, const Eigen::VectorXd& U,
                             const Eigen::MatrixXd& covariance, Interpolation interpolation) {
-  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{kTool}, U, covariance,
+  return *VolumetricModel::from_vector(layout, Gauge::G1, std::array{kCubicTool}, U, covariance,
                                        *ValidityVolume::hull_of(tensor_grid(layout.nodes())),
                                        interpolation);
 }
@@ -59,9 +59,9 @@ TEST(CubicModel, GivesTheReferenceErrorsAt50Points) {
   const auto rows = read_rows(small_file("caseA_V_cubic_at_points.csv"));
   ASSERT_EQ(rows.size(), 50u);
   for (const ReferenceRow& row : rows) {
-    const Vector3 q = three_of(row.values, 0), V = three_of(row.values, 3);
-    EXPECT_LT((model.V_at(q, kTool) - V).norm(), 1e-12);
-    EXPECT_LT((model.error_at(q, kTool).V_m - V).norm(), 1e-12);
+    const Vector3 q = vector_from(row.values, 0), V = vector_from(row.values, 3);
+    EXPECT_LT((model.V_at(q, kCubicTool) - V).norm(), 1e-12);
+    EXPECT_LT((model.error_at(q, kCubicTool).V_m - V).norm(), 1e-12);
   }
 }
 
@@ -71,12 +71,12 @@ TEST(CubicModel, PropagatesItsFullCovariance) {
   for (const Vector3& q :
        {Vector3(0.13, -0.11, -0.27), Vector3(-0.3, 0.25, 0.0), Vector3(0.31, 0.2, -0.2)}) {
     estimation::ModelColumns columns(memory);
-    model.tables()->append_columns({.q_m = q, .tool_offset_m = kTool}, columns);
+    model.tables()->append_columns({.q_m = q, .tool_offset_m = kCubicTool}, columns);
     Eigen::MatrixXd MB = Eigen::MatrixXd::Zero(3, model.U().size());
     for (const estimation::Column& c : columns.span()) {
       MB.col(static_cast<Eigen::Index>(c.parameter)) += c.dV_dU;
     }
-    const VolumetricError e = model.error_at(q, kTool);
+    const VolumetricError e = model.error_at(q, kCubicTool);
     EXPECT_LT((e.V_m - MB * model.U()).norm(), 1e-17);
     EXPECT_TRUE(e.cov_V_m2.isApprox(MB * model.covariance() * MB.transpose(), 1e-11));
   }
@@ -99,8 +99,8 @@ TEST(CubicModel, ComesBackFromItsDescriptionBitForBit) {
   ASSERT_TRUE(again) << again.error().text;
   const Vector3 q(0.2, 0.1, -0.1);
   EXPECT_EQ(again->interpolation(), Interpolation::NaturalCubic);
-  EXPECT_EQ(again->error_at(q, kTool).V_m, model.error_at(q, kTool).V_m);
-  EXPECT_EQ(again->error_at(q, kTool).cov_V_m2, model.error_at(q, kTool).cov_V_m2);
+  EXPECT_EQ(again->error_at(q, kCubicTool).V_m, model.error_at(q, kCubicTool).V_m);
+  EXPECT_EQ(again->error_at(q, kCubicTool).cov_V_m2, model.error_at(q, kCubicTool).cov_V_m2);
 }
 
 TEST(CubicModel, WithAnotherCubicIsRefused) {

@@ -17,13 +17,13 @@ using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 using estimation::Interpolation;
 
-Result<Identification> identified(const MadeRun& run) {
+Result<Identification> identified_cubic(const MadeRun& run) {
   return identify(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
 /// At the nodes, where linear and cubic tables have the same V. Without the rigid motion: the gauge
 /// of the truth is that of linear tables, which differs where the reference is between nodes.
-double largest_error_m(const MadeRun& run, const VolumetricModel& model) {
+double largest_cubic_error_m(const MadeRun& run, const VolumetricModel& model) {
   std::vector<Vector3> points = tensor_grid(run.machine.nodes);
   for (Vector3& p : points) {
     p += run.machine.target_offset_m;
@@ -38,19 +38,19 @@ TEST(CubicTables, AreIdentifiedExactlyFromExactSamples) {
                             .chain = chain,
                             .interpolation = Interpolation::NaturalCubic});
     run.options.estimator = Estimator::Joint;
-    const auto found = identified(run);
+    const auto found = identified_cubic(run);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_EQ(found->solution.model.interpolation(), Interpolation::NaturalCubic);
     EXPECT_EQ(found->solution.statistics.unknowns - found->solution.statistics.rank, 20u);
-    EXPECT_LT(largest_error_m(run, found->solution.model), 1e-9);
+    EXPECT_LT(largest_cubic_error_m(run, found->solution.model), 1e-9);
   }
 }
 
 TEST(CubicTables, OfASmoothMachineAreBetterThanLinearOnes) {
   MadeRun run = make_run({.seed = 2, .interpolation = Interpolation::NaturalCubic});
-  const auto cubic = identified(run);
+  const auto cubic = identified_cubic(run);
   run.machine.interpolation = Interpolation::Linear;
-  const auto linear = identified(run);
+  const auto linear = identified_cubic(run);
   ASSERT_TRUE(cubic && linear);
   EXPECT_LT(cubic->solution.statistics.sigma0, 1.1);
   EXPECT_GT(linear->solution.statistics.sigma0, 2.0);
@@ -58,7 +58,7 @@ TEST(CubicTables, OfASmoothMachineAreBetterThanLinearOnes) {
 
 TEST(CubicTables, AreAcceptedByTheGate) {
   const MadeRun run = make_run({.seed = 3, .interpolation = Interpolation::NaturalCubic});
-  const auto found = identified(run);
+  const auto found = identified_cubic(run);
   ASSERT_TRUE(found) << found.error().text;
   const auto verdict = judge(found->observations, found->solution, nullptr, {}, run.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
@@ -70,9 +70,9 @@ TEST(CubicTables, AreAcceptedByTheGate) {
 /// Linear tables leave a part of smooth errors between the nodes: the held-out test prefers cubic.
 TEST(CubicTables, WinAgainstAnActiveModelOfLinearOnes) {
   MadeRun run = make_run({.seed = 3, .interpolation = Interpolation::NaturalCubic});
-  const auto cubic = identified(run);
+  const auto cubic = identified_cubic(run);
   run.machine.interpolation = Interpolation::Linear;
-  const auto linear = identified(run);
+  const auto linear = identified_cubic(run);
   ASSERT_TRUE(cubic && linear);
   const auto verdict =
       judge(cubic->observations, cubic->solution, &linear->solution.model, {}, run.options);
@@ -84,9 +84,9 @@ TEST(CubicTables, WinAgainstAnActiveModelOfLinearOnes) {
 
 TEST(CubicTables, OfTwoRunsAreTestedForDriftAndJoined) {
   MadeRunOptions made{.seed = 5, .in_gauge = true, .interpolation = Interpolation::NaturalCubic};
-  const auto first = identified(make_run(made));
+  const auto first = identified_cubic(make_run(made));
   made.noise_seed = 2;
-  const auto second = identified(make_run(made));
+  const auto second = identified_cubic(make_run(made));
   ASSERT_TRUE(first && second);
   const auto drift = test_drift(second->solution.model, first->solution.model, {});
   ASSERT_TRUE(drift) << drift.error().text;

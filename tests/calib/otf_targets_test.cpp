@@ -19,7 +19,7 @@ using namespace abbe::tests::otf;
 using estimation::Interpolation;
 using testing::HasSubstr;
 
-const std::vector<Vector3> kThreeTargets{
+const std::vector<Vector3> kThreeRunTargets{
     {0.02, -0.015, -0.12}, {0.17, -0.015, -0.12}, {0.02, 0.135, -0.17}};
 
 struct MadeTargetsOptions {
@@ -27,7 +27,7 @@ struct MadeTargetsOptions {
   double noise_factor = 1.0, error_scale_m = 10e-6, range_offset_m = 0.0;
   std::string chain = "[w X' b Y Z (C1) t]";
   Interpolation interpolation = Interpolation::Linear;
-  std::vector<Vector3> targets_m = kThreeTargets;
+  std::vector<Vector3> targets_m = kThreeRunTargets;
 };
 
 /// Runs of one machine with 18 random tables; the tracker stands elsewhere in each.
@@ -68,18 +68,18 @@ MadeTargets make_targets(const MadeTargetsOptions& wanted) {
   Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(basis.size() + 6));
   const auto n = static_cast<Eigen::Index>(basis.size());
   U.head(n) = random_tables(basis.layout(), wanted.error_scale_m, random);
-  made.truth = to_gauge(Gauge::G1, basis.layout(), kThreeTargets, U)->head(n);
+  made.truth = to_gauge(Gauge::G1, basis.layout(), kThreeRunTargets, U)->head(n);
 
-  constexpr double kRate_hz = 250.0, kSpeed_m_s = 0.4;
+  constexpr double kSamplesPerSecond = 250.0, kSpeed_m_s = 0.4;
   for (std::size_t k = 0; k < wanted.targets_m.size(); ++k) {
     const RigidTransform T = turned_tracker(k);
     const Vector3& t = wanted.targets_m[k];
     std::vector<TrackerObservation>& samples = made.samples.emplace_back();
-    for (const Vector3& q : drive(case_a_path(), kSpeed_m_s, kRate_hz)) {
+    for (const Vector3& q : drive(case_a_path(), kSpeed_m_s, kSamplesPerSecond)) {
       const Vector3 V =
           basis.V_m({.q_m = q, .tool_offset_m = t}, {made.truth.data(), basis.size()});
       const Vector3 p = T.R.transpose() * (q + t + V - T.t_m);
-      samples.push_back({static_cast<double>(samples.size()) / kRate_hz,
+      samples.push_back({static_cast<double>(samples.size()) / kSamplesPerSecond,
                          with_noise(p * (1.0 + wanted.range_offset_m / p.norm()), made.noise,
                                     wanted.noise_factor, random),
                          true});
@@ -91,7 +91,7 @@ MadeTargets make_targets(const MadeTargetsOptions& wanted) {
   return made;
 }
 
-Result<TargetsIdentification> identified(const MadeTargets& made) {
+Result<TargetsIdentification> identified_targets(const MadeTargets& made) {
   return identify_targets(made.runs, made.machine, made.noise, made.options);
 }
 
@@ -99,7 +99,7 @@ TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
   for (const char* chain : {"[w X' b Y Z (C1) t]", "[w b Z X Y (C1) t]"}) {
     MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6, .chain = chain});
     made.options.estimator = Estimator::Joint;
-    const auto found = identified(made);
+    const auto found = identified_targets(made);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_EQ(found->statistics.unknowns - found->statistics.rank, 24u);
     EXPECT_EQ(found->statistics.gauge_conditions, 24u);
@@ -110,7 +110,7 @@ TEST(SeveralTargets, DetermineAll18TablesFromExactSamples) {
 TEST(SeveralTargets, GiveAModelForAToolThatWasNotMeasured) {
   MadeTargets made = make_targets({.noise_factor = 0.0, .error_scale_m = 30e-6});
   made.options.estimator = Estimator::Joint;
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   const Vector3 other(-0.2, 0.3, 0.1);
   EXPECT_TRUE(found->model().holds_for_tool(other));
@@ -123,7 +123,7 @@ TEST(SeveralTargets, AreJoinedWithCubicTablesToo) {
   MadeTargets made = make_targets(
       {.noise_factor = 0.0, .error_scale_m = 30e-6, .interpolation = Interpolation::NaturalCubic});
   made.options.estimator = Estimator::Joint;
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_EQ(found->model().interpolation(), Interpolation::NaturalCubic);
   // The gauge of the truth is that of linear tables: V differs by a rigid motion.
@@ -162,7 +162,7 @@ TEST(SeveralTargets, HaveTheErrorsThatTheyState) {
   ChiSquareOfErrors all;
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
     const MadeTargets made = make_targets({.seed = seed});
-    const auto found = identified(made);
+    const auto found = identified_targets(made);
     ASSERT_TRUE(found) << found.error().text;
     EXPECT_NEAR(found->statistics.sigma0, 1.0, 0.05);
     all.add(found->model(), made.truth);
@@ -176,10 +176,10 @@ TEST(SeveralTargets, HaveTheErrorsThatTheyState) {
 TEST(SeveralTargets, OnALineAreRefused) {
   const Vector3 step(0.1, 0.0, 0.05);
   for (const auto& targets :
-       {std::vector{kThreeTargets[0]}, std::vector{kThreeTargets[0], kThreeTargets[1]},
-        std::vector<Vector3>{kThreeTargets[0], kThreeTargets[0] + step,
-                             kThreeTargets[0] - 2.0 * step}}) {
-    const auto found = identified(make_targets({.targets_m = targets}));
+       {std::vector{kThreeRunTargets[0]}, std::vector{kThreeRunTargets[0], kThreeRunTargets[1]},
+        std::vector<Vector3>{kThreeRunTargets[0], kThreeRunTargets[0] + step,
+                             kThreeRunTargets[0] - 2.0 * step}}) {
+    const auto found = identified_targets(make_targets({.targets_m = targets}));
     ASSERT_FALSE(found) << targets.size();
     EXPECT_EQ(found.error().code, ErrorCode::DegenerateGeometry);
     EXPECT_THAT(found.error().text, HasSubstr("three offsets that are not on a line"));
@@ -189,7 +189,7 @@ TEST(SeveralTargets, OnALineAreRefused) {
 TEST(SeveralTargets, EstimateTheOffsetThatAllRangesShare) {
   MadeTargets made = make_targets({.range_offset_m = 15e-6});
   made.noise.u_range_offset_m = 20e-6;
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   const RangeOffset& offset = found->solutions.back().range_offset;
   EXPECT_NEAR(offset.value_m, 15e-6, 3.0 * offset.u_m);
@@ -199,13 +199,13 @@ TEST(SeveralTargets, EstimateTheOffsetThatAllRangesShare) {
 
 TEST(SeveralTargets, StateTheUncertaintyOfScalesOnceForAllRuns) {
   MadeTargets made = make_targets({});
-  const auto without = identified(made);
+  const auto without = identified_targets(made);
   made.noise.u_scale = 1e-6;
   made.noise.u_axis_scale = {0.0, 2e-6, 0.0};
-  const auto with = identified(made);
+  const auto with = identified_targets(made);
   ASSERT_TRUE(without && with);
   const auto variance_at = [](const TargetsIdentification& found, const Vector3& q) {
-    return found.model().error_at(q, kThreeTargets[0]).cov_V_m2(1, 1);
+    return found.model().error_at(q, kThreeRunTargets[0]).cov_V_m2(1, 1);
   };
   // Along Y, from the reference at 0: 1 ppm of the ranges and 2 ppm of the axis over 0.25 m.
   const Vector3 q(0.0, 0.25, 0.0);
@@ -214,7 +214,7 @@ TEST(SeveralTargets, StateTheUncertaintyOfScalesOnceForAllRuns) {
 
 TEST(SeveralTargets, AreJudgedTogether) {
   const MadeTargets made = make_targets({.seed = 3, .error_scale_m = 30e-6});
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
   ASSERT_TRUE(verdict) << verdict.error().text;
@@ -232,7 +232,7 @@ TEST(SeveralTargets, AreJudgedTogether) {
 TEST(SeveralTargets, WithExchangedOffsetsDoNotFit) {
   MadeTargets made = make_targets({.seed = 3, .error_scale_m = 100e-6});
   std::swap(made.runs[0].target_offset_m, made.runs[1].target_offset_m);
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_GT(found->statistics.sigma0, 1.5);
 }
@@ -240,7 +240,7 @@ TEST(SeveralTargets, WithExchangedOffsetsDoNotFit) {
 TEST(SeveralTargets, NameTheRunThatDoesNotFitItsPath) {
   MadeTargets made = make_targets({});
   made.runs[1].path.vertices_m.resize(20);
-  const auto found = identified(made);
+  const auto found = identified_targets(made);
   ASSERT_FALSE(found);
   EXPECT_THAT(found.error().text, HasSubstr("run 2: "));
 }

@@ -22,7 +22,6 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/tables/input_files.hpp"
-#include "abbe/tables/travel_faults.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -35,8 +34,6 @@ namespace abbe::daemon {
 namespace otf = calib::otf;
 
 namespace {
-
-constexpr double kPpmPer1 = 1e6;
 
 protocol::UtcTime now() {
   return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
@@ -69,31 +66,6 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
           s.blocks,
           s.blocks_used,
           candidate.solution.range_offset};
-}
-
-double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config) {
-  if (arguments.u_scale_ppm) return *arguments.u_scale_ppm / kPpmPer1;
-  const auto tracker = tracker_source(config);
-  return tracker ? tracker->u_scale : 0.0;
-}
-
-void apply(const IdentifyOtfArguments& arguments, Config& config) {
-  OtfConfig& otf = config.otf;
-  if (arguments.estimator)
-    otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
-  otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
-  config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
-                                     .value_or(config.machine.interpolation);
-}
-
-Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {
-  if (auto inside =
-          check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
-      !inside)
-    return inside;
-  auto valid = check_otf_path(path.vertices_m, config.machine, config.otf.mode);
-  if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
-  return valid;
 }
 
 namespace {

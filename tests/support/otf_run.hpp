@@ -99,8 +99,25 @@ inline Vector3 with_noise(const Vector3& p, const calib::otf::Noise& noise, doub
          factor * (noise.sigma_range_m * along * er + noise.sigma_angle_rad * p.norm() * across);
 }
 
+/// The samples of a drive along the path of the run.
+inline void measure_run(MadeRun& run, const MadeRunOptions& wanted) {
+  std::mt19937_64 noise(wanted.noise_seed);
+  const calib::ParameterLayout layout = layout_of(run.machine);
+  const Vector3& t = run.machine.target_offset_m;
+  run.samples.clear();
+  const auto basis = *calib::estimation::TableBasis::of(
+      layout, calib::estimation::TableOptions::all_axes(wanted.interpolation));
+  for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
+    const Vector3 V =
+        basis.V_m({.q_m = q, .tool_offset_m = t}, {run.truth.data(), layout.model_size()});
+    const Vector3 p = run.T_machine_tracker.R.transpose() * (q + t + V - run.T_machine_tracker.t_m);
+    run.samples.push_back({static_cast<double>(run.samples.size()) / wanted.rate_hz,
+                           with_noise(p, run.noise, wanted.noise_factor, noise), true});
+  }
+}
+
 inline MadeRun make_run(const MadeRunOptions& wanted) {
-  std::mt19937_64 random(wanted.seed), noise(wanted.noise_seed);
+  std::mt19937_64 random(wanted.seed);
   MadeRun run;
   run.machine = coarse_machine(wanted.chain);
   run.path = case_a_path();
@@ -117,16 +134,7 @@ inline MadeRun make_run(const MadeRunOptions& wanted) {
     run.truth = calib::to_gauge(calib::Gauge::G1, layout, std::array{t}, U)->head(run.truth.size());
   }
 
-  const auto basis = *calib::estimation::TableBasis::of(
-      layout, calib::estimation::TableOptions::all_axes(wanted.interpolation));
-  for (const Vector3& q : drive(run.path, wanted.speed_m_s, wanted.rate_hz)) {
-    const Vector3 V =
-        basis.V_m({.q_m = q, .tool_offset_m = t}, {run.truth.data(), layout.model_size()});
-    const Vector3 p = run.T_machine_tracker.R.transpose() * (q + t + V - run.T_machine_tracker.t_m);
-    run.samples.push_back({static_cast<double>(run.samples.size()) / wanted.rate_hz,
-                           with_noise(p, run.noise, wanted.noise_factor, noise), true});
-  }
-
+  measure_run(run, wanted);
   return run;
 }
 

@@ -11,33 +11,6 @@ namespace {
 
 constexpr std::size_t kRigid = 6, kDrift = 9, kBacklash = 18, kShift = 3;
 
-std::vector<std::array<int, 3>> directions_of(const std::vector<Vector3>& vertices_m) {
-  constexpr double kRests_m = 1e-6;  // an axis that moves less keeps its direction
-  std::vector<std::array<int, 3>> all;
-  std::array<int, 3> now{};
-
-  for (std::size_t leg = 0; leg + 1 < vertices_m.size(); ++leg) {
-    const Vector3 way = vertices_m[leg + 1] - vertices_m[leg];
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      if (std::abs(way(a)) > kRests_m) {
-        now[static_cast<std::size_t>(a)] = way(a) > 0.0 ? 1 : -1;
-      }
-    }
-    all.push_back(now);
-  }
-
-  return all;
-}
-
-/// Direction of travel with which each leg was driven, or with which each position was reached.
-std::vector<std::array<int, 3>> directions_of(const Observations& o) {
-  std::vector<std::array<int, 3>> all = directions_of(o.vertices_m);
-  if (o.mode == Mode::Standstill) {
-    all.insert(all.begin(), std::array<int, 3>{});
-  }
-  return all;
-}
-
 std::string um(const Vector3& v_m) {
   return message("(", 1e6 * v_m.x(), ", ", 1e6 * v_m.y(), ", ", 1e6 * v_m.z(), ") um");
 }
@@ -45,7 +18,7 @@ std::string um(const Vector3& v_m) {
 }  // namespace
 
 AlternativeColumns::AlternativeColumns(const Observations& o)
-    : o_(o), direction_(directions_of(o)) {
+    : o_(o), direction_(travel_along(o.vertices_m, o.mode)) {
   for (const Observation& row : o.rows) {
     centre_m_ += row.axis_position_m / static_cast<double>(o.rows.size());
   }
@@ -88,7 +61,7 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
       for (const Axis axis : kAllAxes) {
         const Vector3 l = lever(o_.layout().chain(), axis, row.axis_position_m, o_.target_offset_m);
         const Vector3 moment = l.cross(row.direction);
-        const double half = 0.5 * direction_[row.leg][index(axis)];
+        const double half = 0.5 * static_cast<double>(direction_[row.leg][index(axis)]);
         for (std::size_t k = 0; k < 3; ++k) {
           v[kRigid * index(axis) + k] = half * row.direction(static_cast<Eigen::Index>(k));
           v[kRigid * index(axis) + 3 + k] = half * moment(static_cast<Eigen::Index>(k));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/calib/otf/travel.hpp"
 #include "otf/added_columns.hpp"
 
 namespace abbe::calib::otf {
@@ -46,7 +47,7 @@ class AlternativeColumns {
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();
   double last_block_ = 1.0;
-  std::vector<std::array<int, 3>> direction_;  ///< per leg (or position), axis: sign of last motion
+  std::vector<AxisTravel> direction_;  ///< by leg or position
 };
 
 }  // namespace abbe::calib::otf

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include "abbe/calib/otf/judge.hpp"
 #include "check_stopped.hpp"
@@ -193,8 +194,10 @@ Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fol
     }
   }
 
-  const Result<Eigen::VectorXd> U = gauge_of_runs(runs.front().o.basis, unknowns.size())
-                                        .estimate(training, {.weight = options.gauge_weight});
+  const Observations& any = runs.front().o;
+  Result<Eigen::VectorXd> U = gauge_of_runs(any.basis, unknowns.size())
+                                  .estimate(with_backlash_prior(std::move(training), any),
+                                            {.weight = options.gauge_weight});
   if (!U && U.error().code == ErrorCode::RankDeficient) {
     return HeldOutFold{};
   }
@@ -204,7 +207,10 @@ Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fol
                                            U.error().text));
   }
 
-  HeldOutFold held{*U, std::vector<std::vector<std::size_t>>(runs.size())};
+  // The model is the mean of both directions of travel: it does not predict backlash.
+  const auto model = static_cast<Eigen::Index>(any.layout().model_size());
+  U->segment(model, static_cast<Eigen::Index>(any.basis.size()) - model).setZero();
+  HeldOutFold held{*std::move(U), std::vector<std::vector<std::size_t>>(runs.size())};
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const std::vector<Observation>& rows = runs[k].o.rows;
     for (std::size_t i = 0; i < rows.size(); ++i) {

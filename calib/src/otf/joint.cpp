@@ -27,6 +27,7 @@ class ErrorsOnLeg {
   ErrorsOnLeg(const Observations& o, const Eigen::VectorXd& U, std::size_t leg)
       : o_(o),
         U_(U.data(), o.basis.size()),
+        leg_(leg),
         from_m_(o.vertices_m[leg]),
         to_m_(o.vertices_m[leg + 1]) {}
 
@@ -50,11 +51,12 @@ class ErrorsOnLeg {
 
  private:
   [[nodiscard]] Vector3 V_m(const Vector3& q_m) const {
-    return o_.basis.V_m({.q_m = q_m, .tool_offset_m = o_.target_offset_m}, U_);
+    return o_.basis.V_m(o_.state_on(leg_, q_m), U_);
   }
 
   const Observations& o_;
   std::span<const double> U_;
+  std::size_t leg_;
   const Vector3 &from_m_, &to_m_;
 };
 
@@ -132,7 +134,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
 
     RowInformation information = information_of(rows);
     const Result<Eigen::VectorXd> U = gauge_of(rows).estimate(
-        information.data,
+        with_backlash_prior(information.data, rows),
         {.weight = options.gauge_weight, .label = [&](std::size_t i) { return rows.label(i); }});
     if (!U) {
       return tl::unexpected(U.error());

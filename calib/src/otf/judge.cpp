@@ -136,6 +136,9 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
   require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, runs.front());
   note_undetermined_offset(verdict, solution.range_offset, runs.front().u_range_offset_m);
+  for (std::string& note : notes_on(solution.backlash)) {
+    verdict.notes.push_back(std::move(note));
+  }
   verdict.accepted = verdict.reasons.empty();
 
   return verdict;

@@ -264,8 +264,9 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const Vector3& t = fit.o.target_offset_m;
   for (const Vector3& q : sparse_grid(other.layout().nodes())) {
     points.push_back(q + t);
-    difference.push_back(solution.model.V_at(q, t) -
-                         volumetric_error(other.layout(), {a->U.data(), other.basis.size()}, q, t));
+    difference.push_back(
+        solution.model.V_at(q, t) -
+        volumetric_error(other.layout(), {a->U.data(), other.layout().model_size()}, q, t));
   }
 
   const auto bias = rigid_free(points, difference);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/observe_standstills.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
@@ -47,15 +48,15 @@ class MeanColumns {
   std::size_t count_ = 0;
 };
 
-MeanColumns mean_columns(const estimation::TableBasis& basis, const Vector3& t,
+MeanColumns mean_columns(const Observations& o, std::size_t leg,
                          std::span<const Vector3> sub_points_m) {
-  std::vector<estimation::Column> memory(basis.most_columns() + kRigidUnknowns);
+  std::vector<estimation::Column> memory(o.basis.most_columns() + kRigidUnknowns);
   estimation::ModelColumns columns(memory);
   MeanColumns mean;
   for (const Vector3& q : sub_points_m) {
     columns.clear();
-    basis.append_columns({.q_m = q, .tool_offset_m = t}, columns);
-    append_rigid_columns(columns, basis.size(), q + t);
+    o.basis.append_columns(o.state_on(leg, q), columns);
+    append_rigid_columns(columns, o.rigid_offset(), q + o.target_offset_m);
     mean.add(columns.span());
   }
   return mean;
@@ -165,6 +166,12 @@ std::span<const SparseRows::Entry> SparseRows::row(std::size_t i) const {
   return std::span(entries_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
 }
 
+estimation::MachineState Observations::state_on(std::size_t leg, const Vector3& q_m) const {
+  return {.q_m = q_m,
+          .tool_offset_m = target_offset_m,
+          .travel = leg < travel.size() ? travel[leg] : AxisTravel{}};
+}
+
 std::string Observations::label(std::size_t unknown) const {
   constexpr std::array<std::string_view, kRigidUnknowns + kClockUnknowns> kNames{
       "tx", "ty", "tz", "rx", "ry", "rz", "offset of the clocks", "drift of the clocks"};
@@ -203,7 +210,7 @@ Result<void> check(const Noise& noise) {
 
 void append_rows(Observations& o, const PointOnPath& point, std::span<const Vector3> sub_points_m,
                  std::span<const MeasuredComponent> components) {
-  const MeanColumns columns = mean_columns(o.basis, o.target_offset_m, sub_points_m);
+  const MeanColumns columns = mean_columns(o, point.leg, sub_points_m);
   const std::size_t first = o.sub_points_m.size();
   o.sub_points_m.insert(o.sub_points_m.end(), sub_points_m.begin(), sub_points_m.end());
   std::size_t component = 0;
@@ -226,12 +233,14 @@ void append_rows(Observations& o, const PointOnPath& point, std::span<const Vect
 }
 
 Result<Observations> observations_without_rows(const Machine& machine, const Path& path,
-                                               const Noise& noise, Alignment alignment) {
+                                               const Noise& noise, Alignment alignment,
+                                               estimation::TravelDependence backlash) {
+  auto tables = estimation::TableOptions::all_axes(machine.interpolation);
+  tables.travel = backlash;
   Result<estimation::TableBasis> basis =
       ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
           .and_then([&](ParameterLayout layout) {
-            return estimation::TableBasis::of(
-                std::move(layout), estimation::TableOptions::all_axes(machine.interpolation));
+            return estimation::TableBasis::of(std::move(layout), tables);
           });
   if (!basis) {
     return tl::unexpected(basis.error());
@@ -241,6 +250,7 @@ Result<Observations> observations_without_rows(const Machine& machine, const Pat
                       .target_offset_m = machine.target_offset_m,
                       .alignment = std::move(alignment),
                       .vertices_m = path.vertices_m,
+                      .travel = travel_along(path.vertices_m, Mode::OnTheFly),
                       .u_scale = noise.u_scale,
                       .u_axis_scale = noise.u_axis_scale,
                       .u_range_offset_m = noise.u_range_offset_m};
@@ -271,9 +281,8 @@ Observations with_basis(const Observations& o, estimation::TableBasis basis) {
     const Observation& row = o.rows[i];
     // The rows of a block have the same sub-points and the same columns.
     if (i == 0 || row.first_sub_point != o.rows[i - 1].first_sub_point) {
-      columns =
-          mean_columns(other.basis, o.target_offset_m,
-                       std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
+      columns = mean_columns(
+          other, row.leg, std::span(o.sub_points_m).subspan(row.first_sub_point, row.sub_points));
     }
     std::vector<SparseRows::Entry> entries = columns.along(row.direction);
     for (const SparseRows::Entry& e : o.A.row(i)) {
@@ -315,17 +324,22 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   }
 
   Result<Observations> empty =
-      observations_without_rows(machine, path, noise, *std::move(alignment));
+      observations_without_rows(machine, path, noise, *std::move(alignment), options.backlash);
   if (!empty) {
     return empty;
   }
 
   Observations o = *std::move(empty);
+  const Result<std::size_t> first_leg = first_with_backlash(o);
+  if (!first_leg) {
+    return tl::unexpected(first_leg.error());
+  }
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();
 
   for (std::size_t i = 0; i < series.blocks.size(); ++i) {
+    o.alignment.used[i] = o.alignment.used[i] && o.alignment.leg[i] >= *first_leg;
     if (o.alignment.used[i]) {
       append_rows(o,
                   point_on_path(series.blocks[i], i, o.alignment, path, o.target_offset_m, noise),

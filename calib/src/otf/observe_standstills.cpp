@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
@@ -171,22 +172,27 @@ Result<Observations> observe_standstills(const Standstills& all, const Machine& 
     return tl::unexpected(a.error());
   }
 
-  Result<Observations> empty =
-      observations_without_rows(machine, path, noise, alignment_of(*a, all, path));
+  Result<Observations> empty = observations_without_rows(
+      machine, path, noise, alignment_of(*a, all, path), options.backlash);
   if (!empty) {
     return empty;
   }
 
   Observations o = *std::move(empty);
   o.mode = Mode::Standstill;
+  o.travel = travel_along(path.vertices_m, o.mode);
   o.samples = all.samples;
   o.lost_samples = all.lost_samples;
   o.blocks = all.found.size();
   o.notes = notes_of(*a, all.found, path);
   note_noise(o.notes, all, noise);
   const std::vector<Vector3> u_m = u_of_means_m(all, noise, options.standstill.u_repeatability_m);
+  const Result<std::size_t> first = first_with_backlash(o);
+  if (!first) {
+    return tl::unexpected(first.error());
+  }
 
-  for (std::size_t j = 0; j < a->standstill_of.size(); ++j) {
+  for (std::size_t j = *first; j < a->standstill_of.size(); ++j) {
     if (const auto i = a->standstill_of[j]) {
       append_position(o, j, *i, all.found[*i], u_m[*i]);
       o.covered_m.push_back(path.vertices_m[j]);

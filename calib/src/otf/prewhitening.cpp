@@ -162,16 +162,18 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
     return tl::unexpected(w.error());
   }
 
-  const auto n = static_cast<Eigen::Index>(o.basis.size());
-  Result<VolumetricModel> model = VolumetricModel::from_vector(
-      o.layout(), Gauge::G1, std::array{o.target_offset_m}, w->U.head(n),
-      w->covariance.topLeftCorner(n, n), s.model.validity(), o.basis.interpolation(Axis::X).kind());
+  Result<VolumetricModel> model =
+      VolumetricModel::from_vector(o.layout(), Gauge::G1, std::array{o.target_offset_m},
+                                   w->U.head(static_cast<Eigen::Index>(o.layout().model_size())),
+                                   model_covariance(o, w->U, w->covariance), s.model.validity(),
+                                   o.basis.interpolation(Axis::X).kind());
   if (!model) {
     return tl::unexpected(model.error());
   }
 
   s.model = *std::move(model);
-  s.rigid = w->U.segment<kRigidUnknowns>(n);
+  s.rigid = w->U.segment<kRigidUnknowns>(static_cast<Eigen::Index>(o.rigid_offset()));
+  s.backlash = backlash_of(o, w->U, w->covariance);
   s.clock = w->U.tail(static_cast<Eigen::Index>(o.clock_unknowns));
   s.covariance_with_rigid = std::move(w->covariance);
   s.statistics.variance_factor = w->variance_factor;

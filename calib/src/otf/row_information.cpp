@@ -52,9 +52,14 @@ estimation::Datum gauge_of(const Observations& o) {
 }
 
 Result<Adjustment> adjust(const RowInformation& rows, const Observations& o, double gauge_weight) {
-  return gauge_of(o).solve(rows.data, {.weight = gauge_weight,
-                                       .noise = rows.noise ? &*rows.noise : nullptr,
-                                       .label = [&](std::size_t i) { return o.label(i); }});
+  std::optional<estimation::Information> noise;
+  if (rows.noise) {
+    noise = with_backlash_prior(*rows.noise, o);
+  }
+  return gauge_of(o).solve(with_backlash_prior(rows.data, o),
+                           {.weight = gauge_weight,
+                            .noise = noise ? &*noise : nullptr,
+                            .label = [&](std::size_t i) { return o.label(i); }});
 }
 
 }  // namespace abbe::calib::otf

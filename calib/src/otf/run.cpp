@@ -28,6 +28,28 @@ std::optional<Estimator> estimator(std::string_view name) {
   return std::nullopt;
 }
 
+std::string_view backlash_name(estimation::TravelDependence backlash) {
+  switch (backlash) {
+    case estimation::TravelDependence::None:
+      return "none";
+    case estimation::TravelDependence::Backlash:
+      return "per-table";
+    case estimation::TravelDependence::Tables:
+      return "forward-backward";
+  }
+  return "";
+}
+
+std::optional<estimation::TravelDependence> backlash_named(std::string_view text) {
+  using enum estimation::TravelDependence;
+  for (const estimation::TravelDependence one : {None, Backlash, Tables}) {
+    if (text == backlash_name(one)) {
+      return one;
+    }
+  }
+  return std::nullopt;
+}
+
 std::string_view name(Stage stage) {
   switch (stage) {
     case Stage::Observe:

@@ -162,27 +162,29 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   a->covariance += root_of_offset * root_of_offset.transpose();
   add_scale_effects(a->covariance, o, as_observed, a->cofactor_Q);
 
-  const auto n = static_cast<Eigen::Index>(o.basis.size());
   Result<VolumetricModel> model =
       VolumetricModel::from_vector(o.layout(), Gauge::G1, std::array{o.target_offset_m},
-                                   a->U.head(n), a->covariance.topLeftCorner(n, n),
-                                   *std::move(validity), o.basis.interpolation(Axis::X).kind());
+                                   a->U.head(static_cast<Eigen::Index>(o.layout().model_size())),
+                                   model_covariance(o, a->U, a->covariance), *std::move(validity),
+                                   o.basis.interpolation(Axis::X).kind());
 
   if (!model) {
     return tl::unexpected(model.error());
   }
 
   report(options, 1.0);
-  return Solution{.estimator = Estimator::TwoStep,
-                  .model = *std::move(model),
-                  .rigid = a->U.segment<kRigidUnknowns>(n),
-                  .clock = a->U.tail(static_cast<Eigen::Index>(o.clock_unknowns)),
-                  .covariance_with_rigid = a->covariance,
-                  .adjustment = of_rows,
-                  .T_machine_tracker = o.alignment.T_machine_tracker,
-                  .statistics = figures,
-                  .residuals = std::move(residuals),
-                  .range_offset = offset};
+  return Solution{
+      .estimator = Estimator::TwoStep,
+      .model = *std::move(model),
+      .rigid = a->U.segment<kRigidUnknowns>(static_cast<Eigen::Index>(o.rigid_offset())),
+      .clock = a->U.tail(static_cast<Eigen::Index>(o.clock_unknowns)),
+      .covariance_with_rigid = a->covariance,
+      .adjustment = of_rows,
+      .T_machine_tracker = o.alignment.T_machine_tracker,
+      .statistics = figures,
+      .residuals = std::move(residuals),
+      .range_offset = offset,
+      .backlash = backlash_of(o, a->U, a->covariance)};
 }
 
 }  // namespace abbe::calib::otf

@@ -46,11 +46,13 @@ Result<void> check_targets(std::span<const TargetRun> runs) {
   return {};
 }
 
-Result<estimation::TableBasis> basis_of_all_tables(const Machine& machine) {
+Result<estimation::TableBasis> basis_of_all_tables(const Machine& machine,
+                                                   estimation::TravelDependence backlash) {
+  auto tables = estimation::TableOptions::all_axes(machine.interpolation);
+  tables.travel = backlash;
   return ParameterLayout::all_tables(machine.chain, machine.nodes)
       .and_then([&](ParameterLayout layout) {
-        return estimation::TableBasis::of(
-            std::move(layout), estimation::TableOptions::all_axes(machine.interpolation));
+        return estimation::TableBasis::of(std::move(layout), tables);
       });
 }
 
@@ -68,7 +70,7 @@ Result<Observations> observe_run(const TargetRun& run, Machine machine, const No
 
 Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs, const Machine& machine,
                                   const Noise& noise, const Options& options) {
-  const Result<estimation::TableBasis> basis = basis_of_all_tables(machine);
+  const Result<estimation::TableBasis> basis = basis_of_all_tables(machine, options.backlash);
   if (!basis) {
     return tl::unexpected(basis.error());
   }
@@ -98,7 +100,7 @@ estimation::Information information_of_runs(std::span<const Observations> runs) 
   for (std::size_t k = 0; k < runs.size(); ++k) {
     all.add(information_of(runs[k]).data, unknowns.of_run(k));
   }
-  return all;
+  return with_backlash_prior(std::move(all), runs.front());
 }
 
 estimation::DatumOptions datum_options(std::span<const Observations> runs, const Options& options) {
@@ -293,11 +295,11 @@ Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const 
   }
 
   const estimation::TableBasis& basis = runs.front().basis;
-  const auto n = static_cast<Eigen::Index>(basis.size());
+  const auto n = static_cast<Eigen::Index>(basis.layout().model_size());
   return ValidityVolume::hull_of(covered_m).and_then([&](ValidityVolume validity) {
     return VolumetricModel::from_vector(basis.layout(), Gauge::G1, tools_m, a.U.head(n),
-                                        a.covariance.topLeftCorner(n, n), std::move(validity),
-                                        basis.interpolation(Axis::X).kind());
+                                        model_covariance(runs.front(), a.U, a.covariance),
+                                        std::move(validity), basis.interpolation(Axis::X).kind());
   });
 }
 
@@ -354,7 +356,8 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                .T_machine_tracker = runs[k].alignment.T_machine_tracker,
                                .statistics = of_runs[k],
                                .residuals = std::move(residuals[k]),
-                               .range_offset = offset});
+                               .range_offset = offset,
+                               .backlash = backlash_of(runs[k], a->U, a->covariance)});
   }
   found.observations = std::move(runs);
   return found;

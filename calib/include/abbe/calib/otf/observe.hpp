@@ -17,6 +17,7 @@
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/path_frame.hpp"
+#include "abbe/calib/otf/travel.hpp"
 
 namespace abbe::calib::otf {
 
@@ -63,6 +64,7 @@ struct Observations {
   std::vector<Vector3> sub_points_m{};  ///< nominal axis positions; rows are averaged over them
   Alignment alignment{};
   std::vector<Vector3> vertices_m{};     ///< vertices of the path, axis positions
+  std::vector<AxisTravel> travel{};      ///< by Observation::leg; a leg that is missing: unknown
   double u_scale = 0.0;                  ///< see Noise
   std::array<double, 3> u_axis_scale{};  ///< see Noise
   double u_range_offset_m = 0.0;         ///< see Noise
@@ -76,11 +78,13 @@ struct Observations {
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the
-  /// model.
+  /// basis: those of the model, layout().model_size(), and backlash (backlash.hpp).
   [[nodiscard]] std::size_t rigid_offset() const { return basis.size(); }
   /// Index of the clock unknowns, which follow the rigid unknowns.
   [[nodiscard]] std::size_t clock_offset() const { return basis.size() + kRigidUnknowns; }
   [[nodiscard]] std::size_t unknowns() const { return clock_offset() + clock_unknowns; }
+  /// State of the machine at an axis position on a leg.
+  [[nodiscard]] estimation::MachineState state_on(std::size_t leg, const Vector3& q_m) const;
   /// Name of an unknown for messages: "EXX at -0.300 m", "EC0Y", "rx".
   [[nodiscard]] std::string label(std::size_t unknown) const;
 };
@@ -110,9 +114,10 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 
 /// BadInput for a noise that is not positive, or a negative uncertainty.
 [[nodiscard]] Result<void> check(const Noise&);
-/// Without rows: the tables of the machine and the uncertainties of the noise.
-[[nodiscard]] Result<Observations> observations_without_rows(const Machine&, const Path&,
-                                                             const Noise&, Alignment);
+/// Without rows: the tables of the machine and the uncertainties of the noise, for a run on the fly.
+[[nodiscard]] Result<Observations> observations_without_rows(
+    const Machine&, const Path&, const Noise&, Alignment,
+    estimation::TravelDependence backlash = estimation::TravelDependence::None);
 
 /// Derivative of the row's y_m with respect to an offset common to all ranges of the tracker.
 [[nodiscard]] double drow_drange_offset(const Observations&, const Observation& row);

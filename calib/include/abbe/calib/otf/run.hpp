@@ -15,6 +15,7 @@
 
 #include "abbe/calib/axis_table.hpp"
 #include "abbe/calib/estimation/axis_interpolation.hpp"
+#include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
@@ -92,6 +93,11 @@ enum class Estimator { TwoStep, Joint };
 [[nodiscard]] std::string_view name(Estimator);
 [[nodiscard]] std::optional<Estimator> estimator(std::string_view name);
 
+/// Values of Options::backlash in files and options: "none", "per-table", "forward-backward"
+/// (TravelDependence::Tables).
+[[nodiscard]] std::string_view backlash_name(estimation::TravelDependence);
+[[nodiscard]] std::optional<estimation::TravelDependence> backlash_named(std::string_view);
+
 enum class Stage { Observe, Align, Solve, Judge };
 [[nodiscard]] std::string_view name(Stage);
 /// Called in the calling thread with 0 <= fraction <= 1, ascending within a stage.
@@ -104,6 +110,10 @@ struct Options {
   Mode mode = Mode::OnTheFly;
   StandstillOptions standstill;              ///< of Mode::Standstill
   Estimator estimator = Estimator::TwoStep;  ///< of Mode::OnTheFly; standstills: always TwoStep
+  /// None: the tables are the mean of both directions of travel, and backlash stays in the
+  /// residuals. Backlash, Tables: the differences between both directions are estimated, too, one
+  /// value per table or one per node (backlash.hpp).
+  estimation::TravelDependence backlash = estimation::TravelDependence::None;
   /// Samples per block mean. 100 samples are 0.2 s and 8.3 mm at 500 Hz and 2500 mm/min: small
   /// compared with nodes 50 mm apart.
   std::size_t block_samples = 100;

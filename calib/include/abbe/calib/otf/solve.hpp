@@ -33,8 +33,10 @@
 #include <functional>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/observe.hpp"
 #include "abbe/calib/volumetric_model.hpp"
@@ -125,16 +127,17 @@ struct Synchronisation {
 
 struct Solution {
   Estimator estimator = Estimator::TwoStep;
-  VolumetricModel model;            ///< gauge G1, without the rigid unknowns
+  VolumetricModel model;            ///< gauge G1, no rigid unknowns, mean of both directions
   Vector6 rigid = Vector6::Zero();  ///< tx ty tz [m], rx ry rz [rad] relative to the alignment
   Eigen::VectorXd clock{};  ///< corrections of the clock unknowns, if the observations have them
-  Eigen::MatrixXd covariance_with_rigid;  ///< of model, rigid and clock unknowns
+  Eigen::MatrixXd covariance_with_rigid;  ///< of all unknowns of Observations
   Adjustment adjustment;                  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
   Residuals residuals;  ///< after_m: model and effect of the range offset subtracted
   RangeOffset range_offset;
   std::optional<Synchronisation> synchronisation{};  ///< with scale readings
+  std::vector<Backlash> backlash{};                  ///< with Options::backlash
 };
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});

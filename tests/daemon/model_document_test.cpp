@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <set>
@@ -212,6 +213,53 @@ TEST(ModelDocument, IsRefusedWhenCutAnywhere) {
     ASSERT_FALSE(read) << length;
     EXPECT_EQ(read.error().code, ErrorCode::BadInput);
   }
+}
+
+/// One value per table, and one per node.
+ModelDocument document_with_backlash() {
+  auto document = synthetic_document(11);
+  document.backlash = {
+      {.motion = {calib::Motion::X, calib::Axis::X}, .value = 2.859e-6, .u = 8.6e-8},
+      {.motion = {calib::Motion::B, calib::Axis::X},
+       .position_m = -0.3,
+       .value = -3.6e-6,
+       .u = 2.4e-7}};
+  return document;
+}
+
+TEST(ModelDocument, ReadsBackWithBacklash) {
+  const auto written = document_with_backlash();
+  const auto read = parse_model(to_json(written), "model.json");
+  ASSERT_TRUE(read) << read.error().text << read.error().details.front();
+  ASSERT_THAT(read->backlash, SizeIs(2));
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(read->backlash[i].motion, written.backlash[i].motion);
+    EXPECT_EQ(read->backlash[i].position_m, written.backlash[i].position_m);
+    EXPECT_TRUE(same_bits(read->backlash[i].value, written.backlash[i].value));
+    EXPECT_TRUE(same_bits(read->backlash[i].u, written.backlash[i].u));
+    EXPECT_TRUE(read->backlash[i].determined);
+  }
+  EXPECT_EQ(to_json(*read), to_json(written));
+}
+
+TEST(ModelDocument, IsNamedWhereBacklashIsUnreadable) {
+  const auto text = to_json(document_with_backlash());
+  for (const auto& [what, with, where] :
+       {std::array{"\"name\": \"EBX\", \"position", "\"name\": \"EBQ\", \"position",
+                   "backlash[1].name: must be an error such as EXX"},
+        std::array{"\"value\": 2.859", "\"value\": \"2\"", "backlash[0].value: must be a number"},
+        std::array{"\"backlash\": [", "\"backlash\": 3, \"other\": [",
+                   "backlash: must be an array"}}) {
+    const auto read = parse_model(replaced(text, what, with), "model.json");
+    ASSERT_FALSE(read) << what;
+    EXPECT_THAT(read.error().details, ::testing::Contains(HasSubstr(where)));
+  }
+}
+
+TEST(ModelDocument, GivesBacklashToSpreadsheets) {
+  const auto document = document_with_backlash();
+  const auto csv = to_tables_csv(document.model, document.backlash);
+  EXPECT_THAT(csv, HasSubstr("\nEXX.backlash,,2.859,0.086,um\nEBX.backlash,-300,-3.6,0.24,urad\n"));
 }
 
 TEST(ModelDocument, GivesTablesToSpreadsheets) {

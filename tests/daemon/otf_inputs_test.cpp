@@ -42,6 +42,15 @@ TEST(OtfInputs, TheConfigurationNamesTheEstimator) {
   }
 }
 
+TEST(OtfInputs, TheConfigurationNamesTheFormOfBacklash) {
+  using enum calib::estimation::TravelDependence;
+  EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = {}}).backlash, None);
+  for (const auto form : {Backlash, Tables}) {
+    const OtfConfig otf{.backlash = form};
+    EXPECT_EQ(otf_options({}, {.machine = machine(), .otf = otf}).backlash, form);
+  }
+}
+
 TEST(OtfInputs, TheGateOfTheConfigurationDecidesHowARunIsJudged) {
   const GateConfig gate{.max_error_m = 2e-3, .max_gradient = 1e-2, .holdout_fraction = 0.1};
   EXPECT_EQ(otf_options({}, {.machine = machine(), .gate = gate}).held_out_folds, 10u);

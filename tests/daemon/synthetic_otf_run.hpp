@@ -91,8 +91,9 @@ struct SyntheticPoint {
 };
 
 /// Tracker frame turned and moved against the machine. `stand_s`: after the last leg.
-inline std::vector<SyntheticPoint> synthetic_points(double dwell_s = 0.2, double stand_s = 0.2) {
-  const auto truth = synthetic_truth();
+inline std::vector<SyntheticPoint> synthetic_points(
+    double dwell_s = 0.2, double stand_s = 0.2,
+    const sim::TruthMachine& truth = synthetic_truth()) {
   sim::PathPlan plan;
   for (const auto& q : synthetic_path_m()) plan.vertices.push_back({q});
   plan.dwell_s = dwell_s;  // the standstill at both ends must hold 20 points
@@ -106,18 +107,18 @@ inline std::vector<SyntheticPoint> synthetic_points(double dwell_s = 0.2, double
   for (int i = 0; i < count; ++i) {
     const double time_s = i / kPointRate_Hz;
     const auto state = motion.at(time_s);
-    points.push_back(
-        {time_s, state.q_m,
-         R_machine_tracker.transpose() * (sim::position_m(truth, state.q_m) - tracker_m)});
+    points.push_back({time_s, state.q_m,
+                      R_machine_tracker.transpose() *
+                          (sim::position_m(truth, state.q_m, {state.direction}) - tracker_m)});
   }
 
   return points;
 }
 
 /// Spherical form.
-inline std::string synthetic_tracker_csv() {
+inline std::string synthetic_tracker_csv(const sim::TruthMachine& truth = synthetic_truth()) {
   std::string text = "time_s,range_mm,azimuth_rad,elevation_rad\n";
-  for (const auto& [time_s, q_m, p_m] : synthetic_points())
+  for (const auto& [time_s, q_m, p_m] : synthetic_points(0.2, 0.2, truth))
     text += fmt::format("{},{:.17g},{:.17g},{:.17g}\n", time_s, p_m.norm() * 1e3,
                         std::atan2(p_m[1], p_m[0]), std::asin(p_m[2] / p_m.norm()));
   return text;

@@ -22,6 +22,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "backlash_lines.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -198,13 +199,13 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
 Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {
   const ModelDocument& document = outcome.document;
   return write_results(folder, document,
-                       {{"tables.csv", to_tables_csv(document.model)},
+                       {{"tables.csv", to_tables_csv(document.model, document.backlash)},
                         {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
 }
 
 void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) {
   const auto& s = outcome.document.statistics;
-  const nlohmann::json object{
+  nlohmann::json object{
       {"model", (folder / "model.json").string()},
       {"id", model_id(outcome.document)},
       {"hash", model_hash(outcome.document)},
@@ -228,6 +229,8 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
       {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kUmPerM},
       {"gate", verdict_json(outcome.verdict)}};
+  if (!outcome.document.backlash.empty())
+    object["backlash"] = backlash_json(outcome.document.backlash);
   fmt::print("{}\n", object.dump(1));
 }
 
@@ -249,6 +252,7 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
   if (outcome.range_offset.u_m > 0.0)
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
+  print_backlash(outcome.document.backlash);
   print_verdict(outcome.verdict);
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
@@ -353,6 +357,12 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                    "interpolation of the tables between their nodes: linear, or cubic (natural,\n"
                    "for smooth errors); default: [model] basis, or linear")
       ->check(CLI::IsMember({calib::kLinearBasis, calib::kCubicBasis}));
+  command
+      ->add_flag("--backlash{per-table}", arguments->backlash,
+                 "also estimate the backlash of every table; --backlash=forward-backward: the\n"
+                 "difference between both directions of travel at every node. The tables are the\n"
+                 "mean of both directions; default: [otf] backlash, or none")
+      ->check(CLI::IsMember({"none", "per-table", "forward-backward"}));
   command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")

@@ -19,6 +19,7 @@ struct IdentifyOtfArguments {
   std::optional<std::string> estimator;  // without a value: that of [otf]
   std::size_t block_samples = 0;         // 0: blocks by travel
   std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
+  std::string backlash;                  // empty: that of [otf]
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
   std::vector<std::string> targets;  // X,Y,Z=FILE, one per run

@@ -27,6 +27,7 @@ void apply(const IdentifyOtfArguments& arguments, Config& config) {
   if (arguments.estimator)
     otf.estimator = otf::estimator(*arguments.estimator).value_or(otf.estimator);
   otf.mode = otf::mode_named(arguments.mode).value_or(otf.mode);
+  otf.backlash = otf::backlash_named(arguments.backlash).value_or(otf.backlash);
   config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
                                      .value_or(config.machine.interpolation);
 }

@@ -280,6 +280,32 @@ std::string read_optional(Reader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
+/// Absent in models without backlash.
+std::vector<calib::otf::Backlash> read_backlash(Reader& in) {
+  std::vector<calib::otf::Backlash> all;
+  const std::string path = "backlash";
+  if (!in.root().is_object() || !in.root().contains(path)) return all;
+  const Json& list = in.root().at(path);
+  if (!list.is_array()) in.fault(path, "must be an array");
+
+  for (std::size_t i = 0; list.is_array() && i < list.size(); ++i) {
+    const std::string at = fmt::format("{}[{}]", path, i);
+    const Json* name = in.find(list[i], at, "name");
+    const auto motion = name != nullptr && name->is_string()
+                            ? calib::error_motion(name->get<std::string>())
+                            : std::nullopt;
+    if (!motion) in.fault(at + ".name", "must be an error such as EXX");
+    calib::otf::Backlash b{.motion = motion.value_or(calib::ErrorMotion{}),
+                           .value = in.number_of(list[i], at, "value", kMicroUnit),
+                           .u = in.number_of(list[i], at, "u", kMicroUnit),
+                           .determined = true};
+    if (list[i].is_object() && list[i].contains("position_mm"))
+      b.position_m = in.number_of(list[i], at, "position_mm", kMm);
+    all.push_back(b);
+  }
+  return all;
+}
+
 std::vector<InputFile> read_inputs(Reader& in) {
   std::vector<InputFile> inputs;
   const Json* list = in.find(in.root(), "", "inputs");
@@ -311,6 +337,7 @@ Result<ModelDocument> read_document(Reader& in) {
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);
+  const auto backlash = read_backlash(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
@@ -318,7 +345,7 @@ Result<ModelDocument> read_document(Reader& in) {
   if (in.any()) return tl::make_unexpected(in.to_error());
   ModelDocument document{std::move(*model), method,        estimator,  machine,
                          machine_hash,      *created,      statistics, inputs,
-                         artefact,          recording_gap, mode};
+                         artefact,          recording_gap, mode,       backlash};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

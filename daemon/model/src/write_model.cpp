@@ -86,6 +86,24 @@ void write_parameters(JsonText& out, const calib::VolumetricModel& model) {
   out.raw("\n  ]");
 }
 
+std::string_view unit_of_backlash(const calib::otf::Backlash& b) {
+  return calib::is_rotation(b.motion.motion) ? "urad" : "um";
+}
+
+void write_backlash(JsonText& out, const std::vector<calib::otf::Backlash>& backlash) {
+  out.key("backlash");
+  out.raw("[");
+  for (std::size_t i = 0; i < backlash.size(); ++i) {
+    const auto& b = backlash[i];
+    out.raw(fmt::format("{}\n    {{\"name\": \"{}\", ", i > 0 ? "," : "", calib::name(b.motion)));
+    if (b.position_m) out.raw(fmt::format("\"position_mm\": {}, ", to_decimal(*b.position_m, kMm)));
+    out.raw(fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}",
+                        to_decimal(b.value, kMicroUnit), to_decimal(b.u, kMicroUnit),
+                        unit_of_backlash(b)));
+  }
+  out.raw("\n  ]");
+}
+
 void write_covariance(JsonText& out, const Eigen::MatrixXd& covariance) {
   out.key("covariance");
   out.raw("[");
@@ -173,6 +191,7 @@ std::string to_json(const ModelDocument& document) {
   out.key("validity");
   out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));
   write_parameters(out, model);
+  if (!document.backlash.empty()) write_backlash(out, document.backlash);
   write_covariance(out, model.covariance());
 
   return out.finish();
@@ -185,12 +204,18 @@ std::string to_coefficients_csv(const calib::evemu::EvemuModel& model) {
   return text;
 }
 
-std::string to_tables_csv(const calib::VolumetricModel& model) {
+std::string to_tables_csv(const calib::VolumetricModel& model,
+                          std::span<const calib::otf::Backlash> backlash) {
   std::string text = "name,position_mm,value,u,unit\n";
   for (const auto& p : model.parameters())
     text +=
         fmt::format("{},{},{},{},{}\n", p.name, p.position_m ? to_decimal(*p.position_m, kMm) : "",
                     to_decimal(p.value, kMicroUnit), to_decimal(p.u, kMicroUnit), unit_of(p));
+  for (const auto& b : backlash)
+    text += fmt::format("{}.backlash,{},{},{},{}\n", calib::name(b.motion),
+                        b.position_m ? to_decimal(*b.position_m, kMm) : "",
+                        to_decimal(b.value, kMicroUnit), to_decimal(b.u, kMicroUnit),
+                        unit_of_backlash(b));
   return text;
 }
 

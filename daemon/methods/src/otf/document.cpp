@@ -1,6 +1,8 @@
 #include "abbe/methods/otf/document.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -48,6 +50,8 @@ ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mod
                          model_statistics(solution),
                          std::move(inputs)};
   document.mode = calib::otf::name(mode);
+  std::copy_if(solution.backlash.begin(), solution.backlash.end(),
+               std::back_inserter(document.backlash), [](const auto& b) { return b.determined; });
   return document;
 }
 

@@ -91,6 +91,20 @@ void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   page.table({"", "urad", "u, urad"}, rows);
 }
 
+void add_backlash(HtmlReport& page, const std::vector<calib::otf::Backlash>& backlash) {
+  if (backlash.empty()) return;
+  page.heading("Backlash");
+  page.paragraph(
+      "The error while its axis travels forward, minus that while it travels backward. The tables "
+      "above are the mean of both directions; half of each value is in the uncertainty of V.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& b : backlash)
+    rows.push_back(
+        {calib::name(b.motion), b.position_m ? fmt::format("{:.1f}", *b.position_m * kMmPerM) : "",
+         fmt::format("{:.3f}", b.value * kUmPerM), fmt::format("{:.3f}", b.u * kUmPerM)});
+  page.table({"", "at, mm", "um or urad", "u, um or urad"}, rows);
+}
+
 }  // namespace
 
 std::string otf_report(const ModelDocument& document, const calib::otf::Residuals& residuals,
@@ -102,6 +116,7 @@ std::string otf_report(const ModelDocument& document, const calib::otf::Residual
   add_residuals(page, document.statistics, residuals,
                 stands ? "along and across the beam" : "across the path");
   add_tables(page, document.model);
+  add_backlash(page, document.backlash);
   add_origin(page, document);
   return page.text();
 }

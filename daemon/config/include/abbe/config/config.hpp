@@ -175,6 +175,8 @@ struct OtfConfig {
   /// See calib::otf::StandstillOptions.
   double u_repeatability_m = calib::otf::StandstillOptions{}.u_repeatability_m;
   calib::otf::Estimator estimator = calib::otf::Estimator::TwoStep;  ///< of on-the-fly mode
+  /// See calib::otf::Options.
+  calib::estimation::TravelDependence backlash = calib::otf::Options{}.backlash;
 };
 
 /// [drift]: comparison of the tables of a new run with those of the active model, and continuous

@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/environment/thermal_expansion.hpp"
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/protocol/time.hpp"
@@ -59,6 +61,9 @@ struct ModelDocument {
   /// Of method otf: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
   /// versions.
   std::string mode{};
+  /// Of method otf with backlash: the differences that the run determined. They do not affect V, so
+  /// they are not in the hash.
+  std::vector<calib::otf::Backlash> backlash{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
@@ -86,8 +91,10 @@ struct ModelDocument {
 /// for a polynomial model.
 [[nodiscard]] std::string to_coefficients_csv(const calib::evemu::EvemuModel& model);
 
-/// CSV with the columns `name,position_mm,value,u,unit`.
-[[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model);
+/// CSV with the columns `name,position_mm,value,u,unit`: tables and squareness, then backlash
+/// (`EXX.backlash`).
+[[nodiscard]] std::string to_tables_csv(const calib::VolumetricModel& model,
+                                        std::span<const calib::otf::Backlash> backlash = {});
 
 /// Note in the verdict if a candidate is not compared with the active model.
 inline constexpr std::string_view kOfAnotherMachine =

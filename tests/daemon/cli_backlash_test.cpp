@@ -1,0 +1,109 @@
+// `abbe identify otf --backlash`, on a run of a simulated machine with known backlash.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "abbe/model/model_document.hpp"
+#include "abbe_command.hpp"
+#include "synthetic_otf_run.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kEXX_m = 4e-6, kEAY_rad = -20e-6;
+
+sim::TruthMachine truth_with_backlash() {
+  auto truth = test::synthetic_truth();
+  truth.axis(sim::Axis::X).backlash[0] = kEXX_m;
+  truth.axis(sim::Axis::Y).backlash[3] = kEAY_rad;
+  return truth;
+}
+
+/// One folder for the whole suite.
+class CliBacklash : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::path(::testing::TempDir()) / fmt::format("cli_backlash_{}", ::getpid());
+    const auto files = test::write_synthetic_run(folder_);
+    test::write_text(files.tracker, test::synthetic_tracker_csv(truth_with_backlash()));
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static test::Ran identify(const std::string& more) {
+    return test::run_abbe(folder_,
+                          "identify otf --machine machine.toml --path path.csv --tracker "
+                          "tracker.csv -o out " +
+                              more);
+  }
+  static std::string text_of(const std::string& file) { return test::text_of(folder_ / file); }
+
+  static inline fs::path folder_;
+};
+
+/// Without noise the values are those of the machine within the second order, 0.1 um.
+TEST_F(CliBacklash, PrintsTheValueOfEveryTable) {
+  const auto ran = identify("--backlash --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto all = nlohmann::json::parse(ran.out).at("backlash");
+  ASSERT_EQ(all.size(), 14u);
+  EXPECT_EQ(all[0].at("name"), "EXX");
+  EXPECT_NEAR(all[0].at("value_um").get<double>(), 1e6 * kEXX_m, 0.1);
+  for (const auto& one : all) {
+    if (one.at("name") == "EAY") {
+      EXPECT_NEAR(one.at("value_urad").get<double>(), 1e6 * kEAY_rad, 1.0);
+    } else if (one.at("name") != "EXX" && one.contains("value_um")) {
+      EXPECT_NEAR(one.at("value_um").get<double>(), 0.0, 0.1) << one;
+    }
+  }
+}
+
+TEST_F(CliBacklash, IsInSummaryVerdictAndFiles) {
+  const auto ran = identify("--backlash");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("backlash    EXX 4.0"));
+  EXPECT_THAT(ran.out, HasSubstr("backlash, forward minus backward: EXX 4.0"));
+  EXPECT_THAT(text_of("out/tables.csv"), HasSubstr("\nEXX.backlash,,"));
+  EXPECT_THAT(text_of("out/report.html"), HasSubstr("Backlash"));
+  const auto document = read_model(folder_ / "out/model.json");
+  ASSERT_TRUE(document);
+  EXPECT_EQ(document->backlash.size(), 14u);
+}
+
+TEST_F(CliBacklash, MayDependOnThePosition) {
+  const auto ran = identify("--backlash=forward-backward --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto all = nlohmann::json::parse(ran.out).at("backlash");
+  ASSERT_EQ(all.size(), 42u);  // three nodes
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(all[i].at("position_mm"), -60.0 + 60.0 * static_cast<double>(i));
+    EXPECT_NEAR(all[i].at("value_um").get<double>(), 1e6 * kEXX_m, 0.3);
+  }
+}
+
+TEST_F(CliBacklash, IsChosenByTheConfiguration) {
+  const auto machine = test::synthetic_machine_toml();
+  test::write_text(folder_ / "machine.toml", machine + "[otf]\nbacklash = \"per-table\"\n");
+  EXPECT_THAT(identify("").out, HasSubstr("backlash    EXX 4.0"));
+  EXPECT_THAT(identify("--backlash=none").out, Not(HasSubstr("backlash    ")));
+  test::write_text(folder_ / "machine.toml", machine);
+}
+
+TEST_F(CliBacklash, IsNotEstimatedUnlessAskedFor) {
+  const auto ran = identify("--json");
+  EXPECT_FALSE(nlohmann::json::parse(ran.out).contains("backlash"));
+  EXPECT_THAT(text_of("out/model.json"), Not(HasSubstr("backlash")));
+  EXPECT_THAT(text_of("out/tables.csv"), Not(HasSubstr("backlash")));
+  const auto refused = identify("--backlash=some");
+  EXPECT_EQ(refused.exit, 2);
+  EXPECT_THAT(refused.err, HasSubstr("some"));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

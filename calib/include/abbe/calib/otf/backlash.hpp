@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/otf/observe.hpp"
 
 namespace abbe::calib::otf {

@@ -17,12 +17,9 @@ namespace {
 constexpr std::uint32_t kDamagedChunks = 3;
 constexpr std::uint32_t kPerDamagedChunk = 10;
 
-#ifdef __SANITIZE_THREAD__
-// one thread and 40 kB of schema texts: nothing to find there, and slow
-constexpr std::size_t kSummaryStep = 16;
-#else
-constexpr std::size_t kSummaryStep = 1;
-#endif
+/// 40 kB of schema texts follow the chunks: cuts in them are alike.
+constexpr std::size_t kSummaryStep = 17;
+constexpr std::size_t kFooterBytes = 200;
 
 std::vector<std::string> texts(std::span<const RecordingLoss> losses) {
   std::vector<std::string> all;
@@ -57,15 +54,16 @@ class DamagedRecording : public ::testing::Test {
   std::vector<std::size_t> chunk_ends_;
 };
 
-TEST_F(DamagedRecording, CutAtAnyByteKeepsEveryFinishedChunk) {
+TEST_F(DamagedRecording, CutAnywhereKeepsEveryFinishedChunk) {
   ASSERT_EQ(chunk_ends_.size(), kDamagedChunks);
   const auto file = folder_.path() / "cut.mcap";
   write_file(file, whole_, whole_.size());
 
   // indexes and DataEnd lie behind the last chunk
   const std::size_t data_end = chunk_ends_.back() + 1024;
+  const std::size_t footer = whole_.size() - kFooterBytes;
   for (std::size_t cut = whole_.size(); cut >= chunk_starts_[0];
-       cut -= cut > data_end ? kSummaryStep : 1) {
+       cut -= cut > data_end && cut < footer ? kSummaryStep : 1) {
     std::filesystem::resize_file(file, cut);
     const auto finished = static_cast<std::uint32_t>(
         std::ranges::count_if(chunk_ends_, [cut](std::size_t end) { return end <= cut; }));

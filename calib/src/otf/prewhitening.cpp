@@ -147,7 +147,8 @@ NoiseFilter noise_filter(const Observations& o, std::span<const double> residual
 
 Result<Solution> prewhitened(Solution s, const Observations& o, const Options& options) {
   const NoiseFilter first = noise_filter(o, s.residuals.after_m);
-  if (first.is_white()) {
+  const bool stated_noise_is_larger = s.statistics.variance_factor <= 1.0;
+  if (first.is_white() || stated_noise_is_larger) {
     return s;
   }
 

@@ -46,7 +46,9 @@ struct NoiseFilter {
 /// statistics `variance_factor` and `noise_correlation`. `adjustment`, residuals, range offset and
 /// the other statistics remain those of the rows themselves, which judge() tests for lack of fit.
 /// The coefficients are estimated twice: from the residuals of `solution`, then from those of the
-/// prewhitened solution. `solution` itself if its residuals are white. Errors of adjust().
+/// prewhitened solution. `solution` itself if its residuals are white, or if they are so small that
+/// the stated noise covers them with their correlation (statistics.variance_factor is 1): the
+/// correlation then is not that of the stated noise. Errors of adjust().
 [[nodiscard]] Result<Solution> prewhitened(Solution, const Observations&, const Options& = {});
 
 }  // namespace abbe::calib::otf

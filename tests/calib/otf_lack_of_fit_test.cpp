@@ -41,6 +41,7 @@ TEST(LackOfFit, WhiteNoiseWidensNoCovariance) {
 // An autocorrelation of rho from block to block divides the information by (1 + rho) / (1 - rho).
 TEST(LackOfFit, CorrelatedNoiseWidensTheCovariance) {
   MadeRun run = make_run({.noise_factor = 0.0});
+  run.options.estimator = Estimator::TwoStep;  // Joint prewhitens
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
   const double rho = 0.8,

@@ -348,9 +348,9 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "use abbe model activate");
   command
       ->add_option("--estimator", arguments->estimator,
-                   "two-step: align, then adjust;\n"
                    "joint: alignment and errors together, by Gauss-Newton;\n"
-                   "default: that of [otf], or two-step")
+                   "two-step: align, then adjust, as published;\n"
+                   "default: that of [otf], or joint")
       ->check(CLI::IsMember({"two-step", "joint"}));
   command
       ->add_option("--tables", arguments->tables,

@@ -108,8 +108,8 @@ using Stopped = std::function<bool()>;
 
 struct Options {
   Mode mode = Mode::OnTheFly;
-  StandstillOptions standstill;              ///< of Mode::Standstill
-  Estimator estimator = Estimator::TwoStep;  ///< of Mode::OnTheFly; standstills: always TwoStep
+  StandstillOptions standstill;            ///< of Mode::Standstill
+  Estimator estimator = Estimator::Joint;  ///< of Mode::OnTheFly; standstills: always TwoStep
   /// None: the tables are the mean of both directions of travel, and backlash stays in the
   /// residuals. Backlash, Tables: the differences between both directions are estimated, too, one
   /// value per table or one per node (backlash.hpp).

@@ -174,7 +174,7 @@ struct OtfConfig {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;  ///< unless a request names another one
   /// See calib::otf::StandstillOptions.
   double u_repeatability_m = calib::otf::StandstillOptions{}.u_repeatability_m;
-  calib::otf::Estimator estimator = calib::otf::Estimator::TwoStep;  ///< of on-the-fly mode
+  calib::otf::Estimator estimator = calib::otf::Estimator::Joint;  ///< of on-the-fly mode
   /// See calib::otf::Options.
   calib::estimation::TravelDependence backlash = calib::otf::Options{}.backlash;
 };

@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <random>
 #include <string>
 
 #include "abbe/calib/model_comparison.hpp"
@@ -140,6 +141,28 @@ TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
   RecordProperty("mean_squared_normalised_error", std::to_string(of_tables));
   EXPECT_NEAR(of_tables, 1.0, 0.25);
   EXPECT_NEAR(of_clock / (2.0 * kRuns), 1.0, 1.0);  // 16 squares: standard deviation 0.35
+}
+
+/// Noise of 1 s in all components: the rows along the travel are as good as those across it.
+TEST(SynchronisedEstimate, DoesNotTakeCorrelatedNoiseForErrorsOfTheReadings) {
+  EncoderRun run = make_encoder_run({});
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const double kept = std::exp(-1.0 / 250.0);  // from sample to sample
+  const double sigma_m = 2e-6 * std::sqrt(1.0 - kept * kept);
+  Vector3 slow_m = Vector3::Zero();
+  for (TrackerObservation& sample : run.run.samples) {
+    slow_m = kept * slow_m + sigma_m * Vector3(normal(random), normal(random), normal(random));
+    sample.p_tracker_m += slow_m;
+  }
+
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+    run.run.options.estimator = estimator;
+    const auto id = identify_with_readings(run);
+    ASSERT_TRUE(id) << id.error().text;
+    ASSERT_TRUE(id->solution.synchronisation);
+    EXPECT_EQ(id->solution.synchronisation->sigma_factor, 1.0);
+  }
 }
 
 TEST(SynchronisedEstimate, IsAcceptedByTheGate) {

@@ -132,7 +132,7 @@ Result<Identification> identify_synchronised(
     }
 
     const NoiseOfRows noise_of = noise_along(*id);
-    const double excess = noise_of.noise.variance_factor() / variance_across(*id);
+    const double excess = noise_of.noise.sigma0 * noise_of.noise.sigma0 / variance_across(*id);
     const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / noise_of.degrees_of_freedom);
     if (excess <= unsuspicious || round == kRounds) {
       id->solution.synchronisation = synchronisation_of(*id, along, noise_of);

@@ -114,8 +114,9 @@ class VolumetricModel {
   [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
   [[nodiscard]] const KinematicChain& chain() const;
   /// Positions at which the model is checked, compared and published. Linear tables: their nodes;
-  /// cubic tables: their nodes and the middles of the cells between them; polynomials: a grid over
-  /// the bounding box of the validity volume. The nodes of any tables are in tables()->layout().
+  /// cubic tables: their nodes and the middles of the cells between them, the nodes alone if there
+  /// would be more than 300,000 positions; polynomials: a grid over the bounding box of the validity
+  /// volume. The nodes of any tables are in tables()->layout().
   [[nodiscard]] const MachineNodes& nodes() const { return nodes_; }
   /// V is linear between nodes() along each axis.
   [[nodiscard]] bool linear_between_nodes() const {

@@ -18,6 +18,7 @@ using namespace abbe::calib::otf;
 using namespace abbe::tests::otf;
 using estimation::Interpolation;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::vector<Vector3> kThreeRunTargets{
     {0.02, -0.015, -0.12}, {0.17, -0.015, -0.12}, {0.02, 0.135, -0.17}};
@@ -235,6 +236,42 @@ TEST(SeveralTargets, WithExchangedOffsetsDoNotFit) {
   const auto found = identified_targets(made);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_GT(found->statistics.sigma0, 1.5);
+  const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  ASSERT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons.front(), HasSubstr("the run contradicts the others: offset"));
+  EXPECT_THAT(testing::PrintToString(verdict->reasons), Not(HasSubstr("nodes are too far apart")));
+}
+
+/// The given position is that of the tracker in the first run.
+TEST(SeveralTargets, ComparesTheTrackersPositionInTheFirstRunOnly) {
+  MadeTargets made = make_targets({.seed = 3, .error_scale_m = 30e-6});
+  made.options.orientation = {.tracker_m = case_a_alignment(true).t_m};
+  const auto found = identified_targets(made);
+  ASSERT_TRUE(found) << found.error().text;
+  const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
+}
+
+/// Its path file with two signs reversed: the errors belong to other places.
+TEST(SeveralTargets, ContradictALaterRunWithARotatedPath) {
+  MadeTargets made = make_targets({.seed = 3, .error_scale_m = 30e-6});
+  const MachineNodes& nodes = made.machine.nodes;
+  const auto mirrored = [&nodes](std::size_t a, double q_m) {
+    const std::vector<double>& of = nodes[a].nodes_m;
+    return of.front() + of.back() - q_m;
+  };
+  for (Vector3& q : made.runs[2].path.vertices_m) {
+    q = {mirrored(0, q.x()), mirrored(1, q.y()), q.z()};
+  }
+
+  const auto found = identified_targets(made);
+  ASSERT_TRUE(found) << found.error().text;
+  const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  ASSERT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons.front(), HasSubstr("the run contradicts the others"));
 }
 
 TEST(SeveralTargets, NameTheRunThatDoesNotFitItsPath) {

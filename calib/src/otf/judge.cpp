@@ -105,11 +105,13 @@ Result<Verdict> judge(const Observations& measured, const Solution& solution,
 Result<Verdict> judge(std::span<const Observations> measured, std::span<const Solution> solutions,
                       const VolumetricModel* active, const GateLimits& limits,
                       const Options& options) {
+  const Tables tables = measured.size() > 1 ? Tables::OfSeveralRuns : Tables::OfThisRun;
   std::vector<Observations> runs;
   std::vector<std::vector<Alternative>> others;
   for (std::size_t k = 0; k < measured.size(); ++k) {
     runs.push_back(without_range_offset(measured[k], solutions[k].range_offset.value_m));
-    Result<std::vector<Alternative>> of_run = alternatives(runs.back(), solutions[k], options);
+    Result<std::vector<Alternative>> of_run =
+        alternatives(runs.back(), solutions[k], options, tables);
     if (!of_run) {
       return tl::unexpected(of_run.error());
     }
@@ -128,10 +130,12 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     add_alternatives(verdict, others[k], runs.size() == 1 ? "" : message("run ", k + 1, ": "));
   }
   require_plausible_scale(verdict, common_scale_error(solution.model), limits.max_scale_error);
-  for (const Observations& o : runs) {
-    require_orientation(verdict, {o.vertices_m}, o.layout().nodes(), o.target_offset_m,
-                        o.alignment.T_machine_tracker, options.orientation);
-  }
+
+  // The evidence is that of the first run. The runs have common tables: a later run with a rotated
+  // path contradicts them.
+  const Observations& first = runs.front();
+  require_orientation(verdict, {first.vertices_m}, first.layout().nodes(), first.target_offset_m,
+                      first.alignment.T_machine_tracker, options.orientation);
   const CorrectionSize size = correction_size(solution.model);
   require_certainty(verdict, size.V_m, size.u_m);
   note_what_u_leaves_out(verdict, runs.front());

@@ -250,8 +250,10 @@ Result<std::optional<Alternative>> other_design(const Fit& fit, const Solution& 
   const std::vector<double> left = residuals_m(other, a->U);
   const double drop = fit.chi2 - chi2(other, left);
   const double factor = residual_noise(other, left, other.rows.size() - a->rank).variance_factor();
-  const double more =
-      std::max(1.0, static_cast<double>(a->rank) - static_cast<double>(fit.adjustment.rank));
+  const auto rank = static_cast<double>(a->rank);
+  const double more = cause == Cause::OtherRuns  // every unknown of the run is one more
+                          ? rank
+                          : std::max(1.0, rank - static_cast<double>(fit.adjustment.rank));
   const double bound = std::max(fit.noise.local * fit.noise.local, factor) *
                        chi2_bound(more, natural_logarithm(kCauses / kFalseAlarm));
   constexpr double kClearlyBetter = 0.5;
@@ -342,6 +344,26 @@ Result<std::optional<Alternative>> closer_nodes(const Fit& fit, const Solution& 
                       options);
 }
 
+/// Tables that this run does not share with others.
+Result<std::optional<Alternative>> own_tables(const Fit& fit, const Solution& solution,
+                                              const Options& options) {
+  const ParameterLayout& shared = fit.o.layout();
+  return other_design(
+      fit, solution, ParameterLayout::observable_with_one_target(shared.chain(), shared.nodes()),
+      Cause::OtherRuns,
+      "the run contradicts the others: offset of its target, its files, or a change of the machine "
+      "between the runs",
+      options);
+}
+
+/// The designs that are compared if the residuals are too large.
+std::vector<decltype(&closer_nodes)> other_designs(Tables tables) {
+  if (tables == Tables::OfSeveralRuns) {
+    return {own_tables};
+  }
+  return {other_order, closer_nodes};
+}
+
 }  // namespace
 
 double ResidualNoise::variance_factor() const {
@@ -421,6 +443,8 @@ std::string_view name(Cause cause) {
       return "chain-order";
     case Cause::NodeSpacing:
       return "node-spacing";
+    case Cause::OtherRuns:
+      return "other-runs";
     case Cause::CorrelatedNoise:
       return "correlated-noise";
   }
@@ -429,7 +453,7 @@ std::string_view name(Cause cause) {
 }
 
 Result<std::vector<Alternative>> alternatives(const Observations& o, const Solution& solution,
-                                              const Options& options) {
+                                              const Options& options, Tables tables) {
   const Fit fit = fit_of(o, solution);
   const AlternativeColumns columns(o);
   std::vector<Alternative> found;
@@ -448,7 +472,7 @@ Result<std::vector<Alternative>> alternatives(const Observations& o, const Solut
   }
 
   if (fit.noise.variance_factor() > kSuspicious && fit.excess() > 0.0) {
-    for (const auto design : {other_order, closer_nodes}) {
+    for (const auto design : other_designs(tables)) {
       Result<std::optional<Alternative>> better = design(fit, solution, options);
       if (!better) {
         return tl::unexpected(better.error());

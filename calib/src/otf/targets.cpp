@@ -371,6 +371,12 @@ Result<TargetsIdentification> identify_targets(std::span<const TargetRun> runs,
   if (Result<void> valid = check_targets(runs); !valid) {
     return tl::unexpected(valid.error());
   }
+  if (options.encoders != nullptr) {
+    return failure(
+        ErrorCode::BadInput,
+        "several targets: scale readings (Options::encoders) belong to one run; identify "
+        "the runs without them");
+  }
 
   Result<ObservedRuns> observed = observe_runs(runs, machine, noise, options);
   if (!observed) {

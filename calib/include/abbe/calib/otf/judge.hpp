@@ -35,7 +35,7 @@ namespace abbe::calib::otf {
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {});
 /// The same for the joint adjustment of several runs (targets.hpp): one solution per run, all with
-/// the same model.
+/// the same model. The evidence for the orientation of the path is that of the first run.
 [[nodiscard]] Result<Verdict> judge(std::span<const Observations>, std::span<const Solution>,
                                     const VolumetricModel* active, const GateLimits& = {},
                                     const Options& = {});

@@ -59,6 +59,7 @@ enum class Cause {
   RangeOffset,
   ChainOrder,
   NodeSpacing,
+  OtherRuns,
   CorrelatedNoise
 };
 [[nodiscard]] std::string_view name(Cause);
@@ -74,7 +75,11 @@ struct Alternative {
 /// The significant alternatives (family-wise error probability 1e-4), at most one per cause, sorted
 /// by `explained`, largest first. CorrelatedNoise is put first if the residuals are correlated and
 /// no alternative has `explained` of one half or more.
+/// With Tables::OfSeveralRuns (targets.hpp) the run is fitted with tables of its own instead of
+/// another order of axes or closer nodes: these also fit the differences between the runs.
+enum class Tables { OfThisRun, OfSeveralRuns };
 [[nodiscard]] Result<std::vector<Alternative>> alternatives(const Observations&, const Solution&,
-                                                            const Options& = {});
+                                                            const Options& = {},
+                                                            Tables = Tables::OfThisRun);
 
 }  // namespace abbe::calib::otf

@@ -38,8 +38,8 @@ struct TargetsIdentification {
 };
 
 /// `machine.target_offset_m` is not used. DegenerateGeometry if the offsets are on a line (0.5 mm);
-/// other errors name the run, counted from 1. judge(observations, solutions, ...) judges the
-/// result.
+/// BadInput with Options::encoders; other errors name the run, counted from 1.
+/// judge(observations, solutions, ...) judges the result.
 [[nodiscard]] Result<TargetsIdentification> identify_targets(std::span<const TargetRun>,
                                                              const Machine& machine, const Noise&,
                                                              const Options& = {});

@@ -153,7 +153,7 @@ Result<JointModel> joint_model(std::span<const Part> parts, const CommonTables& 
   const Eigen::MatrixXd C = c.N * of_e * c.N.transpose();
   Result<VolumetricModel> model = VolumetricModel::from_vector(
       common.basis.layout(), Gauge::G1, std::array{common.tool_offset_m}, U,
-      0.5 * (C + C.transpose()), *std::move(validity));
+      0.5 * (C + C.transpose()), *std::move(validity), common.basis.interpolation(Axis::X).kind());
   if (!model) {
     return tl::unexpected(model.error());
   }

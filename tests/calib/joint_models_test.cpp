@@ -1,0 +1,80 @@
+// Joint identification of models with covariances that are made here: effects that parts share,
+// cubic tables, another tool.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "gauge_coordinates.hpp"
+#include "joint_parts.hpp"
+
+namespace {
+namespace joint = abbe::calib::joint;
+using abbe::calib::Axis;
+using abbe::calib::index;
+using abbe::calib::Vector3;
+using abbe::calib::VolumetricModel;
+using abbe::calib::estimation::Interpolation;
+using abbe::calib::estimation::TableBasis;
+using abbe::calib::estimation::TableOptions;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+const Vector3 kModelTool_m(0.02, -0.015, -0.12);
+
+/// Models of one machine: equal truth, independent noise of `u_m` per coordinate of the gauge.
+struct ModelsOfOneMachine {
+  TableBasis basis;
+  Eigen::MatrixXd N;
+  Eigen::VectorXd truth;
+  std::mt19937_64 random{7};
+
+  explicit ModelsOfOneMachine(Interpolation kind)
+      : basis(*TableBasis::of(abbe::tests::otf::layout_of(
+                                  abbe::tests::otf::coarse_machine("[w X' b Y Z (C1) t]")),
+                              TableOptions::all_axes(kind))),
+        N(abbe::calib::gauge_coordinates(basis).N),
+        truth(N * draw(30e-6)) {}
+
+  Eigen::VectorXd draw(double sigma) {
+    std::normal_distribution<double> normal;
+    return Eigen::VectorXd::NullaryExpr(N.cols(), [&] { return sigma * normal(random); });
+  }
+  [[nodiscard]] VolumetricModel with(const Eigen::VectorXd& U, const Eigen::MatrixXd& C,
+                                     const Vector3& tool_m = kModelTool_m) const {
+    return *VolumetricModel::from_vector(
+        basis.layout(), abbe::calib::Gauge::G1, std::array{tool_m}, U, 0.5 * (C + C.transpose()),
+        *abbe::calib::ValidityVolume::hull_of(abbe::calib::tensor_grid(basis.layout().nodes())),
+        basis.interpolation(Axis::X).kind());
+  }
+  /// G: effects that are contained in the covariance but are 0 here.
+  VolumetricModel model(double u_m, const Eigen::MatrixXd& G) {
+    return with(truth + N * draw(u_m), u_m * u_m * N * N.transpose() + G * G.transpose());
+  }
+  VolumetricModel model(double u_m) { return model(u_m, Eigen::MatrixXd(N.rows(), 0)); }
+  [[nodiscard]] joint::CommonTables common() const { return {basis, kModelTool_m}; }
+};
+
+joint::JointModel joined(const std::vector<joint::Part>& parts, const joint::CommonTables& common) {
+  const auto result = joint::identify(parts, common);
+  EXPECT_TRUE(result) << (result ? "" : result.error().text);
+  EXPECT_THAT(result->contradictions, testing::IsEmpty());
+  return *result->joint;
+}
+
+TEST(JointModels, CubicTablesRemainCubic) {
+  ModelsOfOneMachine m(Interpolation::NaturalCubic);
+  const joint::JointModel result =
+      joined({*joint::part_of_run("run 1", m.model(1e-9), m.common()),
+              *joint::part_of_run("run 2", m.model(1e-9), m.common())},
+             m.common());
+  EXPECT_EQ(result.model.interpolation(), Interpolation::NaturalCubic);
+
+  const Vector3 between(-0.21, 0.11, -0.07);
+  const Vector3 V = m.basis.V_m({.q_m = between, .tool_offset_m = kModelTool_m},
+                                {m.truth.data(), m.basis.size()});
+  EXPECT_LT((result.model.V_at(between, kModelTool_m) - V).norm(), 20e-9);
+}
+
+}  // namespace

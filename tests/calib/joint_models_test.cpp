@@ -77,4 +77,57 @@ TEST(JointModels, CubicTablesRemainCubic) {
   EXPECT_LT((result.model.V_at(between, kModelTool_m) - V).norm(), 20e-9);
 }
 
+/// One column for each of the scales of X, Y, Z, with the relative standard uncertainty u.
+Eigen::MatrixXd scales(const ModelsOfOneMachine& m, double u) {
+  return u * joint::axis_scale_columns(m.basis.layout());
+}
+
+/// u of EXX at its first node, 0.3 m from the reference.
+double u_of_first_EXX(const VolumetricModel& model) {
+  const auto table = model.tables()->layout().find({abbe::calib::Motion::X, Axis::X});
+  const auto at = static_cast<Eigen::Index>(table->offset);
+  return std::sqrt(model.covariance()(at, at));
+}
+
+TEST(JointModels, ACommonScaleDoesNotAverageOut) {
+  constexpr double kScale = 10e-6, kNoise = 0.1e-6;
+  const joint::CommonEffects effects{.u_axis_scale = {kScale, kScale, kScale}};
+  for (const std::size_t count : {2u, 3u}) {
+    ModelsOfOneMachine m(Interpolation::Linear);
+    std::vector<joint::Part> shared, independent;
+    for (std::size_t k = 0; k < count; ++k) {
+      const VolumetricModel model = m.model(kNoise, scales(m, kScale));
+      const std::string name = "run " + std::to_string(k + 1);
+      shared.push_back(*joint::part_of_run(name, model, m.common(), effects));
+      independent.push_back(*joint::part_of_run(name, model, m.common()));
+    }
+
+    const joint::JointModel result = joined(shared, m.common());
+    const double of_scale = kScale * 0.3;
+    EXPECT_GT(u_of_first_EXX(result.model), of_scale);
+    EXPECT_LT(u_of_first_EXX(joined(independent, m.common()).model),
+              1.01 * of_scale / std::sqrt(static_cast<double>(count)));
+    ASSERT_THAT(result.effects, SizeIs(3));
+    EXPECT_EQ(result.effects.front().name, "scale of X");
+    EXPECT_NEAR(result.effects.front().u, 1.0, 1e-6);  // no part determines it
+
+    // Only the common error is in all parts: the rest averages as without it.
+    const Eigen::MatrixXd G = scales(m, kScale);
+    const Eigen::MatrixXd expected =
+        kNoise * kNoise / static_cast<double>(count) * m.N * m.N.transpose() + G * G.transpose();
+    EXPECT_LT((result.model.covariance() - expected).norm(), 1e-9 * expected.norm());
+  }
+}
+
+TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
+  ModelsOfOneMachine m(Interpolation::Linear);
+  const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));
+  const auto part = joint::part_of_run(
+      "run 1", model, m.common(), {.u_ranges = 5e-6, .u_axis_scale = {10e-6, 20e-6, 10e-6}});
+  ASSERT_FALSE(part);
+  EXPECT_EQ(part.error().code, abbe::calib::ErrorCode::NotApplicable);
+  EXPECT_THAT(part.error().text, HasSubstr("the covariance of run 1 is not larger than the effects "
+                                           "stated as common (ranges of tracker, scale of X"));
+}
+
 }  // namespace

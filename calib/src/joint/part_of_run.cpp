@@ -84,6 +84,29 @@ std::optional<ScaledTriangle> scaled_triangle(const Eigen::MatrixXd& C) {
   return t;
 }
 
+/// Triangle of C - G G^T; `names`: effects of the columns of G.
+Result<ScaledTriangle> triangle_without_effects(const std::string& part, const Eigen::MatrixXd& C,
+                                                const Eigen::MatrixXd& G,
+                                                const std::vector<std::string>& names) {
+  if (std::optional<ScaledTriangle> triangle = scaled_triangle(C - G * G.transpose())) {
+    return *std::move(triangle);
+  }
+  if (names.empty() || !scaled_triangle(C)) {
+    return failure(ErrorCode::NotApplicable,
+                   message("joint identification: the covariance of ", part,
+                           " leaves a combination of its parameters without uncertainty"));
+  }
+
+  std::string stated;
+  for (const std::string& effect : names) {
+    stated += (stated.empty() ? "" : ", ") + effect;
+  }
+  return failure(ErrorCode::NotApplicable,
+                 message("joint identification: the covariance of ", part,
+                         " is not larger than the effects stated as common (", stated,
+                         "): state the u_scale and u_axis_scale with which the run was identified"));
+}
+
 /// W M with W^T W = C^-1.
 Eigen::MatrixXd whitened_by(const ScaledTriangle& t, const Eigen::MatrixXd& M) {
   return t.factor.matrixL().solve(t.scale.cwiseInverse().asDiagonal() * M);
@@ -99,17 +122,11 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
 
   const Eigen::MatrixXd N = gauge_coordinates(common.basis).N;
   SharedColumns shared = shared_columns(common.basis.layout(), effects);
-  const Eigen::MatrixXd C = N.transpose() * model.covariance() * N;
   const Eigen::MatrixXd G = N.transpose() * shared.G;
-  std::optional<ScaledTriangle> triangle = scaled_triangle(C - G * G.transpose());
+  const Result<ScaledTriangle> triangle =
+      triangle_without_effects(name, N.transpose() * model.covariance() * N, G, shared.names);
   if (!triangle) {
-    shared.names.clear();
-    triangle = scaled_triangle(C);
-  }
-  if (!triangle) {
-    return failure(ErrorCode::NotApplicable,
-                   message("joint identification: the covariance of ", name,
-                           " leaves a combination of its parameters without uncertainty"));
+    return tl::unexpected(triangle.error());
   }
 
   const LeftOutRotations left_out(common, model.tool_offsets_m().front() - common.tool_offset_m);

@@ -55,7 +55,9 @@ struct Part {
   std::function<std::vector<Mistake>()> mistakes{};
 };
 
-/// Standard uncertainties that parts may have in common.
+/// Standard uncertainties of errors that parts have in common. An error that is not stated here
+/// counts as independent between the parts: if it is not, the joint uncertainty of n parts is too
+/// small by up to sqrt(n).
 struct CommonEffects {
   /// Relative, of the scale of the ranges (otf::Noise::u_scale). Parts with the same `ranges_of` had
   /// the same tracker.
@@ -67,9 +69,10 @@ struct CommonEffects {
 };
 
 /// The part of an on-the-fly run: its model with its covariance, which contains all effects of the
-/// run. `effects` are those that the covariance contains and that other parts share; an effect that
-/// cannot be separated from the covariance (in rounding) remains in it.
-/// NotApplicable for other nodes, tables or axes than the common ones, or another gauge.
+/// run. `effects` are those that the covariance contains and that other parts share: they are
+/// separated from the covariance and become unknowns of the part.
+/// NotApplicable for other nodes, tables or axes than the common ones, or another gauge; and if the
+/// covariance is not larger than the effects, or leaves a combination without uncertainty.
 [[nodiscard]] Result<Part> part_of_run(std::string name, const VolumetricModel&,
                                        const CommonTables&, const CommonEffects& = {});
 

@@ -119,6 +119,18 @@ TEST(JointModels, ACommonScaleDoesNotAverageOut) {
   }
 }
 
+TEST(JointModels, RefusesAnArrayWithoutBallErrors) {
+  const ModelsOfOneMachine m(Interpolation::Linear);
+  abbe::calib::evemu::Observations o;
+  o.machine = {m.basis.layout().chain(), kModelTool_m};
+  for (const double s_m : {0.0, 1e-6}) {
+    const auto part = joint::part_of_array("array 2", o, m.common(), {.s_m = s_m});
+    ASSERT_FALSE(part);
+    EXPECT_EQ(part.error().code, abbe::calib::ErrorCode::TooFewObservations);
+    EXPECT_EQ(part.error().text, "joint identification: array 2: there are no ball errors");
+  }
+}
+
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
   ModelsOfOneMachine m(Interpolation::Linear);
   const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));

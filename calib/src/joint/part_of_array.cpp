@@ -223,6 +223,18 @@ std::vector<Mistake> mistakes_of_array(const evemu::Observations& o, const Commo
   return mistakes;
 }
 
+Result<void> check_array(const evemu::Observations& o, const CommonTables& common) {
+  if (o.machine.chain.order_w_to_t() != common.basis.layout().chain().order_w_to_t()) {
+    return failure(ErrorCode::NotApplicable,
+                   message("the array was touched with the axes ", o.machine.chain.text(),
+                           ", the common tables have ", common.basis.layout().chain().text()));
+  }
+  if (o.rows.empty()) {
+    return failure(ErrorCode::TooFewObservations, "there are no ball errors");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Part> part_of_array(std::string name, const evemu::Observations& o,
@@ -230,10 +242,8 @@ Result<Part> part_of_array(std::string name, const evemu::Observations& o,
   const auto in_this_part = [&](const Error& e) {
     return Error{e.code, message("joint identification: ", name, ": ", e.text)};
   };
-  if (o.machine.chain.order_w_to_t() != common.basis.layout().chain().order_w_to_t()) {
-    return failure(ErrorCode::NotApplicable,
-                   message("joint identification: ", name, " has the axes ", o.machine.chain.text(),
-                           ", the common tables ", common.basis.layout().chain().text()));
+  if (Result<void> valid = check_array(o, common); !valid) {
+    return tl::unexpected(in_this_part(valid.error()));
   }
 
   Result<Part> part = array_part(o, common, options, options.s_m);

@@ -131,6 +131,21 @@ TEST(JointModels, RefusesAnArrayWithoutBallErrors) {
   }
 }
 
+TEST(JointModels, RefusesABallBeyondTheNodes) {
+  const ModelsOfOneMachine m(Interpolation::Linear);
+  abbe::calib::evemu::Observations o;
+  o.machine = {m.basis.layout().chain(), kModelTool_m};
+  for (int ball = 1; ball <= 4; ++ball) {
+    o.rows.push_back({3, ball, Vector3(0.0, 0.1 * (ball - 1), -0.1 * (ball % 2)), Vector3::Zero()});
+  }
+  const auto part = joint::part_of_array("array", o, m.common(), {.s_m = 1e-6});
+  ASSERT_FALSE(part);
+  EXPECT_EQ(part.error().code, abbe::calib::ErrorCode::BadInput);
+  EXPECT_THAT(part.error().text,
+              HasSubstr("array: ball 4 at position 3 has the reading Y = 300 mm, the nodes of the "
+                        "common tables reach from -250 to 250 mm"));
+}
+
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
   ModelsOfOneMachine m(Interpolation::Linear);
   const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));

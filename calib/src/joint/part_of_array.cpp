@@ -113,13 +113,16 @@ evemu::Observations with_changed_errors(evemu::Observations o, const Matrix3& of
   return o;
 }
 
-bool all_inside_travel(const evemu::Observations& o, const MachineNodes& nodes) {
+std::vector<Vector3> readings_m(const evemu::Observations& o) {
   std::vector<Vector3> readings;
   for (const evemu::BallError& row : o.rows) {
     readings.push_back(row.reading_m);
   }
-  constexpr double kBeyond_m = 0.05;
-  return outside_travel(readings, nodes, kBeyond_m).empty();
+  return readings;
+}
+
+bool all_inside_travel(const evemu::Observations& o, const MachineNodes& nodes) {
+  return outside_travel(readings_m(o), nodes).empty();
 }
 
 struct ChangedArray {
@@ -232,6 +235,22 @@ Result<void> check_array(const evemu::Observations& o, const CommonTables& commo
   if (o.rows.empty()) {
     return failure(ErrorCode::TooFewObservations, "there are no ball errors");
   }
+
+  const MachineNodes& nodes = common.basis.layout().nodes();
+  const std::vector<Vector3> readings = readings_m(o);
+  if (const std::vector<OutsideTravel> outside = outside_travel(readings, nodes);
+      !outside.empty()) {
+    const auto [point, axis] = outside.front();
+    const std::vector<double>& nodes_m = nodes[axis].nodes_m;
+    return failure(ErrorCode::BadInput,
+                   message("ball ", o.rows[point].ball, " at position ", o.rows[point].position,
+                           " has the reading ", letter(kAllAxes[axis]), " = ",
+                           kMmPerM * readings[point](static_cast<Eigen::Index>(axis)),
+                           " mm, the nodes of the common tables reach from ",
+                           kMmPerM * nodes_m.front(), " to ", kMmPerM * nodes_m.back(),
+                           " mm: leave the ball out, or identify tables that contain it",
+                           corrections_inside_travel(readings, nodes)));
+  }
   return {};
 }
 
@@ -260,9 +279,7 @@ Result<Part> part_of_array(std::string name, const evemu::Observations& o,
     return tl::unexpected(std::move(error));
   }
 
-  for (const evemu::BallError& row : o.rows) {
-    part->covered_m.push_back(row.reading_m);
-  }
+  part->covered_m = readings_m(o);
   part->name = std::move(name);
   part->mistakes = [o, common, options, unknowns = part->information.unknowns()] {
     return mistakes_of_array(o, common, options, unknowns);

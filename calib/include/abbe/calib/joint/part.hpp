@@ -91,7 +91,8 @@ struct ArrayOptions {
 };
 /// The part of a ball array (evemu/pose_blocks.hpp). NotApplicable for another order of the axes.
 /// TooFewObservations without ball errors, or if s is to be estimated from fewer than 20 degrees of
-/// freedom; BadInput if s is larger than `most_s_m`, naming the mistakes without which it is not.
+/// freedom; BadInput for a ball beyond the nodes of the common tables (they are not
+/// extrapolated), or if s is larger than `most_s_m`, naming the mistakes without which it is not.
 [[nodiscard]] Result<Part> part_of_array(std::string name, const evemu::Observations&,
                                          const CommonTables&, const ArrayOptions& = {});
 

@@ -146,6 +146,31 @@ TEST(JointModels, RefusesABallBeyondTheNodes) {
                         "common tables reach from -250 to 250 mm"));
 }
 
+/// EYX differs at one node, so that p is about 0.02: a contradiction with a limit of 0.1 only.
+TEST(JointModels, ExplanationsLeaveNoContradiction) {
+  ModelsOfOneMachine m(Interpolation::Linear);
+  const auto table = m.basis.layout().find({abbe::calib::Motion::Y, Axis::X});
+  const auto first = static_cast<Eigen::Index>(table->offset);
+  Eigen::VectorXd bump = Eigen::VectorXd::Zero(m.N.rows());
+  bump(first + 1) = 1.0;  // EYX at -0.1 m
+  const Eigen::MatrixXd C = 1e-12 * m.N * m.N.transpose();
+  const auto one = joint::part_of_run("run 1", m.with(m.truth, C), m.common());
+  const double u_m = std::sqrt(2.0) * 1e-6;
+  const auto other = joint::part_of_run("run 2", m.with(m.truth + 7.0 * u_m * bump, C), m.common());
+
+  const std::vector<joint::Part> parts{*one, *other};
+  const auto usual = joint::test_pairs(parts, m.common());
+  ASSERT_TRUE(usual);
+  const double p = usual->front().all.p;
+  ASSERT_GT(p, 1e-3);
+  ASSERT_LT(p, 0.1);
+  const auto strict = joint::test_pairs(parts, m.common(), {.false_alarm = std::sqrt(p)});
+  ASSERT_TRUE(strict);
+  ASSERT_TRUE(strict->front().contradiction);
+  ASSERT_THAT(strict->front().explanations, SizeIs(1));
+  EXPECT_THAT(strict->front().explanations.front(), HasSubstr("they differ in EYX"));
+}
+
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
   ModelsOfOneMachine m(Interpolation::Linear);
   const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));

@@ -16,12 +16,17 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// An explanation must leave a disagreement that occurs more often than this.
-constexpr double kLikely = 1e-3;
 constexpr std::size_t kMostExplanations = 3, kMostTables = 3;
 
-bool agrees(const Disagreement& d) {
-  return d.dof == 0 || d.log_p > natural_logarithm(kLikely);
+/// An explanation must leave a disagreement that occurs with a larger probability than this, and
+/// that is no contradiction: larger than the limit of the test.
+double least_likely(const PairTest& test) {
+  constexpr double kLikely = 1e-3;
+  return std::max(kLikely, test.all.limit);
+}
+
+bool agrees(const Disagreement& d, double least) {
+  return d.dof == 0 || d.log_p > natural_logarithm(least);
 }
 
 struct Hypothesis {
@@ -48,7 +53,8 @@ DeterminingRows with_unit(DeterminingRows rows, double factor) {
 /// Mistakes that no unknown describes.
 class Hypotheses {
  public:
-  Hypotheses(const PairProblem& pair, const Part& i, const Part& j) : pair_(pair), i_(i), j_(j) {}
+  Hypotheses(const PairProblem& pair, const Part& i, const Part& j, double least)
+      : pair_(pair), i_(i), j_(j), least_(least) {}
 
   void add_signs(const GaugeCoordinates& c) {
     test("the sign of V is reversed in " + i_.name + " or in " + j_.name, pair_.of_i(),
@@ -95,13 +101,14 @@ class Hypotheses {
  private:
   void test(std::string text, const DeterminingRows& i, const DeterminingRows& j) {
     const Disagreement left = pair_.disagreement(i, j);
-    if (agrees(left)) {
+    if (agrees(left, least_)) {
       found_.push_back({std::move(text), left});
     }
   }
 
   const PairProblem& pair_;
   const Part &i_, &j_;
+  double least_ = 0.0;
   std::vector<Hypothesis> found_;
 };
 
@@ -110,7 +117,7 @@ void explain_by_length(PairTest& test, const PairProblem& pair, const Part& i, c
                        const GaugeCoordinates& c, const ParameterLayout& layout) {
   const Eigen::VectorXd column = c.N.transpose() * axis_scale_columns(layout).rowwise().sum();
   const PairProblem::Freed freed = pair.freed(column);
-  if (freed.drop_dof == 1 && agrees(freed.left)) {
+  if (freed.drop_dof == 1 && agrees(freed.left, least_likely(test))) {
     test.explanations.push_back(
         message("lengths of ", j.name, " are larger than those of ", i.name, " by ",
                 freed.d(0) * kUmPerM, " um/m (u ", freed.root_cov_d.norm() * kUmPerM,
@@ -154,7 +161,7 @@ Eigen::MatrixXd columns_of(const std::vector<const GaugeGroup*>& tables, Eigen::
 /// The table whose freedom decreases X2 most significantly, with those already free.
 const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoordinates& c,
                                          const std::vector<const GaugeGroup*>& already,
-                                         ChiSquare& best_test) {
+                                         double least, ChiSquare& best_test) {
   const Eigen::Index m = c.N.cols();
   const PairProblem::Freed before = pair.freed(columns_of(already, m));
   const GaugeGroup* best = nullptr;
@@ -173,7 +180,7 @@ const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoo
     if (best == nullptr || log_p < best_log_p) {
       best = &group;
       best_log_p = log_p;
-      best_test = {drop, dof, exponential(log_p), kLikely};
+      best_test = {drop, dof, exponential(log_p), least};
     }
   }
   return best;
@@ -181,18 +188,19 @@ const GaugeGroup* most_significant_table(const PairProblem& pair, const GaugeCoo
 
 void explain_by_tables(PairTest& test, const PairProblem& pair, const GaugeCoordinates& c,
                        const ParameterLayout& layout) {
+  const double least = least_likely(test);
   std::vector<const GaugeGroup*> tables;
   std::vector<ChiSquare> tests;
   bool explained = false;
   while (!explained && tables.size() < kMostTables) {
     ChiSquare of_table;
-    const GaugeGroup* next = most_significant_table(pair, c, tables, of_table);
-    if (next == nullptr || of_table.p > kLikely) {
+    const GaugeGroup* next = most_significant_table(pair, c, tables, least, of_table);
+    if (next == nullptr || of_table.p > least) {
       break;
     }
     tables.push_back(next);
     tests.push_back(of_table);
-    explained = agrees(pair.freed(columns_of(tables, c.N.cols())).left);
+    explained = agrees(pair.freed(columns_of(tables, c.N.cols())).left, least);
   }
   if (tables.empty()) {
     return;
@@ -225,7 +233,7 @@ std::string text(const TableDifference& d) {
 
 void explain(PairTest& test, const PairProblem& pair, const Part& i, const Part& j,
              const GaugeCoordinates& c, const ParameterLayout& layout) {
-  Hypotheses mistakes(pair, i, j);
+  Hypotheses mistakes(pair, i, j, least_likely(test));
   mistakes.add_signs(c);
   mistakes.add_units();
   mistakes.add_mistakes_of_methods();

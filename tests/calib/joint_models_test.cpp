@@ -6,6 +6,7 @@
 
 #include <random>
 
+#include "chi2_tail.hpp"
 #include "gauge_coordinates.hpp"
 #include "joint_parts.hpp"
 
@@ -169,6 +170,19 @@ TEST(JointModels, ExplanationsLeaveNoContradiction) {
   ASSERT_TRUE(strict->front().contradiction);
   ASSERT_THAT(strict->front().explanations, SizeIs(1));
   EXPECT_THAT(strict->front().explanations.front(), HasSubstr("they differ in EYX"));
+}
+
+TEST(JointModels, AnEstimatedNoiseMayBeTooSmallByItsTwoPercentQuantile) {
+  ModelsOfOneMachine m(Interpolation::Linear);
+  std::vector<joint::Part> parts{*joint::part_of_run("run 1", m.model(1e-6), m.common()),
+                                 *joint::part_of_run("run 2", m.model(1e-6), m.common())};
+  const double stated = joint::test_pairs(parts, m.common())->front().all.statistic;
+  for (const std::size_t dof : {20u, 50u, 200u}) {
+    parts.back().dof_of_noise = static_cast<double>(dof);
+    const double estimated = joint::test_pairs(parts, m.common())->front().all.statistic;
+    const double chi_square = static_cast<double>(dof) * estimated / stated;
+    EXPECT_NEAR(std::exp(abbe::calib::log_chi2_tail(chi_square, dof)), 0.98, 1e-3) << dof;
+  }
 }
 
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {

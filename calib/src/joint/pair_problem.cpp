@@ -19,9 +19,18 @@ std::vector<std::string> shared_effects(const Part& i, const Part& j) {
   return shared;
 }
 
-/// How much larger the variance of the noise may be than its estimate, with a probability of 2 %.
+/// The factor by which the variance of the noise exceeds its estimate with a probability of 2 %: dof
+/// divided by the 2 % quantile of chi-square with dof degrees of freedom, in the approximation of
+/// [Wilson 1931]. The approximation fails for dof of 1 or 2, where the factor is limited.
 double variance_may_be(const Part& part) {
-  return part.dof_of_noise > 0.0 ? 1.0 + 2.0 * std::sqrt(2.0 / part.dof_of_noise) : 1.0;
+  if (!(part.dof_of_noise > 0.0)) {
+    return 1.0;
+  }
+  constexpr double kNormalQuantile = 2.054;  // exceeded with a probability of 2 %
+  constexpr double kLeastRoot = 0.1;
+  const double s = 2.0 / (9.0 * part.dof_of_noise);
+  const double root = std::max(1.0 - s - kNormalQuantile * std::sqrt(s), kLeastRoot);
+  return 1.0 / (root * root * root);
 }
 
 }  // namespace

@@ -11,8 +11,10 @@
 /// X2 is chi-square with rank(i) + rank(j) + (shared effects) - rank(i + j) degrees of freedom if
 /// both describe one machine. It is the chi-square of the difference over all combinations of
 /// parameters that both determine; combinations that one part alone determines do not contribute.
-/// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor that it
-/// exceeds with a probability of 2 %, 1 + 2 sqrt(2 / dof).
+/// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor by which its
+/// variance exceeds the estimate with a probability of 2 %,
+///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931]
+/// The covariance of the joint model is not widened for a noise that is known only to some percent.
 ///
 /// Explanations of a contradiction, in this order; the first that makes the rest of X2 likely is
 /// stated:

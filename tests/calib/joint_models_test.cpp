@@ -6,8 +6,10 @@
 
 #include <random>
 
+#include "abbe/calib/model_comparison.hpp"
 #include "chi2_tail.hpp"
 #include "gauge_coordinates.hpp"
+#include "joint/left_out_rotations.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -183,6 +185,19 @@ TEST(JointModels, AnEstimatedNoiseMayBeTooSmallByItsTwoPercentQuantile) {
     const double chi_square = static_cast<double>(dof) * estimated / stated;
     EXPECT_NEAR(std::exp(abbe::calib::log_chi2_tail(chi_square, dof)), 0.98, 1e-3) << dof;
   }
+}
+
+/// The reference of X (0) is between nodes: the condition of cubic tables contains other nodes than
+/// that of linear ones.
+TEST(JointModels, LeftOutRotationsAreInTheGaugeOfCubicTables) {
+  const ModelsOfOneMachine m(Interpolation::NaturalCubic);
+  const Eigen::MatrixXd K =
+      abbe::calib::gauge_conditions(abbe::calib::Gauge::G1, m.basis, m.basis.size());
+  const auto effect =
+      joint::LeftOutRotations(m.common(), Vector3(0.03, 0.02, -0.05)).of_parameters();
+  ASSERT_TRUE(effect);
+  EXPECT_GT(effect->norm(), 1e-3);
+  EXPECT_LT((K * *effect).norm(), 1e-12 * effect->norm());
 }
 
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {

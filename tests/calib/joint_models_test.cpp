@@ -34,9 +34,9 @@ struct ModelsOfOneMachine {
   std::mt19937_64 random{7};
 
   explicit ModelsOfOneMachine(Interpolation kind)
-      : basis(*TableBasis::of(abbe::tests::otf::layout_of(
-                                  abbe::tests::otf::coarse_machine("[w X' b Y Z (C1) t]")),
-                              TableOptions::all_axes(kind))),
+      : basis(*TableBasis::of(
+            abbe::tests::otf::layout_of(abbe::tests::otf::coarse_machine("[w X' b Y Z (C1) t]")),
+            TableOptions::all_axes(kind))),
         N(abbe::calib::gauge_coordinates(basis).N),
         truth(N * draw(30e-6)) {}
 
@@ -68,10 +68,9 @@ joint::JointModel joined(const std::vector<joint::Part>& parts, const joint::Com
 
 TEST(JointModels, CubicTablesRemainCubic) {
   ModelsOfOneMachine m(Interpolation::NaturalCubic);
-  const joint::JointModel result =
-      joined({*joint::part_of_run("run 1", m.model(1e-9), m.common()),
-              *joint::part_of_run("run 2", m.model(1e-9), m.common())},
-             m.common());
+  const joint::JointModel result = joined({*joint::part_of_run("run 1", m.model(1e-9), m.common()),
+                                           *joint::part_of_run("run 2", m.model(1e-9), m.common())},
+                                          m.common());
   EXPECT_EQ(result.model.interpolation(), Interpolation::NaturalCubic);
 
   const Vector3 between(-0.21, 0.11, -0.07);
@@ -200,11 +199,42 @@ TEST(JointModels, LeftOutRotationsAreInTheGaugeOfCubicTables) {
   EXPECT_LT((K * *effect).norm(), 1e-12 * effect->norm());
 }
 
+TEST(JointModels, RefusesACommonEffectOfTwoSizes) {
+  ModelsOfOneMachine m(Interpolation::Linear);
+  const VolumetricModel model = m.model(1e-6, scales(m, 10e-6));
+  const std::vector<joint::Part> parts{
+      *joint::part_of_run("run 1", model, m.common(), {.u_axis_scale = {1e-6, 0.0, 0.0}}),
+      *joint::part_of_run("run 2", model, m.common(), {.u_axis_scale = {2e-6, 0.0, 0.0}})};
+  const auto result = joint::identify(parts, m.common());
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, abbe::calib::ErrorCode::BadInput);
+  EXPECT_THAT(result.error().text,
+              HasSubstr("the uncertainty of 'scale of X' is 1e-06 in run 1, 2e-06 in run 2"));
+}
+
+/// Array 2 does not state an uncertainty of Ball2: the errors of the other balls must still be the
+/// same unknowns as those of array 1.
+TEST(JointModels, ErrorsOfTheArrayArePairedByBall) {
+  const auto run = abbe::tests::otf::make_run({});
+  const joint::CommonTables common{*TableBasis::of(abbe::tests::otf::layout_of(run.machine)),
+                                   run.machine.target_offset_m};
+  auto observed = abbe::tests::joint::observed_array(run, abbe::tests::joint::field_of(run),
+                                                     {.tool_m = common.tool_offset_m});
+  const auto one = joint::part_of_array("array 1", observed, common, {.s_m = 1e-6});
+  observed.artefact->u_ball_m[1] = 0.0;
+  const auto two = joint::part_of_array("array 2", observed, common, {.s_m = 1e-6});
+  ASSERT_TRUE(one && two);
+  ASSERT_THAT(one->effects, SizeIs(27));
+  ASSERT_THAT(two->effects, SizeIs(24));
+  EXPECT_EQ(one->effects[7], "y of ball 3 of array");
+  EXPECT_EQ(two->effects[4], "y of ball 3 of array");
+}
+
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
   ModelsOfOneMachine m(Interpolation::Linear);
   const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));
-  const auto part = joint::part_of_run(
-      "run 1", model, m.common(), {.u_ranges = 5e-6, .u_axis_scale = {10e-6, 20e-6, 10e-6}});
+  const auto part = joint::part_of_run("run 1", model, m.common(),
+                                       {.u_ranges = 5e-6, .u_axis_scale = {10e-6, 20e-6, 10e-6}});
   ASSERT_FALSE(part);
   EXPECT_EQ(part.error().code, abbe::calib::ErrorCode::NotApplicable);
   EXPECT_THAT(part.error().text, HasSubstr("the covariance of run 1 is not larger than the effects "

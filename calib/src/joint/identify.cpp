@@ -1,7 +1,10 @@
 #include "abbe/calib/joint/identify.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "abbe/calib/estimation/datum.hpp"
 #include "elementary.hpp"
@@ -13,6 +16,32 @@
 
 namespace abbe::calib::joint {
 namespace {
+
+/// An effect of several parts is one unknown, a multiple of its standard uncertainty: all of them
+/// must state the same one.
+Result<void> check_same_effects(std::span<const Part> parts) {
+  constexpr double kSame = 1e-6;  // relative; uncertainties in files are decimal numbers
+  std::map<std::string, std::pair<double, const Part*>> stated;
+  for (const Part& part : parts) {
+    if (!part.u_of_effects.empty() && part.u_of_effects.size() != part.effects.size()) {
+      return failure(ErrorCode::BadInput,
+                     message("joint identification: ", part.name, " has ", part.effects.size(),
+                             " effects, but uncertainties of ", part.u_of_effects.size()));
+    }
+    for (std::size_t k = 0; k < part.u_of_effects.size(); ++k) {
+      const double u = part.u_of_effects[k];
+      const auto [first, is_new] = stated.try_emplace(part.effects[k], u, &part);
+      const auto& [u_first, of_first] = first->second;
+      if (!is_new && !(std::abs(u - u_first) <= kSame * u_first)) {
+        return failure(ErrorCode::BadInput,
+                       message("joint identification: the uncertainty of '", part.effects[k],
+                               "' is ", u_first, " in ", of_first->name, ", ", u, " in ", part.name,
+                               ": state the same one, or another name if it is another error"));
+      }
+    }
+  }
+  return {};
+}
 
 Result<void> check_parts(std::span<const Part> parts, const CommonTables& common,
                          std::size_t least) {
@@ -34,7 +63,7 @@ Result<void> check_parts(std::span<const Part> parts, const CommonTables& common
     return failure(ErrorCode::BadInput,
                    message("joint identification: ", parts.size(), " parts, needs ", least));
   }
-  return {};
+  return check_same_effects(parts);
 }
 
 /// The union of the effects, in the order in which parts name them.

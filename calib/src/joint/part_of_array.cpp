@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "abbe/calib/axis_mistakes.hpp"
+#include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/pose_blocks.hpp"
 #include "abbe/calib/joint/part.hpp"
 #include "joint/determining_rows.hpp"
@@ -162,11 +163,13 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
   const Eigen::MatrixX3d of_axis = axis_scale_columns(common.basis.layout());
   ArrayUnknowns unknowns{common, left_out, Eigen::MatrixXd(of_axis.rows(), 0)};
   std::vector<std::string> effects;
+  std::vector<double> u_of_effects;
   for (const Axis a : kAllAxes) {
     if (const double u = options.effects.u_axis_scale[index(a)]; u > 0.0) {
       unknowns.scales.conservativeResize(Eigen::NoChange, unknowns.scales.cols() + 1);
       unknowns.scales.rightCols<1>() = u * of_axis.col(static_cast<Eigen::Index>(index(a)));
       effects.push_back(message("scale of ", letter(a)));
+      u_of_effects.push_back(u);
     }
   }
 
@@ -193,9 +196,9 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
   if (!all) {
     return tl::unexpected(all.error());
   }
-  const std::size_t errors = all->unknowns() - unknowns.first_error();
-  for (std::size_t k = 0; k < errors; ++k) {
-    effects.push_back(message("error ", k + 1, " of ", options.array));
+  for (const evemu::ArtefactError& error : evemu::artefact_errors(o)) {
+    effects.push_back(error.name + " of " + options.array);
+    u_of_effects.push_back(error.u);
   }
   if (left_out.size() > 0) {
     all = all->without_unknowns(counted(unknowns.first_left_out(), unknowns.first_error()));
@@ -203,6 +206,7 @@ Result<Part> array_part(const evemu::Observations& o, const CommonTables& common
   return Part{.method = "evemu",
               .information = *std::move(all),
               .effects = std::move(effects),
+              .u_of_effects = std::move(u_of_effects),
               .dof_of_noise = dof};
 }
 

@@ -16,23 +16,25 @@ namespace {
 struct SharedColumns {
   Eigen::MatrixXd G;
   std::vector<std::string> names;
+  std::vector<double> u;
 };
 
 SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects& e) {
   const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
-  SharedColumns shared{Eigen::MatrixXd(of_axis.rows(), 4), {}};
+  SharedColumns shared{Eigen::MatrixXd(of_axis.rows(), 4), {}, {}};
   Eigen::Index columns = 0;
-  const auto add = [&](const Eigen::VectorXd& column, std::string name) {
-    if (column.squaredNorm() > 0.0) {
-      shared.G.col(columns++) = column;
+  const auto add = [&](double u, const Eigen::VectorXd& column, std::string name) {
+    if (u > 0.0 && column.squaredNorm() > 0.0) {
+      shared.G.col(columns++) = u * column;
       shared.names.push_back(std::move(name));
+      shared.u.push_back(u);
     }
   };
 
   // A relative error of the ranges enlarges the whole machine.
-  add(e.u_ranges * of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
+  add(e.u_ranges, of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
   for (const Axis a : kAllAxes) {
-    add(e.u_axis_scale[index(a)] * of_axis.col(static_cast<Eigen::Index>(index(a))),
+    add(e.u_axis_scale[index(a)], of_axis.col(static_cast<Eigen::Index>(index(a))),
         message("scale of ", letter(a)));
   }
   shared.G.conservativeResize(Eigen::NoChange, columns);
@@ -101,10 +103,11 @@ Result<ScaledTriangle> triangle_without_effects(const std::string& part, const E
   for (const std::string& effect : names) {
     stated += (stated.empty() ? "" : ", ") + effect;
   }
-  return failure(ErrorCode::NotApplicable,
-                 message("joint identification: the covariance of ", part,
-                         " is not larger than the effects stated as common (", stated,
-                         "): state the u_scale and u_axis_scale with which the run was identified"));
+  return failure(
+      ErrorCode::NotApplicable,
+      message("joint identification: the covariance of ", part,
+              " is not larger than the effects stated as common (", stated,
+              "): state the u_scale and u_axis_scale with which the run was identified"));
 }
 
 /// W M with W^T W = C^-1.
@@ -150,6 +153,7 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
               .information = eliminated.empty() ? std::move(information)
                                                 : information.without_unknowns(eliminated),
               .effects = std::move(shared.names),
+              .u_of_effects = std::move(shared.u),
               .covered_m = {hull.begin(), hull.end()}};
 }
 

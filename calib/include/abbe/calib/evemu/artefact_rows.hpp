@@ -12,6 +12,8 @@
 /// Where n1 . n2 != 0, the rotations about z and y are correlated.
 
 #include <Eigen/Core>
+#include <string>
+#include <vector>
 
 #include "abbe/calib/evemu/observe.hpp"
 
@@ -23,5 +25,13 @@ namespace abbe::calib::evemu {
 /// direction of block 2 along x; length. A quantity with zero uncertainty has no column. No columns
 /// if the errors were given without an array (observe_errors()).
 [[nodiscard]] Eigen::MatrixXd artefact_rows(const Observations&);
+
+/// What a column of artefact_rows() is the effect of.
+struct ArtefactError {
+  std::string name;  ///< "y of ball 3", "direction of block 1 along x", "length"
+  double u = 0.0;    ///< standard uncertainty: m, rad, relative
+};
+/// In the order of the columns.
+[[nodiscard]] std::vector<ArtefactError> artefact_errors(const Observations&);
 
 }  // namespace abbe::calib::evemu

@@ -61,8 +61,9 @@ struct PairTest {
   std::vector<TableDifference> tables{};  ///< of a contradiction: the most significant, at most 3
 };
 
-/// Tests all pairs. BadInput for fewer than two parts, names that repeat, or parts with another
-/// number of parameters.
+/// Tests all pairs. BadInput for fewer than two parts, names that repeat, parts with another
+/// number of parameters, a false-alarm probability that is not between 0 and 1, or an effect that
+/// two parts state with different uncertainties.
 [[nodiscard]] Result<std::vector<PairTest>> test_pairs(std::span<const Part>, const CommonTables&,
                                                        const JointOptions& = {});
 

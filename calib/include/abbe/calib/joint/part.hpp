@@ -47,6 +47,9 @@ struct Part {
   /// about the parameters of the common tables, then `effects`; without the priors of the effects
   estimation::Information information;
   std::vector<std::string> effects{};
+  /// Standard uncertainty of each effect in its own unit (relative, m, rad); empty: not compared.
+  /// Parts that share an effect must state the same one, since the unknown is a multiple of it.
+  std::vector<double> u_of_effects{};
   /// The covariance of the part was multiplied by a variance estimated from its own residuals with
   /// these degrees of freedom; 0: the uncertainties were stated.
   double dof_of_noise = 0.0;

@@ -10,6 +10,7 @@
 #include "chi2_tail.hpp"
 #include "gauge_coordinates.hpp"
 #include "joint/left_out_rotations.hpp"
+#include "joint/pair_problem.hpp"
 #include "joint_parts.hpp"
 
 namespace {
@@ -228,6 +229,36 @@ TEST(JointModels, ErrorsOfTheArrayArePairedByBall) {
   ASSERT_THAT(two->effects, SizeIs(24));
   EXPECT_EQ(one->effects[7], "y of ball 3 of array");
   EXPECT_EQ(two->effects[4], "y of ball 3 of array");
+}
+
+/// Both parts leave one combination of EXX undetermined; d is determined by the other one. The
+/// difference and its uncertainty are those of the two rows that contain it.
+TEST(JointModels, ADifferenceKeepsItsRowsWhereBothPartsAreIncomplete) {
+  const ModelsOfOneMachine m(Interpolation::Linear);
+  const abbe::calib::GaugeCoordinates c = abbe::calib::gauge_coordinates(m.basis);
+  const auto& EXX = c.groups.front();
+  ASSERT_EQ(EXX.name, "EXX");
+  ASSERT_EQ(EXX.size, 3);
+  const Eigen::VectorXd direction = Eigen::Vector3d(1.0, 1.0 / 3.0, 0.7).normalized();
+  constexpr double kDifference_m = 5e-6, kU_m = 1e-6;
+  const auto part = [&](const char* name, double value_m) {
+    abbe::calib::estimation::Information information(m.basis.size());
+    Eigen::VectorXd column = Eigen::VectorXd::Zero(c.N.cols());
+    column.segment(EXX.first, EXX.size) = direction;
+    information.add_rows((c.N * column).transpose() / kU_m,
+                         Eigen::VectorXd::Constant(1, value_m / kU_m));
+    return joint::Part{.name = name, .method = "test", .information = information};
+  };
+
+  const joint::Part one = part("one", 0.0), two = part("two", kDifference_m);
+  const joint::PairProblem pair(one, two, c);
+  Eigen::MatrixXd free = Eigen::MatrixXd::Zero(c.N.cols(), EXX.size);
+  free.middleRows(EXX.first, EXX.size).setIdentity();
+  const joint::PairProblem::Freed freed = pair.freed(free);
+  EXPECT_EQ(freed.drop_dof, 1u);
+  ASSERT_GE(freed.root_cov_d.cols(), 1);
+  EXPECT_NEAR(direction.dot(freed.d), kDifference_m, 1e-9);
+  EXPECT_NEAR((direction.transpose() * freed.root_cov_d).norm(), std::sqrt(2.0) * kU_m, 1e-9);
 }
 
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {

@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "chi2_tail.hpp"
 
@@ -92,9 +93,13 @@ PairProblem::Freed PairProblem::freed(const Eigen::MatrixXd& free) const {
     return result;
   }
 
-  // The last rows of R contain d alone.
-  const Eigen::MatrixXd R = with.sum.R().bottomRightCorner(free.cols(), free.cols());
-  const Eigen::VectorXd z = with.sum.z().tail(free.cols());
+  // R of the sum is not pivoted: where both parts leave a combination of e undetermined, its pivot
+  // is a rounding error, and the rows below it lack a row of information about d.
+  std::vector<std::size_t> all_but_d(with.sum.unknowns() - static_cast<std::size_t>(free.cols()));
+  std::iota(all_but_d.begin(), all_but_d.end(), std::size_t{0});
+  const estimation::Information of_d = with.sum.without_unknowns(all_but_d);
+  const Eigen::MatrixXd R = of_d.R();
+  const Eigen::VectorXd z = of_d.z();
   const Eigen::VectorXd length = R.colwise().norm();
   const Eigen::VectorXd scale = length.unaryExpr([](double l) { return l > 0.0 ? 1.0 / l : 1.0; });
   constexpr double kUndetermined = 1e-9;

@@ -7,12 +7,22 @@
 namespace abbe::calib::joint {
 
 Result<CommonTables> tables_of(const VolumetricModel& model) {
+  const auto not_applicable = [](const std::string& reason) {
+    return failure(ErrorCode::NotApplicable, "joint identification: the model " + reason);
+  };
   const estimation::TableBasis* tables = model.tables();
-  if (tables == nullptr || model.gauge() != Gauge::G1 || model.tool_offsets_m().size() != 1 ||
-      tables->travel() != estimation::TravelDependence::None) {
-    return failure(ErrorCode::NotApplicable,
-                   "joint identification: the model must have tables in gauge G1 for one tool, "
-                   "alike for both directions of travel");
+  if (tables == nullptr) {
+    return not_applicable("has polynomials, must have tables");
+  }
+  if (model.gauge() != Gauge::G1) {
+    return not_applicable("is not in gauge G1");
+  }
+  if (model.tool_offsets_m().size() != 1) {
+    return not_applicable(
+        message("has ", model.tool_offsets_m().size(), " tool offsets, must have one"));
+  }
+  if (tables->travel() != estimation::TravelDependence::None) {
+    return not_applicable("depends on the direction of travel, which parts do not");
   }
   return CommonTables{*tables, model.tool_offsets_m().front()};
 }

@@ -8,6 +8,7 @@
 #include "gauge_coordinates.hpp"
 #include "joint/left_out_rotations.hpp"
 #include "message.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::joint {
 namespace {
@@ -41,31 +42,58 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
   return shared;
 }
 
+/// "has 4 nodes of X, not 5"; empty if nodes, reference and interpolation of the axis are the same.
+std::string difference_of_axis(Axis axis, const estimation::TableBasis& own,
+                               const estimation::TableBasis& common) {
+  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
+  const AxisNodes &x = own.layout().nodes()[index(axis)], &y = common.layout().nodes()[index(axis)];
+  if (x.nodes_m.size() != y.nodes_m.size()) {
+    return message("has ", x.nodes_m.size(), " nodes of ", letter(axis), ", not ",
+                   y.nodes_m.size());
+  }
+  for (std::size_t i = 0; i < x.nodes_m.size(); ++i) {
+    if (!(std::abs(x.nodes_m[i] - y.nodes_m[i]) < kSame_m)) {
+      return message("has a node at ", letter(axis), " = ", kMmPerM * x.nodes_m[i], " mm, not at ",
+                     kMmPerM * y.nodes_m[i], " mm");
+    }
+  }
+  if (!(std::abs(x.reference_m - y.reference_m) < kSame_m)) {
+    return message("has the reference ", letter(axis), " = ", kMmPerM * x.reference_m, " mm, not ",
+                   kMmPerM * y.reference_m, " mm");
+  }
+
+  const auto of_own = own.interpolation(axis).kind(), of_common = common.interpolation(axis).kind();
+  return of_own == of_common ? ""
+                             : message("has ", estimation::name(of_own), " tables of ",
+                                       letter(axis), ", not ", estimation::name(of_common));
+}
+
 Result<void> check_same_layout(const std::string& name, const VolumetricModel& model,
                                const CommonTables& common) {
-  constexpr double kSame_m = 1e-9;  // files contain decimal numbers in mm
   const Result<CommonTables> own = tables_of(model);
   if (!own) {
-    return failure(own.error().code, message(name, ": ", own.error().text));
+    return failure(own.error().code, message(own.error().text, " (", name, ")"));
   }
 
   const ParameterLayout &a = own->basis.layout(), &b = common.basis.layout();
-  bool same = a.chain().order_w_to_t() == b.chain().order_w_to_t() &&
-              std::equal(a.tables().begin(), a.tables().end(), b.tables().begin(), b.tables().end(),
-                         [](const Table& s, const Table& t) { return s.motion == t.motion; });
-  for (const Axis axis : kAllAxes) {
-    const AxisNodes &x = a.nodes()[index(axis)], &y = b.nodes()[index(axis)];
-    const auto near = [](double p, double q) { return std::abs(p - q) < kSame_m; };
-    same =
-        same &&
-        std::equal(x.nodes_m.begin(), x.nodes_m.end(), y.nodes_m.begin(), y.nodes_m.end(), near) &&
-        near(x.reference_m, y.reference_m) &&
-        own->basis.interpolation(axis).kind() == common.basis.interpolation(axis).kind();
+  std::string difference;
+  if (a.chain().order_w_to_t() != b.chain().order_w_to_t()) {
+    difference = message("has the axes ", a.chain().text(), ", not ", b.chain().text());
+  } else if (const auto [s, t] = std::mismatch(
+                 a.tables().begin(), a.tables().end(), b.tables().begin(), b.tables().end(),
+                 [](const Table& p, const Table& q) { return p.motion == q.motion; });
+             s != a.tables().end() || t != b.tables().end()) {
+    difference = message("has ", a.tables().size(), " tables, the common ones are ",
+                         b.tables().size(), "; the first that differs is ",
+                         abbe::calib::name(s != a.tables().end() ? s->motion : t->motion));
   }
-  if (!same) {
+  for (const Axis axis : kAllAxes) {
+    difference =
+        difference.empty() ? difference_of_axis(axis, own->basis, common.basis) : difference;
+  }
+  if (!difference.empty()) {
     return failure(ErrorCode::NotApplicable,
-                   message("joint identification: ", name,
-                           " has other axes, tables, nodes or references than the first part"));
+                   message("joint identification: ", name, " ", difference));
   }
   return {};
 }
@@ -135,7 +163,8 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
   const LeftOutRotations left_out(common, model.tool_offsets_m().front() - common.tool_offset_m);
   const Result<Eigen::MatrixXd> of_rotations = left_out.of_parameters();
   if (!of_rotations) {
-    return failure(of_rotations.error().code, message(name, ": ", of_rotations.error().text));
+    return failure(of_rotations.error().code,
+                   message("joint identification: ", name, ": ", of_rotations.error().text));
   }
 
   const auto n = static_cast<Eigen::Index>(common.basis.size()), own = std::ssize(shared.names);

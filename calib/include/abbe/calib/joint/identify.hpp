@@ -16,13 +16,17 @@
 ///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931]
 /// The covariance of the joint model is not widened for a noise that is known only to some percent.
 ///
-/// Explanations of a contradiction, in this order; the first that makes the rest of X2 likely is
-/// stated:
-/// - a mistake without unknowns: the sign of a whole part or of one table, the unit of a part, the
-///   mistakes of its method (axes, tool);
+/// Explanations of a contradiction: all that leave an X2 whose probability is larger than 1e-3 and
+/// than the limit of the test, in this order:
+/// - mistakes without unknowns, at most three, most likely first: the sign of a whole part or of one
+///   table, the unit of a part, the mistakes of its method (axes, tool);
 /// - one common factor of all lengths (temperature, expansion, unit, ranges of the tracker);
-/// - one table, or up to three, that differ.
+/// - tables that differ, at most three: each is the table that decreases X2 most significantly with
+///   those before it free, until the rest is likely.
 /// Two parts alone do not show which of them is wrong.
+///
+/// All functions are pure and may be called from any thread; Part::mistakes is called on the thread
+/// of the caller. The text of an error starts with "joint identification: ".
 
 #include <optional>
 #include <span>
@@ -56,7 +60,7 @@ struct PairTest {
   std::size_t i = 0, j = 0;  ///< indices of the parts
   ChiSquare all;             ///< statistic, degrees of freedom, p, limit
   bool contradiction = false;
-  /// Of a contradiction: what makes both agree, most likely first; else empty.
+  /// Of a contradiction: what makes both agree (mistakes, length, tables); else empty.
   std::vector<std::string> explanations{};
   std::vector<TableDifference> tables{};  ///< of a contradiction: the most significant, at most 3
 };
@@ -79,7 +83,8 @@ struct JointModel {
   double condition = 0.0;
 };
 /// The model of all parts, tested or not: the caller tests them before. RankDeficient if all parts
-/// together leave a combination undetermined; the text names parameters.
+/// together leave a combination undetermined; the text names parameters. BadInput as test_pairs(),
+/// for no part at all, and if the covered positions of all parts span no volume.
 [[nodiscard]] Result<JointModel> joint_model(std::span<const Part>, const CommonTables&);
 
 struct JointIdentification {
@@ -89,6 +94,8 @@ struct JointIdentification {
   /// Of each contradiction: "run 1 and array contradict each other (chi-square ...): ...".
   std::vector<std::string> contradictions;
 };
+/// Tests all pairs, and computes the model if no pair contradicts each other. A contradiction is a
+/// result, not an error. Errors as test_pairs() and joint_model().
 [[nodiscard]] Result<JointIdentification> identify(std::span<const Part>, const CommonTables&,
                                                    const JointOptions& = {});
 

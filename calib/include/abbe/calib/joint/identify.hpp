@@ -13,7 +13,7 @@
 /// parameters that both determine; combinations that one part alone determines do not contribute.
 /// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor by which its
 /// variance exceeds the estimate with a probability of 2 %,
-///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931]
+///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931], at most 1000
 /// The covariance of the joint model is not widened for a noise that is known only to some percent.
 ///
 /// Explanations of a contradiction: all that leave an X2 whose probability is larger than 1e-3 and

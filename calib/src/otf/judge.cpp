@@ -10,6 +10,7 @@
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "certainty.hpp"
 #include "message.hpp"
+#include "plausible_scale.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -28,24 +29,6 @@ void add_alternatives(Verdict& verdict, const std::vector<Alternative>& others,
     } else {  // larger, or NaN
       verdict.refuse(name(other.cause), text, reasons++);
     }
-  }
-}
-
-double common_scale_error(const VolumetricModel& model) {
-  const std::vector<Vector3> at = tensor_grid(model.nodes());
-  std::vector<Vector3> V_m;
-  for (const Vector3& q : at) {
-    V_m.push_back(model.V_at(q, model.tool_offsets_m().front()));
-  }
-  return common_scale(at, V_m);
-}
-
-void require_plausible_scale(Verdict& verdict, double scale, double most) {
-  if (!(std::abs(scale) <= most)) {
-    verdict.refuse(
-        "growth",
-        message("the machine is larger by ", 1e6 * scale, " um/m in all directions, limit ",
-                1e6 * most, " um/m: wrong scale of the path, of the ranges or of a temperature"));
   }
 }
 

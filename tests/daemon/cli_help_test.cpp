@@ -84,6 +84,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "identify",
                                     "identify otf",
                                     "identify evemu",
+                                    "identify joint",
                                     "identify artefact",
                                     "verify",
                                     "model",

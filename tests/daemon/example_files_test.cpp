@@ -8,6 +8,7 @@
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
 #include "recording_fixture.hpp"
@@ -59,6 +60,10 @@ TEST_F(ExampleFiles, OfABallArrayAreAccepted) {
   EXPECT_EQ(test::faults_text(read_errors_csv(printed("errors.csv"))), "");
 }
 
+TEST_F(ExampleFiles, OfAJointIdentificationAreAccepted) {
+  EXPECT_EQ(test::faults_text(read_parts_toml(printed("parts.toml"))), "");
+}
+
 TEST_F(ExampleFiles, OfModelCommandsAreAccepted) {
   EXPECT_EQ(test::faults_text(read_points_csv(printed("points.csv"))), "");
   EXPECT_EQ(test::faults_text(read_verification_csv(printed("verification.csv"))), "");
@@ -76,7 +81,7 @@ TEST_F(ExampleFiles, AreListed) {
   EXPECT_EQ(ran.exit, 0) << ran.err;
   for (const char* name :
        {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
-        "encoder.csv", "touches.csv", "errors.csv", "points.csv", "verification.csv", "truth.csv"})
+        "encoder.csv", "touches.csv", "parts.toml", "errors.csv", "points.csv", "verification.csv", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)

@@ -16,6 +16,7 @@
 #include "abbe/sim/truth_table.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
 #include "recording_fixture.hpp"
@@ -93,6 +94,7 @@ std::map<std::string, FileReader> all_readers() {
   auto readers = kTableReaders;
   readers["abbed.toml"] = readers["machine.toml"] = faults_of_config;
   readers["calibrator.toml"] = reader(read_calibrator_toml);
+  readers["parts.toml"] = reader(read_parts_toml);
   readers["folds.txt"] = [](const fs::path& file) {
     return calib::sparse::parse_folds(test::text_of(file)) ? "" : "no folds";
   };

@@ -11,6 +11,7 @@ namespace abbe::daemon {
 
 void add_identify_otf(CLI::App& parent, int& exit);
 void add_identify_evemu(CLI::App& parent, int& exit);
+void add_identify_joint(CLI::App& parent, int& exit);
 void add_identify_artefact(CLI::App& parent, int& exit);
 void add_plan_otf(CLI::App& parent, int& exit);
 void add_calibrate_otf(CLI::App& parent, int& exit);

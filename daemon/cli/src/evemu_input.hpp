@@ -24,6 +24,7 @@ struct EvemuInputArguments {
   double u_artefact_K = 0.0;
   double u_reference_um = 1.0;
   bool rotation_known = false, scales_corrected = false;
+  std::optional<calib::Vector3> tip_offset_m{};  ///< without a value: [target] offset_mm
 };
 
 /// The measured data, from files or from a recording.

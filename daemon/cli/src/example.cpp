@@ -28,6 +28,7 @@ constexpr std::array kPurposes{
     Purpose{"tracker.csv", "points of a laser tracker along the path"},
     Purpose{"encoder.csv", "scale readings along the path"},
     Purpose{"touches.csv", "touches of a ball array"},
+    Purpose{"parts.toml", "runs and ball arrays for abbe identify joint"},
     Purpose{"errors.csv", "errors at the balls of an array, from another program or instrument"},
     Purpose{"points.csv", "positions for abbe model eval"},
     Purpose{"verification.csv", "readings and independent measurements for abbe verify"},

@@ -20,13 +20,11 @@
 #include "abbe/methods/otf/path_readings.hpp"
 #include "abbe/methods/otf/report.hpp"
 #include "abbe/model/model_document.hpp"
-#include "abbe/replay/replay.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "backlash_lines.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
-#include "opened_recording.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
 
@@ -116,8 +114,10 @@ Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, con
                            files.config.gate.path_tolerance_m);
 }
 
-Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
-                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
+}  // namespace
+
+Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
+                                    const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   apply(arguments, files->config);
@@ -157,43 +157,18 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
   if (auto air = unmeasured_air_text(files->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
-  return outcome_of({std::move(found->solution), std::move(*verdict), options.mode}, files->config,
-                    std::move(files->sources));
+  return OtfFromFiles{std::move(files->config), std::move(files->sources), noise, options.mode,
+                      *std::move(found),        std::move(*verdict)};
 }
 
-/// The last run of the recording in which the whole path was driven.
-Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
-  std::string why = replayed.calibrations.empty() ? "no calibration was requested" : "";
-  for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
-    if (c->outcome && *c->outcome) {
-      if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome)) return std::move(*otf);
-      continue;
-    }
-    if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
-  }
-  return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete calibration: {}", file, why));
-}
+namespace {
 
-Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
-                                  const std::optional<ModelDocument>& active, ProgressBar& bar) {
-  auto recording = open_recording(arguments.recording, arguments.machine);
-  if (!recording) return tl::make_unexpected(recording.error());
-  apply(arguments, recording->config);
-  if (const auto given = require_target(recording->config.machine); !given)
-    return tl::make_unexpected(given.error());
-  const auto other = comparison_model(active, recording->config);
-  auto replayed = replay(
-      recording->reader, recording->config,
-      {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
-  auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
-  if (!candidate) return tl::make_unexpected(candidate.error());
-  other.add_note(candidate->verdict);
-  auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
-  outcome.document.recording_gap = recording->reader.damage();
-
-  return outcome;
+Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
+                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
+  auto run = identify_files(arguments, active, bar);
+  if (!run) return tl::make_unexpected(run.error());
+  return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode},
+                    run->config, std::move(run->sources));
 }
 
 Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/calib/otf/identify.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/model/model_document.hpp"
@@ -22,7 +23,9 @@ struct IdentifyOtfArguments {
   std::string backlash;                  // empty: that of [otf]
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
-  std::vector<std::string> targets;  // X,Y,Z=FILE, one per run
+  std::vector<std::string> targets;                 // X,Y,Z=FILE, one per run
+  // without a value: [target] offset_mm, [tracker] position_mm
+  std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
 };
 
 struct OtfOutcome {
@@ -49,6 +52,25 @@ void apply(const IdentifyOtfArguments& arguments, Config& config);
 /// vertex outside the travel gives line and column.
 [[nodiscard]] Result<void> check_path(const std::string& file, const PathFile& path,
                                       const Config& config);
+
+/// A run that was identified and judged, from files.
+struct OtfFromFiles {
+  Config config;
+  std::vector<InputFile> sources;
+  calib::otf::Noise noise;
+  calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
+  calib::otf::Identification found;
+  calib::Verdict verdict;
+};
+/// Identifies one run from the files --machine, --path, --tracker and --encoder.
+[[nodiscard]] Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
+                                                  const std::optional<ModelDocument>& active,
+                                                  ProgressBar& bar);
+
+/// Identifies the last complete run of --recording.
+[[nodiscard]] Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
+                                                const std::optional<ModelDocument>& active,
+                                                ProgressBar& bar);
 
 /// Identifies all 18 tables from the runs of --target.
 [[nodiscard]] Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,

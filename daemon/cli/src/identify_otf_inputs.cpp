@@ -5,6 +5,7 @@
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/tables/travel_faults.hpp"
 #include "identify_otf.hpp"
+#include "target_offset.hpp"
 
 namespace abbe::daemon {
 
@@ -30,6 +31,9 @@ void apply(const IdentifyOtfArguments& arguments, Config& config) {
   otf.backlash = otf::backlash_named(arguments.backlash).value_or(otf.backlash);
   config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
                                      .value_or(config.machine.interpolation);
+  if (const auto& t = arguments.target_offset_m) set_target(config.machine, *t);
+  if (const auto& p = arguments.tracker_position_m)
+    config.machine.tracker_position_m = {p->x(), p->y(), p->z()};
 }
 
 Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {

@@ -86,6 +86,7 @@ void add_commands(CLI::App& app, int& exit) {
   identify->require_subcommand(1);
   add_identify_otf(*identify, exit);
   add_identify_evemu(*identify, exit);
+  add_identify_joint(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);
   auto* model =

@@ -66,7 +66,9 @@ LineChart table_chart(const std::vector<calib::Parameter>& parameters, char axis
   return chart;
 }
 
-void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
+}  // namespace
+
+void add_error_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("Error motions (ISO 230-1)");
   page.paragraph(
       "Each with twice its standard uncertainty in the stated gauge. With one target, a missing "
@@ -90,6 +92,8 @@ void add_tables(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("Squareness");
   page.table({"", "urad", "u, urad"}, rows);
 }
+
+namespace {
 
 void add_backlash(HtmlReport& page, const std::vector<calib::otf::Backlash>& backlash) {
   if (backlash.empty()) return;
@@ -115,7 +119,7 @@ std::string otf_report(const ModelDocument& document, const calib::otf::Residual
   add_verdict(page, verdict, stands ? "positions" : "legs", kDecimals);
   add_residuals(page, document.statistics, residuals,
                 stands ? "along and across the beam" : "across the path");
-  add_tables(page, document.model);
+  add_error_tables(page, document.model);
   add_backlash(page, document.backlash);
   add_origin(page, document);
   return page.text();

@@ -7,6 +7,7 @@
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/report/html_report.hpp"
 
 namespace abbe::daemon {
 
@@ -15,5 +16,8 @@ namespace abbe::daemon {
 [[nodiscard]] std::string otf_report(const ModelDocument& document,
                                      const calib::otf::Residuals& residuals,
                                      const calib::Verdict& verdict);
+
+/// Adds charts of the error tables with their uncertainty, and the squareness errors.
+void add_error_tables(HtmlReport& page, const calib::VolumetricModel& model);
 
 }  // namespace abbe::daemon

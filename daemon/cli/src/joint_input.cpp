@@ -1,0 +1,158 @@
+#include "joint_input.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <initializer_list>
+#include <utility>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/calib/evemu/judge.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/methods/otf/inputs.hpp"
+#include "abbe/tables/parts_file.hpp"
+#include "evemu_input.hpp"
+#include "identify_otf.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace evemu = calib::evemu;
+
+Error in_part(const std::string& name, Error error) {
+  error.text = fmt::format("{}: {}", name, error.text);
+  return error;
+}
+
+std::string file_names(std::initializer_list<std::string> files) {
+  std::string text;
+  for (const auto& file : files)
+    if (!file.empty())
+      text += (text.empty() ? "" : ", ") + std::filesystem::path(file).filename().string();
+  return text;
+}
+
+/// Adds the files that are not yet in the list.
+void add_sources(JointInput& input, const std::vector<InputFile>& more) {
+  for (const InputFile& file : more)
+    if (std::ranges::find(input.sources, file) == input.sources.end())
+      input.sources.push_back(file);
+}
+
+IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFiles& files) {
+  IdentifyOtfArguments run;
+  run.machine = all.machine;
+  run.path = files.path;
+  run.tracker = files.tracker;
+  run.encoder = files.encoder;
+  run.estimator = all.estimator;
+  run.u_scale_ppm = all.u_scale_ppm;
+  run.scales_corrected = all.scales_corrected;
+  run.accept_path_orientation = all.accept_path_orientation;
+  run.target_offset_m = files.target_offset_m;
+  run.tracker_position_m = files.tracker_position_m;
+  return run;
+}
+
+Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& files,
+                     JointInput& input, ProgressBar& bar) {
+  auto run = identify_files(arguments_of(arguments, files), std::nullopt, bar);
+  if (!run) return tl::make_unexpected(in_part(files.name, run.error()));
+  const auto& solution = run->found.solution;
+  if (!input.common) {
+    auto common = calib::joint::tables_of(solution.model);
+    if (!common) return tl::make_unexpected(in_part(files.name, error_of(common.error())));
+    input.common = std::move(*common);
+  }
+
+  const calib::joint::CommonEffects effects{.u_ranges = run->noise.u_scale,
+                                            .ranges_of = files.instrument,
+                                            .u_axis_scale = run->noise.u_axis_scale};
+  auto part = calib::joint::part_of_run(files.name, solution.model, *input.common, effects);
+  if (!part) return tl::make_unexpected(error_of(part.error()));
+
+  input.observations.push_back(calib::otf::without_range_offset(std::move(run->found.observations),
+                                                                solution.range_offset.value_m));
+  input.runs.push_back({input.parts.size(), &input.observations.back(), effects});
+  input.parts.push_back(std::move(*part));
+  input.facts.push_back({files.name, "otf", file_names({files.path, files.tracker, files.encoder}),
+                         solution.statistics.observations, solution.model,
+                         std::move(run->verdict)});
+  add_sources(input, run->sources);
+
+  return {};
+}
+
+EvemuInputArguments arguments_of(const IdentifyJointArguments& all, const ArrayFiles& files) {
+  EvemuInputArguments array;
+  array.machine = all.machine;
+  array.touches = files.touches;
+  array.calibrator = files.calibrator;
+  array.errors = files.errors;
+  array.positions = files.positions;
+  array.artefact_C = files.artefact_C;
+  array.u_artefact_K = files.u_artefact_K;
+  array.tip_offset_m = files.tip_offset_m;
+  array.scales_corrected = all.scales_corrected;
+  return array;
+}
+
+/// The verdict of the ball array's own method. An array that determines no model by itself has no
+/// reasons, and a note.
+calib::Verdict verdict_of_array(const EvemuInput& array) {
+  const auto solution = evemu::solve(array.observations);
+  if (!solution) return {.notes = {"not judged by itself: " + solution.error().text}};
+  auto verdict =
+      evemu::judge(array.observations, *solution, nullptr,
+                   {.limits = gate_limits(array.config.gate), .accept_shape_only = true});
+  if (!verdict) return {.notes = {"not judged by itself: " + verdict.error().text}};
+  return std::move(*verdict);
+}
+
+Result<void> add_array(const IdentifyJointArguments& arguments, const ArrayFiles& files,
+                       JointInput& input, ProgressBar& bar) {
+  bar.show(fmt::format("evaluating {}", files.name), 0.0);
+  auto array = read_evemu_input(arguments_of(arguments, files));
+  if (!array) return tl::make_unexpected(in_part(files.name, array.error()));
+
+  // Parts measured with one array have the same errors of its calibration.
+  calib::joint::ArrayOptions options{.s_m = files.s_centre_m,
+                                     .linearised_at = input.facts.front().own_model->U()};
+  if (!files.calibrator.empty()) options.array = file_names({files.calibrator});
+  auto part = calib::joint::part_of_array(files.name, array->observations, *input.common, options);
+  if (!part) return tl::make_unexpected(error_of(part.error()));
+
+  input.facts.push_back(
+      {files.name, "evemu", file_names({files.touches, files.calibrator, files.errors}),
+       3 * array->observations.rows.size(), std::nullopt, verdict_of_array(*array)});
+  input.parts.push_back(std::move(*part));
+  add_sources(input, array->sources);
+
+  return {};
+}
+
+}  // namespace
+
+Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, ProgressBar& bar) {
+  auto config = load_config(arguments.machine);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  const auto files = read_parts_toml(arguments.parts);
+  if (!files) return tl::make_unexpected(files.error());
+
+  JointInput input{
+      std::move(*config),
+      {{std::filesystem::path(arguments.machine).filename().string(), *hash}, files->source}};
+  for (const RunFiles& run : files->runs)
+    if (const auto added = add_run(arguments, run, input, bar); !added)
+      return tl::make_unexpected(added.error());
+  for (const ArrayFiles& array : files->arrays)
+    if (const auto added = add_array(arguments, array, input, bar); !added)
+      return tl::make_unexpected(added.error());
+
+  return input;
+}
+
+}  // namespace abbe::daemon

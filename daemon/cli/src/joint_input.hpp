@@ -1,0 +1,48 @@
+#pragma once
+/// The measured data of `abbe identify joint`: every run and array of parts.toml, identified and
+/// judged by its own method, as part of a joint identification.
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
+#include "abbe/calib/gate.hpp"
+#include "abbe/calib/joint/judge.hpp"
+#include "abbe/config/config.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+struct IdentifyJointArguments {
+  std::string machine, parts, keep, out;
+  std::optional<std::string> estimator;  // of the runs; without a value: that of [otf]
+  std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
+  double false_alarm = 1e-3;
+  bool scales_corrected = false, accept_path_orientation = false, json = false;
+};
+
+/// What the report states about a part.
+struct PartFacts {
+  std::string name, method, files;
+  std::size_t observations = 0;
+  std::optional<calib::VolumetricModel> own_model{};  ///< tables; nullopt for an array
+  calib::Verdict verdict;                             ///< on the part alone
+};
+
+struct JointInput {
+  Config config;
+  std::vector<InputFile> sources;
+  std::optional<calib::joint::CommonTables> common{};   ///< of the first run
+  std::vector<calib::joint::Part> parts{};              ///< runs, then arrays
+  std::vector<PartFacts> facts{};                       ///< one per part
+  std::deque<calib::otf::Observations> observations{};  ///< of the runs; `runs` points to them
+  std::vector<calib::joint::RunOfPart> runs{};
+};
+
+/// Errors of a part begin with its name. Io, BadInput with file and line, DataInsufficient.
+[[nodiscard]] Result<JointInput> read_joint_input(const IdentifyJointArguments&, ProgressBar&);
+
+}  // namespace abbe::daemon

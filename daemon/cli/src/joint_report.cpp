@@ -1,0 +1,194 @@
+#include "joint_report.hpp"
+
+#include <fmt/format.h>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/lack_of_fit.hpp"
+#include "abbe/methods/otf/report.hpp"
+#include "abbe/report/html_report.hpp"
+#include "abbe/report/sections.hpp"
+#include "identified_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::joint::PairTest;
+using calib::joint::TableUncertainty;
+
+constexpr std::string_view kUndetermined = "not determined";
+
+/// "0.123 um", or that the tables are not determined.
+std::string u_text(const std::optional<double>& u_m) {
+  return u_m ? um_text(*u_m, 3) : std::string{kUndetermined};
+}
+
+nlohmann::json u_json(const std::optional<double>& u_m) {
+  return u_m ? nlohmann::json(*u_m * kUmPerM) : nlohmann::json();
+}
+
+double u_of_joint_m(const JointOutcome& outcome) {
+  return calib::otf::correction_size(outcome.joint.model).u_m;
+}
+
+std::string names_of(const JointInput& input, const PairTest& pair) {
+  return fmt::format("{} and {}", input.parts[pair.i].name, input.parts[pair.j].name);
+}
+
+nlohmann::json parts_json(const JointOutcome& outcome) {
+  nlohmann::json parts = nlohmann::json::array();
+  for (std::size_t k = 0; k < outcome.input.facts.size(); ++k) {
+    const PartFacts& part = outcome.input.facts[k];
+    const auto& share = outcome.contributions[k];
+    parts.push_back({{"name", part.name},
+                     {"method", part.method},
+                     {"observations", part.observations},
+                     {"u_alone_um", u_json(share.u_alone_m)},
+                     {"u_without_um", u_json(share.u_without_m)},
+                     {"gate_alone", verdict_json(part.verdict)}});
+  }
+  return parts;
+}
+
+/// Standard uncertainty of each table: of the model of every run, and of the joint model.
+struct TableRow {
+  TableUncertainty joint;
+  std::vector<double> u_of_runs;
+};
+std::vector<TableRow> table_rows(const JointOutcome& outcome) {
+  std::vector<TableRow> rows;
+  for (const TableUncertainty& t : calib::joint::table_uncertainties(outcome.joint.model))
+    rows.push_back({t, {}});
+  for (const PartFacts& part : outcome.input.facts) {
+    if (!part.own_model) continue;
+    const auto own = calib::joint::table_uncertainties(*part.own_model);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].u_of_runs.push_back(own[i].u);
+  }
+  return rows;
+}
+
+nlohmann::json tables_json(const JointOutcome& outcome) {
+  nlohmann::json tables = nlohmann::json::array();
+  for (const TableRow& row : table_rows(outcome)) {
+    std::vector<double> u;
+    for (const double of_run : row.u_of_runs) u.push_back(of_run * kUmPerM);
+    tables.push_back({{"table", row.joint.table},
+                      {"unit", row.joint.is_angle ? "urad" : "um"},
+                      {"u_of_runs", u},
+                      {"u", row.joint.u * kUmPerM}});
+  }
+  return tables;
+}
+
+void add_parts(HtmlReport& page, const JointOutcome& outcome) {
+  page.heading("Parts");
+  page.paragraph(
+      "u: standard uncertainty of V over the nodes, rms, without a rigid motion of the whole "
+      "volume; of the part alone, and of all other parts together.");
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t k = 0; k < outcome.input.facts.size(); ++k) {
+    const PartFacts& part = outcome.input.facts[k];
+    const auto& share = outcome.contributions[k];
+    rows.push_back({part.name, part.method, part.files, fmt::to_string(part.observations),
+                    u_text(share.u_alone_m), u_text(share.u_without_m)});
+  }
+  rows.push_back({"all parts", "joint", "", "", um_text(u_of_joint_m(outcome), 3), ""});
+  page.table({"part", "method", "files", "observations", "u alone", "u without it"}, rows);
+}
+
+void add_pairs(HtmlReport& page, const JointOutcome& outcome) {
+  page.heading("Do the parts agree?");
+  page.paragraph(
+      "Each pair is tested in all combinations of parameters that both parts determine. p: "
+      "probability of a larger chi-square if both describe the same machine.");
+  std::vector<std::vector<std::string>> rows;
+  for (const PairTest& pair : outcome.pairs)
+    rows.push_back({names_of(outcome.input, pair), fmt::format("{:.2f}", pair.all.statistic),
+                    fmt::to_string(pair.all.dof), fmt::format("{:.3g}", pair.all.p),
+                    fmt::format("{:.3g}", pair.all.limit)});
+  page.table({"pair", "chi-square", "degrees of freedom", "p", "refused below"}, rows);
+}
+
+void add_uncertainties(HtmlReport& page, const JointOutcome& outcome) {
+  page.heading("Standard uncertainty of each table");
+  std::vector<std::string> columns{"rms over the nodes"};
+  for (const PartFacts& part : outcome.input.facts)
+    if (part.own_model) columns.push_back(part.name);
+  columns.emplace_back("all parts");
+  std::vector<std::vector<std::string>> rows;
+  for (const TableRow& row : table_rows(outcome)) {
+    std::vector<std::string> cells{
+        fmt::format("{}, {}", row.joint.table, row.joint.is_angle ? "urad" : "um")};
+    for (const double u : row.u_of_runs) cells.push_back(fmt::format("{:.3f}", u * kUmPerM));
+    cells.push_back(fmt::format("{:.3f}", row.joint.u * kUmPerM));
+    rows.push_back(std::move(cells));
+  }
+  page.table(columns, rows);
+}
+
+}  // namespace
+
+nlohmann::json pairs_json(const JointInput& input, const std::vector<PairTest>& pairs) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const PairTest& pair : pairs)
+    all.push_back({{"parts", {input.parts[pair.i].name, input.parts[pair.j].name}},
+                   {"chi2", pair.all.statistic},
+                   {"dof", pair.all.dof},
+                   {"p", pair.all.p},
+                   {"limit", pair.all.limit},
+                   {"contradiction", pair.contradiction},
+                   {"explanations", pair.explanations}});
+  return all;
+}
+
+nlohmann::json joint_json(const JointOutcome& outcome, const std::filesystem::path& folder) {
+  const auto& held_out = outcome.verdict.held_out;
+  nlohmann::json effects = nlohmann::json::array();
+  for (const auto& effect : outcome.joint.effects)
+    effects.push_back({{"name", effect.name}, {"value", effect.value}, {"u", effect.u}});
+  return {{"model", (folder / "model.json").string()},
+          {"id", model_id(outcome.document)},
+          {"hash", model_hash(outcome.document)},
+          {"parts", parts_json(outcome)},
+          {"pairs", pairs_json(outcome.input, outcome.pairs)},
+          {"u_um", u_of_joint_m(outcome) * kUmPerM},
+          {"tables", tables_json(outcome)},
+          {"effects", effects},
+          {"rank", outcome.joint.rank},
+          {"condition", outcome.joint.condition},
+          {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
+          {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
+          {"gate", verdict_json(outcome.verdict)}};
+}
+
+void print_joint_summary(const JointOutcome& outcome, const std::filesystem::path& folder) {
+  fmt::print("model       {}  ({} tables, tool and machine \"{}\")\n", model_id(outcome.document),
+             outcome.joint.model.tables()->layout().tables().size(), outcome.document.machine);
+  for (std::size_t k = 0; k < outcome.input.facts.size(); ++k) {
+    const PartFacts& part = outcome.input.facts[k];
+    const auto& share = outcome.contributions[k];
+    fmt::print("part        {} ({}): {} observations; u alone {}, of all others {}\n", part.name,
+               part.method, part.observations, u_text(share.u_alone_m), u_text(share.u_without_m));
+  }
+  for (const PairTest& pair : outcome.pairs)
+    fmt::print("agreement   {}: chi-square {:.2f}, {} degrees of freedom, p {:.3g}\n",
+               names_of(outcome.input, pair), pair.all.statistic, pair.all.dof, pair.all.p);
+  fmt::print("uncertainty {} of all parts, rank {}, condition {:.3g}\n",
+             um_text(u_of_joint_m(outcome), 3), outcome.joint.rank, outcome.joint.condition);
+  print_verdict(outcome.verdict);
+  fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
+}
+
+std::string joint_report(const JointOutcome& outcome) {
+  HtmlReport page(fmt::format("{}: joint identification", outcome.document.machine));
+  add_verdict(page, outcome.verdict, "legs", 3);
+  add_parts(page, outcome);
+  add_pairs(page, outcome);
+  add_uncertainties(page, outcome);
+  add_error_tables(page, outcome.document.model);
+  add_model_origin(page, outcome.document, outcome.document.inputs,
+                   {{"rank, condition",
+                     fmt::format("{}, {:.3g}", outcome.joint.rank, outcome.joint.condition)}});
+  return page.text();
+}
+
+}  // namespace abbe::daemon

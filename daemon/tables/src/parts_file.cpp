@@ -1,0 +1,106 @@
+#include "abbe/tables/parts_file.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+void read_file_name(Section& part, std::string_view key, std::string& out,
+                    const std::filesystem::path& folder, Need need = Need::Optional) {
+  if (part.get(key, out, need)) out = (folder / out).string();
+}
+
+void read_vector(Section& part, std::string_view key, std::optional<calib::Vector3>& out) {
+  std::vector<double> given;
+  if (!part.get(key, given, kMilli)) return;
+  if (given.size() == 3)
+    out = calib::Vector3(given[0], given[1], given[2]);
+  else
+    part.fault(key, "must be three numbers, x, y, z");
+}
+
+RunFiles read_run(Section& part, std::size_t number, const std::filesystem::path& folder) {
+  RunFiles run{.name = fmt::format("run {}", number)};
+  part.get("name", run.name);
+  read_file_name(part, "path", run.path, folder, Need::Required);
+  read_file_name(part, "tracker", run.tracker, folder, Need::Required);
+  read_file_name(part, "encoder", run.encoder, folder);
+  read_vector(part, "target_offset_mm", run.target_offset_m);
+  read_vector(part, "tracker_position_mm", run.tracker_position_m);
+  part.get("instrument", run.instrument);
+  part.close();
+  return run;
+}
+
+void read_temperature(Section& part, ArrayFiles& out) {
+  double artefact_C = 0.0;
+  const bool known = part.get("artefact_C", artefact_C, kPlain, {-50.0, 100.0});
+  const bool u = part.get("u_artefact_K", out.u_artefact_K, kPlain, {0.0, 50.0},
+                          known ? Need::Required : Need::Optional);
+  if (known) out.artefact_C = artefact_C;
+  if (u && !known) part.fault("u_artefact_K", "needs artefact_C");
+}
+
+ArrayFiles read_array(Section& part, std::size_t number, const std::filesystem::path& folder) {
+  ArrayFiles array{.name = fmt::format("array {}", number)};
+  part.get("name", array.name);
+  read_file_name(part, "touches", array.touches, folder);
+  read_file_name(part, "calibrator", array.calibrator, folder);
+  read_file_name(part, "errors", array.errors, folder);
+  if (array.touches.empty() == array.errors.empty())
+    part.fault("touches", "needs either touches and calibrator, or errors");
+  else if (array.touches.empty() != array.calibrator.empty())
+    part.fault("calibrator", "needs touches, and touches need it");
+  read_vector(part, "tip_offset_mm", array.tip_offset_m);
+  if (int positions = 0; part.get_integer("positions", positions, 2, 1000))
+    array.positions = positions;
+  read_temperature(part, array);
+  part.get("s_centre_um", array.s_centre_m, kMicro, kPositive);
+  part.close();
+  return array;
+}
+
+void check_names(const PartsFile& parts, Section& root) {
+  std::set<std::string> names;
+  const auto take = [&](const std::string& key, const std::string& name) {
+    if (!names.insert(name).second)
+      root.fault(key, fmt::format("two parts have the name \"{}\"", name));
+  };
+  for (const RunFiles& run : parts.runs) take("run", run.name);
+  for (const ArrayFiles& array : parts.arrays) take("array", array.name);
+}
+
+}  // namespace
+
+Result<PartsFile> read_parts_toml(const std::filesystem::path& file) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  const auto table = parse_toml(*text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
+  Faults faults(file.string());
+  Section root(&*table, "", {1, 1}, faults);
+  PartsFile out{{file.filename().string(), sha256_hex(*text)}, {}, {}};
+
+  for (Section& part : root.children("run"))
+    out.runs.push_back(read_run(part, out.runs.size() + 1, file.parent_path()));
+  for (Section& part : root.children("array"))
+    out.arrays.push_back(read_array(part, out.arrays.size() + 1, file.parent_path()));
+  root.close();
+  if (out.runs.empty())
+    root.fault("run", "needs at least one: the model has the tables of the first [[run]]");
+  else if (out.runs.size() + out.arrays.size() < 2)
+    root.fault("array", "needs two parts or more, each a [[run]] or an [[array]]");
+  check_names(out, root);
+
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return out;
+}
+
+}  // namespace abbe::daemon

@@ -23,6 +23,7 @@
 #include "abbe/tables/input_files.hpp"
 #include "backlash_lines.hpp"
 #include "commands.hpp"
+#include "encoder_clock.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
 #include "scales_corrected.hpp"
@@ -64,7 +65,8 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
           std::move(candidate.verdict),
           s.blocks,
           s.blocks_used,
-          candidate.solution.range_offset};
+          candidate.solution.range_offset,
+          candidate.solution.synchronisation};
 }
 
 namespace {
@@ -140,8 +142,12 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
 
   otf::Noise noise = otf_noise(files->config.machine);
   noise.u_scale = u_scale_of(arguments, files->config);
-  auto found = otf::identify(files->tracker.points, *machine, otf_path(files->path.vertices_m),
-                             noise, options);
+  const otf::Path path = otf_path(files->path.vertices_m);
+  auto found =
+      files->encoder
+          ? identify_with_scales(files->tracker.points, *machine, path, noise, options,
+                                 encoder_log(files->encoder->rows, arguments.encoder_u_time_us))
+          : otf::identify(files->tracker.points, *machine, path, noise, options);
   if (!found && options.mode == otf::Mode::Standstill)
     found.error().text = fmt::format("{}: {}", arguments.tracker, found.error().text);
   if (!found) return tl::make_unexpected(error_of(found.error()));
@@ -178,8 +184,9 @@ Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome
                         {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
 }
 
-void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) {
+void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
   const auto& s = outcome.document.statistics;
+  const std::filesystem::path folder = arguments.out;
   nlohmann::json object{
       {"model", (folder / "model.json").string()},
       {"id", model_id(outcome.document)},
@@ -206,11 +213,14 @@ void print_json(const OtfOutcome& outcome, const std::filesystem::path& folder) 
       {"gate", verdict_json(outcome.verdict)}};
   if (!outcome.document.backlash.empty())
     object["backlash"] = backlash_json(outcome.document.backlash);
+  if (outcome.synchronisation)
+    object["clocks"] = clock_json(*outcome.synchronisation, arguments.encoder_u_time_us);
   fmt::print("{}\n", object.dump(1));
 }
 
-void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folder) {
+void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
   const auto& s = outcome.document.statistics;
+  const std::filesystem::path folder = arguments.out;
   fmt::print("model       {}  ({} {} tables, tool and machine \"{}\")\n",
              model_id(outcome.document), outcome.document.model.tables()->layout().tables().size(),
              calib::estimation::name(*outcome.document.model.interpolation()),
@@ -228,6 +238,8 @@ void print_summary(const OtfOutcome& outcome, const std::filesystem::path& folde
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
   print_backlash(outcome.document.backlash);
+  if (outcome.synchronisation)
+    fmt::print("{}", clock_text(*outcome.synchronisation, arguments.encoder_u_time_us));
   print_verdict(outcome.verdict);
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
@@ -251,7 +263,7 @@ int run(const IdentifyOtfArguments& arguments) {
           keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf");
       !kept)
     return report(kept.error());
-  arguments.json ? print_json(*outcome, arguments.out) : print_summary(*outcome, arguments.out);
+  arguments.json ? print_json(*outcome, arguments) : print_summary(*outcome, arguments);
   return exit_code(outcome->verdict);
 }
 
@@ -276,9 +288,16 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                           "or time_s,x_mm,y_mm,z_mm[,status]");
   auto* encoder = command->add_option(
       "--encoder", arguments->encoder,
-      "encoder.csv: time_s,x_mm,y_mm,z_mm, scale readings along the path, times of any clock;\n"
-      "compared with the vertices of the path, to [gate] path_tolerance_mm where the machine "
-      "stands still");
+      "encoder.csv: time_s,x_mm,y_mm,z_mm, scale readings along the path with times of the\n"
+      "machine's clock; compared with the vertices of the path, to [gate] path_tolerance_mm where\n"
+      "the machine stands still. On the fly they add the component along the path: offset and "
+      "drift\nof the clocks are estimated. Readings of another drive, or with useless times, are "
+      "not used\nfor it, and the verdict states why");
+  auto* u_time = command->add_option(
+      "--encoder-u-time-us", arguments->encoder_u_time_us,
+      "standard uncertainty of the time of one reading, us; larger residuals give the readings "
+      "less\nweight; a trigger line needs about 10 or less");
+  u_time->needs(encoder)->check(CLI::Range(0.001, 1e6))->capture_default_str();
   auto* recording = command->add_option(
       "--recording", arguments->recording,
       "instead of path and tracker, a recording of the daemon (.mcap): its last complete run,\n"

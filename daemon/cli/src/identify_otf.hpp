@@ -21,6 +21,7 @@ struct IdentifyOtfArguments {
   std::size_t block_samples = 0;         // 0: blocks by travel
   std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
   std::string backlash;                  // empty: that of [otf]
+  double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
   std::vector<std::string> targets;                 // X,Y,Z=FILE, one per run
@@ -34,6 +35,7 @@ struct OtfOutcome {
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
   calib::otf::RangeOffset range_offset;
+  std::optional<calib::otf::Synchronisation> synchronisation{};
 };
 
 /// Words of the progress bar.

@@ -1,0 +1,29 @@
+#pragma once
+/// Scale readings with times of the machine's clock, for an on-the-fly identification that also
+/// uses the component along the direction of travel.
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "abbe/calib/otf/identify.hpp"
+#include "abbe/tables/input_files.hpp"
+
+namespace abbe::daemon {
+
+/// `u_time_us`: standard uncertainty of the time of one reading.
+[[nodiscard]] calib::otf::EncoderLog encoder_log(std::span<const EncoderRow>, double u_time_us);
+
+/// otf::identify() with the scale readings. If they are not those of this drive (another clock rate,
+/// another run), the same without them, with a note in the observations that states why.
+[[nodiscard]] calib::Result<calib::otf::Identification> identify_with_scales(
+    std::span<const calib::otf::TrackerObservation>, const calib::otf::Machine&,
+    const calib::otf::Path&, const calib::otf::Noise&, const calib::otf::Options&,
+    const calib::otf::EncoderLog&);
+
+/// Offset and drift of the clocks with standard uncertainties, and what the readings contributed:
+/// lines of the summary.
+[[nodiscard]] std::string clock_text(const calib::otf::Synchronisation&, double u_time_us);
+[[nodiscard]] nlohmann::json clock_json(const calib::otf::Synchronisation&, double u_time_us);
+
+}  // namespace abbe::daemon

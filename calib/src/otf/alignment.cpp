@@ -104,8 +104,21 @@ Pairs pair_up(const BlockSeries& series, std::span<const Vector3> points,
   return pairs;
 }
 
-Result<void> check_length(double measured_m, double nominal_m, double allowed) {
-  if (std::abs(measured_m / nominal_m - 1.0) > allowed) {
+/// Upper bound of the travel in beam breaks that the polyline of the measured points does not
+/// contain, because it takes the shortest way: the travel of as many other blocks, each with the
+/// mean travel of the polyline.
+double travel_in_breaks_m(const BlockSeries& series, double measured_m) {
+  const auto has_samples = [](const Block& b) { return b.samples > 0; };
+  const auto first = std::find_if(series.blocks.begin(), series.blocks.end(), has_samples);
+  const auto last = std::find_if(series.blocks.rbegin(), series.blocks.rend(), has_samples).base();
+  const auto all = std::distance(first, last);
+  const auto with_samples = std::count_if(first, last, has_samples);
+  return measured_m * static_cast<double>(all - with_samples) / static_cast<double>(with_samples);
+}
+
+Result<void> check_length(double measured_m, double in_breaks_m, double nominal_m, double allowed) {
+  if (measured_m > (1.0 + allowed) * nominal_m ||
+      measured_m + in_breaks_m < (1.0 - allowed) * nominal_m) {
     return failure(
         ErrorCode::AlignmentFailed,
         message("alignment: the tracker measured ", measured_m, " m of travel, the path is ",
@@ -213,7 +226,8 @@ Result<Alignment> align_as_given(const BlockSeries& series, const Machine& machi
   }
 
   if (Result<void> valid =
-          check_length(measured.length_m, nominal.length_m, options.max_length_mismatch);
+          check_length(measured.length_m, travel_in_breaks_m(series, measured.length_m),
+                       nominal.length_m, options.max_length_mismatch);
       !valid) {
     return tl::unexpected(valid.error());
   }

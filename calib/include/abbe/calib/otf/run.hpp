@@ -146,6 +146,7 @@ struct Options {
   double max_alignment_rms_m = 1e-3;
   double max_alignment_distance_m = 3e-3;
   /// AlignmentFailed if measured and nominal length of the path differ by more than this fraction.
+  /// A measured length that is too short may be explained by beam breaks.
   double max_length_mismatch = 0.05;
   /// Joint: it stops when an adjustment changes the estimate by less than this fraction of its
   /// standard uncertainty (root mean square over all combinations of the unknowns). Three

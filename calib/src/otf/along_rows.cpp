@@ -135,9 +135,9 @@ Observations AlongRows::added_to(const Observations& across, const BlockSeries& 
     const RigidTransform& T = across.alignment.T_machine_tracker;
     const Vector3 a1 = row.direction.cross(other.direction);  // a2 x a3
     const double v_m_s = a1.dot(line.v_m_s), late_m = v_m_s * log_->sigma_time_s;
-    const double variance_m2 = sample_variance_m2(a1, T.R * block.mean_tracker_m, noise) /
-                                   static_cast<double>(block.samples) +
-                               late_m * late_m * line.variance;
+    const double variance_m2 =
+        sample_variance_m2(a1, T.R * block.mean_tracker_m, noise) / block.effective_samples() +
+        late_m * late_m * line.variance;
     const std::array<SparseRows::Entry, kClockUnknowns> clock{
         {{o.clock_offset(), v_m_s},
          {o.clock_offset() + 1, v_m_s * (block.time_s - clock_.reference_s)}}};

@@ -62,17 +62,21 @@ class BlockCutter {
   }
 
   void add(const TrackerObservation& sample) {
+    ++added_;
     if (sample.valid) {
+      note_return();
       in_block_.push_back(&sample.p_tracker_m);
       times_s_.push_back(sample.time_s);
     } else {
       ++series_.lost_samples;
+      ++lost_in_a_row_;
     }
     step();
   }
 
   void lose(std::size_t ticks) {
     series_.lost_samples += ticks;
+    lost_in_a_row_ += ticks;
     for (std::size_t i = 0; i < ticks; ++i) {
       step();
     }
@@ -81,6 +85,16 @@ class BlockCutter {
   [[nodiscard]] BlockSeries take() { return std::move(series_); }
 
  private:
+  void note_return() {
+    constexpr std::size_t kBreak = 5;
+    const std::size_t block = series_.blocks.size();
+    std::vector<std::size_t>& returned = series_.beam_returned;
+    if (lost_in_a_row_ >= kBreak && (returned.empty() || returned.back() != block)) {
+      returned.push_back(block);
+    }
+    lost_in_a_row_ = 0;
+  }
+
   void step() {
     if (++ticks_ == options_.block_samples) {
       close();
@@ -90,6 +104,8 @@ class BlockCutter {
   void close() {
     Block block;
     block.samples = in_block_.size();
+    block.begin_sample = closed_;
+    block.end_sample = closed_ = added_;
     for (const Vector3* p : in_block_) {
       block.mean_tracker_m += *p;
     }
@@ -141,6 +157,8 @@ class BlockCutter {
   std::vector<const Vector3*> in_block_;
   std::vector<double> times_s_;  ///< of the samples in_block_
   std::size_t ticks_ = 0;
+  std::size_t added_ = 0, closed_ = 0;  ///< samples: so far, and in closed blocks
+  std::size_t lost_in_a_row_ = 0;
 };
 
 /// Mean of the first valid samples in [begin, end): at most `count` samples, and only samples

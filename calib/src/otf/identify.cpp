@@ -2,8 +2,10 @@
 
 #include <utility>
 
+#include "abbe/calib/otf/aligned_blocks.hpp"
 #include "abbe/calib/otf/joint.hpp"
 #include "abbe/calib/otf/prewhitening.hpp"
+#include "otf/observe_aligned.hpp"
 #include "otf/synchronised.hpp"
 
 namespace abbe::calib::otf {
@@ -61,6 +63,17 @@ Result<Identification> estimated(Observations across, const BlockSeries& series,
                   options);
 }
 
+Result<Identification> identify_observed(Observations observations, const BlockSeries& series,
+                                         const Noise& noise, const Options& options) {
+  if (options.encoders != nullptr) {
+    return identify_synchronised(observations, series, noise, options, [&](AlongRows* along) {
+      return estimated(observations, series, noise, options, along);
+    });
+  }
+
+  return estimated(std::move(observations), series, noise, options, nullptr);
+}
+
 }  // namespace
 
 Result<Identification> identify(std::span<const TrackerObservation> samples, const Machine& machine,
@@ -71,28 +84,22 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
     });
   }
 
-  const Result<BlockSeries> series = make_blocks(samples, options);
-  if (!series) {
-    return tl::unexpected(series.error());
+  Result<AlignedBlocks> run = aligned_blocks(samples, machine, path, noise, options);
+  if (!run) {
+    return tl::unexpected(run.error());
   }
-  return identify_blocks(*series, machine, path, noise, options);
+  return observe_aligned(run->series, std::move(run->alignment), machine, path, noise, options)
+      .and_then([&](Observations o) {
+        return identify_observed(std::move(o), run->series, noise, options);
+      });
 }
 
 Result<Identification> identify_blocks(const BlockSeries& series, const Machine& machine,
                                        const Path& path, const Noise& noise,
                                        const Options& options) {
-  Result<Observations> observations = observe_blocks(series, machine, path, noise, options);
-  if (!observations) {
-    return tl::unexpected(observations.error());
-  }
-
-  if (options.encoders != nullptr) {
-    return identify_synchronised(*observations, series, noise, options, [&](AlongRows* along) {
-      return estimated(*observations, series, noise, options, along);
-    });
-  }
-
-  return estimated(*std::move(observations), series, noise, options, nullptr);
+  return observe_blocks(series, machine, path, noise, options).and_then([&](Observations o) {
+    return identify_observed(std::move(o), series, noise, options);
+  });
 }
 
 }  // namespace abbe::calib::otf

@@ -78,7 +78,7 @@ void append_block(Observations& o, const Eigen::VectorXd& U, const BlockSeries& 
   append_rows(
       o,
       {leg, i, p_m - c_m, c_m, path_frame(errors.travel(c_m), T.R * block.mean_tracker_m, noise),
-       static_cast<double>(block.samples)},
+       block.effective_samples()},
       sub_points_m);
 }
 

@@ -77,6 +77,20 @@ void note_undetermined_offset(Verdict& verdict, const RangeOffset& offset, doubl
       1e6 * kNormal99 * root_sum_of_squares(u_of_data_m, prior_m), " um would not be detected"));
 }
 
+void note_set_aside(Verdict& verdict, const Observations& o, const std::string& run) {
+  if (!o.set_aside.any()) {
+    return;
+  }
+
+  const std::size_t samples = o.samples - o.lost_samples;
+  const std::string found = run + set_aside_text(o.set_aside, samples);
+  if (static_cast<double>(o.set_aside.samples()) > kMostSetAside * static_cast<double>(samples)) {
+    verdict.refuse("outliers", message(found, ", limit ", 100.0 * kMostSetAside, " %"));
+  } else {
+    verdict.notes.push_back(found);
+  }
+}
+
 }  // namespace
 
 Result<Verdict> judge(const Observations& measured, const Solution& solution,
@@ -110,7 +124,9 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
   Verdict verdict = decide(solution.model, *figures, limits, active);
   for (std::size_t k = 0; k < runs.size(); ++k) {
     verdict.notes.insert(verdict.notes.end(), runs[k].notes.begin(), runs[k].notes.end());
-    add_alternatives(verdict, others[k], runs.size() == 1 ? "" : message("run ", k + 1, ": "));
+    const std::string run = runs.size() == 1 ? "" : message("run ", k + 1, ": ");
+    add_alternatives(verdict, others[k], run);
+    note_set_aside(verdict, runs[k], run);
   }
   require_plausible_scale(verdict, common_scale_error(solution.model), limits.max_scale_error);
 

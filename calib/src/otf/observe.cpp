@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "abbe/calib/otf/aligned_blocks.hpp"
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/observe_standstills.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/observe_aligned.hpp"
 #include "otf/rigid_columns.hpp"
 
 namespace abbe::calib::otf {
@@ -81,8 +84,8 @@ double travel_per_block_m(const BlockSeries& series) {
   return *middle;
 }
 
-/// BadInput if the travel of a block is longer than twice Options::corner_m: a block so long could
-/// extend over a corner and still be used.
+}  // namespace
+
 Result<void> check_travel(const BlockSeries& series, const Options& options) {
   const double travel_m = travel_per_block_m(series), most_m = 2.0 * options.corner_m;
   if (travel_m <= most_m) {
@@ -106,6 +109,8 @@ Result<void> check_travel(const BlockSeries& series, const Options& options) {
                          " times as many points per second"));
 }
 
+namespace {
+
 PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a, const Path& path,
                           const Vector3& t, const Noise& noise) {
   const Vector3 &from = path.vertices_m[a.leg[i]], &to = path.vertices_m[a.leg[i] + 1];
@@ -119,7 +124,7 @@ PointOnPath point_on_path(const Block& block, std::size_t i, const Alignment& a,
           q - closest,
           closest,
           path_frame(to - from, beam_m, noise),
-          static_cast<double>(block.samples)};
+          block.effective_samples()};
 }
 
 std::vector<Vector3> sub_points(const BlockSeries& series, std::size_t i, const Alignment& a,
@@ -301,11 +306,9 @@ Result<Observations> observe(std::span<const TrackerObservation> samples, const 
   if (options.mode == Mode::Standstill) {
     return observe_standstills(samples, machine, path, noise, options);
   }
-  const Result<BlockSeries> series = make_blocks(samples, options);
-  if (!series) {
-    return tl::unexpected(series.error());
-  }
-  return observe_blocks(*series, machine, path, noise, options);
+  return aligned_blocks(samples, machine, path, noise, options).and_then([&](AlignedBlocks run) {
+    return observe_aligned(run.series, std::move(run.alignment), machine, path, noise, options);
+  });
 }
 
 Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,
@@ -318,13 +321,16 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
     return tl::unexpected(valid.error());
   }
 
-  Result<Alignment> alignment = align(series, machine, path, options);
-  if (!alignment) {
-    return tl::unexpected(alignment.error());
-  }
+  return align(series, machine, path, options).and_then([&](Alignment alignment) {
+    return observe_aligned(series, std::move(alignment), machine, path, noise, options);
+  });
+}
 
+Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignment,
+                                     const Machine& machine, const Path& path, const Noise& noise,
+                                     const Options& options) {
   Result<Observations> empty =
-      observations_without_rows(machine, path, noise, *std::move(alignment), options.backlash);
+      observations_without_rows(machine, path, noise, std::move(alignment), options.backlash);
   if (!empty) {
     return empty;
   }
@@ -337,6 +343,8 @@ Result<Observations> observe_blocks(const BlockSeries& series, const Machine& ma
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();
+  o.beam_returned = series.beam_returned;
+  o.set_aside = series.set_aside;
 
   for (std::size_t i = 0; i < series.blocks.size(); ++i) {
     o.alignment.used[i] = o.alignment.used[i] && o.alignment.leg[i] >= *first_leg;

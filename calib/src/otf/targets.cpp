@@ -4,11 +4,12 @@
 #include <cmath>
 #include <utility>
 
-#include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/aligned_blocks.hpp"
 #include "abbe/calib/otf/joint.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
+#include "otf/observe_aligned.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"
 #include "otf/run_unknowns.hpp"
@@ -62,10 +63,12 @@ Result<Observations> observe_run(const TargetRun& run, Machine machine, const No
   if (options.mode == Mode::Standstill) {
     return observe(run.samples, machine, run.path, noise, options);
   }
-  return make_blocks(run.samples, options).and_then([&](BlockSeries blocks) {
-    series.push_back(std::move(blocks));
-    return observe_blocks(series.back(), machine, run.path, noise, options);
-  });
+  return aligned_blocks(run.samples, machine, run.path, noise, options)
+      .and_then([&](AlignedBlocks blocks) {
+        series.push_back(std::move(blocks.series));
+        return observe_aligned(series.back(), std::move(blocks.alignment), machine, run.path, noise,
+                               options);
+      });
 }
 
 Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs, const Machine& machine,

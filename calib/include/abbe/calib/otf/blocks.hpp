@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/run.hpp"
+#include "abbe/calib/otf/set_aside.hpp"
 
 namespace abbe::calib::otf {
 
@@ -20,6 +21,16 @@ struct Block {
   std::size_t first_sub_point = 0;
   /// Tracker clock: mean, first and last time of the samples in the mean; 0 without times.
   double time_s = 0.0, first_s = 0.0, last_s = 0.0;
+  /// Range of the indices of its samples, valid or not. Both 0 in blocks from means.
+  std::size_t begin_sample = 0, end_sample = 0;
+  /// Standard deviation of its samples in units of that of the other samples of the run, if it is
+  /// much larger (aligned_blocks.hpp); else 1.
+  double noise_factor = 1.0;
+
+  /// Number of samples with the noise of the run whose mean is as uncertain as that of the block.
+  [[nodiscard]] double effective_samples() const {
+    return static_cast<double>(samples) / (noise_factor * noise_factor);
+  }
 };
 
 /// Blocks of equal duration, in the order of time.
@@ -34,6 +45,9 @@ struct BlockSeries {
   std::size_t lost_samples = 0;  ///< invalid samples, and samples missing in the time series
   double first_time_s = 0.0;     ///< of the first sample, tracker clock
   double period_s = 0.0;         ///< from sample to sample (median); 0: blocks without times
+  /// Blocks in which the beam returned after at least five lost samples, ascending.
+  std::vector<std::size_t> beam_returned{};
+  SetAside set_aside{};  ///< by aligned_blocks(); these samples are not in `lost_samples`
 };
 
 inline constexpr double kBlockTravel_m = 8.33e-3;

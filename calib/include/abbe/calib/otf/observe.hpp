@@ -73,7 +73,9 @@ struct Observations {
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
-  std::size_t clock_unknowns = 0;    ///< kClockUnknowns with scale readings and unknown clocks
+  std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
+  std::vector<std::size_t> beam_returned{};  ///< see BlockSeries
+  SetAside set_aside{};
   std::vector<std::string> notes{};  ///< for the verdict
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
@@ -128,9 +130,10 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// other nodes.
 [[nodiscard]] Observations with_basis(const Observations&, estimation::TableBasis);
 
+/// On the fly: observations of aligned_blocks().
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});
-/// observe() from blocks that are already averaged.
+/// The same from blocks that are already averaged. No sample of them is set aside.
 [[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
                                                   const Noise&, const Options& = {});
 

@@ -1,0 +1,150 @@
+#include "abbe/calib/otf/aligned_blocks.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/calib/otf/observe.hpp"
+#include "otf/observe_aligned.hpp"
+#include "otf/off_line_samples.hpp"
+#include "otf/unreachable_samples.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+using KeptSamples = std::vector<TrackerObservation>;
+
+KeptSamples without_aside(std::span<const TrackerObservation> samples,
+                          const std::vector<bool>& aside) {
+  KeptSamples kept(samples.begin(), samples.end());
+  for (std::size_t i = 0; i < aside.size(); ++i) {
+    kept[i].valid = kept[i].valid && !aside[i];
+  }
+  return kept;
+}
+
+/// Adds where samples are set aside.
+void add_places(SetAside& a, std::span<const TrackerObservation> samples,
+                const std::vector<bool>& aside, const AlignedBlocks& run) {
+  std::size_t in_a_row = 0;
+  for (std::size_t i = 0; i < aside.size(); ++i) {
+    in_a_row = aside[i] ? in_a_row + 1 : 0;
+    if (in_a_row > a.longest) {
+      a.longest = in_a_row;
+      a.longest_from_s = samples[i + 1 - in_a_row].time_s - samples.front().time_s;
+    }
+  }
+
+  std::vector<std::size_t> on_leg(run.alignment.leg.back() + 1, 0);
+  for (std::size_t b = 0; b < run.series.blocks.size(); ++b) {
+    const Block& block = run.series.blocks[b];
+    on_leg[run.alignment.leg[b]] += static_cast<std::size_t>(
+        std::count(aside.begin() + static_cast<std::ptrdiff_t>(block.begin_sample),
+                   aside.begin() + static_cast<std::ptrdiff_t>(block.end_sample), true));
+  }
+  const auto worst = std::max_element(on_leg.begin(), on_leg.end());
+  a.worst_leg = static_cast<std::size_t>(worst - on_leg.begin());
+  a.on_worst_leg = *worst;
+}
+
+std::size_t count_of(const std::vector<bool>& aside) {
+  return static_cast<std::size_t>(std::count(aside.begin(), aside.end(), true));
+}
+
+class Screening {
+ public:
+  Screening(std::span<const TrackerObservation> samples, const Machine& machine, const Path& path,
+            const Noise& noise, const Options& options)
+      : samples_(samples), machine_(machine), path_(path), noise_(noise), options_(options) {}
+
+  [[nodiscard]] Result<AlignedBlocks> blocks() {
+    return make_blocks(samples_, options_)
+        .and_then([&](BlockSeries all) { return without_unreachable(std::move(all)); })
+        .and_then([&](AlignedBlocks run) { return without_off_line(std::move(run)); });
+  }
+
+ private:
+  Result<AlignedBlocks> without_unreachable(BlockSeries all) {
+    aside_ = unreachable_samples(samples_);
+    if (aside_.empty()) {
+      return aligned(std::move(all));
+    }
+
+    Result<AlignedBlocks> run = aligned_without_aside();
+    if (!run) {
+      aside_.clear();
+      return aligned(std::move(all));
+    }
+    found_.unreachable = count_of(aside_);
+    return run;
+  }
+
+  Result<AlignedBlocks> without_off_line(AlignedBlocks run) {
+    const KeptSamples reachable = aside_.empty() ? KeptSamples{} : without_aside(samples_, aside_);
+    const OffLine off =
+        off_line_samples(aside_.empty() ? samples_ : std::span<const TrackerObservation>(reachable),
+                         run.series, run.alignment, machine_.target_offset_m, path_, noise_);
+
+    found_.off_line = off.samples.size();
+    found_.noisy_blocks = off.blocks.size();
+    if (!off.samples.empty()) {
+      aside_.resize(samples_.size(), false);
+      for (const std::size_t i : off.samples) {
+        aside_[i] = true;
+      }
+      Result<AlignedBlocks> again = aligned_without_aside();
+      if (!again) {
+        return again;
+      }
+      run = *std::move(again);
+    }
+
+    for (const OffLine::Noisy& noisy : off.blocks) {
+      run.series.blocks[noisy.block].noise_factor = noisy.noise_factor;
+    }
+    if (!aside_.empty()) {
+      add_places(found_, samples_, aside_, run);
+    }
+    run.series.set_aside = found_;
+    return run;
+  }
+
+  Result<AlignedBlocks> aligned_without_aside() {
+    return make_blocks(without_aside(samples_, aside_), options_).and_then([&](BlockSeries series) {
+      series.lost_samples -= count_of(aside_);
+      return aligned(std::move(series));
+    });
+  }
+
+  Result<AlignedBlocks> aligned(BlockSeries series) {
+    const Result<void> valid =
+        check(noise_).and_then([&] { return check_travel(series, options_); });
+    if (!valid) {
+      return tl::unexpected(valid.error());
+    }
+
+    Result<Alignment> alignment = align(series, machine_, path_, options_);
+    options_.progress = {};  // the first alignment has reported it
+    if (!alignment) {
+      return tl::unexpected(alignment.error());
+    }
+    return AlignedBlocks{std::move(series), *std::move(alignment)};
+  }
+
+  std::span<const TrackerObservation> samples_;
+  const Machine& machine_;
+  const Path& path_;
+  const Noise& noise_;
+  Options options_;
+  std::vector<bool> aside_;  ///< one value per sample; empty if none is set aside
+  SetAside found_;
+};
+
+}  // namespace
+
+Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples,
+                                     const Machine& machine, const Path& path, const Noise& noise,
+                                     const Options& options) {
+  return Screening(samples, machine, path, noise, options).blocks();
+}
+
+}  // namespace abbe::calib::otf

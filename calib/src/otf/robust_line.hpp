@@ -1,0 +1,32 @@
+#pragma once
+/// A straight line through points of which many may be wrong.
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace abbe::calib::otf {
+
+/// Standard deviation of a normal distribution, divided by its median absolute deviation.
+inline constexpr double kSigmaOfMad = 1.4826;
+
+/// Middle value, the larger one of two; 0 without values. The order of the values changes.
+[[nodiscard]] double median_in_place(std::vector<double>& values);
+
+/// Line of repeated medians: the points are divided into kParts parts in their order, and each part
+/// becomes its medians of x and y. The slope is the median over the parts of the median slope to
+/// all other parts; then the intercept is the median of y - slope x.
+class RobustLine {
+ public:
+  static constexpr std::size_t kParts = 15;
+
+  /// `x` and `y` have the same, positive size. x ascends, but for wrong points.
+  RobustLine(std::span<const double> x, std::span<const double> y);
+
+  [[nodiscard]] double at(double x) const { return intercept_ + slope_ * x; }
+
+ private:
+  double slope_ = 0.0, intercept_ = 0.0;
+};
+
+}  // namespace abbe::calib::otf

@@ -201,4 +201,16 @@ TEST(AlignedBlocks, RefuseARunWithAQuarterOfOutliers) {
   EXPECT_THAT(verdict_of(run, *found).causes, Contains("outliers"));
 }
 
+TEST(AlignedBlocks, NameARangeThatChangedAtABreak) {
+  MadeRun run = noisy_run(1);
+  change_between(run.samples, 30.0, 1.0, [](auto& s) { s.valid = false; });
+  change_between(run.samples, 70.0, 1.0, [](auto& s) { s.valid = false; });
+  change_between(run.samples, 70.0, 1e9,
+                 [](auto& s) { s.p_tracker_m += 20e-6 * s.p_tracker_m.normalized(); });
+  const Verdict verdict = verdict_of(run, *identified(run));
+  ASSERT_FALSE(verdict.accepted);
+  EXPECT_EQ(verdict.causes.front(), name(Cause::RangeStep));
+  EXPECT_THAT(verdict.reasons.front(), HasSubstr("the ranges of the tracker changed by "));
+}
+
 }  // namespace

@@ -24,6 +24,13 @@ void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> 
   }
 }
 
+AddedColumns& AddedColumns::operator+=(const AddedColumns& other) {
+  CWC_ += other.CWC_;
+  CWA_ += other.CWA_;
+  CWr_ += other.CWr_;
+  return *this;
+}
+
 AddedColumns& AddedColumns::operator-=(const AddedColumns& other) {
   CWC_ -= other.CWC_;
   CWA_ -= other.CWA_;

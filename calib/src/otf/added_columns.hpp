@@ -19,6 +19,7 @@ class AddedColumns {
   /// `values`: one value per added column in this row.
   void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
            std::span<const double> values);
+  AddedColumns& operator+=(const AddedColumns&);
   AddedColumns& operator-=(const AddedColumns&);
 
   struct Estimate {

@@ -88,6 +88,9 @@ std::size_t AlternativeColumns::values(const Added& added, const Observation& ro
     case Cause::RangeOffset:
       v[0] = drow_drange_offset(o_, row);
       return 1;
+    case Cause::RangeStep:
+      v[0] = drow_drange_offset(o_, row);
+      return row.block >= added.place ? 1 : 0;
     default:
       return 0;
   }
@@ -120,6 +123,38 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
   }
 
   return before;
+}
+
+/// Sums for an offset of all ranges from the return of the beam on, for the first kMostBreaks
+/// breaks that have rows before and after them. The sums are those of the rows from one break to the
+/// next, added up from the end of the run.
+AlternativeColumns::Family AlternativeColumns::range_steps(
+    std::span<const double> residual_m) const {
+  constexpr std::size_t kMostBreaks = 50;
+  Family after;
+  auto next = o_.beam_returned.begin();
+  Values v{};
+
+  for (std::size_t i = 0; i < o_.rows.size(); ++i) {
+    const std::size_t block = o_.rows[i].block;
+    if (next != o_.beam_returned.end() && *next <= block) {
+      while (next != o_.beam_returned.end() && *next <= block) {
+        ++next;
+      }
+      if (i > 0 && after.size() < kMostBreaks) {
+        after.emplace_back(Added{Cause::RangeStep, block}, AddedColumns(1, o_.unknowns()));
+      }
+    }
+    if (!after.empty()) {
+      v[0] = drow_drange_offset(o_, o_.rows[i]);
+      after.back().second.add(o_.rows[i], o_.A.row(i), residual_m[i], std::span(v).first(1));
+    }
+  }
+
+  for (std::size_t k = after.size(); k-- > 1;) {
+    after[k - 1].second += after[k].second;
+  }
+  return after;
 }
 
 std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
@@ -157,6 +192,7 @@ std::vector<AlternativeColumns::Family> AlternativeColumns::sums(
   }
 
   all.push_back(steps(residual_m));
+  all.push_back(range_steps(residual_m));
   return all;
 }
 
@@ -195,6 +231,14 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
     case Cause::RangeOffset:
       return message("all ranges of the tracker have an offset of ", 1e6 * d(0),
                      " um: home position or reflector");
+    case Cause::RangeStep: {
+      const auto at = std::find_if(o_.rows.begin(), o_.rows.end(), [&](const Observation& row) {
+        return row.block >= added.place;
+      });
+      return message("the ranges of the tracker changed by ", 1e6 * d(0),
+                     " um at a beam break before leg ", at == o_.rows.end() ? 0 : at->leg,
+                     " (block ", added.place, "): the distance was set again");
+    }
     default:
       return {};
   }

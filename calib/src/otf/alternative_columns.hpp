@@ -15,8 +15,8 @@
 
 namespace abbe::calib::otf {
 
-/// One alternative. `place`: for Cause::Moved the index of the first block after the motion, for
-/// other causes the index of the vertex or of the leg.
+/// One alternative. `place`: for Cause::Moved and Cause::RangeStep the index of the first block after
+/// the motion or the beam break, for other causes the index of the vertex or of the leg.
 struct Added {
   Cause cause;
   std::size_t place = 0;
@@ -43,6 +43,7 @@ class AlternativeColumns {
   /// path.
   void rigid(const Observation&, Values&) const;
   [[nodiscard]] Family steps(std::span<const double> residual_m) const;
+  [[nodiscard]] Family range_steps(std::span<const double> residual_m) const;
 
   const Observations& o_;
   Vector3 centre_m_ = Vector3::Zero();

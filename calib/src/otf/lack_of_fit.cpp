@@ -23,7 +23,7 @@ namespace {
 
 /// Probability of a false alarm in a run without a fault, over all alternatives together.
 constexpr double kFalseAlarm = 1e-4;
-constexpr double kCauses = 9.0;
+constexpr double kCauses = 10.0;
 /// Other design matrices are tested only above this variance factor, because each test takes the
 /// time of an adjustment.
 constexpr double kSuspicious = 2.0;
@@ -439,6 +439,8 @@ std::string_view name(Cause cause) {
       return "leg";
     case Cause::RangeOffset:
       return "range-offset";
+    case Cause::RangeStep:
+      return "range-step";
     case Cause::ChainOrder:
       return "chain-order";
     case Cause::NodeSpacing:

@@ -258,6 +258,50 @@ std::vector<Fault<OtfRun>> otf_faults() {
       {"five times the noise", [](OtfRun& r) { r.sigma_range_m *= 5.0, r.sigma_angle_rad *= 5.0; },
        noise},
       {"one of 1000 samples off by 0.2 mm", [](OtfRun& r) { r.spikes = 1e-3; }, {}},
+      {"one of 20 samples off by 0.2 mm", [](OtfRun& r) { r.spikes = 0.05; }, {}},
+      {"outliers of 0.2 mm and six beam breaks",
+       [](OtfRun& r) {
+         r.spikes = 0.01;
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_breaks(samples, 6, 0.3, 3.0, random);
+         };
+       },
+       {}},
+      {"50 clusters of 0.2 mm over 50 ms",
+       [](OtfRun& r) {
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_clusters(samples, 50, 0.05, 0.2e-3, random);
+         };
+       },
+       {}},
+      {"20 clusters of 0.2 mm over 0.5 s",
+       [](OtfRun& r) {
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_clusters(samples, 20, 0.5, 0.2e-3, random);
+         };
+       },
+       {}},
+      {"another reflector for 5 s",
+       [](OtfRun& r) {
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_other_target(samples, 5.0, 0.0, 0.3, random);
+         };
+       },
+       {}},
+      {"another reflector within reach of a break",
+       [](OtfRun& r) {
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_other_target(samples, 5.0, 1.0, 0.1, random);
+         };
+       },
+       {{}, {"alignment"}}},
+      {"ranges change by 20 um at a break",
+       [](OtfRun& r) {
+         r.disturb = [](auto& samples, auto& random) {
+           otf::add_range_step(samples, 1.0, 20e-6, random);
+         };
+       },
+       {{"range-step", "moved"}}},
       {"beam lost for 5 %", [](OtfRun& r) { r.lost_from = 0.4, r.lost_to = 0.45; }, align},
       {"last third missing",
        [](OtfRun& r) { r.lost_from = 0.66, r.lost_to = 1.1; },
@@ -341,6 +385,9 @@ std::vector<calib::otf::TrackerObservation> measure(OtfRun& run) {
     samples.push_back({t + stand_s, seen, !lost});
   }
 
+  if (run.disturb) {
+    run.disturb(samples, run.random);
+  }
   return samples;
 }
 

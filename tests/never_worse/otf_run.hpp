@@ -12,6 +12,7 @@
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/truth_machine.hpp"
 #include "campaign.hpp"
+#include "stream_faults.hpp"
 
 namespace abbe::tests::never_worse {
 
@@ -37,6 +38,8 @@ struct OtfRun {
   double dwell_s = 0.05;                          ///< before each leg
   double vibration_m = 0.0, vibration_hz = 30.0;  ///< amplitude, in a random direction
   double breaks_per_s = 0.0, break_s = 0.3;       ///< beam breaks at random times
+  /// Changes the tracker's stream; may be empty.
+  std::function<void(otf::Stream&, std::mt19937_64&)> disturb;
   // the configuration
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   double u_repeatability_m = 0.0;  ///< of standstill mode

@@ -30,11 +30,11 @@ Result<AlignedBlocks> aligned_blocks_of(const MadeRun& run) {
   return aligned_blocks(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
-Result<Identification> identified(const MadeRun& run) {
+Result<Identification> identified_run(const MadeRun& run) {
   return identify(run.samples, run.machine, run.path, run.noise, run.options);
 }
 
-double mean_error_m(const MadeRun& run, const VolumetricModel& model) {
+double mean_error_of_tables_m(const MadeRun& run, const VolumetricModel& model) {
   std::vector<Vector3> points;
   for (const Vector3& q : tensor_grid(run.machine.nodes)) {
     points.push_back(q + run.machine.target_offset_m);
@@ -69,7 +69,7 @@ TEST(AlignedBlocks, AreThoseOfAllSamplesInASoundRun) {
     ASSERT_TRUE(robust && all);
     EXPECT_FALSE(robust->series.set_aside.any());
     const auto as_before = identify_blocks(*all, run.machine, run.path, run.noise, run.options);
-    EXPECT_EQ(identified(run)->solution.model.U(), as_before->solution.model.U());
+    EXPECT_EQ(identified_run(run)->solution.model.U(), as_before->solution.model.U());
   }
 }
 
@@ -97,13 +97,13 @@ TEST_P(FaultOfStream, HardlyChangesTheModel) {
   double clean_m = 0.0, faulty_m = 0.0, clean_squares = 0.0, faulty_squares = 0.0;
   for (const unsigned seed : {1U, 2U, 3U}) {
     MadeRun run = noisy_run(seed);
-    const auto clean = identified(run);
+    const auto clean = identified_run(run);
     std::mt19937_64 random(100 + seed);
     GetParam().put_in(run.samples, random);
-    const auto faulty = identified(run);
+    const auto faulty = identified_run(run);
     ASSERT_TRUE(faulty) << faulty.error().text;
-    clean_m += mean_error_m(run, clean->solution.model);
-    faulty_m += mean_error_m(run, faulty->solution.model);
+    clean_m += mean_error_of_tables_m(run, clean->solution.model);
+    faulty_m += mean_error_of_tables_m(run, faulty->solution.model);
     clean_squares += mean_squared_normalised(run, clean->solution.model);
     faulty_squares += mean_squared_normalised(run, faulty->solution.model);
     const Verdict verdict = verdict_of(run, *faulty);
@@ -146,13 +146,13 @@ TEST(AlignedBlocks, CountWhatIsSetAside) {
   EXPECT_EQ(aside.longest, 3U);
   EXPECT_NEAR(aside.longest_from_s, run.samples[5000].time_s, 1e-9);
   EXPECT_EQ(aligned_blocks_of(run)->series.lost_samples, 0U);
-  EXPECT_THAT(verdict_of(run, *identified(run)).notes, Contains(HasSubstr("5 samples (")));
+  EXPECT_THAT(verdict_of(run, *identified_run(run)).notes, Contains(HasSubstr("5 samples (")));
 }
 
 // Samples at the vertices are in no row; they must not confuse alignment and legs.
 TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
   MadeRun run = noisy_run(2);
-  const double clean_m = mean_error_m(run, identified(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
   std::mt19937_64 random(1);
   const auto aligned = aligned_blocks_of(run);
   for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
@@ -161,12 +161,12 @@ TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
       run.samples[block.begin_sample].p_tracker_m += normal_vector(0.5e-3, random);
     }
   }
-  EXPECT_LT(mean_error_m(run, identified(run)->solution.model), 1.02 * clean_m);
+  EXPECT_LT(mean_error_of_tables_m(run, identified_run(run)->solution.model), 1.02 * clean_m);
 }
 
 TEST(AlignedBlocks, GiveALegOfBadSamplesLittleWeight) {
   MadeRun run = noisy_run(3);
-  const double clean_m = mean_error_m(run, identified(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
   std::mt19937_64 random(1);
   const auto aligned = aligned_blocks_of(run);
   for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
@@ -176,19 +176,19 @@ TEST(AlignedBlocks, GiveALegOfBadSamplesLittleWeight) {
       run.samples[i].p_tracker_m += normal_vector(kOutlier_m, random);
     }
   }
-  const auto found = identified(run);
+  const auto found = identified_run(run);
   EXPECT_GT(found->observations.set_aside.noisy_blocks, 5U);
-  EXPECT_LT(mean_error_m(run, found->solution.model), 1.3 * clean_m);
+  EXPECT_LT(mean_error_of_tables_m(run, found->solution.model), 1.3 * clean_m);
 }
 
 TEST(AlignedBlocks, RefuseAReflectorWithinReachOfABreakOrSetItAside) {
   MadeRun run = noisy_run(1);
-  const double clean_m = mean_error_m(run, identified(run)->solution.model);
+  const double clean_m = mean_error_of_tables_m(run, identified_run(run)->solution.model);
   std::mt19937_64 random(4);
   add_other_target(run.samples, 5.0, 1.0, 0.1, random);
-  const auto found = identified(run);
+  const auto found = identified_run(run);
   if (found && verdict_of(run, *found).accepted) {
-    EXPECT_LT(mean_error_m(run, found->solution.model), 1.15 * clean_m);
+    EXPECT_LT(mean_error_of_tables_m(run, found->solution.model), 1.15 * clean_m);
   }
 }
 
@@ -196,7 +196,7 @@ TEST(AlignedBlocks, RefuseARunWithAQuarterOfOutliers) {
   MadeRun run = noisy_run(1);
   std::mt19937_64 random(5);
   add_outliers(run.samples, 0.25, kOutlier_m, random);
-  const auto found = identified(run);
+  const auto found = identified_run(run);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_THAT(verdict_of(run, *found).causes, Contains("outliers"));
 }
@@ -207,7 +207,7 @@ TEST(AlignedBlocks, NameARangeThatChangedAtABreak) {
   change_between(run.samples, 70.0, 1.0, [](auto& s) { s.valid = false; });
   change_between(run.samples, 70.0, 1e9,
                  [](auto& s) { s.p_tracker_m += 20e-6 * s.p_tracker_m.normalized(); });
-  const Verdict verdict = verdict_of(run, *identified(run));
+  const Verdict verdict = verdict_of(run, *identified_run(run));
   ASSERT_FALSE(verdict.accepted);
   EXPECT_EQ(verdict.causes.front(), name(Cause::RangeStep));
   EXPECT_THAT(verdict.reasons.front(), HasSubstr("the ranges of the tracker changed by "));

@@ -47,7 +47,7 @@ Verdict verdict_on(const MadeRun& run, const Identification& id) {
   return *judge(id.observations, id.solution, nullptr, {}, run.options);
 }
 
-double mean_error_m(const MadeRun& run, const VolumetricModel& model) {
+double mean_error_at_nodes_m(const MadeRun& run, const VolumetricModel& model) {
   std::vector<Vector3> points = tensor_grid(run.machine.nodes);
   for (Vector3& p : points) {
     p += run.machine.target_offset_m;
@@ -91,7 +91,7 @@ TEST_P(BacklashOfARun, IsFoundWithItsSignAndTheModelIsTheMeanOfBothDirections) {
     const auto id = identified_with(run, TravelDependence::Backlash, GetParam());
     ASSERT_TRUE(id) << id.error().text;
     expect_within_four_u(id->solution.backlash, truth);
-    EXPECT_LT(mean_error_m(run, id->solution.model), 0.5e-6);
+    EXPECT_LT(mean_error_at_nodes_m(run, id->solution.model), 0.5e-6);
   }
 }
 
@@ -229,7 +229,7 @@ TEST(ForwardAndBackwardTables, ShowADifferenceThatDependsOnThePosition) {
   ASSERT_TRUE(id) << id.error().text;
   expect_within_four_u(id->solution.backlash, truth);
   EXPECT_EQ(label(id->solution.backlash[0]), "EXX at -0.3 m");
-  EXPECT_LT(mean_error_m(run, id->solution.model), 1e-6);
+  EXPECT_LT(mean_error_at_nodes_m(run, id->solution.model), 1e-6);
 }
 
 TEST(BacklashOfStandstills, IsFoundWithoutTheFirstPosition) {

@@ -79,9 +79,9 @@ TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {
 TEST_F(ExampleFiles, AreListed) {
   const auto ran = abbe("example");
   EXPECT_EQ(ran.exit, 0) << ran.err;
-  for (const char* name :
-       {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
-        "encoder.csv", "touches.csv", "parts.toml", "errors.csv", "points.csv", "verification.csv", "truth.csv"})
+  for (const char* name : {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv",
+                           "tracker.csv", "encoder.csv", "touches.csv", "parts.toml", "errors.csv",
+                           "points.csv", "verification.csv", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)

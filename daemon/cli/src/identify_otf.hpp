@@ -24,7 +24,7 @@ struct IdentifyOtfArguments {
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
-  std::vector<std::string> targets;                 // X,Y,Z=FILE, one per run
+  std::vector<std::string> targets;  // X,Y,Z=FILE, one per run
   // without a value: [target] offset_mm, [tracker] position_mm
   std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
 };

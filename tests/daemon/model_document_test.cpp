@@ -245,9 +245,10 @@ TEST(ModelDocument, ReadsBackWithBacklash) {
 TEST(ModelDocument, IsNamedWhereBacklashIsUnreadable) {
   const auto text = to_json(document_with_backlash());
   for (const auto& [what, with, where] :
-       {std::array{"\"name\": \"EBX\", \"position", "\"name\": \"EBQ\", \"position",
+       {std::array{"\"name\": \"EBX\", \"position_mm\": -300, \"value\": -3.6",
+                   "\"name\": \"EBQ\", \"position_mm\": -300, \"value\": -3.6",
                    "backlash[1].name: must be an error such as EXX"},
-        std::array{"\"value\": 2.859", "\"value\": \"2\"", "backlash[0].value: must be a number"},
+        std::array{"\"value\": 2.859,", "\"value\": \"2\",", "backlash[0].value: must be a number"},
         std::array{"\"backlash\": [", "\"backlash\": 3, \"other\": [",
                    "backlash: must be an array"}}) {
     const auto read = parse_model(replaced(text, what, with), "model.json");

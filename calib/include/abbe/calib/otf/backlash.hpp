@@ -10,10 +10,10 @@
 /// axis is not known there.
 ///
 /// Not estimable: differences between directions that the path does not show, for example of an
-/// axis that moves in one direction only. The prior N(0, kUOfBacklash^2) of each b or D leaves these
-/// at zero. With one value per table it does not change the model: b and a constant of the table
-/// then occur only as their sum, and the gauge fixes the constants of all tables. With one value per
-/// node U is uncertain by half the prior where the path shows one direction only.
+/// axis that moves in one direction only. The prior N(0, kUOfBacklash^2) of each b or D leaves
+/// these at zero. With one value per table it does not change the model: b and a constant of the
+/// table then occur only as their sum, and the gauge fixes the constants of all tables. With one
+/// value per node U is uncertain by half the prior where the path shows one direction only.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -27,8 +27,8 @@
 
 namespace abbe::calib::otf {
 
-/// Standard uncertainty of the prior of a difference between both directions, m or rad. Data with an
-/// uncertainty of 1 um make a difference smaller by 1e-4 of its value because of the prior.
+/// Standard uncertainty of the prior of a difference between both directions, m or rad. Data with
+/// an uncertainty of 1 um make a difference smaller by 1e-4 of its value because of the prior.
 inline constexpr double kUOfBacklash = 100e-6;
 
 /// Difference between both directions of travel: forward minus backward.
@@ -43,9 +43,9 @@ struct Backlash {
 [[nodiscard]] std::string label(const Backlash&);
 
 [[nodiscard]] bool estimates_backlash(const Observations&);
-/// The first leg (standstill: position) on which the direction of travel of all axes is known; those
-/// before it are not used with backlash, and a note names them. 0 without backlash. RankDeficient if
-/// an axis does not move on the path.
+/// The first leg (standstill: position) on which the direction of travel of all axes is known;
+/// those before it are not used with backlash, and a note names them. 0 without backlash.
+/// RankDeficient if an axis does not move on the path.
 [[nodiscard]] Result<std::size_t> first_with_backlash(Observations&);
 /// `data` with the prior of all differences; unchanged without backlash.
 [[nodiscard]] estimation::Information with_backlash_prior(estimation::Information data,

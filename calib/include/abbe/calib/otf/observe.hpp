@@ -116,7 +116,7 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 
 /// BadInput for a noise that is not positive, or a negative uncertainty.
 [[nodiscard]] Result<void> check(const Noise&);
-/// Without rows: the tables of the machine and the uncertainties of the noise, for a run on the fly.
+/// Without rows: tables of the machine and uncertainties of the noise, for a run on the fly.
 [[nodiscard]] Result<Observations> observations_without_rows(
     const Machine&, const Path&, const Noise&, Alignment,
     estimation::TravelDependence backlash = estimation::TravelDependence::None);

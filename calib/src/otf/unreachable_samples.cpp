@@ -7,7 +7,8 @@ namespace abbe::calib::otf {
 namespace {
 
 constexpr double kLeastReach_m = 1e-3;
-constexpr double kFaster = 3.0;  // than the usual travel per sample
+constexpr double kFaster = 3.0;          // than the usual travel per sample
+constexpr double kMostVariation = 10.0;  // of the travel per sample within a run
 constexpr std::size_t kNeighbours = 8;
 
 double quantile_of(std::vector<double> values, double share) {
@@ -61,8 +62,10 @@ class Reach {
 
   /// `local_m`: travel per sample around valid samples i and j.
   [[nodiscard]] bool reaches(std::size_t i, std::size_t j, double local_m) const {
-    return distance_m(i, j) <=
-           kLeastReach_m + kFaster * periods(i, j) * std::max(usual_m_, local_m);
+    // Several spikes close together would otherwise permit each other.
+    const double travel_m =
+        usual_m_ > 0.0 ? std::clamp(local_m, usual_m_, kMostVariation * usual_m_) : local_m;
+    return distance_m(i, j) <= kLeastReach_m + kFaster * periods(i, j) * travel_m;
   }
 
  private:

@@ -7,9 +7,10 @@
 /// from one sample to the next, further than
 ///     1 mm + 3 s n
 /// s: travel per sample, the larger of the upper quartile of the run and the median over the eight
-/// samples before or after; n: number of sample periods, more than 1 after a beam break. Of the
-/// parts, those are kept that follow one another within this limit and have the most samples. If the
-/// kept parts do not fit the path, or are less than four fifths of the run, nothing is set aside.
+/// samples before or after, but at most ten times the former; n: number of sample periods, more than
+/// 1 after a beam break. Of the parts, those are kept that follow one another within this limit and
+/// have the most samples. If the kept parts do not fit the path, or are less than four fifths of the
+/// run, nothing is set aside in this step.
 ///
 /// After it, samples off the line: a block whose samples deviate in one direction across the travel
 /// by five standard deviations from their median, or whose mean deviates by as much from the means

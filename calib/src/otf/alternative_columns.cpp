@@ -126,8 +126,8 @@ AlternativeColumns::Family AlternativeColumns::steps(std::span<const double> res
 }
 
 /// Sums for an offset of all ranges from the return of the beam on, for the first kMostBreaks
-/// breaks that have rows before and after them. The sums are those of the rows from one break to the
-/// next, added up from the end of the run.
+/// breaks that have rows before and after them. The sums are those of the rows from one break to
+/// the next, added up from the end of the run.
 AlternativeColumns::Family AlternativeColumns::range_steps(
     std::span<const double> residual_m) const {
   constexpr std::size_t kMostBreaks = 50;

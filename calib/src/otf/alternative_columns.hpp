@@ -15,8 +15,8 @@
 
 namespace abbe::calib::otf {
 
-/// One alternative. `place`: for Cause::Moved and Cause::RangeStep the index of the first block after
-/// the motion or the beam break, for other causes the index of the vertex or of the leg.
+/// One alternative. `place`: for Cause::Moved and Cause::RangeStep the index of the first block
+/// after the motion or the beam break, for other causes the index of the vertex or of the leg.
 struct Added {
   Cause cause;
   std::size_t place = 0;

@@ -7,10 +7,10 @@
 /// from one sample to the next, further than
 ///     1 mm + 3 s n
 /// s: travel per sample, the larger of the upper quartile of the run and the median over the eight
-/// samples before or after, but at most ten times the former; n: number of sample periods, more than
-/// 1 after a beam break. Of the parts, those are kept that follow one another within this limit and
-/// have the most samples. If the kept parts do not fit the path, or are less than four fifths of the
-/// run, nothing is set aside in this step.
+/// samples before or after, but at most ten times the former; n: number of sample periods, more
+/// than 1 after a beam break. Of the parts, those are kept that follow one another within this
+/// limit and have the most samples. If the kept parts do not fit the path, or are less than four
+/// fifths of the run, nothing is set aside in this step.
 ///
 /// After it, samples off the line: a block whose samples deviate in one direction across the travel
 /// by five standard deviations from their median, or whose mean deviates by as much from the means
@@ -20,9 +20,9 @@
 ///     7 max(1, f, g) sigma
 /// sigma: stated for one sample; f: 1.4826 times the median absolute deviation of the samples from
 /// the median of their block, in units of sigma, median over all blocks; g: the same of the samples
-/// around this line. With normal noise one sample in 4e11 is beyond. In a block in which differences
-/// of successive samples have more than three times max(1, f) sigma, this factor increases the
-/// uncertainty of its mean (Block::noise_factor).
+/// around this line. With normal noise one sample in 4e11 is beyond. In a block in which
+/// differences of successive samples have more than three times max(1, f) sigma, this factor
+/// increases the uncertainty of its mean (Block::noise_factor).
 ///
 /// Not found: a fault longer than about two blocks that begins and ends within reach, and errors
 /// along the direction of travel.

@@ -2,8 +2,8 @@
 /// Tests of the residuals of a run for lack of fit. The model is compared with alternatives. An
 /// alternative is one of
 /// - a few additional columns C in the adjustment y = A U + C d: the tracker moved, the machine
-///   drifts, an axis has backlash, a vertex or a leg of the path was driven at another position, the
-///   ranges have an offset, or they have one from a beam break on,
+///   drifts, an axis has backlash, a vertex or a leg of the path was driven at another position,
+///   the ranges have an offset, or they have one from a beam break on,
 /// - another design matrix: another order of the axes, or closer nodes.
 ///
 /// With the residuals r of the model, the weights W of the rows (1/sigma) and Q = (A^T W^2 A)^-1,

@@ -7,8 +7,8 @@
 namespace abbe::calib::otf {
 
 struct SetAside {
-  /// Samples at places that the target cannot have reached from the places before and after: another
-  /// reflector, a spike.
+  /// Samples at places that the target cannot have reached from the places before and after:
+  /// another reflector, a spike.
   std::size_t unreachable = 0;
   /// Samples off the line through their neighbours, across the direction of travel.
   std::size_t off_line = 0;

@@ -7,8 +7,8 @@
 namespace abbe::calib::joint {
 namespace {
 
-/// 1 / length of every column, 1 / the longest for a column that consists of rounding errors: that of
-/// an effect which the data cannot separate from the pose of the array.
+/// 1 / length of every column, 1 / the longest for a column that consists of rounding errors: that
+/// of an effect which the data cannot separate from the pose of the array.
 Eigen::VectorXd inverse_lengths(const Eigen::MatrixXd& R) {
   constexpr double kRounding = 1e-13;
   const Eigen::VectorXd length = R.colwise().norm();

@@ -20,9 +20,9 @@ std::vector<std::string> shared_effects(const Part& i, const Part& j) {
   return shared;
 }
 
-/// The factor by which the variance of the noise exceeds its estimate with a probability of 2 %: dof
-/// divided by the 2 % quantile of chi-square with dof degrees of freedom, in the approximation of
-/// [Wilson 1931]. The approximation fails for dof of 1 or 2, where the factor is limited.
+/// The factor by which the variance of the noise exceeds its estimate with a probability of 2 %:
+/// dof divided by the 2 % quantile of chi-square with dof degrees of freedom, in the approximation
+/// of [Wilson 1931], which is wrong for a dof of 1 or 2: the factor is at most 1000.
 double variance_may_be(const Part& part) {
   if (!(part.dof_of_noise > 0.0)) {
     return 1.0;

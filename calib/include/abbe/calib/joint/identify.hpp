@@ -11,15 +11,15 @@
 /// X2 is chi-square with rank(i) + rank(j) + (shared effects) - rank(i + j) degrees of freedom if
 /// both describe one machine. It is the chi-square of the difference over all combinations of
 /// parameters that both determine; combinations that one part alone determines do not contribute.
-/// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor by which its
-/// variance exceeds the estimate with a probability of 2 %,
+/// An estimated noise (Part::dof_of_noise) may be too small: X2 is divided by the factor by which
+/// its variance exceeds the estimate with a probability of 2 %,
 ///     1 / (1 - s - 2.054 sqrt(s))^3,   s = 2 / (9 dof)    [Wilson 1931], at most 1000
 /// The covariance of the joint model is not widened for a noise that is known only to some percent.
 ///
 /// Explanations of a contradiction: all that leave an X2 whose probability is larger than 1e-3 and
 /// than the limit of the test, in this order:
-/// - mistakes without unknowns, at most three, most likely first: the sign of a whole part or of one
-///   table, the unit of a part, the mistakes of its method (axes, tool);
+/// - mistakes without unknowns, at most three, most likely first: the sign of a whole part or of
+///   one table, the unit of a part, the mistakes of its method (axes, tool);
 /// - one common factor of all lengths (temperature, expansion, unit, ranges of the tracker);
 /// - tables that differ, at most three: each is the table that decreases X2 most significantly with
 ///   those before it free, until the rest is likely.

@@ -13,8 +13,8 @@
 /// These rotations are nuisances of the part, one table each, without prior: the part then states
 /// less about the translations of these axes, and as much about everything else.
 ///
-/// All functions are pure and may be called from any thread. The text of an error starts with "joint
-/// identification: " and names the part.
+/// All functions are pure and may be called from any thread. The text of an error starts with
+/// "joint identification: " and names the part.
 
 #include <Eigen/Core>
 #include <array>

@@ -174,12 +174,12 @@ class OffLineSearch {
 
   /// One value for each used block: it must be compared with a line.
   [[nodiscard]] std::vector<bool> suspicious_blocks() const {
-    constexpr double kSuspicious = 5.0;
+    constexpr double kOffLine = 5.0;
     std::vector<bool> all(used_.size(), false);
     for (std::size_t k = 0; k < used_.size(); ++k) {
       bool suspicious = false;
       for (std::size_t c = 0; c < kAcross; ++c) {
-        const double limit = kSuspicious * scale_[c];
+        const double limit = kOffLine * scale_[c];
         suspicious =
             suspicious || scatter_[k].farthest[c] > limit || scatter_[k].off_means[c] > limit;
       }

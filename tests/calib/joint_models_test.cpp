@@ -261,6 +261,29 @@ TEST(JointModels, ADifferenceKeepsItsRowsWhereBothPartsAreIncomplete) {
   EXPECT_NEAR((direction.transpose() * freed.root_cov_d).norm(), std::sqrt(2.0) * kU_m, 1e-9);
 }
 
+/// The scales of the machine are in the run and in the array.
+TEST(JointModels, RunAndArrayShareTheScales) {
+  constexpr double kScale = 10e-6;
+  const auto run = abbe::tests::otf::make_run({.in_gauge = true});
+  ASSERT_EQ(run.machine.target_offset_m, kModelTool_m);
+  ModelsOfOneMachine m(Interpolation::Linear);
+  m.truth = run.truth;
+  const joint::CommonEffects effects{.u_axis_scale = {kScale, kScale, kScale}};
+  const auto array =
+      joint::part_of_array("array",
+                           abbe::tests::joint::observed_array(
+                               run, abbe::tests::joint::field_of(run), {.tool_m = kModelTool_m}),
+                           m.common(), {.s_m = 1e-6, .effects = effects});
+  ASSERT_TRUE(array) << array.error().text;
+  ASSERT_EQ(array->effects.front(), "scale of X");
+
+  const auto of_run =
+      joint::part_of_run("run", m.model(0.1e-6, scales(m, kScale)), m.common(), effects);
+  const joint::JointModel result = joined({*of_run, *array}, m.common());
+  EXPECT_GT(u_of_first_EXX(result.model), kScale * 0.3);
+  EXPECT_THAT(result.effects, SizeIs(3 + 27));
+}
+
 TEST(JointModels, RefusesEffectsThatTheCovarianceDoesNotContain) {
   ModelsOfOneMachine m(Interpolation::Linear);
   const VolumetricModel model = m.model(0.1e-6, scales(m, 10e-6));

@@ -50,6 +50,13 @@ Eigen::MatrixXd GaugeCoordinates::of_group(const GaugeGroup& group,
          matrix.middleRows(group.offset, group.count);
 }
 
+bool is_in_gauge(const GaugeCoordinates& c, const Eigen::MatrixXd& covariance) {
+  constexpr double kRounding = 1e-6;
+  const double all = covariance.trace();
+  const double in_gauge = (covariance * c.N).cwiseProduct(c.N).sum();
+  return all - in_gauge <= kRounding * all;
+}
+
 GaugeCoordinates gauge_coordinates(const estimation::TableBasis& basis) {
   const Eigen::MatrixXd K = gauge_conditions(Gauge::G1, basis, basis.size());
   GaugeCoordinates c{.N = {}, .groups = groups_of(basis.layout())};

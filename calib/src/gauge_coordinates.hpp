@@ -32,6 +32,10 @@ struct GaugeCoordinates {
 };
 [[nodiscard]] GaugeCoordinates gauge_coordinates(const estimation::TableBasis&);
 
+/// False if the covariance of a model, one row per parameter, contains more than the coordinates e:
+/// half the backlash (otf/backlash.hpp), which is common to all runs and changes no e.
+[[nodiscard]] bool is_in_gauge(const GaugeCoordinates&, const Eigen::MatrixXd& covariance);
+
 /// Smoothest change of a group that the gauge permits, one value per parameter, 1 where it is
 /// largest: straightness a parabola that is 0 at both ends, other tables a line that is 0 at the
 /// reference, squareness 1.

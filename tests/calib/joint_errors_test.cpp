@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "abbe/calib/joint/identify.hpp"
+#include "abbe/calib/model_drift.hpp"
 #include "gauge_coordinates.hpp"
 #include "otf_run.hpp"
 
@@ -84,6 +85,25 @@ TEST(JointErrors, StateWhatModelHasNoCommonTables) {
             "joint identification: the model has 2 tool offsets, must have one");
   EXPECT_THAT(joint::part_of_run("run 2", two, *joint::tables_of(model)).error().text,
               HasSubstr("(run 2)"));
+}
+
+/// Half the backlash is common to all runs and is no part of the gauge's coordinates.
+TEST(JointErrors, RefuseBacklashInTheCovariance) {
+  const VolumetricModel model = zero_model();
+  const auto& layout = model.tables()->layout();
+  Eigen::VectorXd half = Eigen::VectorXd::Zero(model.U().size());
+  half.head(static_cast<Eigen::Index>(layout.node_count(layout.tables()[0].motion.axis)))
+      .setConstant(1e-6);
+  const VolumetricModel with =
+      *VolumetricModel::from_vector(layout, Gauge::G1, std::array{kErrorsTool_m}, model.U(),
+                                    model.covariance() + half * half.transpose(), model.validity());
+
+  ASSERT_TRUE(joint::tables_of(model));
+  EXPECT_EQ(joint::tables_of(with).error().code, ErrorCode::NotApplicable);
+  EXPECT_THAT(joint::tables_of(with).error().text, HasSubstr("half its backlash"));
+  EXPECT_TRUE(abbe::calib::check_same_parameters(model, model));
+  EXPECT_THAT(abbe::calib::check_same_parameters(model, with).error().text,
+              HasSubstr("half its backlash"));
 }
 
 TEST(JointErrors, NameThePartsThatCannotBeTested) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "gauge_coordinates.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::joint {
@@ -23,6 +24,11 @@ Result<CommonTables> tables_of(const VolumetricModel& model) {
   }
   if (tables->travel() != estimation::TravelDependence::None) {
     return not_applicable("depends on the direction of travel, which parts do not");
+  }
+  if (!is_in_gauge(gauge_coordinates(*tables), model.covariance())) {
+    return not_applicable(
+        "has half its backlash in the covariance, which does not average out over "
+        "parts: identify the runs without backlash");
   }
   return CommonTables{*tables, model.tool_offsets_m().front()};
 }

@@ -145,6 +145,7 @@ TEST(AlignedBlocks, CountWhatIsSetAside) {
   EXPECT_EQ(aside.unreachable, 1U);
   EXPECT_EQ(aside.longest, 3U);
   EXPECT_NEAR(aside.longest_from_s, run.samples[5000].time_s, 1e-9);
+  EXPECT_EQ(aside.of_samples, run.samples.size());
   EXPECT_EQ(aligned_blocks_of(run)->series.lost_samples, 0U);
   EXPECT_THAT(verdict_of(run, *identified_run(run)).notes, Contains(HasSubstr("5 samples (")));
 }
@@ -158,7 +159,7 @@ TEST(AlignedBlocks, OutliersAtTheVerticesChangeNothing) {
   for (std::size_t b = 0; b < aligned->series.blocks.size(); ++b) {
     const Block& block = aligned->series.blocks[b];
     if (!aligned->alignment.used[b]) {
-      run.samples[block.begin_sample].p_tracker_m += normal_vector(0.5e-3, random);
+      run.samples[block.begin_sample].p_tracker_m += normal_vector(0.1, random);
     }
   }
   EXPECT_LT(mean_error_of_tables_m(run, identified_run(run)->solution.model), 1.02 * clean_m);
@@ -199,6 +200,19 @@ TEST(AlignedBlocks, RefuseARunWithAQuarterOfOutliers) {
   const auto found = identified_run(run);
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_THAT(verdict_of(run, *found).causes, Contains("outliers"));
+}
+
+/// Samples that the tracker does not report are no part of the share.
+TEST(AlignedBlocks, CountTheShareWithoutMissingSamples) {
+  MadeRun run = noisy_run(1);
+  std::mt19937_64 random(6);
+  add_outliers(run.samples, 0.05, kOutlier_m, random);
+  const auto begin = run.samples.begin() + 4000;
+  run.samples.erase(begin, begin + 100);
+  const auto aligned = aligned_blocks_of(run);
+  ASSERT_TRUE(aligned) << aligned.error().text;
+  EXPECT_GE(aligned->series.lost_samples, 100U);
+  EXPECT_EQ(aligned->series.set_aside.of_samples, run.samples.size());
 }
 
 TEST(AlignedBlocks, NameARangeThatChangedAtABreak) {

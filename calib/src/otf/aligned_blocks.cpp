@@ -104,6 +104,8 @@ class Screening {
     if (!aside_.empty()) {
       add_places(found_, samples_, aside_, run);
     }
+    found_.of_samples = static_cast<std::size_t>(std::count_if(
+        samples_.begin(), samples_.end(), [](const TrackerObservation& s) { return s.valid; }));
     run.series.set_aside = found_;
     return run;
   }

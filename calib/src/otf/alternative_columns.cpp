@@ -236,8 +236,9 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
         return row.block >= added.place;
       });
       return message("the ranges of the tracker changed by ", 1e6 * d(0),
-                     " um at a beam break before leg ", at == o_.rows.end() ? 0 : at->leg,
-                     " (block ", added.place, "): the distance was set again");
+                     " um at a beam break, or where samples are set aside, before leg ",
+                     at == o_.rows.end() ? 0 : at->leg, " (block ", added.place,
+                     "): the distance was set again");
     }
     default:
       return {};

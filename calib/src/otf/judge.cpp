@@ -82,9 +82,9 @@ void note_set_aside(Verdict& verdict, const Observations& o, const std::string& 
     return;
   }
 
-  const std::size_t samples = o.samples - o.lost_samples;
-  const std::string found = run + set_aside_text(o.set_aside, samples);
-  if (static_cast<double>(o.set_aside.samples()) > kMostSetAside * static_cast<double>(samples)) {
+  const std::string found = run + set_aside_text(o.set_aside);
+  const auto of_samples = static_cast<double>(o.set_aside.of_samples);
+  if (static_cast<double>(o.set_aside.samples()) > kMostSetAside * of_samples) {
     verdict.refuse("outliers", message(found, ", limit ", 100.0 * kMostSetAside, " %"));
   } else {
     verdict.notes.push_back(found);
@@ -123,8 +123,10 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
   const Solution& solution = solutions.front();
   Verdict verdict = decide(solution.model, *figures, limits, active);
   for (std::size_t k = 0; k < runs.size(); ++k) {
-    verdict.notes.insert(verdict.notes.end(), runs[k].notes.begin(), runs[k].notes.end());
     const std::string run = runs.size() == 1 ? "" : message("run ", k + 1, ": ");
+    for (const std::string& note : runs[k].notes) {
+      verdict.notes.push_back(run + note);
+    }
     add_alternatives(verdict, others[k], run);
     note_set_aside(verdict, runs[k], run);
   }

@@ -4,10 +4,10 @@
 
 namespace abbe::calib::otf {
 
-std::string set_aside_text(const SetAside& a, std::size_t samples) {
+std::string set_aside_text(const SetAside& a) {
   std::string all;
   if (a.samples() > 0) {
-    const double share = static_cast<double>(a.samples()) / static_cast<double>(samples);
+    const double share = static_cast<double>(a.samples()) / static_cast<double>(a.of_samples);
     all = message(a.samples(), " samples (", 100.0 * share, " %) are set aside: ", a.off_line,
                   " off the line through their neighbours, ", a.unreachable,
                   " at places that the target cannot have reached; the most on leg ", a.worst_leg,

@@ -62,7 +62,7 @@ class Reach {
 
   /// `local_m`: travel per sample around valid samples i and j.
   [[nodiscard]] bool reaches(std::size_t i, std::size_t j, double local_m) const {
-    // Several spikes close together would otherwise permit each other.
+    // Spikes close together would otherwise enlarge the limit for one another.
     const double travel_m =
         usual_m_ > 0.0 ? std::clamp(local_m, usual_m_, kMostVariation * usual_m_) : local_m;
     return distance_m(i, j) <= kLeastReach_m + kFaster * periods(i, j) * travel_m;

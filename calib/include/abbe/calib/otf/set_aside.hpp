@@ -7,6 +7,7 @@
 namespace abbe::calib::otf {
 
 struct SetAside {
+  std::size_t of_samples = 0;  ///< valid samples of the run, those set aside included
   /// Samples at places that the target cannot have reached from the places before and after:
   /// another reflector, a spike.
   std::size_t unreachable = 0;
@@ -29,7 +30,6 @@ inline constexpr double kManySetAside = 0.02;
 inline constexpr double kMostSetAside = 0.2;
 
 /// One sentence for the verdict: how many samples were set aside, why, and where the most are.
-/// `samples`: of the run, without lost ones.
-[[nodiscard]] std::string set_aside_text(const SetAside&, std::size_t samples);
+[[nodiscard]] std::string set_aside_text(const SetAside&);
 
 }  // namespace abbe::calib::otf

@@ -348,10 +348,12 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
     return tl::unexpected(model.error());
   }
 
+  const Estimator estimator =
+      options.mode == Mode::OnTheFly ? options.estimator : Estimator::TwoStep;
   TargetsIdentification found{.observations = {}, .solutions = {}, .statistics = all};
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const auto rigid = static_cast<Eigen::Index>(unknowns.rigid_offset(k));
-    found.solutions.push_back({.estimator = options.estimator,
+    found.solutions.push_back({.estimator = estimator,
                                .model = *model,
                                .rigid = a->U.segment<kRigidUnknowns>(rigid),
                                .covariance_with_rigid = unknowns.block(a->covariance, k),

@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 const std::vector<Vector3> kTargets_m{
     {0.02, -0.015, -0.12}, {0.17, -0.015, -0.12}, {0.02, 0.135, -0.17}};
 
-/// What a noise-free tracker sees of the drive with a target; it stands elsewhere in each run.
+/// Points of a noise-free tracker along the drive with a target; it stands elsewhere in each run.
 std::string tracker_csv_of(std::size_t run) {
   auto truth = test::synthetic_truth();
   truth.target_offset_m = kTargets_m[run];

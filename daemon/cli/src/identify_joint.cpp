@@ -143,7 +143,7 @@ void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
       ->required();
   command
       .add_option("--estimator", arguments.estimator,
-                  "of the runs: two-step or joint; default: that of [otf], or two-step")
+                  "of the runs: two-step or joint; default: that of [otf], or joint")
       ->check(CLI::IsMember({"two-step", "joint"}));
   command
       .add_option("--u-scale-ppm", arguments.u_scale_ppm,

@@ -72,6 +72,13 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
   auto part = calib::joint::part_of_run(files.name, solution.model, *input.common, effects);
   if (!part) return tl::make_unexpected(error_of(part.error()));
 
+  // Of its variance, less than three quarters are determined by the data.
+  constexpr double kHalf = 0.5;
+  if (solution.range_offset.u_m > kHalf * run->noise.u_range_offset_m)
+    run->verdict.notes.emplace_back(
+        "the offset of the ranges is known from its stated uncertainty only; it counts as "
+        "independent between runs: state a smaller u_range_offset_um, or use a longer path");
+
   input.observations.push_back(calib::otf::without_range_offset(std::move(run->found.observations),
                                                                 solution.range_offset.value_m));
   input.runs.push_back({input.parts.size(), &input.observations.back(), effects});

@@ -339,14 +339,6 @@ Result<void> check_same_parameters(const VolumetricModel& a, const VolumetricMod
                                   ": the tables contain the effect of the tool"));
   }
 
-  for (const VolumetricModel* model : {&a, &b}) {
-    if (!is_in_gauge(gauge_coordinates(*model->tables()), model->covariance())) {
-      return not_comparable(
-          "one of them has half its backlash in the covariance, which does not average out over "
-          "runs; identify the runs without backlash");
-    }
-  }
-
   return {};
 }
 

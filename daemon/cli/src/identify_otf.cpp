@@ -319,8 +319,8 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       "--target", arguments->targets,
       "instead of --tracker, three times or more: X,Y,Z=FILE, target offset in mm and tracker.csv "
       "of\na run of the path with it. Offsets that are not on a line give all 18 tables, valid for "
-      "any\ntool; the tracker may stand elsewhere in each run ([tracker] position_mm is that of "
-      "the first)");
+      "any\ntool; the tracker may stand elsewhere in each run (position_mm of the tracker is that "
+      "of the first)");
   targets->allow_extra_args(false)
       ->needs(machine, path)
       ->excludes(tracker)

@@ -25,7 +25,7 @@ struct IdentifyOtfArguments {
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
   std::vector<std::string> targets;  // X,Y,Z=FILE, one per run
-  // without a value: [target] offset_mm, [tracker] position_mm
+  // without a value: those of the configuration
   std::optional<calib::Vector3> target_offset_m{}, tracker_position_m{};
 };
 

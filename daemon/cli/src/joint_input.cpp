@@ -144,6 +144,11 @@ Result<void> add_array(const IdentifyJointArguments& arguments, const ArrayFiles
 Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, ProgressBar& bar) {
   auto config = load_config(arguments.machine);
   if (!config) return tl::make_unexpected(config.error());
+  if (config->otf.backlash != calib::estimation::TravelDependence::None)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: otf.backlash: must be \"none\" for identify joint: half the "
+                            "backlash is in the uncertainty of every run and does not average out",
+                            arguments.machine));
   const auto hash = sha256_hex_of_file(arguments.machine);
   if (!hash) return tl::make_unexpected(hash.error());
   const auto files = read_parts_toml(arguments.parts);

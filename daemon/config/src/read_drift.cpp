@@ -25,6 +25,10 @@ void read_drift(Section& root, Config& out) {
   section.get("noise_urad", drift.angle_rad_per_root_day, kMicro, kNotNegative);
   if (drift.continuous && !drift.test)
     section.fault("continuous", "needs test = true: a table that drifted must not be averaged");
+  if (drift.continuous && out.otf.backlash != calib::estimation::TravelDependence::None)
+    section.fault("continuous",
+                  "needs backlash = \"none\" in [otf]: half the backlash is in the uncertainty of "
+                  "every run, and an update would take it for noise that averages out");
   if (drift.hold && !drift.test) section.fault("hold", "needs test = true");
 
   Section tables = section.child("tables");

@@ -97,8 +97,8 @@ struct DriftTest {
 [[nodiscard]] std::string text(const DriftTest&);
 
 /// NotApplicable, with the first difference: one of the models is no table in gauge G1, or they have
-/// other axes, tables, nodes, references or tools, or one contains backlash in its covariance
-/// (otf/backlash.hpp). Parameters of both can then not be compared one by one.
+/// other axes, tables, nodes, references or tools. Parameters of both can then not be compared one
+/// by one.
 [[nodiscard]] Result<void> check_same_parameters(const VolumetricModel& a,
                                                  const VolumetricModel& b);
 

@@ -20,7 +20,7 @@ struct RunFiles {
   std::string encoder;  ///< empty: no scale readings
   /// Tool reference point to reflector; nullopt: [target] offset_mm of the machine.
   std::optional<calib::Vector3> target_offset_m{};
-  /// Place of the tracker in machine coordinates, to 0.5 m; nullopt: [tracker] position_mm.
+  /// Place of the tracker in machine coordinates, to 0.5 m; nullopt: that of the configuration.
   std::optional<calib::Vector3> tracker_position_m{};
   /// Runs with the same instrument have the same error of the scale of its ranges.
   std::string instrument = "tracker";

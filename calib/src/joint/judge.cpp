@@ -34,6 +34,16 @@ struct FoldedRun {
   [[nodiscard]] bool is_held_out(const otf::Observation& row, std::size_t fold) const {
     return row.leg % needed.size() == fold && !needed[fold][row.leg];
   }
+  [[nodiscard]] std::vector<std::size_t> held_out_rows(std::size_t fold) const {
+    const std::vector<otf::Observation>& all = run.observations->rows;
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (is_held_out(all[i], fold)) {
+        rows.push_back(i);
+      }
+    }
+    return rows;
+  }
 };
 
 /// The observations without the rows of a fold.
@@ -86,57 +96,6 @@ Result<std::optional<VolumetricModel>> model_without_fold(std::span<const Part> 
   return std::move(joint->model);
 }
 
-/// Residuals of the held-out rows of all folds.
-struct HeldOutSums {
-  otf::Remainder none, candidate, candidate_beside, active;
-
-  void add(const FoldedRun& folded, std::size_t fold, const VolumetricModel& model,
-           const VolumetricModel* other) {
-    const otf::Observations& o = *folded.run.observations;
-    std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < o.rows.size(); ++i) {
-      if (folded.is_held_out(o.rows[i], fold)) {
-        rows.push_back(i);
-      }
-    }
-    // A best-fit rigid motion fits as few rows as it has unknowns exactly.
-    if (rows.size() <= otf::kRigidUnknowns) {
-      return;
-    }
-
-    const auto by = [&](const VolumetricModel& m) {
-      return [&o, &m](std::size_t i) { return otf::predicted_by_model(o, i, m); };
-    };
-    otf::add_without_rigid(none, o, rows,
-                           otf::residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
-    otf::add_without_rigid(candidate, o, rows, otf::residuals_of_rows(o, rows, by(model)));
-    if (other == nullptr || !other->holds_for_tool(o.target_offset_m)) {
-      return;
-    }
-    const std::vector<std::size_t> both = otf::rows_inside(o, rows, other->validity());
-    if (both.size() > otf::kRigidUnknowns) {
-      otf::add_without_rigid(candidate_beside, o, both, otf::residuals_of_rows(o, both, by(model)));
-      otf::add_without_rigid(active, o, both, otf::residuals_of_rows(o, both, by(*other)));
-    }
-  }
-
-  [[nodiscard]] HeldOutFigures figures(std::size_t all_rows) const {
-    HeldOutFigures f{.no_compensation = none.rms(),
-                     .candidate = candidate.rms(),
-                     .observations = none.rows,
-                     .not_held_out = all_rows - none.rows,
-                     .no_compensation_rms_m = none.rms_m(),
-                     .candidate_rms_m = candidate.rms_m()};
-    if (active.rows > 0) {
-      f.active = active.rms();
-      f.active_rms_m = active.rms_m();
-      f.candidate_beside_active = candidate_beside.rms();
-      f.observations_beside_active = active.rows;
-    }
-    return f;
-  }
-};
-
 /// Causes of reasons that concern the model of one part alone (Verdict::causes).
 bool concerns_own_model(std::string_view cause) {
   constexpr std::array<std::string_view, 9> kOwn{"held-out", "nowhere",    "size",
@@ -169,7 +128,7 @@ Result<HeldOutFigures> held_out(std::span<const Part> parts, std::span<const Run
     return failure(ErrorCode::BadInput, "held-out test: no part is a run");
   }
 
-  HeldOutSums sums;
+  otf::HeldOutSums sums;
   for (std::size_t f = 0; f < folds; ++f) {
     if (Result<void> running = check_stopped(options.stopped); !running) {
       return tl::unexpected(running.error());
@@ -179,7 +138,11 @@ Result<HeldOutFigures> held_out(std::span<const Part> parts, std::span<const Run
       return tl::unexpected(model.error());
     }
     for (std::size_t k = 0; *model && k < runs.size(); ++k) {
-      sums.add(runs[k], f, **model, active);
+      const otf::Observations& o = *runs[k].run.observations;
+      const auto predicted_m = [&](std::size_t row) {
+        return otf::predicted_by_model(o, row, **model);
+      };
+      sums.add(o, runs[k].held_out_rows(f), predicted_m, active);
     }
     if (options.progress) {
       options.progress(otf::Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));

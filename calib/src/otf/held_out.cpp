@@ -128,7 +128,7 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
   }
 
   const RunUnknowns unknowns(observed);
-  Remainder none, candidate, other, candidate_beside;
+  HeldOutSums sums;
 
   for (std::size_t f = 0; f < folds; ++f) {
     if (Result<void> running = check_stopped(options.stopped); !running) {
@@ -140,30 +140,16 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
     }
     for (std::size_t k = 0; k < fit->rows.size(); ++k) {
       const Observations& o = observed[k];
-      const std::vector<std::size_t>& rows = fit->rows[k];
-      if (rows.size() <= kRigidUnknowns) {
-        continue;
-      }
-      add_without_rigid(none, o, rows, residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
       const Eigen::VectorXd U = unknowns.part(fit->U, k);
-      const auto by_fit = [&](std::size_t i) { return predicted_by_fit(o, i, U); };
-      add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, by_fit));
-      const bool with_active = active != nullptr && active->holds_for_tool(o.target_offset_m);
-      const std::vector<std::size_t> both =
-          with_active ? rows_inside(o, rows, active->validity()) : std::vector<std::size_t>{};
-      if (both.size() > kRigidUnknowns) {
-        add_without_rigid(candidate_beside, o, both, residuals_of_rows(o, both, by_fit));
-        add_without_rigid(other, o, both, residuals_of_rows(o, both, [&](std::size_t i) {
-                            return predicted_by_model(o, i, *active);
-                          }));
-      }
+      sums.add(
+          o, fit->rows[k], [&](std::size_t row) { return predicted_by_fit(o, row, U); }, active);
     }
     if (options.progress) {
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));
     }
   }
 
-  if (none.rows == 0) {
+  if (sums.none.rows == 0) {
     return failure(
         ErrorCode::RankDeficient,
         message("held-out test: without any one of ", folds,
@@ -171,21 +157,7 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
                 "volume on more legs"));
   }
 
-  HeldOutFigures figures{.no_compensation = none.rms(),
-                         .candidate = candidate.rms(),
-                         .observations = none.rows,
-                         .not_held_out = all_rows - none.rows,
-                         .no_compensation_rms_m = none.rms_m(),
-                         .candidate_rms_m = candidate.rms_m()};
-
-  if (other.rows > 0) {
-    figures.active = other.rms();
-    figures.active_rms_m = other.rms_m();
-    figures.candidate_beside_active = candidate_beside.rms();
-    figures.observations_beside_active = other.rows;
-  }
-
-  return figures;
+  return sums.figures(all_rows);
 }
 
 }  // namespace abbe::calib::otf

@@ -26,8 +26,7 @@ struct Remainder {
   [[nodiscard]] double rms_m() const { return std::sqrt(squares_m2 / static_cast<double>(rows)); }
 };
 
-/// Entries of the six rigid unknowns in a row of the design. (Residuals of at most kRigidUnknowns
-/// rows are not compared: a best-fit rigid motion fits so few rows exactly, whatever the model.)
+/// Entries of the six rigid unknowns in a row of the design.
 inline Vector6 rigid_row(const Observations& o, std::size_t row) {
   Vector6 r = Vector6::Zero();
   for (const SparseRows::Entry& e : o.A.row(row)) {
@@ -102,6 +101,51 @@ std::vector<double> residuals_of_rows(const Observations& o, std::span<const std
   }
   return r;
 }
+
+/// Sums over the held-out rows of all folds: without compensation, by the candidate, and by another
+/// model (the active one) with the candidate on the same rows.
+struct HeldOutSums {
+  Remainder none, candidate, candidate_beside_other, other;
+
+  /// `predicted_m(row)`: the prediction of the candidate, which was not fitted to `rows`.
+  template <class Prediction>
+  void add(const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
+           const VolumetricModel* other_model) {
+    // A best-fit rigid motion fits as few rows as it has unknowns exactly.
+    if (rows.size() <= kRigidUnknowns) {
+      return;
+    }
+    add_without_rigid(none, o, rows, residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
+    add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, predicted_m));
+
+    if (other_model == nullptr || !other_model->holds_for_tool(o.target_offset_m)) {
+      return;
+    }
+    const std::vector<std::size_t> both = rows_inside(o, rows, other_model->validity());
+    if (both.size() > kRigidUnknowns) {
+      add_without_rigid(candidate_beside_other, o, both, residuals_of_rows(o, both, predicted_m));
+      add_without_rigid(other, o, both, residuals_of_rows(o, both, [&](std::size_t row) {
+                          return predicted_by_model(o, row, *other_model);
+                        }));
+    }
+  }
+
+  [[nodiscard]] HeldOutFigures figures(std::size_t all_rows) const {
+    HeldOutFigures f{.no_compensation = none.rms(),
+                     .candidate = candidate.rms(),
+                     .observations = none.rows,
+                     .not_held_out = all_rows - none.rows,
+                     .no_compensation_rms_m = none.rms_m(),
+                     .candidate_rms_m = candidate.rms_m()};
+    if (other.rows > 0) {
+      f.active = other.rms();
+      f.active_rms_m = other.rms_m();
+      f.candidate_beside_active = candidate_beside_other.rms();
+      f.observations_beside_active = other.rows;
+    }
+    return f;
+  }
+};
 
 /// Marks the legs of the fold that observe a parameter without observations in the other folds.
 /// `linear`: the observations with linear tables, where only the nodes of a cell occur in a row.

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/model_drift.hpp"
+#include "axis_scale_columns.hpp"
 #include "gauge_coordinates.hpp"
 #include "message.hpp"
 
@@ -77,19 +78,10 @@ void add_process_noise(Eigen::MatrixXd& C, const GaugeCoordinates& c, const Para
 /// scale of an axis that of this axis.
 Eigen::MatrixXd common_part(const GaugeCoordinates& c, const ParameterLayout& layout,
                             const UpdateOptions& o) {
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(c.N.rows(), 4);
-  for (const GaugeGroup& group : c.groups) {
-    if (!group.motion || !is_positioning(*group.motion)) {
-      continue;
-    }
-    const std::size_t axis = index(group.motion->axis);
-    const AxisNodes& nodes = layout.nodes()[axis];
-    for (Eigen::Index i = 0; i < group.count; ++i) {
-      const double way_m = nodes.nodes_m[static_cast<std::size_t>(i)] - nodes.reference_m;
-      G(group.offset + i, static_cast<Eigen::Index>(axis)) = o.u_axis_scale[axis] * way_m;
-      G(group.offset + i, 3) = o.u_scale * way_m;
-    }
-  }
+  const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
+  Eigen::MatrixX4d G(of_axis.rows(), 4);
+  G << of_axis * Vector3(o.u_axis_scale[0], o.u_axis_scale[1], o.u_axis_scale[2]).asDiagonal(),
+      o.u_scale * of_axis.rowwise().sum();
   return c.N.transpose() * G;
 }
 

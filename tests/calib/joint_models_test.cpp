@@ -7,6 +7,7 @@
 #include <random>
 
 #include "abbe/calib/model_comparison.hpp"
+#include "axis_scale_columns.hpp"
 #include "chi2_tail.hpp"
 #include "gauge_coordinates.hpp"
 #include "joint/left_out_rotations.hpp"
@@ -82,7 +83,7 @@ TEST(JointModels, CubicTablesRemainCubic) {
 
 /// One column for each of the scales of X, Y, Z, with the relative standard uncertainty u.
 Eigen::MatrixXd scales(const ModelsOfOneMachine& m, double u) {
-  return u * joint::axis_scale_columns(m.basis.layout());
+  return u * axis_scale_columns(m.basis.layout());
 }
 
 /// u of EXX at its first node, 0.3 m from the reference.

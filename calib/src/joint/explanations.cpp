@@ -8,6 +8,7 @@
 #include <sstream>
 #include <utility>
 
+#include "axis_scale_columns.hpp"
 #include "chi2_tail.hpp"
 #include "elementary.hpp"
 #include "message.hpp"

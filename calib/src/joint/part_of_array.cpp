@@ -6,6 +6,7 @@
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/pose_blocks.hpp"
 #include "abbe/calib/joint/part.hpp"
+#include "axis_scale_columns.hpp"
 #include "joint/determining_rows.hpp"
 #include "joint/left_out_rotations.hpp"
 #include "message.hpp"

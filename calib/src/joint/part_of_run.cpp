@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "abbe/calib/joint/part.hpp"
+#include "axis_scale_columns.hpp"
 #include "gauge_coordinates.hpp"
 #include "joint/left_out_rotations.hpp"
 #include "message.hpp"

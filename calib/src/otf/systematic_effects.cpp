@@ -1,11 +1,11 @@
 #include "otf/systematic_effects.hpp"
 
-#include <optional>
-
+#include "axis_scale_columns.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
+
 Eigen::VectorXd dg_drange_scale(const Observations& o, const WhitenedRows& rows) {
   const Vector3& tracker_m = o.alignment.T_machine_tracker.t_m;
   const auto of_row = [&](std::size_t i) {
@@ -24,14 +24,9 @@ Eigen::VectorXd dg_drange_scale(const Observations& o, const WhitenedRows& rows)
 }
 
 Eigen::VectorXd dU_daxis_scale(const Observations& o, Axis axis) {
-  const ParameterLayout& layout = o.layout();
   Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(o.unknowns()));
-  const AxisNodes& nodes = layout.nodes()[index(axis)];
-  const std::optional<Table> positioning = layout.find({static_cast<Motion>(index(axis)), axis});
-  for (std::size_t i = 0; positioning && i < nodes.nodes_m.size(); ++i) {
-    slope(static_cast<Eigen::Index>(positioning->offset + i)) =
-        nodes.nodes_m[i] - nodes.reference_m;
-  }
+  slope.head(static_cast<Eigen::Index>(o.layout().model_size())) =
+      axis_scale_columns(o.layout()).col(static_cast<Eigen::Index>(index(axis)));
   return slope;
 }
 

@@ -102,8 +102,4 @@ struct ArrayOptions {
 [[nodiscard]] Result<Part> part_of_array(std::string name, const evemu::Observations&,
                                          const CommonTables&, const ArrayOptions& = {});
 
-/// Effect of a relative change of the scale of each axis on the parameters: the positioning table
-/// has slope 1 and is zero at the reference. One column each for X, Y, Z.
-[[nodiscard]] Eigen::MatrixX3d axis_scale_columns(const ParameterLayout&);
-
 }  // namespace abbe::calib::joint

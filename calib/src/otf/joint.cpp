@@ -7,6 +7,7 @@
 
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/change_in_u.hpp"
 #include "otf/gauge_of.hpp"
 
 namespace abbe::calib::otf {
@@ -82,12 +83,6 @@ void append_block(Observations& o, const Eigen::VectorXd& U, const BlockSeries& 
       sub_points_m);
 }
 
-/// Size of a change of the estimate in units of its standard uncertainty.
-double size_of(const Eigen::VectorXd& change, const estimation::Information& data) {
-  const Eigen::VectorXd whitened = data.R() * change;
-  return whitened.norm() / std::sqrt(static_cast<double>(change.size()));
-}
-
 }  // namespace
 
 Observations linearised_at(Observations o, const Eigen::VectorXd& U, const BlockSeries& series,
@@ -140,7 +135,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
       return tl::unexpected(U.error());
     }
 
-    change = size_of(*U - at, information.data);
+    change = change_in_u(*U - at, information.data);
     if (change < options.adjustment_tolerance) {
       return JointObservations{std::move(rows), std::move(information), adjustments};
     }

@@ -9,6 +9,7 @@
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/added_columns.hpp"
+#include "otf/change_in_u.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"
@@ -110,12 +111,6 @@ estimation::DatumOptions datum_options(std::span<const Observations> runs, const
   return {.weight = options.gauge_weight, .label = [runs](std::size_t unknown) {
             return RunUnknowns(runs).label(runs.front(), unknown);
           }};
-}
-
-/// Size of a change of the estimate in units of its standard uncertainty.
-double change_in_u(const Eigen::VectorXd& change, const estimation::Information& data) {
-  const Eigen::VectorXd whitened = data.R() * change;
-  return whitened.norm() / std::sqrt(static_cast<double>(change.size()));
 }
 
 /// Linearises the runs at their common solution; returns the number of adjustments.

@@ -8,6 +8,7 @@
 #include "chi2_bound.hpp"
 #include "elementary.hpp"
 #include "evemu/ball_of_radius.hpp"
+#include "median.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -56,9 +57,7 @@ double radius_at_all_positions_m(const std::vector<FeatureResiduals>& all, std::
       radii.push_back(f.radius_m);
     }
   }
-  const auto middle = radii.begin() + std::ssize(radii) / 2;
-  std::nth_element(radii.begin(), middle, radii.end());
-  return *middle;
+  return median(radii);
 }
 
 /// The surface through all touches of a feature but one.

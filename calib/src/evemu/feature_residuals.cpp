@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "median.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
@@ -129,7 +130,6 @@ Features all_features(const Observations& o, const VolumetricModel& model) {
 }
 
 double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
-  constexpr double kMadToSigma = 1.4826;
   std::vector<double> values;
   for (const FeatureResiduals& f : all) {
     for (Eigen::Index k = 0; k < f.r_m.size(); ++k) {
@@ -139,13 +139,7 @@ double pooled_sigma_m(const std::vector<FeatureResiduals>& all) {
     }
   }
 
-  if (values.empty()) {
-    return 0.0;
-  }
-
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return kMadToSigma * *middle;
+  return kMadToSigma * median(values);
 }
 
 std::string place_of(const Observations& o, const FeatureResiduals& f) {

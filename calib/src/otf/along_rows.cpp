@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "median.hpp"
+
 namespace abbe::calib::otf {
 namespace {
 
@@ -52,9 +54,7 @@ class ConstantSpeed {
       return;
     }
 
-    const auto middle = speeds.begin() + std::ssize(speeds) / 2;
-    std::nth_element(speeds.begin(), middle, speeds.end());
-    const double v_m_s = *middle;
+    const double v_m_s = median(speeds);
     constexpr double kStands_m_s = 1e-4, kSame = 0.02, kSure = 4.0;
     for (std::size_t i = begin; v_m_s > kStands_m_s && i < end; ++i) {
       if (lines[i]) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "median.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -46,9 +47,7 @@ double median_tick_s(std::span<const TrackerObservation> samples) {
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     ticks[i] = samples[i + 1].time_s - samples[i].time_s;
   }
-  const auto middle = ticks.begin() + std::ssize(ticks) / 2;
-  std::nth_element(ticks.begin(), middle, ticks.end());
-  return *middle;
+  return median(ticks);
 }
 
 /// Divides the samples of the tracker into blocks of equal duration. A gap in time counts as lost

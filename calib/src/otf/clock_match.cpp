@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "abbe/calib/axis_mistakes.hpp"
+#include "median.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -27,12 +28,6 @@ constexpr double kTravelPerStep_m = 2e-3;  ///< between two offsets that are com
 constexpr double kMedianLimit_m = 1e-3, kLimit_m = 3e-3;
 constexpr double kLeastCovered = 0.25;  ///< share of the used blocks whose time the log contains
 
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<TimedPoint> timed_points(const Observations& across, const BlockSeries& series) {
   std::vector<TimedPoint> points;
   const RigidTransform& T = across.alignment.T_machine_tracker;
@@ -53,7 +48,7 @@ double median_speed_m_s(std::span<const TimedPoint> points) {
     speeds.push_back((points[i].q_m - points[i - 1].q_m).norm() /
                      (points[i].time_s - points[i - 1].time_s));
   }
-  return speeds.empty() ? 0.0 : middle_of(std::move(speeds));
+  return median(speeds);
 }
 
 /// The readings at equal steps of time; without a value in gaps.
@@ -154,7 +149,7 @@ void correct(ClockMap& clock, std::span<const PointToLog> all) {
     for (std::size_t i = begin; i < end; ++i) {
       values.push_back(near[i].*member);
     }
-    return middle_of(std::move(values));
+    return median(values);
   };
   const std::size_t half = near.size() / 2;
   const double t1_s = median_of(0, half, &PointToLog::time_s),
@@ -193,7 +188,7 @@ ClockFit fit_at(const ClockMap& clock, std::span<const TimedPoint> points,
   const auto at_95 = distances.begin() + (95 * std::ssize(distances)) / 100;
   std::nth_element(distances.begin(), at_95, distances.end());
   fit.share_95_m = *at_95;
-  fit.median_m = middle_of(std::move(distances));
+  fit.median_m = median(distances);
   return fit;
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "abbe/calib/otf/along_rows.hpp"
+#include "median.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -15,12 +16,7 @@ double median_period_s(std::span<const EncoderReading> readings) {
   for (std::size_t i = 1; i < readings.size(); ++i) {
     periods_s.push_back(readings[i].time_s - readings[i - 1].time_s);
   }
-  if (periods_s.empty()) {
-    return 0.0;
-  }
-  const auto middle = periods_s.begin() + std::ssize(periods_s) / 2;
-  std::nth_element(periods_s.begin(), middle, periods_s.end());
-  return *middle;
+  return median(periods_s);
 }
 
 /// Least squares. At least two readings.

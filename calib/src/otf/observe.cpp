@@ -8,6 +8,7 @@
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/observe_standstills.hpp"
 #include "check_stopped.hpp"
+#include "median.hpp"
 #include "message.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/rigid_columns.hpp"
@@ -75,13 +76,7 @@ double travel_per_block_m(const BlockSeries& series) {
     }
   }
 
-  if (travel_m.empty()) {
-    return 0.0;
-  }
-
-  const auto middle = travel_m.begin() + std::ssize(travel_m) / 2;
-  std::nth_element(travel_m.begin(), middle, travel_m.end());
-  return *middle;
+  return median(travel_m);
 }
 
 }  // namespace

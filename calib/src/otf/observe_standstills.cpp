@@ -1,12 +1,12 @@
 #include "abbe/calib/otf/observe_standstills.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "check_stopped.hpp"
+#include "median.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -20,12 +20,6 @@ Vector3 stated_sigma_m(const Standstill& s, const Noise& noise) {
   return {noise.sigma_range_m, across_m, across_m};
 }
 
-double middle_value(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Median over the standstills of (scatter / stated)^2, for each axis; at least 1.
 Vector3 common_excess(const Standstills& all, const Noise& noise) {
   Vector3 excess = Vector3::Ones();
@@ -37,8 +31,8 @@ Vector3 common_excess(const Standstills& all, const Noise& noise) {
     }
     const double unsuspicious =
         1.0 + kQuantile999 * std::sqrt(2.0 / static_cast<double>(all.found.front().samples));
-    const double median = middle_value(std::move(ratios));
-    excess(k) = median > unsuspicious ? median : 1.0;
+    const double typical = median(ratios);
+    excess(k) = typical > unsuspicious ? typical : 1.0;
   }
   return excess;
 }

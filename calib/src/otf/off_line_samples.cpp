@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "abbe/calib/otf/path_frame.hpp"
+#include "median.hpp"
 #include "otf/robust_line.hpp"
 
 namespace abbe::calib::otf {
@@ -116,12 +117,12 @@ class OffLineSearch {
       for (const PointAcross& p : points) {
         values.push_back(p.across[c]);
       }
-      const double middle = median_in_place(values);
+      const double middle = median(values);
       for (double& v : values) {
         v = std::abs(v - middle);
         scatter.farthest[c] = std::max(scatter.farthest[c], v);
       }
-      scatter.mad[c] = median_in_place(values);
+      scatter.mad[c] = median(values);
     }
 
     scatter.off_means = off_means(k);
@@ -142,13 +143,13 @@ class OffLineSearch {
         const double by_means =
             scatter_[k].off_means[c] * std::sqrt(static_cast<double>(n) / kOfMeans);
         if (n >= kEnough || by_means > 0.0) {
-          of_blocks[c].push_back(kSigmaOfMad * (n >= kEnough ? scatter_[k].mad[c] : by_means));
+          of_blocks[c].push_back(kMadToSigma * (n >= kEnough ? scatter_[k].mad[c] : by_means));
         }
       }
     }
 
     for (std::size_t c = 0; c < kAcross; ++c) {
-      scale_[c] = std::max(1.0, median_in_place(of_blocks[c]));
+      scale_[c] = std::max(1.0, median(of_blocks[c]));
     }
   }
 
@@ -253,7 +254,7 @@ class OffLineSearch {
     for (std::size_t i = 0; i < across.size(); ++i) {
       across[i] = std::abs(across[i] - line.at(along_m[i]));
     }
-    const double limit = kOff * std::max(scale_[c], kSigmaOfMad * median_in_place(across));
+    const double limit = kOff * std::max(scale_[c], kMadToSigma * median(across));
     for (std::size_t i = 0; i < own.size(); ++i) {
       off[i] = off[i] || std::abs(own[i].across[c] - line.at(own[i].along_m)) > limit;
     }
@@ -267,9 +268,7 @@ class OffLineSearch {
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {
       differences.push_back(std::abs(points[i + 1].across[c] - points[i].across[c]));
     }
-    return differences.size() < kEnough
-               ? 0.0
-               : kSigmaOfMad * median_in_place(differences) / std::sqrt(2.0);
+    return differences.size() < kEnough ? 0.0 : kMadToSigma * median(differences) / std::sqrt(2.0);
   }
 
   std::span<const TrackerObservation> samples_;

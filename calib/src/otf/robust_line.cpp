@@ -3,16 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace abbe::calib::otf {
+#include "median.hpp"
 
-double median_in_place(std::vector<double>& values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+namespace abbe::calib::otf {
 
 RobustLine::RobustLine(std::span<const double> x, std::span<const double> y) {
   const std::size_t parts = std::min(kParts, x.size());
@@ -21,7 +14,7 @@ RobustLine::RobustLine(std::span<const double> x, std::span<const double> y) {
     const std::size_t begin = part * of.size() / parts, end = (part + 1) * of.size() / parts;
     values.assign(of.begin() + static_cast<std::ptrdiff_t>(begin),
                   of.begin() + static_cast<std::ptrdiff_t>(end));
-    return median_in_place(values);
+    return median(values);
   };
   for (std::size_t i = 0; i < parts; ++i) {
     part_x.push_back(median_of_part(x, i));
@@ -38,16 +31,16 @@ RobustLine::RobustLine(std::span<const double> x, std::span<const double> y) {
       }
     }
     if (!to_others.empty()) {
-      slopes.push_back(median_in_place(to_others));
+      slopes.push_back(median(to_others));
     }
   }
-  slope_ = median_in_place(slopes);
+  slope_ = median(slopes);
 
   values.clear();
   for (std::size_t i = 0; i < parts; ++i) {
     values.push_back(part_y[i] - slope_ * part_x[i]);
   }
-  intercept_ = median_in_place(values);
+  intercept_ = median(values);
 }
 
 }  // namespace abbe::calib::otf

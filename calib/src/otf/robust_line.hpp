@@ -7,12 +7,6 @@
 
 namespace abbe::calib::otf {
 
-/// Standard deviation of a normal distribution, divided by its median absolute deviation.
-inline constexpr double kSigmaOfMad = 1.4826;
-
-/// Middle value, the larger one of two; 0 without values. The order of the values changes.
-[[nodiscard]] double median_in_place(std::vector<double>& values);
-
 /// Line of repeated medians: the points are divided into kParts parts in their order, and each part
 /// becomes its medians of x and y. The slope is the median over the parts of the median slope to
 /// all other parts; then the intercept is the median of y - slope x.

@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "median.hpp"
+
 namespace abbe::calib::otf {
 namespace {
-
-constexpr double kMadToStandardDeviation = 1.4826;
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Deviation of sample i from the middle of its neighbours; nullopt if one of them is lost.
 std::optional<Vector3> off_neighbours_m(std::span<const TrackerObservation> samples,
@@ -44,7 +38,7 @@ SampleTimes sample_times(std::span<const TrackerObservation> samples) {
   }
 
   const double mean_s = sum_s / static_cast<double>(steps_s.size());
-  const double median_s = median_of(steps_s);
+  const double median_s = median(steps_s);
   const bool by_delivery = median_s < kWithinBurst * mean_s;
   times.period_s = by_delivery ? mean_s : median_s;
   times.time_s.reserve(samples.size());
@@ -71,8 +65,7 @@ double sample_noise_m(std::span<const TrackerObservation> samples) {
     }
   }
 
-  return off_m.empty() ? 0.0
-                       : kMadToStandardDeviation * median_of(off_m) / std::sqrt(kOfDifference);
+  return off_m.empty() ? 0.0 : kMadToSigma * median(off_m) / std::sqrt(kOfDifference);
 }
 
 SampleWindows::SampleWindows(std::span<const TrackerObservation> samples, double sigma_m)

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "median.hpp"
+
 namespace abbe::calib::otf {
 namespace {
 
@@ -39,18 +41,12 @@ LinearFit linear_fit(std::span<const double> time_s, std::span<const Vector3> po
   return fit;
 }
 
-double middle_of(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Largest deviation of component k from its median that counts as noise.
 struct Band {
   double centre = 0.0, half_width = 0.0;
 };
 Band noise_band(std::span<const Vector3> residuals, Eigen::Index k) {
-  constexpr double kRobust = 5.0 * 1.4826;
+  constexpr double kRobust = 5.0 * kMadToSigma;
   constexpr double kResolution_m = 1e-7;  // of a stream without noise
   std::vector<double> values;
   values.reserve(residuals.size());
@@ -59,11 +55,11 @@ Band noise_band(std::span<const Vector3> residuals, Eigen::Index k) {
   }
 
   Band band;
-  band.centre = middle_of(values);
+  band.centre = median(values);
   for (double& v : values) {
     v = std::abs(v - band.centre);
   }
-  band.half_width = std::max(kRobust * middle_of(values), kResolution_m);
+  band.half_width = std::max(kRobust * median(values), kResolution_m);
   return band;
 }
 

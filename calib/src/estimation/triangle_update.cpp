@@ -3,6 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#define ABBE_ALWAYS_INLINE inline __attribute__((always_inline))
+
 namespace abbe::calib::estimation {
 namespace {
 
@@ -51,8 +53,8 @@ void reflect_column(Reflection& r, double& diagonal, double* rows, std::size_t c
 
 /// sum = top + rows^T v, over the columns from `begin` to `end`. Four rows are added at a time, so
 /// that `sum` is read and written less often. Each element is summed in the order of the rows.
-void project(const Reflection& r, const double* top, double* __restrict sum, std::size_t begin,
-             std::size_t end) {
+ABBE_ALWAYS_INLINE void project(const Reflection& r, const double* top, double* __restrict sum,
+                                std::size_t begin, std::size_t end) {
   const std::size_t n = r.rows.size();
   for (std::size_t c = begin; c < end; ++c) {
     sum[c] = top[c];
@@ -78,8 +80,8 @@ void project(const Reflection& r, const double* top, double* __restrict sum, std
 
 /// Applies the reflection to the columns from `begin` to `end`; `sum` is the result of project().
 /// Also changes the sign of `top`, the row of the triangle.
-void apply(const Reflection& r, double* top, double* __restrict sum, std::size_t begin,
-           std::size_t end) {
+ABBE_ALWAYS_INLINE void apply(const Reflection& r, double* top, double* __restrict sum,
+                              std::size_t begin, std::size_t end) {
   for (std::size_t c = begin; c < end; ++c) {
     sum[c] *= r.tau;
     top[c] = sum[c] - top[c];
@@ -94,23 +96,55 @@ void apply(const Reflection& r, double* top, double* __restrict sum, std::size_t
   }
 }
 
-}  // namespace
-
-void update_triangle(double* triangle, double* rows, std::size_t count, std::size_t unknowns) {
-  const std::size_t width = unknowns + 1;
-  std::vector<double> sum(width);
+/// Makes the columns of `rows` zero, one after another. `sum` has `width` elements.
+ABBE_ALWAYS_INLINE void reflect_all(double* triangle, double* rows, std::size_t count,
+                                    std::size_t width, double* sum) {
   Reflection r;
   r.rows.reserve(count);
   r.v.reserve(count);
 
-  for (std::size_t column = 0; column < unknowns; ++column) {
+  for (std::size_t column = 0; column + 1 < width; ++column) {
     double* top = triangle + column * width;
     reflect_column(r, top[column], rows, count, width, column);
     if (!r.rows.empty()) {
-      project(r, top, sum.data(), column + 1, width);
-      apply(r, top, sum.data(), column + 1, width);
+      project(r, top, sum, column + 1, width);
+      apply(r, top, sum, column + 1, width);
     }
   }
+}
+
+/// The loops of reflect_all() are compiled for each width of the vector registers. All give the
+/// same bits: each element is computed by itself, and fused multiply-add is not used.
+void reflect_all_baseline(double* triangle, double* rows, std::size_t count, std::size_t width,
+                          double* sum) {
+  reflect_all(triangle, rows, count, width, sum);
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) void reflect_all_avx2(double* triangle, double* rows,
+                                                      std::size_t count, std::size_t width,
+                                                      double* sum) {
+  reflect_all(triangle, rows, count, width, sum);
+}
+#endif
+
+using ReflectAll = decltype(&reflect_all_baseline);
+
+ReflectAll reflect_all_of_processor() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) {
+    return reflect_all_avx2;
+  }
+#endif
+  return reflect_all_baseline;
+}
+
+}  // namespace
+
+void update_triangle(double* triangle, double* rows, std::size_t count, std::size_t unknowns) {
+  static const ReflectAll of_processor = reflect_all_of_processor();
+  std::vector<double> sum(unknowns + 1);
+  of_processor(triangle, rows, count, unknowns + 1, sum.data());
 }
 
 }  // namespace abbe::calib::estimation

@@ -1,0 +1,43 @@
+#pragma once
+/// Least-squares cylinder: minimises the sum of (distance of p_i from the axis - radius)^2 by
+/// Gauss-Newton with small displacements of the axis. In the frame of the present axis, with
+/// p_i = (r_i cos t_i, r_i sin t_i, z_i), a rotation (alpha, beta) about x and y, a shift (u, v) and
+/// a change of the radius by w reduce the residuals r_i - radius by
+///     -z_i sin t_i alpha + z_i cos t_i beta + cos t_i u + sin t_i v + w
+/// (Viprey et al., appendix A). The covariance assumes equal, independent noise of the points along
+/// the normal, with a standard deviation computed from the residuals.
+
+#include <optional>
+#include <span>
+
+#include "abbe/calib/fit/residuals.hpp"
+
+namespace abbe::calib::fit {
+
+/// Lengths in the unit of the points.
+struct Cylinder {
+  Vector3 point = Vector3::Zero();  ///< projection of the centroid of the points on the axis
+  Vector3 direction = Vector3::UnitZ();
+  double radius = 0.0;
+  /// of point x y z, direction x y z and radius: rank 5, zero along the axis for the point and for
+  /// the direction; zero for 5 points
+  Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
+  ResidualStatistics residuals;  ///< negative: point inside
+  /// condition number of the Jacobian with lengths in units of the size of the points
+  double condition = 0.0;
+  int iterations = 0;
+};
+
+/// `near`: approximate direction of the axis; the scalar product with the result is positive. The
+/// nominal direction is the right choice: from 70 degrees off, one fit in five finds the best
+/// cylinder. Without it the fit begins with directions all over the hemisphere and takes the
+/// cylinder with the smallest residuals; the largest component of its direction is positive.
+/// NotFinite; TooFewObservations below 5 different points; DegenerateGeometry if they lie on a
+/// line, in a plane, or so that rounding decides the result (for example two points in each
+/// section); NotConverged if no iteration converges. `known_sigma`: standard deviation of a point
+/// along the normal, used for the covariance instead of that of the residuals.
+[[nodiscard]] Result<Cylinder> fit_cylinder(std::span<const Vector3> points,
+                                            std::optional<Vector3> near = {},
+                                            std::optional<double> known_sigma = {});
+
+}  // namespace abbe::calib::fit

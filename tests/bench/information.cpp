@@ -3,7 +3,8 @@
 /// - Householder reflections in batches (estimation::Information),
 /// - Householder reflections, first for the rows of each cell (estimation::information_of),
 /// - sparse normal equations,
-/// - Eigen's dense QR of all rows at once, with whose solution the others are compared.
+/// - Eigen's dense QR of all rows at once, with whose solution the others are compared,
+/// - Ceres Solver (Debian's libceres-dev), if it was there when this program was built.
 /// Then the information of four parts is merged, as in the held-out test. Build type Release.
 ///     bench_information [--short]
 
@@ -16,6 +17,10 @@
 #include <cstring>
 #include <random>
 #include <vector>
+
+#ifdef ABBE_WITH_CERES
+#include <ceres/ceres.h>
+#endif
 
 #include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/estimation/information.hpp"
@@ -146,6 +151,68 @@ double median_ms(int runs, Work work) {
   return ms[ms.size() / 2];
 }
 
+#ifdef ABBE_WITH_CERES
+/// Residual of one row: sum of value * unknown - y. Each unknown is a parameter block of its own.
+class RowCost : public ceres::CostFunction {
+ public:
+  RowCost(const std::vector<RowEntry>& row, double y) : row_(row), y_(y) {
+    set_num_residuals(1);
+    mutable_parameter_block_sizes()->assign(row.size(), 1);
+  }
+  bool Evaluate(double const* const* U, double* residual, double** jacobians) const override {
+    *residual = -y_;
+    for (std::size_t i = 0; i < row_.size(); ++i) {
+      *residual += row_[i].value * *U[i];
+      if (jacobians != nullptr && jacobians[i] != nullptr) {
+        *jacobians[i] = row_[i].value;
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::vector<RowEntry> row_;
+  double y_;
+};
+
+void add_row(ceres::Problem& problem, const std::vector<RowEntry>& row, double y,
+             Eigen::VectorXd& U) {
+  std::vector<double*> blocks;
+  for (const RowEntry& e : row) {
+    blocks.push_back(U.data() + e.column);
+  }
+  problem.AddResidualBlock(new RowCost(row, y), nullptr, blocks);
+}
+
+/// Solves the rows and the conditions of the datum with one thread.
+Eigen::VectorXd solve_with_ceres(const Run& run, const Eigen::MatrixXd& conditions,
+                                 ceres::LinearSolverType type) {
+  Eigen::VectorXd U = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(run.layout.fit_size()));
+  ceres::Problem problem;
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    add_row(problem, run.rows[i], run.y[i], U);
+  }
+  for (const auto& condition : conditions.rowwise()) {
+    std::vector<RowEntry> row;
+    for (Eigen::Index k = 0; k < condition.size(); ++k) {
+      if (condition(k) != 0.0) {
+        row.push_back({static_cast<std::size_t>(k), condition(k)});
+      }
+    }
+    add_row(problem, row, 0.0, U);
+  }
+
+  ceres::Solver::Options options;
+  options.linear_solver_type = type;
+  options.num_threads = 1;
+  options.function_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return U;
+}
+#endif
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -194,6 +261,24 @@ int main(int argc, char** argv) {
   fmt::print("  merge of four parts    {:7.1f} ms\n", merge_ms);
   fmt::print("  solution and covariance{:7.1f} ms\n", solve_ms);
   fmt::print("  solution alone         {:7.1f} ms\n", estimate_ms);
+  const double ours_ms = by_cell_ms + solve_ms;
+  fmt::print("  by cells with solution and covariance / dense QR without: {:.3f}\n",
+             ours_ms / dense_ms);
+#ifdef ABBE_WITH_CERES
+  for (const auto& [type, what] : {std::pair{ceres::SPARSE_NORMAL_CHOLESKY, "sparse"},
+                                   std::pair{ceres::DENSE_NORMAL_CHOLESKY, "dense"}}) {
+    Eigen::VectorXd of_ceres;
+    const double ceres_ms =
+        median_ms(runs, [&] { of_ceres = solve_with_ceres(run, datum.conditions(), type); });
+    fmt::print(
+        "  Ceres, {} normal equations, without covariance {:7.1f} ms, {:.1e} from dense QR; "
+        "by cells / Ceres: {:.3f}\n",
+        what, ceres_ms, (of_ceres - dense).norm() / dense.norm(), ours_ms / ceres_ms);
+  }
+#else
+  fmt::print("  Ceres Solver: not measured, libceres-dev is not installed\n");
+#endif
+
   const double difference = (solution.U - dense).norm() / dense.norm();
   fmt::print("  solution against dense QR: {:.1e} relative (asked 1e-12)\n", difference);
 

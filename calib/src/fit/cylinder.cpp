@@ -181,4 +181,21 @@ Result<Cylinder> fit_cylinder(std::span<const Vector3> points, std::optional<Vec
   return c;
 }
 
+Eigen::Matrix<double, 7, Eigen::Dynamic> derivatives_by_points(const Cylinder& c,
+                                                               std::span<const Vector3> points) {
+  Eigen::Matrix3Xd p(3, std::ssize(points));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    p.col(static_cast<Eigen::Index>(i)) = points[i] - c.point;
+  }
+  const double size = p.colwise().norm().maxCoeff();
+  p /= size;
+
+  Frame f;
+  f.turn_to(c.direction);
+  f.radius = c.radius / size;
+  const Linearised<5> at = linearised(p, f);
+  const Eigen::Matrix<double, 5, 5> root = cofactor<5>(at.J).root;
+  return -derivatives(f, size) * root * root.transpose() * at.J.transpose() / size;
+}
+
 }  // namespace abbe::calib::fit

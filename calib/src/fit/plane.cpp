@@ -1,5 +1,6 @@
 #include "abbe/calib/fit/plane.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "abbe/calib/fit/point_set.hpp"
@@ -46,6 +47,27 @@ Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
 
   plane.u_offset = sigma / std::sqrt(static_cast<double>(points.size()));
   return plane;
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> derivatives_by_points(const Plane& plane,
+                                                               std::span<const Vector3> points) {
+  const Eigen::Index n = std::ssize(points);
+  Eigen::Matrix3Xd centred(3, n);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    centred.col(static_cast<Eigen::Index>(i)) = points[i] - plane.point;
+  }
+
+  // A small rotation (a, b) of the normal about the axes e1, e2 of the plane is the regression of
+  // the displacements over the places in the plane.
+  const Vector3 e1 = plane.normal.unitOrthogonal(), e2 = plane.normal.cross(e1);
+  Eigen::Matrix<double, 2, Eigen::Dynamic> q(2, n);
+  q << e1.transpose() * centred, e2.transpose() * centred;
+  const Eigen::Matrix<double, 2, Eigen::Dynamic> slope = (q * q.transpose()).inverse() * q;
+
+  Eigen::Matrix<double, 6, Eigen::Dynamic> D(6, n);
+  D.topRows<3>() = plane.normal * Eigen::RowVectorXd::Constant(n, 1.0 / static_cast<double>(n));
+  D.bottomRows<3>() = -e1 * slope.row(0) - e2 * slope.row(1);
+  return D;
 }
 
 }  // namespace abbe::calib::fit

@@ -40,4 +40,9 @@ struct Cylinder {
                                             std::optional<Vector3> near = {},
                                             std::optional<double> known_sigma = {});
 
+/// Derivatives of point, direction and radius, in the order of Cylinder::covariance, with respect to
+/// a displacement of each point along the outward normal: 7 x points. `points` are those of the fit.
+[[nodiscard]] Eigen::Matrix<double, 7, Eigen::Dynamic> derivatives_by_points(
+    const Cylinder&, std::span<const Vector3> points);
+
 }  // namespace abbe::calib::fit

@@ -27,4 +27,9 @@ struct Plane {
 [[nodiscard]] Result<Plane> fit_plane(std::span<const Vector3> points, const Vector3& towards,
                                       std::optional<double> known_sigma = {});
 
+/// Derivatives of point and normal with respect to a displacement of each point along the normal:
+/// 6 x points. `points` are those of the fit.
+[[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> derivatives_by_points(
+    const Plane&, std::span<const Vector3> points);
+
 }  // namespace abbe::calib::fit

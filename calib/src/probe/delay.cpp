@@ -3,11 +3,11 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include "message.hpp"
+#include "student_tail.hpp"
 
 namespace abbe::calib::probe {
 namespace {
@@ -111,19 +111,6 @@ Scatter scatter_of(const std::vector<Feed>& feeds) {
   for (const Feed& f : feeds) scatter.s0_m2 += f.variance_m2 / static_cast<double>(feeds.size());
   for (int i = 0; i < kRounds; ++i) scatter = refined(feeds, scatter);
   return scatter;
-}
-
-/// Student's t for 95 % divided by the quantile of the normal distribution: [GUM] table G.2, and
-/// from 6 degrees of freedom the Cornish-Fisher series, accurate to 0.1 %.
-double student_over_normal(double dof) {
-  constexpr double z = 1.959964;
-  constexpr std::array kT95{12.706205, 4.302653, 3.182446, 2.776445, 2.570582};
-  if (dof < 5.5) return kT95.at(static_cast<std::size_t>(std::lround(dof)) - 1) / z;
-  constexpr double z2 = z * z;
-  const double first = (z2 + 1) / (4 * dof);
-  const double second = (5 * z2 * z2 + 16 * z2 + 3) / (96 * dof * dof);
-  const double third = (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * dof * dof * dof);
-  return 1 + first + second + third;
 }
 
 }  // namespace

@@ -1,0 +1,103 @@
+#pragma once
+/// Compares directly measured error motions with the tables of a model, table by table, as in
+/// [Sanders 2023] section 2.3. Both are brought into the same convention first, by the same linear
+/// operator P on their values at the same positions: those measured positions that are within the
+/// nodes of the model (the common range).
+/// - Positioning and rotations: zero at the reference position of the axis if it is in the common
+///   range, else at the smallest common position.
+/// - Straightness: the line through the first and the last common position removed (section 2.3.2),
+///   or the least-squares line.
+/// - Squareness: the model's value, corrected for the slopes that this convention removes from its
+///   two straightness errors, if they are measured, too:
+///       C0Y - s(EXY) - s(EYX),   B0Z + s(EXZ) + s(EZX),   A0Z - s(EYZ) - s(EZY)
+///   A measured squareness has the sign of the model: rotation of the direction of travel.
+///
+/// The difference d = P (measured - model) at a position has the standard uncertainty u,
+///     u^2 = u_runs^2 + u_device^2 + u_model^2
+/// u_runs: [GUM] 4.2.3, scatter of the runs after P; u_device: DeviceUncertainty; u_model: from the
+/// covariance of the model, P B C B^T P^T. d / u is compared with Student's t; its effective degrees
+/// of freedom are those of the runs, by [GUM] G.4.1 (Welch-Satterthwaite), truncated.
+///
+/// What u leaves out, so that a contradiction can be its effect: errors of the machine between the
+/// nodes of the model, thermal changes between the two measurements, levers of the measured line
+/// that are not stated (MeasuredError::line_m). Where the convention fixes the value to zero there
+/// is no difference to test. The model states errors without backlash, the measured values are means
+/// of both directions: also without, if both were measured. Lengths in m, angles in rad. Pure.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/calib/direct/runs.hpp"
+#include "abbe/calib/volumetric_model.hpp"
+
+namespace abbe::calib::direct {
+
+enum class StraightnessLine { EndPoints, LeastSquares };
+
+/// Standard uncertainty (k = 1) of the device, in addition to the scatter of the runs: resolution,
+/// optics, air. Default 0: the scatter is all that is known.
+struct DeviceUncertainty {
+  double u_m = 0.0;    ///< of one translation, independent at each position
+  double u_rad = 0.0;  ///< of one rotation, or of a squareness
+  double u_scale =
+      0.0;  ///< relative, of all lengths of a positioning error (wavelength, expansion)
+};
+
+struct CompareOptions {
+  StraightnessLine line = StraightnessLine::EndPoints;
+  DeviceUncertainty device{};
+  /// Probability that any table is found to contradict although none does. The limit of one test is
+  /// this, divided by the number of tests of all tables (Bonferroni).
+  double false_alarm = 0.05;
+};
+
+enum class Finding {
+  Agrees,       ///< no difference exceeds its limit
+  Contradicts,  ///< at least one does
+  NotTested,    ///< no uncertainty is known: one run, and none stated of the device
+  NotCompared,  ///< see TableComparison::reason
+};
+/// "agrees", "contradicts", "not tested", "not compared".
+[[nodiscard]] std::string_view name(Finding);
+
+/// One position. Values after P.
+struct PointDifference {
+  double position_m = 0.0;
+  double measured = 0.0, u_measured = 0.0;  ///< u: runs and device
+  double model = 0.0, u_model = 0.0;
+  double difference = 0.0, u = 0.0;
+  double p = 1.0;  ///< probability of a larger |difference| by chance; 1 if not tested
+  bool tested = false;
+};
+
+struct TableComparison {
+  std::string name;
+  bool is_angle = false;
+  bool is_squareness = false;
+  Finding finding = Finding::NotCompared;
+  std::string reason;               ///< why it is not compared or not tested; else empty
+  std::vector<std::string> causes;  ///< corrections of the measured values that make them fit
+  std::size_t runs = 0;
+  std::size_t left_out = 0;  ///< positions that some run or direction does not have
+  std::size_t outside = 0;   ///< positions outside the nodes of the model
+  std::string convention;    ///< "zero at 0 mm", "line through -300 and 300 mm removed"
+  std::vector<PointDifference> points;
+  double mae = 0.0, rms = 0.0, largest = 0.0;  ///< of |difference| over the points; m or rad
+  double largest_at_m = 0.0;
+  /// |difference| / u over the tested points
+  double rms_normalised = 0.0, largest_normalised = 0.0;
+  std::optional<Reversal> reversal{};
+};
+
+/// One entry per error, in their order. NotApplicable: the model has no tables (polynomials).
+/// BadInput: an unknown or repeated name, a false alarm that is not in (0, 1), a negative
+/// uncertainty; and the errors of runs_of().
+[[nodiscard]] Result<std::vector<TableComparison>> compare(std::span<const MeasuredError>,
+                                                           const VolumetricModel&,
+                                                           const CompareOptions& = {});
+
+}  // namespace abbe::calib::direct

@@ -1,0 +1,26 @@
+#pragma once
+/// Why a directly measured error does not fit a model: mistakes that people make with such files.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/direct/compare.hpp"
+#include "direct/model_curve.hpp"
+
+namespace abbe::calib::direct {
+
+/// The corrections of the measured values with which they fit the model: the rms difference is at
+/// most a third of that of the given values, and at most 1.5 times that of the best correction.
+/// Degrees of freedom: positions without the conditions of the convention and without the parameters
+/// of the correction. Empty if nothing helps, or with fewer than 3 degrees of freedom.
+///
+/// Tried: the sign; the positions reversed or counted from the other end, with either sign; a factor
+/// (unit); a slope of a positioning error (temperature, wavelength, scales); an offset of the
+/// positions; an offset of the measured line, which adds rotations times levers (Abbe).
+[[nodiscard]] std::vector<std::string> likely_causes(const ModelCurve&,
+                                                     std::span<const double> positions_m,
+                                                     const Eigen::VectorXd& measured,
+                                                     StraightnessLine);
+
+}  // namespace abbe::calib::direct

@@ -1,0 +1,38 @@
+#pragma once
+/// Measured errors and a model as parameters of the same tables on the same nodes; see
+/// abbe/calib/direct/volume.hpp.
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "abbe/calib/direct/compare.hpp"
+
+namespace abbe::calib::direct {
+
+/// A measured error that the model has.
+struct UsedError {
+  const MeasuredError* error;
+  std::optional<ErrorMotion> motion;  // nullopt: squareness
+  Runs runs;                          // within the nodes of the model
+};
+/// Those with at least three positions within the nodes of the model.
+[[nodiscard]] Result<std::vector<UsedError>> used_errors(std::span<const MeasuredError>,
+                                                         const VolumetricModel&);
+/// The tables of the used errors, on the nodes that they have in common.
+[[nodiscard]] Result<ParameterLayout> common_layout(const std::vector<UsedError>&,
+                                                    const VolumetricModel&);
+
+/// Parameters of the common layout with their covariance, in gauge G1.
+struct TableValues {
+  Eigen::VectorXd U;
+  Eigen::MatrixXd cov_U;
+};
+struct CommonValues {
+  TableValues measured, model;
+};
+[[nodiscard]] CommonValues common_values(const std::vector<UsedError>&, const ParameterLayout&,
+                                         const VolumetricModel&, const DeviceUncertainty&);
+
+}  // namespace abbe::calib::direct

@@ -1,0 +1,230 @@
+#include "abbe/calib/direct/compare.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "direct/causes.hpp"
+#include "direct/convention.hpp"
+#include "direct/device.hpp"
+#include "direct/judge.hpp"
+#include "direct/model_curve.hpp"
+#include "direct/squareness.hpp"
+#include "message.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::direct {
+namespace {
+
+/// An error with its runs at the common positions.
+struct Reduced {
+  TableComparison table;
+  Runs runs;                 // at the common positions
+  Eigen::VectorXd measured;  // mean over the runs, before the convention
+  std::optional<LineChange> lines{};
+};
+
+bool is_squareness_name(std::string_view name) {
+  return std::find(kSquarenessNames.begin(), kSquarenessNames.end(), name) !=
+         kSquarenessNames.end();
+}
+
+Result<void> check_names(std::span<const MeasuredError> errors) {
+  std::set<std::string> seen;
+  for (const MeasuredError& error : errors) {
+    if (!error_motion(error.name) && !is_squareness_name(error.name)) {
+      return failure(ErrorCode::BadInput,
+                     message("comparison: \"", error.name, "\" is not the name of an error"));
+    }
+    if (!seen.insert(error.name).second) {
+      return failure(ErrorCode::BadInput, message("comparison: ", error.name, " is given twice"));
+    }
+  }
+  return {};
+}
+
+Result<void> check_options(const CompareOptions& options) {
+  if (!(options.false_alarm > 0.0 && options.false_alarm < 1.0)) {
+    return failure(ErrorCode::BadInput, message("comparison: false-alarm probability ",
+                                                options.false_alarm, " must be in (0, 1)"));
+  }
+  const DeviceUncertainty& u = options.device;
+  for (const double value : {u.u_m, u.u_rad, u.u_scale}) {
+    if (!(value >= 0.0 && std::isfinite(value))) {
+      return failure(ErrorCode::BadInput,
+                     message("comparison: uncertainty of the device ", value, " is negative"));
+    }
+  }
+  return {};
+}
+
+std::string why_no_common_range(const Runs& runs, const ModelCurve& curve) {
+  const std::vector<double>& nodes_m = curve.nodes().nodes_m;
+  std::string text =
+      message("measured at ", runs.positions_m.size(), " positions from ",
+              kMmPerM * runs.positions_m.front(), " to ", kMmPerM * runs.positions_m.back(),
+              " mm, the model covers ", kMmPerM * nodes_m.front(), " to ", kMmPerM * nodes_m.back(),
+              " mm: fewer than ", kLeastPositions, " common positions");
+  return text;
+}
+
+Result<Reduced> compare_motion(const MeasuredError& error, ErrorMotion motion,
+                               const VolumetricModel& model, const CompareOptions& options) {
+  const auto all = runs_of(error);
+  if (!all) {
+    return tl::make_unexpected(all.error());
+  }
+  Reduced out;
+  out.table.name = error.name;
+  out.table.is_angle = is_rotation(motion.motion);
+  out.table.runs = all->values.size();
+  out.table.left_out = all->left_out;
+  out.table.reversal = reversal_of(*all);
+  if (!model.tables()->layout().find(motion)) {
+    out.table.reason =
+        "the model does not have this table: with one tool offset its effect is part "
+        "of other tables";
+    return out;
+  }
+
+  const ModelCurve curve(model, motion, error.line_m);
+  out.runs = at_positions(*all, [&](double p) { return curve.covers(p); });
+  out.table.outside = all->positions_m.size() - out.runs.positions_m.size();
+  if (out.runs.positions_m.size() < kLeastPositions) {
+    out.table.reason = why_no_common_range(*all, curve);
+    return out;
+  }
+
+  const std::vector<double>& p = out.runs.positions_m;
+  const double reference_m = curve.nodes().reference_m;
+  const Eigen::MatrixXd P = reduction(motion, p, reference_m, options.line);
+  const Eigen::MatrixXd B = P * curve.rows(p);
+  out.measured = out.runs.mean();
+  out.table.convention = convention_text(motion, p, reference_m, options.line);
+  out.lines = line_change(motion, *all, p, options.line);
+  add_points(out.table, out.runs, P * out.measured, B * model.U(),
+             {out.runs.covariance_of_mean(P), covariance_of_device(motion, P, p, options.device),
+              B * model.covariance() * B.transpose()});
+  return out;
+}
+
+std::vector<LineChange> lines_of(std::span<const Reduced> motions) {
+  std::vector<LineChange> lines;
+  for (const Reduced& r : motions) {
+    if (r.lines) {
+      lines.push_back(*r.lines);
+    }
+  }
+  return lines;
+}
+
+Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricModel& model,
+                                   std::span<const Reduced> motions,
+                                   const CompareOptions& options) {
+  const auto runs = runs_of(error);
+  if (!runs) {
+    return tl::make_unexpected(runs.error());
+  }
+  if (runs->positions_m.size() != 1) {
+    return failure(
+        ErrorCode::BadInput,
+        message(error.name, ": a squareness has one value per run, not one per position"));
+  }
+
+  Reduced out{.table = {}, .runs = *runs, .measured = runs->mean()};
+  out.table.name = error.name;
+  out.table.is_angle = out.table.is_squareness = true;
+  out.table.runs = runs->values.size();
+  const std::vector<LineChange> lines = lines_of(motions);
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
+  const Eigen::MatrixXd row = squareness_row(error.name, model, lines, options.line);
+  out.measured.array() += squareness_change(error.name, lines);
+  out.table.convention = squareness_text(error.name, lines);
+  add_points(out.table, *runs, out.measured, row * model.U(),
+             {runs->covariance_of_mean(one), options.device.u_rad * options.device.u_rad * one,
+              row * model.covariance() * row.transpose()});
+  return out;
+}
+
+/// Causes of a squareness: only its sign can be told from one value.
+void add_squareness_cause(TableComparison& table) {
+  const PointDifference& point = table.points.front();
+  const double reversed = std::abs(-point.measured - point.model);
+  if (reversed <= std::max(point.u, std::abs(point.difference) / 3.0)) {
+    table.causes.emplace_back("with the sign of the value reversed");
+  }
+}
+
+void add_causes(Reduced& r, const VolumetricModel& model, const MeasuredError& error,
+                StraightnessLine line) {
+  if (r.table.finding == Finding::Agrees || r.table.points.empty()) {
+    return;
+  }
+  if (r.table.is_squareness) {
+    add_squareness_cause(r.table);
+    return;
+  }
+  const ModelCurve curve(model, *error_motion(error.name), error.line_m);
+  r.table.causes = likely_causes(curve, r.runs.positions_m, r.measured, line);
+}
+
+}  // namespace
+
+std::string_view name(Finding finding) {
+  switch (finding) {
+    case Finding::Agrees:
+      return "agrees";
+    case Finding::Contradicts:
+      return "contradicts";
+    case Finding::NotTested:
+      return "not tested";
+    case Finding::NotCompared:
+      break;
+  }
+  return "not compared";
+}
+
+Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> errors,
+                                             const VolumetricModel& model,
+                                             const CompareOptions& options) {
+  if (model.tables() == nullptr) {
+    return failure(
+        ErrorCode::NotApplicable,
+        "comparison: the model consists of polynomials and has no tables of error motions");
+  }
+  for (const Result<void>& valid : {check_names(errors), check_options(options)}) {
+    if (!valid) {
+      return tl::make_unexpected(valid.error());
+    }
+  }
+
+  std::vector<Reduced> all(errors.size());
+  for (const bool squareness : {false, true}) {  // squareness needs the lines of the straightness
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const auto motion = error_motion(errors[i].name);
+      if (motion.has_value() == squareness) {
+        continue;
+      }
+      auto reduced = motion ? compare_motion(errors[i], *motion, model, options)
+                            : compare_squareness(errors[i], model, all, options);
+      if (!reduced) {
+        return tl::make_unexpected(reduced.error());
+      }
+      all[i] = std::move(*reduced);
+    }
+  }
+
+  std::size_t tests = 0;
+  for (const Reduced& r : all) {
+    tests += count_tests(r.table);
+  }
+  std::vector<TableComparison> tables;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    judge(all[i].table, options.false_alarm / static_cast<double>(std::max<std::size_t>(1, tests)));
+    add_causes(all[i], model, errors[i], options.line);
+    tables.push_back(std::move(all[i].table));
+  }
+  return tables;
+}
+
+}  // namespace abbe::calib::direct

@@ -1,0 +1,31 @@
+#pragma once
+/// Conventions of error tables as linear operators on values at ascending positions.
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/direct/compare.hpp"
+
+namespace abbe::calib::direct {
+
+/// Fewer positions leave nothing to compare after the conditions of a convention.
+inline constexpr std::size_t kLeastPositions = 3;
+
+/// Number of conditions that the convention imposes on a table: 2 for straightness, else 1.
+[[nodiscard]] std::size_t conditions_of(ErrorMotion);
+
+/// Where positioning and rotations are zero.
+[[nodiscard]] double zero_position_m(std::span<const double> positions_m, double reference_m);
+
+/// P of compare.hpp; at least 2 positions.
+[[nodiscard]] Eigen::MatrixXd reduction(ErrorMotion, std::span<const double> positions_m,
+                                        double reference_m, StraightnessLine);
+[[nodiscard]] std::string convention_text(ErrorMotion, std::span<const double> positions_m,
+                                          double reference_m, StraightnessLine);
+
+/// s such that s * values is the slope that reduction() removes from a straightness.
+[[nodiscard]] Eigen::RowVectorXd slope_row(std::span<const double> positions_m, StraightnessLine);
+
+}  // namespace abbe::calib::direct

@@ -1,0 +1,110 @@
+/// Mistakes in files of directly measured errors are named.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "abbe/calib/direct/compare.hpp"
+#include "direct_measurement.hpp"
+#include "joint_parts.hpp"
+
+namespace abbe::calib::direct {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using tests::direct::measured_table;
+
+class DirectCauses : public ::testing::Test {
+ protected:
+  DirectCauses()
+      : run_(tests::otf::make_run({.in_gauge = true})), model_(tests::joint::model_of(run_)) {}
+
+  template <class Change>
+  TableComparison with(const std::string& name, Change change) const {
+    MeasuredError error = measured_table(run_, name);
+    for (Reading& r : error.readings) {
+      change(r);
+    }
+    return compare(std::vector{error}, model_).value().front();
+  }
+
+  tests::otf::MadeRun run_;
+  VolumetricModel model_;
+};
+
+TEST_F(DirectCauses, NamesAReversedSign) {
+  for (const char* name : {"EXX", "EYX", "ECX", "EZY"}) {
+    const auto t = with(name, [](Reading& r) { r.value = -r.value; });
+    EXPECT_EQ(t.finding, Finding::Contradicts) << name;
+    EXPECT_THAT(t.causes, Each(HasSubstr("sign of the values reversed"))) << name;
+    EXPECT_THAT(t.causes, ::testing::Not(IsEmpty())) << name;
+  }
+}
+
+TEST_F(DirectCauses, NamesReversedPositions) {
+  const auto t = with("EXX", [](Reading& r) { r.position_m = -r.position_m; });
+  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("with the sign of the positions reversed: ")));
+}
+
+TEST_F(DirectCauses, NamesPositionsFromTheOtherEnd) {
+  const auto t = with("EYZ", [](Reading& r) { r.position_m = -0.4 - r.position_m; });
+  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("counted from the other end: ")));
+}
+
+TEST_F(DirectCauses, NamesAnOffsetOfThePositions) {
+  const auto t = with("EXX", [](Reading& r) { r.position_m += 0.05; });
+  EXPECT_THAT(t.causes, Each(HasSubstr("-50 mm added to the positions")));
+}
+
+TEST_F(DirectCauses, NamesAWrongUnit) {
+  const auto t = with("EXX", [](Reading& r) { r.value *= 1e-3; });
+  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("divided by 0.001")));
+}
+
+TEST_F(DirectCauses, NamesAScaleOfLengths) {
+  const auto t = with("EXX", [](Reading& r) { r.value += 150e-6 * r.position_m; });
+  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("after removal of 150 um/m")));
+}
+
+/// A line 0.2 m beside the axis: EXX + EBX 0.2 m.
+TEST_F(DirectCauses, NamesALeverOfTheMeasuredLine) {
+  const auto t = with("EXX", [&](Reading& r) {
+    r.value += 0.4 * tests::direct::table_value(run_, {Motion::B, Axis::X}, r.position_m);
+  });
+  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("rotations times levers")));
+}
+
+TEST_F(DirectCauses, NamesNothingForAnOffsetOfTheValues) {
+  const auto t = with("EXX", [](Reading& r) { r.value += 1e-3; });
+  EXPECT_EQ(t.finding, Finding::Agrees);
+  EXPECT_THAT(t.causes, IsEmpty());
+}
+
+TEST_F(DirectCauses, NamesNothingForAnotherMachine) {
+  const auto other = tests::otf::make_run({.seed = 9, .in_gauge = true});
+  const auto t = compare(std::vector{measured_table(other, "EXX")}, model_).value().front();
+  EXPECT_EQ(t.finding, Finding::Contradicts);
+  EXPECT_THAT(t.causes, IsEmpty());
+}
+
+/// Measured where the program is told the line: rotations times levers are part of the model's
+/// value.
+TEST_F(DirectCauses, AKnownLineNeedsNoCause) {
+  const Vector3 line(0.0, 0.1, -0.3), t = run_.machine.target_offset_m;
+  MeasuredError error = measured_table(run_, "EXX");
+  error.line_m = line;
+  for (Reading& r : error.readings) {
+    const double EBX = tests::direct::table_value(run_, {Motion::B, Axis::X}, r.position_m);
+    const double ECX = tests::direct::table_value(run_, {Motion::C, Axis::X}, r.position_m);
+    r.value += EBX * (line.z() + t.z()) - ECX * (line.y() + t.y());
+  }
+  EXPECT_EQ(compare(std::vector{error}, model_).value().front().finding, Finding::Agrees);
+  error.line_m = std::nullopt;
+  EXPECT_EQ(compare(std::vector{error}, model_).value().front().finding, Finding::Contradicts);
+}
+
+}  // namespace
+}  // namespace abbe::calib::direct

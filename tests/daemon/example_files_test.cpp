@@ -8,6 +8,7 @@
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tables/measured_file.hpp"
 #include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
@@ -67,6 +68,7 @@ TEST_F(ExampleFiles, OfAJointIdentificationAreAccepted) {
 TEST_F(ExampleFiles, OfModelCommandsAreAccepted) {
   EXPECT_EQ(test::faults_text(read_points_csv(printed("points.csv"))), "");
   EXPECT_EQ(test::faults_text(read_verification_csv(printed("verification.csv"))), "");
+  EXPECT_EQ(test::faults_text(read_measured_csv(printed("measured.csv"))), "");
 }
 
 TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {

@@ -16,6 +16,7 @@
 #include "abbe/sim/truth_table.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "abbe/tables/measured_file.hpp"
 #include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
@@ -88,6 +89,7 @@ const std::map<std::string, FileReader> kTableReaders{
     {"errors.csv", reader(read_errors_csv)},
     {"points.csv", reader(read_points_csv)},
     {"verification.csv", reader(read_verification_csv)},
+    {"measured.csv", reader(read_measured_csv)},
     {"eval.csv", reader(read_known_errors_csv)}};
 
 std::map<std::string, FileReader> all_readers() {

@@ -32,6 +32,7 @@ constexpr std::array kPurposes{
     Purpose{"errors.csv", "errors at the balls of an array, from another program or instrument"},
     Purpose{"points.csv", "positions for abbe model eval"},
     Purpose{"verification.csv", "readings and independent measurements for abbe verify"},
+    Purpose{"measured.csv", "directly measured error motions for abbe model compare"},
     Purpose{"truth.csv", "the errors of a simulated machine"},
 };
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/parsed_table.hpp"
@@ -14,26 +13,11 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/section.hpp"
+#include "whole_number.hpp"
 
 namespace abbe::daemon {
 
 namespace {
-
-// Largest number of a position or feature (ball, block): far above that of any procedure, and far
-// below integer overflow.
-constexpr int kMostNumber = 1000;
-
-/// The cell as a whole number. If it is not a whole number of at least 1, adds a fault and returns
-/// 1.
-int number_at(const NumberTable& table, std::size_t row, std::size_t column, std::string_view name,
-              Faults& faults) {
-  const double value = table.at(row, column);
-  const bool valid = value >= 1.0 && value <= kMostNumber && value == std::floor(value);
-  if (!valid && table.sound(row))
-    faults.add_kind("whole number", table.line(row), 1, name,
-                    fmt::format("{}: must be a whole number, 1 to {}", value, kMostNumber));
-  return valid ? static_cast<int>(value) : 1;
-}
 
 calib::Vector3 vector_at(const NumberTable& table, std::size_t row, std::size_t first,
                          double per_m) {

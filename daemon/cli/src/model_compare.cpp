@@ -1,4 +1,5 @@
-/// `abbe model compare A B`: the difference of two models, in the volume where both are valid.
+/// `abbe model compare A B`: the difference of two models, in the volume where both are valid; or of
+/// a model and directly measured error motions.
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
 #include "figures.hpp"
+#include "measured_comparison.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 
@@ -17,6 +19,7 @@ namespace {
 
 struct ModelCompareArguments {
   std::string a, b;
+  MeasuredOptions measured;
   StoreOption store;
   bool json = false;
 };
@@ -58,6 +61,13 @@ void print(const char* what, const calib::VectorStatistics& s) {
              s.max_m * kUmPerM);
 }
 
+int run_measured(const ModelCompareArguments& arguments) {
+  const auto model = model_named(arguments.a, arguments.store);
+  if (!model) return report(model.error());
+  const auto exit = compare_with_measured(model->model, arguments.measured, arguments.json);
+  return exit ? *exit : report(exit.error());
+}
+
 int run(const ModelCompareArguments& arguments) {
   const auto found = compare(arguments);
   if (!found) return report(found.error());
@@ -87,16 +97,26 @@ void add_model_compare(CLI::App& parent, int& exit) {
       "compare",
       "Print the difference of two models at the nodes where both are valid, for the tool of A:\n"
       "as stated, and without the rigid motion of the whole volume, which no measurement can "
-      "determine.");
+      "determine.\nWith --measured FILE instead of B: the difference of directly measured error "
+      "motions and A.");
   command
       ->add_option("A", arguments->a,
                    "model.json; or a model of the store: its id, the beginning of its id, or "
                    "\"active\"")
       ->required();
-  command->add_option("B", arguments->b, "the other model, given like A")->required();
+  auto* b = command->add_option("B", arguments->b, "the other model, given like A");
+  auto* measured = add_measured_options(*command, arguments->measured);
+  measured->excludes(b);
   add_store_options(*command, arguments->store);
   command->add_flag("--json", arguments->json, "print one JSON object");
-  command->callback([arguments, &exit] { exit = run(*arguments); });
+  command->callback([arguments, &exit] {
+    if (!arguments->measured.file.empty())
+      exit = run_measured(*arguments);
+    else if (arguments->b.empty())
+      exit = report({ErrorCode::Usage, "model compare: give a second model B, or --measured"});
+    else
+      exit = run(*arguments);
+  });
 }
 
 }  // namespace abbe::daemon

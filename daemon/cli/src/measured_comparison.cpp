@@ -1,0 +1,258 @@
+#include "measured_comparison.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/direct/volume.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/tables/measured_file.hpp"
+#include "figures.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace direct = calib::direct;
+using nlohmann::json;
+
+constexpr double kMicroUnits = 1e6;  // um per m, urad per rad
+
+struct MeasuredComparison {
+  MeasuredFile file;
+  std::vector<direct::TableComparison> tables;
+  calib::Result<direct::VolumeComparison> volume;
+};
+
+direct::CompareOptions compare_options(const MeasuredOptions& options) {
+  return {.line = options.straightness == "least-squares" ? direct::StraightnessLine::LeastSquares
+                                                          : direct::StraightnessLine::EndPoints,
+          .device = {.u_m = options.u_um / kUmPerM,
+                     .u_rad = options.u_urad / kUradPerRad,
+                     .u_scale = options.u_ppm / kMicroUnits},
+          .false_alarm = options.false_alarm};
+}
+
+Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
+                                    const MeasuredOptions& options) {
+  auto file = read_measured_csv(options.file);
+  if (!file) return tl::make_unexpected(file.error());
+  const auto wanted = compare_options(options);
+  auto tables = direct::compare(file->errors, model, wanted);
+  if (!tables) {
+    auto error = error_of(tables.error());
+    return fail(error.code, fmt::format("{}: {}", options.file, error.text));
+  }
+  auto volume = direct::compare_in_volume(file->errors, model, wanted.device);
+  return MeasuredComparison{std::move(*file), std::move(*tables), std::move(volume)};
+}
+
+bool any_with(const MeasuredComparison& found, direct::Finding finding) {
+  return std::ranges::any_of(found.tables,
+                             [&](const auto& table) { return table.finding == finding; });
+}
+
+const char* unit_of(const direct::TableComparison& table) {
+  return table.is_angle ? "urad" : "um";
+}
+
+// JSON.
+
+json reversal_json(const std::optional<direct::Reversal>& reversal) {
+  if (!reversal) return {};
+  return {{"mean", kMicroUnits * reversal->mean},
+          {"u", reversal->u ? json(kMicroUnits * *reversal->u) : json()},
+          {"largest", kMicroUnits * reversal->largest},
+          {"largest_at_mm", kMmPerM * reversal->at_m}};
+}
+
+json point_json(const direct::TableComparison& table, const direct::PointDifference& point) {
+  json object{{"measured", kMicroUnits * point.measured},
+              {"u_measured", kMicroUnits * point.u_measured},
+              {"model", kMicroUnits * point.model},
+              {"u_model", kMicroUnits * point.u_model},
+              {"difference", kMicroUnits * point.difference},
+              {"u", kMicroUnits * point.u},
+              {"p", point.tested ? json(point.p) : json()}};
+  if (!table.is_squareness) object["position_mm"] = kMmPerM * point.position_m;
+  return object;
+}
+
+json table_json(const direct::TableComparison& table) {
+  json object{{"name", table.name},
+              {"unit", unit_of(table)},
+              {"verdict", direct::name(table.finding)},
+              {"reason", table.reason},
+              {"causes", table.causes},
+              {"convention", table.convention},
+              {"runs", table.runs},
+              {"positions_left_out", table.left_out},
+              {"positions_outside", table.outside},
+              {"reversal", reversal_json(table.reversal)},
+              {"points", json::array()}};
+  for (const auto& point : table.points) object["points"].push_back(point_json(table, point));
+  if (table.points.empty()) return object;
+
+  object["mae"] = kMicroUnits * table.mae;
+  object["rms"] = kMicroUnits * table.rms;
+  object["max"] = kMicroUnits * table.largest;
+  object["rms_normalised"] = table.rms_normalised;
+  object["max_normalised"] = table.largest_normalised;
+  return object;
+}
+
+json volume_json(const calib::Result<direct::VolumeComparison>& volume) {
+  if (!volume) return {{"not_compared", volume.error().text}};
+  return {{"points", volume->points},
+          {"compared", volume->compared},
+          {"not_measured", volume->not_measured},
+          {"measured", vector_figures(volume->V_measured)},
+          {"model", vector_figures(volume->V_model)},
+          {"as_stated", vector_figures(volume->difference.as_stated)},
+          {"rigid_free", vector_figures(volume->difference.rigid_free)},
+          {"u_rms_um", volume->u_rms_m ? json(kUmPerM * *volume->u_rms_m) : json()}};
+}
+
+void print_measured_json(const MeasuredComparison& found, const MeasuredOptions& options) {
+  json object{{"measured", found.file.source.name},
+              {"sha256", found.file.source.sha256},
+              {"straightness", options.straightness},
+              {"tables", json::array()},
+              {"volume", volume_json(found.volume)}};
+  for (const auto& table : found.tables) object["tables"].push_back(table_json(table));
+  fmt::print("{}\n", object.dump(1));
+}
+
+// Text.
+
+std::string coloured_verdict(const direct::TableComparison& table) {
+  const std::string text = fmt::format("{:<12}", direct::name(table.finding));
+  if (table.finding == direct::Finding::Contradicts) return coloured(text, kRed, STDOUT_FILENO);
+  if (table.finding == direct::Finding::Agrees) return coloured(text, kGreen, STDOUT_FILENO);
+  return text;
+}
+
+void print_row(const direct::TableComparison& table) {
+  fmt::print("{:<5}  {}  {:>4}  {:>6}", table.name, coloured_verdict(table), table.runs,
+             table.points.size());
+  if (table.points.empty()) return fmt::print("  {}\n", table.reason);
+  const std::string place =
+      table.is_squareness ? "-" : fmt::format("{:.1f}", kMmPerM * table.largest_at_m);
+  const std::string reversal =
+      table.reversal ? fmt::format("{:.2f}", kMicroUnits * table.reversal->mean) : "-";
+  fmt::print("  {:>8.2f}  {:>8.2f}  {:>8.2f}  {:>8}  {:<4}  {:>7.2f}  {:>7.2f}  {:>8}\n",
+             kMicroUnits * table.mae, kMicroUnits * table.rms, kMicroUnits * table.largest, place, unit_of(table),
+             table.rms_normalised, table.largest_normalised, reversal);
+}
+
+void print_remarks(const direct::TableComparison& table) {
+  const auto remark = [&](const std::string& text) { fmt::print("{}: {}\n", table.name, text); };
+  if (table.left_out > 0)
+    remark(fmt::format("{} positions left out: some run or direction does not have them",
+                       table.left_out));
+  if (table.outside > 0 && !table.points.empty())
+    remark(fmt::format("{} positions left out: outside the nodes of the model", table.outside));
+  if (!table.reason.empty() && !table.points.empty()) remark(table.reason);
+  for (const auto& cause : table.causes) remark("fits " + cause);
+}
+
+/// The conventions, each once.
+void print_conventions(const MeasuredComparison& found) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> tables_of;
+  for (const auto& table : found.tables) {
+    if (table.points.empty()) continue;
+    const std::string text = fmt::format(
+        "{}{}", table.is_squareness ? "" : fmt::format("{}: ", table.name[2]), table.convention);
+    auto at = std::ranges::find(tables_of, text, [](const auto& entry) { return entry.first; });
+    if (at == tables_of.end()) at = tables_of.insert(tables_of.end(), {text, {}});
+    at->second.push_back(table.name);
+  }
+  for (const auto& [text, tables] : tables_of)
+    fmt::print("{}  ({})\n", text, fmt::join(tables, ", "));
+}
+
+void print_vectors(const char* what, const calib::VectorStatistics& s) {
+  fmt::print("{:<32}  {:>8.3f}  {:>8.3f}  {:>8.3f}\n", what, kUmPerM * s.mean_m, kUmPerM * s.rms_m,
+             kUmPerM * s.max_m);
+}
+
+void print_volume(const calib::Result<direct::VolumeComparison>& volume) {
+  if (!volume) return fmt::print("\nin the volume: {}\n", volume.error().text);
+  fmt::print("\n|V| at {} places, from {}, um\n", volume->points,
+             fmt::join(volume->compared, ", "));
+  if (!volume->not_measured.empty())
+    fmt::print("left out of both: {} (not measured)\n", fmt::join(volume->not_measured, ", "));
+  fmt::print("{:<32}  {:>8}  {:>8}  {:>8}\n", "", "mean", "rms", "largest");
+  print_vectors("measured", volume->V_measured);
+  print_vectors("model", volume->V_model);
+  print_vectors("difference as stated", volume->difference.as_stated);
+  print_vectors("difference without rigid motion", volume->difference.rigid_free);
+  if (volume->u_rms_m)
+    fmt::print("{:<32}  {:>8}  {:>8.3f}\n", "standard uncertainty of it", "",
+               kUmPerM * *volume->u_rms_m);
+}
+
+void print_measured_text(const MeasuredComparison& found) {
+  fmt::print("measured minus model; |d|/u: relative to the standard uncertainty of both\n");
+  fmt::print(
+      "{:<5}  {:<12}  {:>4}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:<4}  {:>7}  {:>7}  {:>8}\n",
+      "table", "verdict", "runs", "points", "mae", "rms", "largest", "at mm", "unit", "|d|/u",
+      "largest", "backlash");
+  for (const auto& table : found.tables) print_row(table);
+  fmt::print("\n");
+  for (const auto& table : found.tables) print_remarks(table);
+
+  print_conventions(found);
+  const bool no_line = std::ranges::all_of(
+      found.file.errors, [](const auto& error) { return !error.line_m.has_value(); });
+  if (no_line)
+    fmt::print(
+        "no columns x_mm, y_mm, z_mm: translations are compared as if measured on the axes "
+        "of the machine\ncoordinates; 100 mm beside them change a translation by 0.1 um "
+        "per urad of rotation\n");
+  print_volume(found.volume);
+}
+
+}  // namespace
+
+CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
+  auto* measured = command.add_option(
+      "--measured", options.file,
+      "measured.csv: error motions that a device measured directly; compare A with them, table by\n"
+      "table and in the volume. Exit code 0: no table contradicts; 5: one does; 1: none can be\n"
+      "compared. `abbe example measured.csv` shows the columns");
+  command
+      .add_option("--straightness", options.straightness,
+                  "line that is removed from straightness errors, of both")
+      ->check(CLI::IsMember({"end-points", "least-squares"}))
+      ->needs(measured)
+      ->capture_default_str();
+  const auto add_u = [&](const char* name, double& value, const char* text) {
+    command.add_option(name, value, text)->check(CLI::NonNegativeNumber)->needs(measured);
+  };
+  add_u("--u-um", options.u_um, "standard uncertainty of the device: of a translation, each value");
+  add_u("--u-urad", options.u_urad, "standard uncertainty of the device: of an angle");
+  add_u("--u-ppm", options.u_ppm,
+        "standard uncertainty of the device: of lengths (wavelength, expansion)");
+  return measured;
+}
+
+Result<int> compare_with_measured(const calib::VolumetricModel& model,
+                                  const MeasuredOptions& options, bool json) {
+  const auto found = compared(model, options);
+  if (!found) return tl::make_unexpected(found.error());
+  json ? print_measured_json(*found, options) : print_measured_text(*found);
+
+  if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);
+  const bool none =
+      std::ranges::all_of(found->tables, [](const auto& table) { return table.points.empty(); });
+  return none ? exit_code(ErrorCode::DataInsufficient) : 0;
+}
+
+}  // namespace abbe::daemon

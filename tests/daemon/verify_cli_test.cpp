@@ -121,6 +121,33 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
 }
 
+TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {
+  const auto good = test::synthetic_document(3), other = test::synthetic_document(4);
+  write("good.json", to_json(good));
+  write("other.json", to_json(other));
+  const auto tool = good.model.tool_offsets_m().front();
+  std::vector<calib::verify::MeasuredPoint> points{{{1.0, 0.0, -0.2}, {1.0, 0.0, -0.2}}};
+  for (int i = 0; i < 64; ++i) {
+    const calib::Vector3 q(-0.3 + 0.2 * (i % 4), -0.3 + 0.2 * (i / 4 % 4), -0.4 + 0.1 * (i / 16));
+    points.push_back({q, q + tool + good.model.V_at(q, tool)});
+  }
+  points.front().measured_m += tool;
+  write("points.csv", to_verification_csv(points));
+
+  const auto ran = abbe("verify good.json other.json --points points.csv --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto object = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(object["points"], 65);
+  EXPECT_EQ(object["inside_all"], 64);
+  EXPECT_LT(object["models"][0]["after"]["max_um"].get<double>(), 1e-3);
+  EXPECT_EQ(object["models"][0]["effect"], "better");
+  EXPECT_EQ(object["models"][1]["effect"], "worse");
+  EXPECT_THAT(abbe("verify good.json other.json --points points.csv").out,
+              AllOf(HasSubstr("at 64 of 65 points"), HasSubstr("without a model"),
+                    HasSubstr("other.json")));
+  EXPECT_EQ(abbe("verify good.json other.json --points points.csv -o out").exit, 2);
+}
+
 /// Nodes every 50 mm, points farther apart: what interpolating between them costs is far above
 /// 0.09 um.
 std::string points_of_tables(const ModelDocument& document, double factor) {

@@ -40,40 +40,6 @@ Result<std::vector<Vector3>> left_after_fit(std::span<const Vector3> measured_m,
   return left;
 }
 
-/// Fills the results at the measured points: residual errors without and with the model.
-Result<void> compare_at_points(const Observations& o, const VolumetricModel& model,
-                               const Vector3& tool_m, Comparison& out) {
-  std::vector<Vector3> measured, readings, corrected;
-  for (std::size_t i = 0; i < o.readings_m.size(); ++i) {
-    if (!model.validity().contains(o.readings_m[i])) {
-      continue;
-    }
-    out.inside.push_back(i);
-    measured.push_back(o.measured_m[i]);
-    readings.push_back(o.readings_m[i]);
-    corrected.emplace_back(o.readings_m[i] + model.V_at(o.readings_m[i], tool_m));
-  }
-
-  if (out.inside.size() < kLeastPoints) {
-    return failure(
-        ErrorCode::TooFewObservations,
-        message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
-                " measured points are inside the model's validity volume, needs ", kLeastPoints));
-  }
-
-  auto before = left_after_fit(measured, readings), after = left_after_fit(measured, corrected);
-  if (!before || !after) {
-    return tl::make_unexpected(before ? after.error() : before.error());
-  }
-
-  out.residual_before_m = std::move(*before);
-  out.residual_after_m = std::move(*after);
-  out.before = vector_statistics(out.residual_before_m);
-  out.after = vector_statistics(out.residual_after_m);
-
-  return {};
-}
-
 /// BadInput for a step that gives too many grid points, for example a step in um instead of mm.
 Result<void> check_step(const evemu::ReadingBox& box, const Comparison& c) {
   constexpr double kMostPlaces = 1e6;
@@ -281,10 +247,9 @@ double percentile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
-/// A Comparison with origin, step and least distance from the options, or their defaults.
-Comparison with_options(const VolumetricModel& model, const Options& options) {
+/// Sets origin, step and least distance from the options, or their defaults.
+void set_options(Comparison& c, const VolumetricModel& model, const Options& options) {
   constexpr double kSteps = 20.0, kTenth = 0.1;
-  Comparison c;
   c.origin_m = options.origin_m;
   if (!c.origin_m && model.polynomials() != nullptr) {
     c.origin_m = model.polynomials()->ball1_m();
@@ -293,7 +258,6 @@ Comparison with_options(const VolumetricModel& model, const Options& options) {
   const Vector3 extent = 2.0 * box.half_width_m;
   c.step_m = (options.step_m.array() > 0.0).select(options.step_m, extent / kSteps);
   c.least_distance_m = c.origin_m ? options.least_distance_m.value_or(kTenth * extent.norm()) : 0.0;
-  return c;
 }
 
 }  // namespace
@@ -352,19 +316,55 @@ bool ratios_hold(const Comparison& c) noexcept {
   return c.interpolation_rms_m <= std::max(kMostInterpolation * c.after.rms_m, kNegligible_m);
 }
 
-Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
-                           const Vector3& tool_offset_m, const Options& options) {
-  if (!model.holds_for_tool(tool_offset_m)) {
+Result<Comparison> compare_at_points(const Observations& o, const VolumetricModel& model,
+                                     const Vector3& tool_m) {
+  if (!model.holds_for_tool(tool_m)) {
     return failure(ErrorCode::NotApplicable,
-                   message("verification for tool offset (", kMmPerM * tool_offset_m.transpose(),
+                   message("verification for tool offset (", kMmPerM * tool_m.transpose(),
                            ") mm: the model is not valid for it"));
   }
 
-  Comparison c = with_options(model, options);
-  if (auto done = compare_at_points(o, model, tool_offset_m, c); !done) {
-    return tl::make_unexpected(done.error());
+  Comparison out;
+  std::vector<Vector3> measured, readings, corrected;
+  for (std::size_t i = 0; i < o.readings_m.size(); ++i) {
+    if (!model.validity().contains(o.readings_m[i])) {
+      continue;
+    }
+    out.inside.push_back(i);
+    measured.push_back(o.measured_m[i]);
+    readings.push_back(o.readings_m[i]);
+    corrected.emplace_back(o.readings_m[i] + model.V_at(o.readings_m[i], tool_m));
   }
 
+  if (out.inside.size() < kLeastPoints) {
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("verification: ", out.inside.size(), " of ", o.readings_m.size(),
+                " measured points are inside the model's validity volume, needs ", kLeastPoints));
+  }
+
+  auto before = left_after_fit(measured, readings), after = left_after_fit(measured, corrected);
+  if (!before || !after) {
+    return tl::make_unexpected(before ? after.error() : before.error());
+  }
+
+  out.residual_before_m = std::move(*before);
+  out.residual_after_m = std::move(*after);
+  out.before = vector_statistics(out.residual_before_m);
+  out.after = vector_statistics(out.residual_after_m);
+
+  return out;
+}
+
+Result<Comparison> compare(const Observations& o, const VolumetricModel& model,
+                           const Vector3& tool_offset_m, const Options& options) {
+  auto at_points = compare_at_points(o, model, tool_offset_m);
+  if (!at_points) {
+    return at_points;
+  }
+
+  Comparison c = std::move(*at_points);
+  set_options(c, model, options);
   if (auto done = fill_grid(o, model, tool_offset_m, c); !done) {
     return tl::make_unexpected(done.error());
   }

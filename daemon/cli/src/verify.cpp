@@ -15,11 +15,13 @@
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
+#include "effect_name.hpp"
 #include "figures.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 #include "vector_option.hpp"
 #include "verification_points.hpp"
+#include "verify_several.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -27,7 +29,8 @@ namespace {
 namespace verify = calib::verify;
 
 struct VerifyArguments {
-  std::string model, points, recording, out;
+  std::vector<std::string> models;
+  std::string points, recording, out;
   std::string socket = DaemonSocket{}.socket;
   bool live = false;
   std::size_t count = 0;
@@ -96,12 +99,20 @@ Result<LivePoints> points_of(const VerifyArguments& arguments) {
   return points_of_daemon(*socket, arguments.count, keep_them);
 }
 
+Result<verify::Observations> observed_in(const VerifyArguments& arguments,
+                                         const VerificationFile& file) {
+  auto observed = verify::observe(
+      file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
+  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  return std::move(*observed);
+}
+
 /// Sets `cut_short` if points are missing, even if the comparison fails: the missing points may be
 /// the cause of its failure.
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());
-  auto document = model_named(arguments.model, arguments.store);
+  auto document = model_named(arguments.models.front(), arguments.store);
   if (!document) return tl::make_unexpected(document.error());
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
@@ -119,9 +130,8 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   cut_short = std::move(points->cut_short);
 
   VerificationFile& file = points->file;
-  auto observed = verify::observe(
-      file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
-  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  auto observed = observed_in(arguments, file);
+  if (!observed) return tl::make_unexpected(observed.error());
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
 
@@ -147,23 +157,11 @@ nlohmann::json figures(const verify::RatioStatistics& s) {
           {"share_above_1", static_cast<double>(s.above_1) / static_cast<double>(s.count)}};
 }
 
-const char* name(verify::Effect effect) {
-  switch (effect) {
-    case verify::Effect::Better:
-      return "better";
-    case verify::Effect::NotSeen:
-      return "not seen";
-    case verify::Effect::Worse:
-      return "worse";
-  }
-  return "";
-}
-
 void print_json(const VerifyOutcome& outcome) {
   const auto& c = outcome.verification.comparison;
   const auto& turned = c.turned;
   nlohmann::json object{
-      {"effect", name(verify::effect_at_points(c))},
+      {"effect", effect_name(verify::effect_at_points(c))},
       {"model", model_id(outcome.document)},
       {"points", outcome.verification.observations.readings_m.size()},
       {"inside", c.inside.size()},
@@ -247,11 +245,26 @@ int run(const VerifyArguments& arguments) {
   return cut_short ? report(*cut_short) : 0;
 }
 
+/// Several models at the same points.
+int run_several(const VerifyArguments& arguments) {
+  const auto models = models_named(arguments.models, arguments.store, arguments.tool);
+  if (!models) return report(models.error());
+  auto points = points_of(arguments);
+  if (!points) return report(points.error());
+  const auto observed = observed_in(arguments, points->file);
+  if (!observed) return report(observed.error());
+
+  const auto done = verify_several(*models, *observed, arguments.json);
+  const int code = done ? 0 : report(done.error());
+  return points->cut_short ? report(*points->cut_short) : code;
+}
+
 void add_options(CLI::App& command, VerifyArguments& arguments) {
   command
-      .add_option("MODEL", arguments.model,
+      .add_option("MODEL", arguments.models,
                   "model.json; or a model of the store: its id, the beginning of its id, or "
-                  "\"active\"")
+                  "\"active\";\nseveral: only the table of their residuals at the same "
+                  "points")
       ->required();
   add_store_options(command, arguments.store);
   auto* points = command.add_option(
@@ -322,8 +335,10 @@ void add_verify(CLI::App& parent, int& exit) {
     else if (arguments->live && arguments->out.empty())
       exit =
           report({ErrorCode::Usage, "verify --live: -o is required: the points are saved there"});
+    else if (arguments->models.size() > 1 && !arguments->points.empty() && !arguments->out.empty())
+      exit = report({ErrorCode::Usage, "verify: -o writes the report of one model; give one"});
     else
-      exit = run(*arguments);
+      exit = arguments->models.size() > 1 ? run_several(*arguments) : run(*arguments);
   });
 }
 

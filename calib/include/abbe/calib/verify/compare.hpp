@@ -90,6 +90,12 @@ inline constexpr double kMostInterpolation = 1.0 / 3.0;
 /// compensation, or less than 1 nm.
 [[nodiscard]] bool ratios_hold(const Comparison&) noexcept;
 
+/// The comparison at the measured points alone: inside, residuals, before, after. Predicts reference
+/// points ([Sanders 2023] section 2.2). NotApplicable: the model is not valid for the tool.
+/// TooFewObservations: fewer than 4 measured points inside the validity volume.
+[[nodiscard]] Result<Comparison> compare_at_points(const Observations&, const VolumetricModel&,
+                                                   const Vector3& tool_offset_m);
+
 /// NotApplicable: the model is not valid for the tool. TooFewObservations: fewer than 4 measured
 /// points inside the validity volume, or fewer than 4 grid points inside both the validity volume
 /// and the hull of the measured points. DegenerateGeometry: the origin is outside the hull of the

@@ -1,0 +1,110 @@
+#include "verify_several.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/verify/compare.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "effect_name.hpp"
+#include "figures.hpp"
+#include "vector_option.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace verify = calib::verify;
+
+/// The points at which all models are valid: the models are compared at the same points.
+verify::Observations inside_all(const verify::Observations& all,
+                                const std::vector<NamedModel>& models) {
+  verify::Observations common{.frame = all.frame, .T_machine_tracker = all.T_machine_tracker};
+  for (std::size_t i = 0; i < all.readings_m.size(); ++i) {
+    const bool inside = std::ranges::all_of(models, [&](const NamedModel& model) {
+      return model.document.model.validity().contains(all.readings_m[i]);
+    });
+    if (!inside) continue;
+    common.readings_m.push_back(all.readings_m[i]);
+    common.measured_m.push_back(all.measured_m[i]);
+    common.V_m.push_back(all.V_m[i]);
+  }
+  return common;
+}
+
+struct Predicted {
+  const NamedModel* model;
+  verify::Comparison at_points;
+};
+
+Result<std::vector<Predicted>> predictions(const std::vector<NamedModel>& models,
+                                           const verify::Observations& common) {
+  std::vector<Predicted> all;
+  for (const NamedModel& model : models) {
+    auto compared = verify::compare_at_points(common, model.document.model, model.tool_m);
+    if (!compared) {
+      const auto error = error_of(compared.error());
+      return fail(error.code, fmt::format("{}: {}", model.name, error.text));
+    }
+    all.push_back({&model, std::move(*compared)});
+  }
+  return all;
+}
+
+void print_predictions_json(const std::vector<Predicted>& all, std::size_t points,
+                            std::size_t compared) {
+  nlohmann::json object{
+      {"points", points}, {"inside_all", compared}, {"models", nlohmann::json::array()}};
+  for (const auto& [model, at_points] : all)
+    object["models"].push_back({{"name", model->name},
+                                {"model", model_id(model->document)},
+                                {"effect", effect_name(verify::effect_at_points(at_points))},
+                                {"before", vector_figures(at_points.before)},
+                                {"after", vector_figures(at_points.after)}});
+  fmt::print("{}\n", object.dump(1));
+}
+
+void print_prediction(const std::string& name, const char* effect,
+                      const calib::VectorStatistics& s) {
+  fmt::print("{:<32}  {:>9.3f}  {:>9.3f}  {:>9.3f}  {}\n", name, kUmPerM * s.mean_m,
+             kUmPerM * s.rms_m, kUmPerM * s.max_m, effect);
+}
+
+void print_predictions(const std::vector<Predicted>& all, std::size_t points,
+                       std::size_t compared) {
+  fmt::print("residual errors at {} of {} points, where all models are valid, um\n", compared,
+             points);
+  fmt::print("{:<32}  {:>9}  {:>9}  {:>9}  {}\n", "model", "mean", "rms", "largest", "effect");
+  print_prediction("without a model", "", all.front().at_points.before);
+  for (const auto& [model, at_points] : all)
+    print_prediction(model->name, effect_name(verify::effect_at_points(at_points)),
+                     at_points.after);
+}
+
+}  // namespace
+
+Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& names,
+                                             const StoreOption& store, const std::string& tool) {
+  std::vector<NamedModel> models;
+  for (const std::string& name : names) {
+    auto document = model_named(name, store);
+    if (!document) return tl::make_unexpected(document.error());
+    const auto tool_m = tool_of(tool, document->model);
+    if (!tool_m) return tl::make_unexpected(tool_m.error());
+    models.push_back({name, std::move(*document), *tool_m});
+  }
+  return models;
+}
+
+Result<void> verify_several(const std::vector<NamedModel>& models,
+                            const verify::Observations& observed, bool json) {
+  const verify::Observations common = inside_all(observed, models);
+  const auto all = predictions(models, common);
+  if (!all) return tl::make_unexpected(all.error());
+  const std::size_t points = observed.readings_m.size(), compared = common.readings_m.size();
+  json ? print_predictions_json(*all, points, compared) : print_predictions(*all, points, compared);
+  return {};
+}
+
+}  // namespace abbe::daemon

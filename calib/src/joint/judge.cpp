@@ -142,7 +142,8 @@ Result<HeldOutFigures> held_out(std::span<const Part> parts, std::span<const Run
       const auto predicted_m = [&](std::size_t row) {
         return otf::predicted_by_model(o, row, **model);
       };
-      sums.add(o, runs[k].held_out_rows(f), predicted_m, active);
+      sums.add(o, runs[k].held_out_rows(f), predicted_m, active,
+               [](std::size_t, double, double) {});
     }
     if (options.progress) {
       options.progress(otf::Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));

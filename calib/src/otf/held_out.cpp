@@ -112,7 +112,8 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
 }
 
 Result<HeldOutFigures> held_out(std::span<const Observations> observed,
-                                const VolumetricModel* active, const Options& options) {
+                                const VolumetricModel* active, const Options& options,
+                                const HeldOutRow& row) {
   const std::size_t folds = options.held_out_folds;
   std::vector<RunByFold> runs;
   std::size_t all_rows = 0;
@@ -141,8 +142,14 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
     for (std::size_t k = 0; k < fit->rows.size(); ++k) {
       const Observations& o = observed[k];
       const Eigen::VectorXd U = unknowns.part(fit->U, k);
+      const auto of_run = [&](std::size_t i, double no_compensation_m, double candidate_m) {
+        if (row) {
+          row(k, i, no_compensation_m, candidate_m);
+        }
+      };
       sums.add(
-          o, fit->rows[k], [&](std::size_t row) { return predicted_by_fit(o, row, U); }, active);
+          o, fit->rows[k], [&](std::size_t i) { return predicted_by_fit(o, i, U); }, active,
+          of_run);
     }
     if (options.progress) {
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));

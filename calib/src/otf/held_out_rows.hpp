@@ -38,10 +38,10 @@ inline Vector6 rigid_row(const Observations& o, std::size_t row) {
 }
 
 /// Removes the best-fit rigid motion from the residuals of the held-out rows and adds the squares
-/// of the remaining residuals to `total`.
-inline void add_without_rigid(Remainder& total, const Observations& o,
-                              std::span<const std::size_t> rows,
-                              std::span<const double> residual_m) {
+/// of the remaining residuals to `total`. Returns the remaining residuals [m].
+inline std::vector<double> add_without_rigid(Remainder& total, const Observations& o,
+                                             std::span<const std::size_t> rows,
+                                             std::span<const double> residual_m) {
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 g = Vector6::Zero();
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -54,14 +54,18 @@ inline void add_without_rigid(Remainder& total, const Observations& o,
   // Complete orthogonal decomposition: a fold with few legs may not determine the whole rigid
   // motion; the undetermined part is then set to zero.
   const Vector6 rigid = H.completeOrthogonalDecomposition().solve(g);
+  std::vector<double> left_m;
+  left_m.reserve(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double rest_m = residual_m[i] - rigid_row(o, rows[i]).dot(rigid);
+    left_m.push_back(rest_m);
     const double whitened = rest_m / o.rows[rows[i]].sigma_m;
     total.whitened_squares += whitened * whitened;
     total.squares_m2 += rest_m * rest_m;
   }
 
   total.rows += rows.size();
+  return left_m;
 }
 
 /// Prediction of y by a model, averaged over the sub-points of the row, as the row is. The model
@@ -108,15 +112,21 @@ struct HeldOutSums {
   Remainder none, candidate, candidate_beside_other, other;
 
   /// `predicted_m(row)`: the prediction of the candidate, which was not fitted to `rows`.
-  template <class Prediction>
+  /// `left(row, none_m, candidate_m)` gets what remains of the residuals of each row.
+  template <class Prediction, class Left>
   void add(const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
-           const VolumetricModel* other_model) {
+           const VolumetricModel* other_model, Left left) {
     // A best-fit rigid motion fits as few rows as it has unknowns exactly.
     if (rows.size() <= kRigidUnknowns) {
       return;
     }
-    add_without_rigid(none, o, rows, residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
-    add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, predicted_m));
+    const std::vector<double> none_m = add_without_rigid(
+        none, o, rows, residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
+    const std::vector<double> candidate_m =
+        add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, predicted_m));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      left(rows[i], none_m[i], candidate_m[i]);
+    }
 
     if (other_model == nullptr || !other_model->holds_for_tool(o.target_offset_m)) {
       return;

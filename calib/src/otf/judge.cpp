@@ -95,13 +95,13 @@ void note_set_aside(Verdict& verdict, const Observations& o, const std::string& 
 
 Result<Verdict> judge(const Observations& measured, const Solution& solution,
                       const VolumetricModel* active, const GateLimits& limits,
-                      const Options& options) {
-  return judge(std::span(&measured, 1), std::span(&solution, 1), active, limits, options);
+                      const Options& options, const HeldOutRow& row) {
+  return judge(std::span(&measured, 1), std::span(&solution, 1), active, limits, options, row);
 }
 
 Result<Verdict> judge(std::span<const Observations> measured, std::span<const Solution> solutions,
                       const VolumetricModel* active, const GateLimits& limits,
-                      const Options& options) {
+                      const Options& options, const HeldOutRow& row) {
   const Tables tables = measured.size() > 1 ? Tables::OfSeveralRuns : Tables::OfThisRun;
   std::vector<Observations> runs;
   std::vector<std::vector<Alternative>> others;
@@ -115,7 +115,7 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     others.push_back(*std::move(of_run));
   }
 
-  const Result<HeldOutFigures> figures = held_out(runs, active, options);
+  const Result<HeldOutFigures> figures = held_out(runs, active, options, row);
   if (!figures) {
     return tl::unexpected(figures.error());
   }

@@ -11,11 +11,20 @@
 /// and active model separately, and the remaining residuals are compared. So the comparison is also
 /// independent of the gauges.
 
+#include <cstddef>
+#include <functional>
+#include <span>
+
 #include "abbe/calib/gate.hpp"
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "abbe/calib/otf/solve.hpp"
 
 namespace abbe::calib::otf {
+
+/// Called once for each held-out row: residuals [m] of no compensation and of the candidate that
+/// remain after removal of the best-fit rigid motion. `row`: index in Observations::rows of the run.
+using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double no_compensation_m,
+                                      double candidate_m)>;
 
 /// `active`, the model in use, may be null. The active model is compared on the rows inside its
 /// validity volume, and not at all if it is not valid for the target offset of this run. If a node
@@ -27,17 +36,18 @@ namespace abbe::calib::otf {
 
 /// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each run.
 [[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
-                                              const VolumetricModel* active, const Options& = {});
+                                              const VolumetricModel* active, const Options& = {},
+                                              const HeldOutRow& row = {});
 
 /// Runs held_out(), decide() and alternatives(). The model is also refused if an alternative
 /// changes it by more than its uncertainty, or if the uncertainty is more than half the correction.
 [[nodiscard]] Result<Verdict> judge(const Observations&, const Solution&,
                                     const VolumetricModel* active, const GateLimits& = {},
-                                    const Options& = {});
+                                    const Options& = {}, const HeldOutRow& row = {});
 /// The same for the joint adjustment of several runs (targets.hpp): one solution per run, all with
 /// the same model. The evidence for the orientation of the path is that of the first run.
 [[nodiscard]] Result<Verdict> judge(std::span<const Observations>, std::span<const Solution>,
                                     const VolumetricModel* active, const GateLimits& = {},
-                                    const Options& = {});
+                                    const Options& = {}, const HeldOutRow& row = {});
 
 }  // namespace abbe::calib::otf

@@ -1,0 +1,61 @@
+#include "abbe/calib/otf/placed_residuals.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "abbe/calib/otf/identify.hpp"
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::otf;
+using namespace abbe::tests::otf;
+
+/// The point of the path at a length from its first vertex.
+Vector3 on_path(const Path& path, double way_m) {
+  for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
+    const Vector3 leg_m = path.vertices_m[i + 1] - path.vertices_m[i];
+    if (way_m <= leg_m.norm()) return path.vertices_m[i] + way_m * leg_m.normalized();
+    way_m -= leg_m.norm();
+  }
+  return path.vertices_m.back();
+}
+
+TEST(PlacedResiduals, AreAtTheirPlacesOnThePath) {
+  const MadeRun run = make_run({});
+  const auto id = *identify(run.samples, run.machine, run.path, run.noise, run.options);
+  const auto placed = placed_residuals(id.observations, id.solution.residuals);
+  ASSERT_EQ(placed.size(), id.observations.rows.size());
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    EXPECT_LT((placed[i].axis_position_m - on_path(run.path, placed[i].way_m)).norm(), 1e-9);
+    EXPECT_EQ(placed[i].after_m, id.solution.residuals.after_m[i]);
+    EXPECT_FALSE(placed[i].held_out);
+  }
+}
+
+TEST(PlacedResiduals, OfHeldOutRowsGiveTheFiguresOfTheVerdict) {
+  const MadeRun run = make_run({});
+  const auto id = *identify(run.samples, run.machine, run.path, run.noise, run.options);
+  std::vector<std::vector<PlacedResidual>> runs{
+      placed_residuals(id.observations, id.solution.residuals)};
+  const auto verdict =
+      judge(id.observations, id.solution, nullptr, {}, run.options, held_out_into(runs));
+  ASSERT_TRUE(verdict);
+
+  double none = 0.0, candidate = 0.0;
+  std::size_t count = 0;
+  for (const PlacedResidual& r : runs.front()) {
+    if (!r.held_out) continue;
+    ++count;
+    none += std::pow(r.held_out->no_compensation_m / r.sigma_m, 2);
+    candidate += std::pow(r.held_out->candidate_m / r.sigma_m, 2);
+  }
+  const auto n = static_cast<double>(count);
+  EXPECT_EQ(count, verdict->held_out.observations);
+  EXPECT_NEAR(std::sqrt(none / n), verdict->held_out.no_compensation,
+              1e-9 * verdict->held_out.no_compensation);
+  EXPECT_NEAR(std::sqrt(candidate / n), verdict->held_out.candidate, 1e-9);
+}
+
+}  // namespace

@@ -17,6 +17,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "abbe_command.hpp"
+#include "report_page.hpp"
 #include "synthetic_otf_run.hpp"
 #include "warm_scales.hpp"
 
@@ -123,6 +124,27 @@ TEST_F(Cli, WritesAReportThatNeedsNoNetwork) {
   }
   EXPECT_THAT(page, Not(HasSubstr("src=")));
   EXPECT_THAT(page, Not(HasSubstr("<link")));
+}
+
+TEST_F(Cli, WritesAReportWhoseFiguresHaveTheDataOfTheModel) {
+  for (const std::string options : {"", "--tables cubic", "--backlash=forward-backward"}) {
+    const fs::path out = folder_ / "figures";
+    ASSERT_EQ(identify(files_.path, files_.tracker, out, options).exit, 0) << options;
+    const std::string page = text_of(out / "report.html");
+    EXPECT_TRUE(test::every_figure_has_data(page)) << options;
+    EXPECT_EQ(test::maps_of(page).size(), 3u) << options;
+    const auto charts = test::charts_of(page);
+    EXPECT_FALSE(test::dataset_of(charts, "normal distribution").is_null());
+
+    const auto document = read_model(out / "model.json");
+    ASSERT_TRUE(document);
+    for (const auto& p : document->model.parameters()) {
+      if (!p.position_m || *p.position_m > -0.059) continue;  // the first node of each table
+      EXPECT_NEAR(test::dataset_of(charts, p.name)["data"][0]["y"].get<double>(), 1e6 * p.value,
+                  1e-6)
+          << p.name << options;
+    }
+  }
 }
 
 TEST_F(Cli, KeepsAModelWithTheVerdictAgainstTheActiveOne) {

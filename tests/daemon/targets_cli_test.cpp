@@ -12,6 +12,7 @@
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe_command.hpp"
+#include "report_page.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {
@@ -76,6 +77,10 @@ TEST_F(TargetsCli, DetermineAll18TablesForAnyTool) {
   ASSERT_TRUE(document) << document.error().text;
   EXPECT_EQ(document->model.tables()->layout().tables().size(), 18u);
   EXPECT_EQ(document->inputs.size(), 5u);
+  const std::string page = test::text_of(folder_ / "all/report.html");
+  EXPECT_TRUE(test::every_figure_has_data(page));
+  for (const auto& p : document->model.parameters())
+    EXPECT_EQ(test::dataset_of(test::charts_of(page), p.name).is_null(), !p.position_m) << p.name;
 
   // A tool that no run had. The simulator has exact transforms, the model is linear: 10 nm.
   const Vector3 tool_m(-0.1, 0.2, 0.05);

@@ -61,7 +61,7 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
       otf_document(candidate.solution, candidate.mode, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
-          std::move(candidate.solution.residuals),
+          std::move(candidate.residuals),
           std::move(candidate.verdict),
           s.blocks,
           s.blocks_used,
@@ -153,8 +153,11 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   if (!found) return tl::make_unexpected(error_of(found.error()));
 
   const auto other = comparison_model(active, files->config);
-  auto verdict = otf::judge(found->observations, found->solution, other.model,
-                            gate_limits(files->config.gate), options);
+  std::vector<RunResiduals> residuals{
+      otf::placed_residuals(found->observations, found->solution.residuals)};
+  auto verdict =
+      otf::judge(found->observations, found->solution, other.model, gate_limits(files->config.gate),
+                 options, otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.add_note(*verdict);
   if (files->encoder && *compared == 0)
@@ -163,8 +166,9 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   if (auto air = unmeasured_air_text(files->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
-  return OtfFromFiles{std::move(files->config), std::move(files->sources), noise, options.mode,
-                      *std::move(found),        std::move(*verdict)};
+  return OtfFromFiles{
+      std::move(files->config), std::move(files->sources), noise, options.mode, *std::move(found),
+      std::move(*verdict),      std::move(residuals)};
 }
 
 namespace {
@@ -173,7 +177,8 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                               const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto run = identify_files(arguments, active, bar);
   if (!run) return tl::make_unexpected(run.error());
-  return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode},
+  return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode,
+                     std::move(run->residuals)},
                     run->config, std::move(run->sources));
 }
 

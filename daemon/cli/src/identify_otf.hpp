@@ -31,7 +31,7 @@ struct IdentifyOtfArguments {
 
 struct OtfOutcome {
   ModelDocument document;
-  calib::otf::Residuals residuals;
+  std::vector<RunResiduals> residuals;  ///< see OtfCandidate
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
   calib::otf::RangeOffset range_offset;
@@ -63,6 +63,7 @@ struct OtfFromFiles {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   calib::otf::Identification found;
   calib::Verdict verdict;
+  std::vector<RunResiduals> residuals;
 };
 /// Identifies one run from the files --machine, --path, --tracker and --encoder.
 [[nodiscard]] Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,

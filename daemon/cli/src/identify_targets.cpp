@@ -89,16 +89,19 @@ Result<void> check_runs(const IdentifyOtfArguments& arguments, TargetRuns& all) 
   return check_path(arguments.path, all.path, all.config);
 }
 
-/// One solution with the statistics and residuals of all runs.
+/// The residuals of every run.
+std::vector<RunResiduals> residuals_of(const calib::otf::TargetsIdentification& found) {
+  std::vector<RunResiduals> runs;
+  for (std::size_t k = 0; k < found.solutions.size(); ++k)
+    runs.push_back(
+        calib::otf::placed_residuals(found.observations[k], found.solutions[k].residuals));
+  return runs;
+}
+
+/// One solution with the statistics of all runs.
 calib::otf::Solution of_all_runs(calib::otf::TargetsIdentification found) {
   calib::otf::Solution all = std::move(found.solutions.front());
   all.statistics = found.statistics;
-  for (std::size_t k = 1; k < found.solutions.size(); ++k) {
-    const calib::otf::Residuals& more = found.solutions[k].residuals;
-    auto& to = all.residuals;
-    to.before_m.insert(to.before_m.end(), more.before_m.begin(), more.before_m.end());
-    to.after_m.insert(to.after_m.end(), more.after_m.begin(), more.after_m.end());
-  }
   return all;
 }
 
@@ -130,15 +133,18 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   if (!found) return tl::make_unexpected(error_of(found.error()));
 
   const auto other = comparison_model(active, all->config);
+  std::vector<RunResiduals> residuals = residuals_of(*found);
   auto verdict = calib::otf::judge(found->observations, found->solutions, other.model,
-                                   gate_limits(all->config.gate), options);
+                                   gate_limits(all->config.gate), options,
+                                   calib::otf::held_out_into(residuals));
   if (!verdict) return tl::make_unexpected(error_of(verdict.error()));
   other.add_note(*verdict);
   if (auto air = unmeasured_air_text(all->config, noise.u_scale))
     verdict->notes.push_back(*std::move(air));
 
-  return outcome_of({of_all_runs(std::move(*found)), std::move(*verdict), options.mode},
-                    all->config, std::move(all->sources));
+  return outcome_of(
+      {of_all_runs(std::move(*found)), std::move(*verdict), options.mode, std::move(residuals)},
+      all->config, std::move(all->sources));
 }
 
 }  // namespace abbe::daemon

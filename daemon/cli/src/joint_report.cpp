@@ -6,6 +6,7 @@
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "abbe/methods/otf/report.hpp"
 #include "abbe/report/html_report.hpp"
+#include "abbe/report/model_figures.hpp"
 #include "abbe/report/sections.hpp"
 #include "identified_model.hpp"
 
@@ -185,6 +186,7 @@ std::string joint_report(const JointOutcome& outcome) {
   add_pairs(page, outcome);
   add_uncertainties(page, outcome);
   add_error_tables(page, outcome.document.model);
+  add_volume_maps(page, outcome.document.model);
   add_model_origin(page, outcome.document, outcome.document.inputs,
                    {{"rank, condition",
                      fmt::format("{}, {:.3g}", outcome.joint.rank, outcome.joint.condition)}});

@@ -23,13 +23,6 @@ std::string um_text(double length_m, int decimals) {
   return fmt::format("{:.{}f} um", length_m * kUmPerM, decimals);
 }
 
-std::vector<double> in_um(const std::vector<double>& lengths_m) {
-  std::vector<double> out;
-  out.reserve(lengths_m.size());
-  for (const double m : lengths_m) out.push_back(m * kUmPerM);
-  return out;
-}
-
 void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
                  int decimals) {
   page.heading("Verdict");

@@ -10,6 +10,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/report/html_report.hpp"
+#include "abbe/report/model_figures.hpp"
 #include "abbe/report/sections.hpp"
 
 namespace abbe::daemon {
@@ -126,7 +127,7 @@ void add_residuals(HtmlReport& page, const evemu::Observations& o,
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       const auto name = fmt::format("position {}", o.rows[i].position);
       if (chart.curves.empty() || chart.curves.back().name != name)
-        chart.curves.push_back({name, {}, {}, {}});
+        chart.curves.push_back({.name = name, .x = {}, .y = {}});
       chart.curves.back().x.push_back(o.rows[i].ball);
       chart.curves.back().y.push_back(solution.residuals_m[i](c) * kUmPerM);
     }
@@ -195,6 +196,7 @@ void add_coefficients(HtmlReport& page, const evemu::EvemuModel& model,
 /// A chart shows only the part inside the model's validity volume.
 void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
   page.heading("V through the middle of the volume");
+  page.paragraph("Bands: expanded uncertainty U = 2 u (coverage factor k = 2).");
   const auto& box = model.polynomials()->design().box();
   const calib::Vector3 tool = model.tool_offsets_m().front();
   constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
@@ -203,8 +205,10 @@ void add_sections(HtmlReport& page, const calib::VolumetricModel& model) {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     LineChart chart{fmt::format("along {}", kNames[static_cast<std::size_t>(axis)]),
                     fmt::format("{}, mm", kNames[static_cast<std::size_t>(axis)]),
-                    "um, band: 2 u",
-                    {{"V x", {}, {}, {}}, {"V y", {}, {}, {}}, {"V z", {}, {}, {}}}};
+                    "error, um",
+                    {{.name = "V x", .x = {}, .y = {}},
+                     {.name = "V y", .x = {}, .y = {}},
+                     {.name = "V z", .x = {}, .y = {}}}};
     for (int k = 0; k <= kSteps; ++k) {
       calib::Vector3 q = box.centre_m;
       q(axis) += box.half_width_m(axis) * (2.0 * k / kSteps - 1.0);
@@ -247,6 +251,7 @@ std::string evemu_report(const ModelDocument& document, const evemu::Observation
   add_poses(page, solution);
   if (solution.sparse) add_choice(page, *solution.sparse);
   add_sections(page, document.model);
+  add_volume_maps(page, document.model);
   add_coefficients(page, *document.model.polynomials(), solution);
   add_origin(page, document, solution);
   return page.text();

@@ -53,12 +53,16 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
   noise.u_axis_scale = run.u_axis_scale;
   auto found = calib::otf::identify(points, *machine, otf_path(run.path_m), noise, options);
   if (!found) return tl::unexpected(error_of(found.error()));
-  auto verdict = calib::otf::judge(found->observations, found->solution, active,
-                                   gate_limits(config.gate), options);
+  std::vector<RunResiduals> residuals{
+      calib::otf::placed_residuals(found->observations, found->solution.residuals)};
+  auto verdict =
+      calib::otf::judge(found->observations, found->solution, active, gate_limits(config.gate),
+                        options, calib::otf::held_out_into(residuals));
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
 
-  return OtfCandidate{std::move(found->solution), std::move(*verdict), run.mode};
+  return OtfCandidate{std::move(found->solution), std::move(*verdict), run.mode,
+                      std::move(residuals)};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

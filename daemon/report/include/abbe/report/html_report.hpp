@@ -3,25 +3,33 @@
 /// needs no network, because it contains Chart.js. One thread.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include "abbe/report/value_maps.hpp"
 
 namespace abbe::daemon {
 
-/// Points connected by lines. `u`, if not empty, is the standard uncertainty of y and is drawn as a
-/// band from y - 2 u to y + 2 u.
+/// Points connected by lines. If `u` is not empty, it is the standard uncertainty of y, and a band
+/// from y - 2 u to y + 2 u is drawn; else, if `low` and `high` are not empty, a band between them.
 struct Curve {
   std::string name;
-  std::vector<double> x, y, u;
+  std::vector<double> x, y, u{};
+  std::vector<double> low{}, high{};
+  std::size_t dot_every = 1;  ///< dots at the points 0, n, 2 n ..; 0: no dots
 };
 
 struct LineChart {
   std::string title, x_label, y_label;
-  std::vector<Curve> curves;
+  std::vector<Curve> curves{};
+  bool wide = false;  ///< as wide as the page, else two charts share a row
 };
 
-/// Counts of values in `bins` equal intervals from the smallest to the largest value of all series.
+/// Counts of values in equal intervals from the smallest to the largest value of all series. The
+/// width of the intervals is a round number, so that there are `bins` of them or fewer.
 struct Histogram {
   struct Series {
     std::string name;
@@ -30,6 +38,10 @@ struct Histogram {
   std::string title, x_label;
   std::vector<Series> series;
   std::size_t bins = 40;
+  /// Adds the counts expected of a normal distribution with mean 0 and this standard deviation, for
+  /// the values of the first series.
+  std::optional<double> normal_sd{};
+  bool wide = false;  ///< as wide as the page
 };
 
 /// Vectors in a plane: each is a line that begins at a dot and has `magnification` times the length
@@ -44,6 +56,7 @@ struct VectorChart {
   double magnification = 1.0;
 };
 
+/// Any text may be given: it is escaped. The page has the width of a printed A4 page.
 class HtmlReport {
  public:
   explicit HtmlReport(std::string_view title);
@@ -57,12 +70,13 @@ class HtmlReport {
   void chart(const LineChart&);
   void chart(const Histogram&);
   void chart(const VectorChart&);
+  void maps(const ValueMaps&);
 
   /// The complete page.
   [[nodiscard]] std::string text() const;
 
  private:
-  void canvas(std::string_view configuration);
+  void canvas(std::string_view configuration, bool wide = false);
 
   std::string title_, body_;
   std::size_t charts_ = 0;

@@ -15,7 +15,6 @@ namespace abbe::daemon {
 
 /// "12.35 um".
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
-[[nodiscard]] std::vector<double> in_um(const std::vector<double>& lengths_m);
 
 /// Adds the verdict of the gate and the values on which it is based. `held_out`: name of the groups
 /// of observations that were excluded from the fit, "legs" or "positions".

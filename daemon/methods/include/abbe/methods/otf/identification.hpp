@@ -13,6 +13,7 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/calib/gate.hpp"
+#include "abbe/calib/otf/placed_residuals.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/identification_watch.hpp"
@@ -34,10 +35,13 @@ struct OtfRun {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
 };
 
+using RunResiduals = std::vector<calib::otf::PlacedResidual>;
+
 struct OtfCandidate {
   calib::otf::Solution solution;
   calib::Verdict verdict;
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
+  std::vector<RunResiduals> residuals{};  ///< one element, or one per run of several targets
 };
 
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there

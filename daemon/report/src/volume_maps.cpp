@@ -1,0 +1,212 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "abbe/base/units.hpp"
+#include "abbe/report/model_figures.hpp"
+#include "abbe/report/sections.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::Axis;
+using calib::Vector3;
+
+constexpr std::size_t kMostCells = 20, kMostCellsOfLeftErrors = 8, kFewestCells = 4;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// `count` + 1 equidistant edges.
+std::vector<double> edges(double first, double last, std::size_t count) {
+  std::vector<double> all;
+  for (std::size_t i = 0; i <= count; ++i)
+    all.push_back(first + (last - first) * static_cast<double>(i) / static_cast<double>(count));
+  return all;
+}
+
+std::vector<double> in_mm(const std::vector<double>& lengths_m) {
+  std::vector<double> out;
+  for (const double m : lengths_m) out.push_back(m * kMmPerM);
+  return out;
+}
+
+/// Index of the interval between two edges that holds the value; that of the nearest one outside.
+template <class Edges>
+std::size_t interval_of(const Edges& edges, double value) {
+  const auto above = std::upper_bound(edges.begin() + 1, edges.end() - 1, value);
+  return static_cast<std::size_t>(above - edges.begin()) - 1;
+}
+
+double component(const Vector3& q, Axis axis) {
+  return q(static_cast<Eigen::Index>(index(axis)));
+}
+
+/// Three maps without values.
+ValueMaps empty_maps(const VolumeCuts& cuts, std::string title, std::string scale_label) {
+  ValueMaps maps{.title = std::move(title),
+                 .x_label = fmt::format("{}, mm", letter(cuts.x)),
+                 .y_label = fmt::format("{}, mm", letter(cuts.y)),
+                 .scale_label = std::move(scale_label),
+                 .maps = {}};
+  const std::size_t cells = (cuts.x_edges_m.size() - 1) * (cuts.y_edges_m.size() - 1);
+  for (std::size_t k = 0; k < 3; ++k)
+    maps.maps.push_back(
+        {.title = fmt::format("{} = {:.0f} mm", letter(cuts.across), cuts.cut_m(k) * kMmPerM),
+         .x_edges = in_mm(cuts.x_edges_m),
+         .y_edges = in_mm(cuts.y_edges_m),
+         .values = std::vector<double>(cells, kNone)});
+  return maps;
+}
+
+/// Mean and largest value of all cells: "mean 41.2 um, largest 96.1 um".
+std::string summary(const ValueMaps& maps) {
+  double sum = 0.0, largest = 0.0;
+  std::size_t count = 0;
+  for (const ValueMap& map : maps.maps) {
+    for (const double v : map.values) {
+      if (std::isnan(v)) continue;
+      sum += v;
+      largest = std::max(largest, v);
+      ++count;
+    }
+  }
+
+  if (count == 0) return "no cell of the maps is inside the validity volume";
+  return fmt::format("mean {:.2f} um, largest {:.2f} um", sum / static_cast<double>(count),
+                     largest);
+}
+
+struct ModelMaps {
+  ValueMaps V, U;
+};
+
+/// |V| and U(V) at the middles of the cells.
+ModelMaps maps_of(const calib::VolumetricModel& model) {
+  const VolumeCuts cuts = volume_cuts(model.validity(), kMostCells);
+  ModelMaps maps{empty_maps(cuts, "Before: error |V| of the machine without compensation", "um"),
+                 empty_maps(cuts, "After: expanded uncertainty U(V), k = 2", "um")};
+  const std::size_t columns = cuts.x_edges_m.size() - 1, rows = cuts.y_edges_m.size() - 1;
+  Vector3 q = Vector3::Zero();
+
+  for (std::size_t slab = 0; slab < 3; ++slab) {
+    q(static_cast<Eigen::Index>(index(cuts.across))) = cuts.cut_m(slab);
+    for (std::size_t i = 0; i < columns * rows; ++i) {
+      const std::size_t c = i % columns, r = i / columns;
+      q(static_cast<Eigen::Index>(index(cuts.x))) =
+          0.5 * (cuts.x_edges_m[c] + cuts.x_edges_m[c + 1]);
+      q(static_cast<Eigen::Index>(index(cuts.y))) =
+          0.5 * (cuts.y_edges_m[r] + cuts.y_edges_m[r + 1]);
+      const auto e = model.error_at(q, model.tool_offsets_m().front());
+      if (!e.inside) continue;
+      maps.V.maps[slab].values[i] = e.V_m.norm() * kUmPerM;
+      maps.U.maps[slab].values[i] = 2.0 * std::sqrt(e.cov_V_m2.trace()) * kUmPerM;
+    }
+  }
+
+  return maps;
+}
+
+double rms(std::span<const LeftError> left, double LeftError::*member) {
+  double squares = 0.0;
+  for (const LeftError& one : left) squares += one.*member * one.*member;
+  return std::sqrt(squares / static_cast<double>(left.size()));
+}
+
+/// rms of LeftError::after_m in every cell of a slab.
+ValueMaps map_of(std::span<const LeftError> left, const calib::ValidityVolume& volume) {
+  const VolumeCuts cuts = volume_cuts(volume, kMostCellsOfLeftErrors);
+  ValueMaps maps = empty_maps(
+      cuts, "After: residual of observations to which the model was not fitted, rms", "um");
+  for (std::size_t k = 0; k < 3; ++k)
+    maps.maps[k].title =
+        fmt::format("{} from {:.0f} to {:.0f} mm", letter(cuts.across),
+                    cuts.slab_edges_m[k] * kMmPerM, cuts.slab_edges_m[k + 1] * kMmPerM);
+  const std::size_t columns = cuts.x_edges_m.size() - 1;
+  std::array<std::vector<double>, 3> squares, counts;
+  for (std::size_t k = 0; k < 3; ++k)
+    squares[k] = counts[k] = std::vector<double>(maps.maps[k].values.size(), 0.0);
+
+  for (const LeftError& one : left) {
+    const std::size_t slab =
+        interval_of(cuts.slab_edges_m, component(one.axis_position_m, cuts.across));
+    const std::size_t cell =
+        interval_of(cuts.x_edges_m, component(one.axis_position_m, cuts.x)) +
+        columns * interval_of(cuts.y_edges_m, component(one.axis_position_m, cuts.y));
+    squares[slab][cell] += one.after_m * one.after_m;
+    counts[slab][cell] += 1.0;
+  }
+
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t i = 0; i < counts[k].size(); ++i)
+      if (counts[k][i] > 0.0)
+        maps.maps[k].values[i] = std::sqrt(squares[k][i] / counts[k][i]) * kUmPerM;
+  return maps;
+}
+
+}  // namespace
+
+VolumeCuts volume_cuts(const calib::ValidityVolume& volume, std::size_t most) {
+  Vector3 low = volume.vertices_m().front(), high = low;
+  for (const Vector3& q : volume.vertices_m()) {
+    low = low.cwiseMin(q);
+    high = high.cwiseMax(q);
+  }
+  const Vector3 size = high - low;
+
+  VolumeCuts cuts;
+  for (const Axis axis : {Axis::Y, Axis::X})  // of equal sides: Z
+    if (component(size, axis) < component(size, cuts.across)) cuts.across = axis;
+  cuts.x = cuts.across == Axis::X ? Axis::Y : Axis::X;
+  cuts.y = cuts.across == Axis::Z ? Axis::Y : Axis::Z;
+  for (std::size_t i = 0; i < cuts.slab_edges_m.size(); ++i)
+    cuts.slab_edges_m[i] =
+        component(low, cuts.across) + component(size, cuts.across) * static_cast<double>(i) / 3.0;
+
+  const double longer = std::max(component(size, cuts.x), component(size, cuts.y));
+  const auto edges_of = [&](Axis axis) {
+    const double cells = std::round(static_cast<double>(most) * component(size, axis) / longer);
+    return edges(component(low, axis), component(high, axis),
+                 std::max(kFewestCells, static_cast<std::size_t>(cells)));
+  };
+  cuts.x_edges_m = edges_of(cuts.x);
+  cuts.y_edges_m = edges_of(cuts.y);
+
+  return cuts;
+}
+
+void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
+                     std::span<const LeftError> left) {
+  if (model.validity().vertices_m().empty()) return;
+  page.heading("Volume before and after");
+  const Vector3 tool_mm = model.tool_offsets_m().front() * kMmPerM;
+  page.paragraph(fmt::format(
+      "Three cuts through the volume in which the model is valid, for the tool offset {:.1f}, "
+      "{:.1f}, {:.1f} mm. V: actual minus nominal position, in the gauge of the model, without a "
+      "rigid motion of the whole volume. Cells outside the volume or without data are hatched. "
+      "Each row has its own scale.",
+      tool_mm.x(), tool_mm.y(), tool_mm.z()));
+
+  const ModelMaps maps = maps_of(model);
+  page.maps(maps.V);
+  page.maps(maps.U);
+  page.facts({{"before, |V|", summary(maps.V)},
+              {"after, U(V): what remains, as far as the model states it", summary(maps.U)}});
+  page.paragraph(
+      "U(V): twice the root of the sum of the variances of the three components (coverage factor k "
+      "= 2). The error that is left after compensation is not zero but of this size.");
+  if (left.empty()) return;
+
+  page.maps(map_of(left, model.validity()));
+  page.facts(
+      {{"before, rms of one component", um_text(rms(left, &LeftError::before_m), 3)},
+       {"after", um_text(rms(left, &LeftError::after_m), 3)},
+       {"standard uncertainty of these observations", um_text(rms(left, &LeftError::sigma_m), 3)}});
+  page.paragraph(fmt::format(
+      "{} observations, each predicted by a model that was fitted without it. They contain the "
+      "noise of the measurement: with a perfect model their rms would be their standard "
+      "uncertainty.",
+      left.size()));
+}
+
+}  // namespace abbe::daemon

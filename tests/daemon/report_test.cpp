@@ -1,0 +1,210 @@
+// The figures of a report hold the numbers of the model and of the residuals.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "abbe/report/html_report.hpp"
+#include "abbe/report/model_figures.hpp"
+#include "report_page.hpp"
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::Axis;
+using calib::Vector3;
+using test::charts_of;
+using test::dataset_of;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+calib::VolumetricModel with_interpolation(calib::estimation::Interpolation kind) {
+  auto description = test::synthetic_model(3).description();
+  description.interpolation = kind;
+  return calib::VolumetricModel::from_description(std::move(description)).value();
+}
+
+std::size_t count(const std::string& text, std::string_view what) {
+  std::size_t n = 0;
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += what.size()) ++n;
+  return n;
+}
+
+TEST(Report, ATextCannotEndTheScriptOrTheElement) {
+  const std::string name = "</script><script>alert(1)</script><!--<script>\"'&";
+  HtmlReport page(name);
+  page.heading(name);
+  page.facts({{name, name}});
+  page.chart(LineChart{.title = name,
+                       .x_label = name,
+                       .y_label = name,
+                       .curves = {{.name = name, .x = {0.0, 1.0}, .y = {0.0, 1.0}}}});
+  page.maps({.title = name,
+             .x_label = name,
+             .y_label = name,
+             .scale_label = name,
+             .maps = {{.title = name, .x_edges = {0, 1}, .y_edges = {0, 1}, .values = {1.0}}}});
+
+  const std::string text = page.text();
+  EXPECT_THAT(text, Not(HasSubstr("alert(1)</script>")));
+  EXPECT_EQ(count(text, "<script>"), 3u);  // Chart.js, show(), the chart
+  EXPECT_EQ(count(text, "</script>"), 3u);
+  EXPECT_EQ(dataset_of(charts_of(text), "</script>")["label"], name);
+}
+
+TEST(Report, ATextThatIsNotUtf8DoesNotEndTheProgram) {
+  HtmlReport page("\xff");
+  page.chart(LineChart{.title = "\xff",
+                       .x_label = "x",
+                       .y_label = "y",
+                       .curves = {{.name = "\xc3", .x = {0.0}, .y = {0.0}}}});
+  EXPECT_EQ(charts_of(page.text()).size(), 1u);
+}
+
+/// The dots are the nodes.
+TEST(Report, TheChartsOfTheTablesHaveTheParametersOfTheModel) {
+  const auto model = test::synthetic_model(3);
+  HtmlReport page("tables");
+  add_table_charts(page, model);
+  const auto charts = charts_of(page.text());
+  EXPECT_EQ(charts.size(), 6u);
+
+  for (const auto& p : model.parameters()) {
+    if (!p.position_m) continue;
+    bool found = false;
+    const auto dataset = dataset_of(charts, p.name);
+    for (std::size_t i = 0; i < dataset["data"].size(); ++i) {
+      if (std::abs(dataset["data"][i]["x"].get<double>() - 1e3 * *p.position_m) > 1e-9) continue;
+      found = true;
+      EXPECT_NEAR(dataset["data"][i]["y"].get<double>(), 1e6 * p.value, 1e-9) << p.name;
+      EXPECT_GT(dataset["pointRadius"][i], 0.0) << p.name;
+    }
+    EXPECT_TRUE(found) << p.name;
+  }
+}
+
+/// Two datasets without a name before the curve are the edges of its band.
+TEST(Report, TheBandsAreTwoStandardUncertaintiesOfTheModel) {
+  const auto model = test::synthetic_model(3);
+  HtmlReport page("tables");
+  add_table_charts(page, model);
+  const auto datasets = charts_of(page.text())[0]["data"]["datasets"];
+  ASSERT_THAT(datasets[2]["label"].get<std::string>(), ::testing::StartsWith("EXX"));
+  std::size_t node = 0;
+  for (const auto& p : model.parameters()) {
+    if (p.name != "EXX") continue;
+    const std::size_t i = 6 * node++;  // six points in a cell
+    EXPECT_NEAR(datasets[0]["data"][i]["y"].get<double>(), 1e6 * (p.value - 2.0 * p.u), 1e-9);
+    EXPECT_NEAR(datasets[1]["data"][i]["y"].get<double>(), 1e6 * (p.value + 2.0 * p.u), 1e-9);
+  }
+  EXPECT_EQ(node, 5u);
+}
+
+/// Of a model in which all other tables are zero, V_x is EXX.
+TEST(Report, ATableIsDrawnAsTheModelInterpolatesIt) {
+  using calib::estimation::Interpolation;
+  for (const auto kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
+    auto description = with_interpolation(kind).description();
+    for (auto& p : description.parameters)
+      if (p.name != "EXX") p.value = 0.0;
+    const auto model = calib::VolumetricModel::from_description(description).value();
+    HtmlReport page("one table");
+    add_table_charts(page, model);
+
+    const auto dataset = dataset_of(charts_of(page.text()), "EXX");
+    ASSERT_EQ(dataset["data"].size(), 25u);
+    for (const auto& point : dataset["data"]) {
+      const Vector3 q(1e-3 * point["x"].get<double>(), 0.1, -0.2);
+      EXPECT_NEAR(point["y"].get<double>(), 1e6 * model.V_at(q, model.tool_offsets_m().front()).x(),
+                  1e-9);
+    }
+  }
+}
+
+TEST(Report, TheMapsHaveErrorAndUncertaintyOfTheModel) {
+  const auto model = test::synthetic_model(3);
+  HtmlReport page("maps");
+  add_volume_maps(page, model);
+  const auto maps = test::maps_of(page.text());
+  ASSERT_EQ(maps.size(), 2u);  // before and after; nothing was held out
+  const VolumeCuts cuts = volume_cuts(model.validity(), 20);
+  ASSERT_EQ(cuts.across, Axis::Z);
+
+  std::size_t i = 0;
+  const auto middle = [](const std::vector<double>& e, std::size_t k) {
+    return 0.5 * (e[k] + e[k + 1]);
+  };
+  for (std::size_t slab = 0; slab < 3; ++slab)
+    for (std::size_t y = 0; y + 1 < cuts.y_edges_m.size(); ++y)
+      for (std::size_t x = 0; x + 1 < cuts.x_edges_m.size(); ++x, ++i) {
+        const auto e =
+            model.error_at({middle(cuts.x_edges_m, x), middle(cuts.y_edges_m, y), cuts.cut_m(slab)},
+                           model.tool_offsets_m().front());
+        ASSERT_LT(i, maps[0].size());
+        EXPECT_NEAR(maps[0][i], 1e6 * e.V_m.norm(), 1e-5 * maps[0][i]);
+        EXPECT_NEAR(maps[1][i], 2e6 * std::sqrt(e.cov_V_m2.trace()), 1e-5 * maps[1][i]);
+      }
+  EXPECT_EQ(i, maps[0].size());
+}
+
+TEST(Report, TheMapOfHeldOutObservationsIsTheirRmsInACell) {
+  HtmlReport page("maps");
+  const Vector3 one(-0.29, -0.29, -0.39), other(0.29, 0.29, -0.11);
+  add_volume_maps(
+      page, test::synthetic_model(3),
+      std::vector<LeftError>{
+          {one, 20e-6, 3e-6, 1e-6}, {one, 20e-6, -4e-6, 1e-6}, {other, 20e-6, 2e-6, 1e-6}});
+  const auto maps = test::maps_of(page.text());
+  ASSERT_EQ(maps.size(), 3u);
+  ASSERT_EQ(maps[2].size(), 2u);
+  EXPECT_NEAR(maps[2][0], std::sqrt(12.5), 1e-4);
+  EXPECT_NEAR(maps[2][1], 2.0, 1e-4);
+}
+
+TEST(Report, TheCutsAreAcrossTheShortestAxis) {
+  std::vector<Vector3> corners;
+  for (int i = 0; i < 8; ++i)
+    corners.emplace_back((i & 1) != 0 ? 3.0 : 0.0, (i & 2) != 0 ? 0.02 : 0.0,
+                         (i & 4) != 0 ? 0.5 : 0.0);
+  const auto cuts = volume_cuts(calib::ValidityVolume::hull_of(corners).value(), 20);
+  EXPECT_EQ(cuts.across, Axis::Y);
+  EXPECT_EQ(cuts.x, Axis::X);
+  EXPECT_EQ(cuts.y, Axis::Z);
+  EXPECT_EQ(cuts.x_edges_m.size(), 21u);
+  EXPECT_EQ(cuts.y_edges_m.size(), 5u);
+  EXPECT_DOUBLE_EQ(cuts.cut_m(1), 0.01);
+}
+
+/// The outline of the bars has two points per interval, between a first and a last one.
+TEST(Report, AHistogramCountsEveryValue) {
+  const std::vector<double> values{-1.9, -0.3, 0.1, 0.2, 0.25, 1.4};
+  HtmlReport page("histogram");
+  page.chart(Histogram{.title = "h", .x_label = "x", .series = {{"all", values}}, .bins = 4});
+  const auto points = charts_of(page.text())[0]["data"]["datasets"][0]["data"];
+  std::vector<double> counts;
+  for (std::size_t i = 1; i + 1 < points.size(); i += 2) {
+    counts.push_back(points[i]["y"]);
+    EXPECT_LT(points[i]["x"].get<double>(), points[i + 1]["x"].get<double>());
+  }
+  EXPECT_THAT(counts, ::testing::ElementsAre(1, 1, 3, 1));  // -2, -1, 0, 1, 2
+}
+
+TEST(Report, TheNormalCurveOfAHistogramHasTheExpectedCounts) {
+  HtmlReport page("histogram");
+  std::vector<double> values(1000, 0.0);
+  values.front() = -5.0;
+  values.back() = 5.0;
+  page.chart(Histogram{
+      .title = "h", .x_label = "x", .series = {{"all", values}}, .bins = 20, .normal_sd = 2.0});
+  double sum = 0.0, in_first_half_step = 0.0;
+  for (const auto& point : charts_of(page.text())[0]["data"]["datasets"][0]["data"]) {
+    sum += point["y"].get<double>();
+    if (point["x"] == 0.25) in_first_half_step = point["y"];
+  }
+  EXPECT_NEAR(sum, 1000.0 * (std::erf(2.75 / std::sqrt(2.0)) + std::erf(2.5 / std::sqrt(2.0))) / 2,
+              1e-6);  // from -5 to 5.5
+  EXPECT_NEAR(in_first_half_step, 500.0 * std::erf(0.25 / std::sqrt(2.0)), 1e-6);
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -30,6 +30,7 @@ struct FakeDevices final : SampleSource {
   [[nodiscard]] std::vector<StreamHealth> health(HostTime) override {
     StreamHealth h;
     h.status.name = "encoder";
+    h.latency.of_bucket[drivers::LatencyHistogram::bucket_of(1500ns)] = 7;
     return {h};
   }
   Batch next;
@@ -162,6 +163,17 @@ TEST_F(HubTest, StatusNamesTheAxesOfItsPositions) {
   const json status = ask({{"do", "status"}});
   ASSERT_EQ(status["axes"].size(), status["position_m"].size());
   EXPECT_EQ(status["axes"][0], json({{"axis", "X"}, {"kind", "linear"}}));
+}
+
+TEST_F(HubTest, StatusHasTheLatencyHistogramOfADevice) {
+  cycle();
+  const json status = ask({{"do", "status"}});
+  const json& stream = status["streams"][0];
+  ASSERT_EQ(stream["name"], "encoder");
+  ASSERT_EQ(stream["latency_counts"].size(), 1u);
+  EXPECT_GT(stream["latency_counts"][0][0].get<double>(), 1.5e-6);
+  EXPECT_LT(stream["latency_counts"][0][0].get<double>(), 1.25 * 1.5e-6);
+  EXPECT_EQ(stream["latency_counts"][0][1], 7);
 }
 
 TEST_F(HubTest, RunsATaskOfAnotherThreadInItsNextCycle) {

@@ -30,9 +30,9 @@ struct DeviceSet::State {
 
   StreamHealth health_of(const drivers::DeviceThread& thread, HostTime now) {
     StreamHealth h{.status = thread.status()};
-    const auto latency = thread.latency().read();
-    h.latency_p50_s = std::chrono::duration<double>(latency.quantile(0.50)).count();
-    h.latency_p99_s = std::chrono::duration<double>(latency.quantile(0.99)).count();
+    h.latency = thread.latency().read();
+    h.latency_p50_s = std::chrono::duration<double>(h.latency.quantile(0.50)).count();
+    h.latency_p99_s = std::chrono::duration<double>(h.latency.quantile(0.99)).count();
 
     auto& [at, samples] = counted[h.status.name];
     const std::chrono::duration<double> passed = now - at;

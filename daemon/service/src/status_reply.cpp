@@ -23,6 +23,18 @@ namespace {
 
 using nlohmann::json;
 
+/// The buckets that are not empty: [exclusive upper bound in s, count]. A client that asks twice has
+/// the histogram of the time in between.
+json latency_json(const drivers::LatencyHistogram::Counts& counts) {
+  json buckets = json::array();
+  for (std::size_t i = 0; i < counts.of_bucket.size(); ++i) {
+    if (counts.of_bucket[i] > 0)
+      buckets.push_back(
+          {in_seconds(drivers::LatencyHistogram::upper_bound(i)), counts.of_bucket[i]});
+  }
+  return buckets;
+}
+
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
   return {{"name", d.name},
@@ -41,7 +53,8 @@ json device_json(const StreamHealth& h) {
             {"residual_s", in_seconds(d.clock.residual)},
             {"u_time_s", in_seconds(d.clock.u_time)}}},
           {"latency_p50_s", h.latency_p50_s},
-          {"latency_p99_s", h.latency_p99_s}};
+          {"latency_p99_s", h.latency_p99_s},
+          {"latency_counts", latency_json(h.latency)}};
 }
 
 json next_json(const calib::evemu::NextTouch& next) {

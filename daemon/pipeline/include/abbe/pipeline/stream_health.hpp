@@ -2,6 +2,7 @@
 /// Status of a stream, for the status command, the journal and the Health topic. Pure data.
 
 #include "abbe/drivers/device.hpp"
+#include "abbe/drivers/latency_histogram.hpp"
 
 namespace abbe::daemon {
 
@@ -12,6 +13,9 @@ struct StreamHealth {
   double rate_hz = 0.0;
   double latency_p50_s = 0.0;
   double latency_p99_s = 0.0;
+  /// Latency of the acquisition thread since its start: from the arrival of data to the end of
+  /// their processing. Empty for a part that is not a device.
+  drivers::LatencyHistogram::Counts latency{};
 };
 
 }  // namespace abbe::daemon

@@ -69,6 +69,37 @@ TEST_F(CliOfADaemon, CalibratePrintsWhatEveryStepWaitsFor) {
   EXPECT_THAT(ran.out, StartsWith("active abcd"));
 }
 
+nlohmann::json acquiring_with(const std::vector<nlohmann::json>& tables) {
+  auto acquiring = session("acquiring", "driving the path");
+  acquiring["remaining_s"] = 200.0;
+  acquiring["live"] = {{"tables", tables}, {"samples", 1000}, {"variance_factor", 1.0}};
+  return acquiring;
+}
+
+TEST_F(CliOfADaemon, CalibratePrintsHowManyTablesTheRunDetermines) {
+  const auto table = [](const char* unit, const nlohmann::json& u) {
+    return nlohmann::json{{"unit", unit}, {"determined", u[0].is_number()}, {"u", u}};
+  };
+  const nlohmann::json none{nullptr, 0.5e-6};
+  const auto socket = folder_.path() / "tables.sock";
+  const auto daemon = ControlServer::open(
+      socket,
+      ScriptedDaemon{{acquiring_with({table("m", none), table("rad", none)}),
+                      acquiring_with({table("m", {0.4e-6, 0.8e-6}), table("rad", none)}),
+                      acquiring_with({table("m", {0.4e-6, 0.7e-6}), table("rad", none)}),
+                      acquiring_with({table("m", {0.3e-6, 0.6e-6}), table("rad", {1.5e-6, 1e-6})}),
+                      acquiring_with({table("m", {0.1e-6, 0.2e-6}), table("rad", {1.2e-6, 1e-6})}),
+                      session("active", "accepted")}});
+  ASSERT_TRUE(daemon);
+  const auto ran = calibrate(socket);
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(ran.err,
+            "acquiring: driving the path\n"
+            "tables: 1 of 2 determined, largest u 0.80 um, 0.00 urad\n"
+            "tables: 2 of 2 determined, largest u 0.60 um, 1.50 urad\n"
+            "tables: 2 of 2 determined, largest u 0.20 um, 1.20 urad\n");
+}
+
 nlohmann::json refused_as(const std::string& code) {
   auto refused = session("refused", "because");
   refused["code"] = code;

@@ -11,6 +11,7 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/refusal.hpp"
+#include "abbe/base/units.hpp"
 #include "follow.hpp"
 #include "terminal.hpp"
 
@@ -35,8 +36,40 @@ int print_session_verdict(const json& session, bool as_json) {
   return state == "active" ? 0 : exit_code(error_of_refusal(session).code);
 }
 
+/// What the run determines so far.
+struct TablesSoFar {
+  std::size_t tables = 0, determined = 0;
+  double u_m = 0.0, u_rad = 0.0;  ///< largest standard uncertainty of the determined tables
+};
+
+TablesSoFar tables_so_far(const json& live) {
+  TablesSoFar found;
+  for (const json& table : live.value("tables", json::array())) {
+    ++found.tables;
+    if (!table.value("determined", false)) continue;
+    ++found.determined;
+    double& largest = table.value("unit", "") == "rad" ? found.u_rad : found.u_m;
+    for (const json& u : table.value("u", json::array()))
+      if (u.is_number()) largest = std::max(largest, u.get<double>());
+  }
+
+  return found;
+}
+
+/// "acquiring, 3 min left"
+std::string with_remaining_time(const std::string& state, const json& session) {
+  const auto remaining = session.find("remaining_s");
+  if (remaining == session.end() || !remaining->is_number()) return state;
+  constexpr double kSecondsInMinute = 60.0;
+  const double seconds = remaining->get<double>();
+  return seconds < kSecondsInMinute
+             ? fmt::format("{}, {:.0f} s left", state, seconds)
+             : fmt::format("{}, {:.0f} min left", state, seconds / kSecondsInMinute);
+}
+
 /// Prints one line whenever state or reason of the session change, for example "warming: waiting
-/// for the machine to stand at ...", and one line per new note.
+/// for the machine to stand at ...", one line per new note, and one line whenever the run
+/// determines more tables, or all of them twice as well as printed before.
 class SessionLog {
  public:
   void print_notes(ProgressBar& bar, const json& session) {
@@ -57,9 +90,24 @@ class SessionLog {
     printed_ = std::move(line);
   }
 
+  void print_tables(ProgressBar& bar, const json& session) {
+    const auto live = session.find("live");
+    if (live == session.end() || !live->is_object()) return;
+    const TablesSoFar now = tables_so_far(*live);
+    constexpr double kMuchBetter = 0.5;
+    const bool better =
+        now.u_m < kMuchBetter * tables_.u_m || now.u_rad < kMuchBetter * tables_.u_rad;
+    if (now.determined <= tables_.determined && !(now.determined == now.tables && better)) return;
+    bar.clear();
+    fmt::print(stderr, "tables: {} of {} determined, largest u {:.2f} um, {:.2f} urad\n",
+               now.determined, now.tables, now.u_m * kUmPerM, now.u_rad * kUradPerRad);
+    tables_ = now;
+  }
+
  private:
   std::string printed_;
   std::size_t noted_ = 0;
+  TablesSoFar tables_;  // printed last
 };
 
 /// The session with the number `id`, running or ended; nullopt if the daemon does not keep it any
@@ -95,7 +143,8 @@ int follow_session(const std::filesystem::path& socket, const std::string& metho
       return print_session_verdict(session, as_json);
     }
     log.print_state(bar, state, session["reason"]);
-    bar.show(state, session["progress"].get<double>());
+    log.print_tables(bar, session);
+    bar.show(with_remaining_time(state, session), session["progress"].get<double>());
     return std::nullopt;
   };
 

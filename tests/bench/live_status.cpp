@@ -1,0 +1,325 @@
+// What watching a run costs: abbed calibrates a simulated machine on the fly (abbe-sim on loopback,
+// in real time, tracker at 500 Hz and encoders at 200 Hz), and its status is requested while the
+// machine moves. Requirements: an answer with the current tables and their uncertainties within 100
+// ms, and no change in the latency histogram of the acquisition threads.
+// Phases without and with requests (20 a second over the control socket, and every second the
+// program `abbe status`) alternate in the same run, so that other load on the computer meets both
+// alike. The latency of a thread is compared between the phases with and without requests; the
+// peer is the same comparison between the odd and the even phases without requests.
+//   bench_live_status [--short]
+// Exit code 1: an answer later than 100 ms, no tables, or a p99 latency with requests above that
+// without by more than a bucket of the histogram (25 %) and more than the peer.
+#include <fmt/format.h>
+#include <stdlib.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "abbe/base/control_protocol.hpp"
+#include "abbe/tables/input_files.hpp"
+#include "config_tables.hpp"
+#include "figure.hpp"
+#include "program.hpp"
+
+namespace {
+
+using namespace abbe;  // NOLINT(google-build-using-namespace): a program, not a header
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kAsked_ms = 100.0, kBucket = 1.25;
+constexpr auto kBetweenRequests = 50ms;
+constexpr int kRequestsPerProgram = 20;
+constexpr auto kHealthPeriod = 1100ms;  // abbed reads the histograms once a second
+
+constexpr std::string_view kSimulator = R"([sim]
+machine = "machine.toml"
+seed = 7
+speed = 1
+[sim.truth]
+mean_error_um = 60
+[sim.path]
+file = "{}"
+feed_mm_per_min = 10000
+acceleration_mm_per_s2 = 1000
+standstill_s = 10
+[sim.tracker]
+position_mm = [-750, -620, -350]
+rotation_rad = [0.0013, -0.0342, 1.1003]
+)";
+
+constexpr std::string_view kDaemon = R"(speed = 1
+realtime = "ignore"
+[recording]
+min_free_MB = 1
+[dds]
+supervise = "off"
+)";
+
+/// Counts of durations by the upper bound of their bucket [s].
+using Histogram = std::map<double, std::uint64_t>;
+
+void add(Histogram& sum, const Histogram& more) {
+  for (const auto& [bound_s, count] : more) sum[bound_s] += count;
+}
+
+double quantile_us(const Histogram& histogram, double share) {
+  std::uint64_t total = 0, seen = 0;
+  for (const auto& [bound_s, count] : histogram) total += count;
+  for (const auto& [bound_s, count] : histogram) {
+    seen += count;
+    if (static_cast<double>(seen) >= share * static_cast<double>(total)) return 1e6 * bound_s;
+  }
+  return 0.0;
+}
+
+/// By stream.
+using Latencies = std::map<std::string, Histogram>;
+
+Latencies latencies_of(const json& status) {
+  Latencies all;
+  for (const json& stream : status["streams"]) {
+    const json counts = stream.value("latency_counts", json::array());
+    for (const json& bucket : counts)
+      all[stream["name"]][bucket[0].get<double>()] = bucket[1].get<std::uint64_t>();
+  }
+  return all;
+}
+
+Latencies difference(Latencies later, const Latencies& earlier) {
+  for (auto& [stream, histogram] : later) {
+    const auto before = earlier.find(stream);
+    if (before == earlier.end()) continue;
+    for (const auto& [bound_s, count] : before->second) histogram[bound_s] -= count;
+  }
+  return later;
+}
+
+/// A simulated machine and abbed, each a process, in a temporary folder.
+class Run {
+ public:
+  Run() {
+    std::string name = fs::temp_directory_path() / "abbe-live-status-XXXXXX";
+    folder_ = ::mkdtemp(name.data());
+    write("machine.toml", to_toml(machine()));
+    write("sim.toml", fmt::format(kSimulator, ABBE_DEMO_PATH));
+    simulator_ = start(
+        {ABBE_SIM_PROGRAM, "run", "--config", file("sim.toml"), "--ports-file", file("ports")},
+        "sim");
+    wait_for("the simulator", [this] { return fs::exists(file("ports")); });
+    write("abbed.toml", configuration());
+    abbed_ = start({ABBED_PROGRAM, "--config", file("abbed.toml")}, "abbed");
+    wait_for("abbed", [this] { return ask({{"do", "status"}}).is_object(); });
+  }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+  ~Run() {
+    abbed_.reset();
+    simulator_.reset();
+    fs::remove_all(folder_);
+  }
+
+  /// Returns when the machine moves and the first tables are known.
+  void calibrate() {
+    const auto path = daemon::read_path_csv(ABBE_DEMO_PATH);
+    if (!path) throw std::runtime_error(path.error().text);
+    const json answer = ask(
+        {{"do", "calibrate"}, {"method", "otf"}, {"path_m", path->vertices_m}, {"who", "bench"}});
+    if (!answer.value("ok", false)) throw std::runtime_error("calibrate: " + answer.dump());
+    wait_for("the first tables", [this] { return status()["session"].contains("live"); });
+  }
+  [[nodiscard]] json ask(const json& request) const {
+    const auto answer = daemon::ask_daemon(folder_ / "run" / "control.sock", request);
+    return answer ? *answer : json{};
+  }
+  [[nodiscard]] json status() const {
+    json now = ask({{"do", "status"}});
+    if (!now.is_object()) throw std::runtime_error("abbed does not answer:\n" + abbed_->err());
+    return now;
+  }
+  [[nodiscard]] bool show_status() const {
+    const auto command = fmt::format("'{}' status -c '{}' >'{}'", ABBE_PROGRAM, file("abbed.toml"),
+                                     file("status.txt"));
+    return std::system(command.c_str()) == 0;  // NOLINT(cert-env33-c): the user's way
+  }
+
+ private:
+  static config_tables::Machine machine() {
+    auto of_demo = config_tables::case_a();
+    of_demo.name = "live status";
+    return of_demo;
+  }
+  [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream{folder_ / name, std::ios::binary} << text;
+  }
+  [[nodiscard]] std::uint16_t port(const std::string& name) const {
+    const std::string ports = test::text_of(folder_ / "ports");
+    const auto at = ports.find(name + "=");
+    if (at == std::string::npos) throw std::runtime_error("the simulator has no " + name);
+    return static_cast<std::uint16_t>(std::stoi(ports.substr(at + name.size() + 1)));
+  }
+  [[nodiscard]] std::string configuration() const {
+    return to_toml(machine()) +
+           to_toml(config_tables::Tracker{
+               .port = port("tracker_port"),
+               .more = "weather = \"none\"\nu_scale_ppm = 0\nsigma_range_um = 2\n"
+                       "sigma_angle_urad = 3\n"}) +
+           to_toml(config_tables::Encoder{
+               .peer_port = port("can_port"), .sync_period_us = 5'000, .step_nm = 10}) +
+           std::string{config_tables::kDaemonInItsFolder} + std::string{kDaemon};
+  }
+  [[nodiscard]] std::unique_ptr<test::Program> start(std::vector<std::string> command,
+                                                     const std::string& log) const {
+    return std::make_unique<test::Program>(std::move(command), folder_ / log);
+  }
+  template <class Condition>
+  void wait_for(std::string_view what, Condition seen) {
+    if (!test::eventually(seen))
+      throw std::runtime_error(fmt::format("{} did not appear within 60 s; abbed: {}", what,
+                                           abbed_ ? abbed_->err() : "not started"));
+  }
+
+  fs::path folder_;
+  std::unique_ptr<test::Program> simulator_, abbed_;
+};
+
+double ms_since(Clock::time_point begin) {
+  return 1e3 * std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+struct Answers {
+  std::vector<double> socket_ms, program_ms;
+  std::size_t with_tables = 0;
+};
+
+/// True if the answer has a table with values and uncertainties.
+bool has_tables(const json& status) {
+  const json& session = status["session"];
+  if (session["state"] != "acquiring" || !session.contains("live")) return false;
+  const json tables = session["live"]["tables"];
+  return std::ranges::any_of(
+      tables, [](const json& t) { return !t["u"].empty() && t["u"].size() == t["value"].size(); });
+}
+
+void request_until(Clock::time_point end, const Run& run, Answers& answers) {
+  for (int i = 0; Clock::now() < end; ++i) {
+    const auto begin = Clock::now();
+    const json status = run.status();
+    answers.socket_ms.push_back(ms_since(begin));
+    answers.with_tables += has_tables(status) ? 1 : 0;
+
+    if (i % kRequestsPerProgram == 0) {
+      const auto started = Clock::now();
+      if (!run.show_status()) throw std::runtime_error("abbe status failed");
+      answers.program_ms.push_back(ms_since(started));
+    }
+    std::this_thread::sleep_for(kBetweenRequests);
+  }
+}
+
+/// Latencies of one phase with requests; those of the first second belong to the phase before.
+Latencies phase_with_requests(const Run& run, std::chrono::seconds lasts, Answers& answers) {
+  request_until(Clock::now() + kHealthPeriod, run, answers);
+  const Latencies before = latencies_of(run.status());
+  request_until(Clock::now() + lasts, run, answers);
+  return difference(latencies_of(run.status()), before);
+}
+
+Latencies quiet_phase(const Run& run, std::chrono::seconds lasts) {
+  std::this_thread::sleep_for(kHealthPeriod);
+  const Latencies before = latencies_of(run.status());
+  std::this_thread::sleep_for(lasts);
+  return difference(latencies_of(run.status()), before);
+}
+
+struct Compared {
+  Histogram quiet_odd, quiet_even, requested;
+
+  [[nodiscard]] Histogram quiet() const {
+    Histogram all = quiet_odd;
+    add(all, quiet_even);
+    return all;
+  }
+  [[nodiscard]] double ratio(double share) const {
+    return quantile_us(requested, share) / quantile_us(quiet(), share);
+  }
+  /// At least 1.
+  [[nodiscard]] double peer(double share) const {
+    const double odd = quantile_us(quiet_odd, share), even = quantile_us(quiet_even, share);
+    return std::max(odd, even) / std::min(odd, even);
+  }
+};
+
+bool report_latency(const std::string& stream, const Compared& of) {
+  fmt::print("{}: latency of the acquisition thread, us\n", stream);
+  for (const double share : {0.5, 0.99, 0.999})
+    fmt::print("  {:5.1f} %  without requests {:8.1f}, with {:8.1f}, ratio {:.2f} (peer {:.2f})\n",
+               100.0 * share, quantile_us(of.quiet(), share), quantile_us(of.requested, share),
+               of.ratio(share), of.peer(share));
+  constexpr double kP99 = 0.99;
+  tests::print_figure(fmt::format("live status, latency of {}, p99", stream), "ratio 1",
+                      "ratio {:.2f}, without requests among themselves {:.2f}", of.ratio(kP99),
+                      of.peer(kP99));
+  return of.ratio(kP99) <= kBucket * of.peer(kP99);
+}
+
+double part_of(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  const auto at = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  return values[std::min(at, values.size() - 1)];
+}
+
+bool report_answers(std::string_view what, const std::vector<double>& ms) {
+  tests::print_figure(fmt::format("live status, {}", what), fmt::format("{:.0f} ms", kAsked_ms),
+                      "median {:.1f} ms, p99 {:.1f} ms, longest {:.1f} ms, {} answers",
+                      part_of(ms, 0.5), part_of(ms, 0.99), part_of(ms, 1.0), ms.size());
+  return part_of(ms, 1.0) <= kAsked_ms;
+}
+
+bool measure(const Run& run, int pairs, std::chrono::seconds phase) {
+  Answers answers;
+  std::map<std::string, Compared> streams;
+  for (int i = 0; i < pairs; ++i) {
+    for (const auto& [stream, histogram] : quiet_phase(run, phase))
+      add(i % 2 == 0 ? streams[stream].quiet_even : streams[stream].quiet_odd, histogram);
+    for (const auto& [stream, histogram] : phase_with_requests(run, phase, answers))
+      add(streams[stream].requested, histogram);
+  }
+
+  bool good = report_answers("answer over the socket", answers.socket_ms);
+  good = report_answers("program abbe status", answers.program_ms) && good;
+  fmt::print("{} of {} answers with tables and uncertainties\n", answers.with_tables,
+             answers.socket_ms.size());
+  for (const auto& [stream, of] : streams) good = report_latency(stream, of) && good;
+
+  return good && !streams.empty() && answers.with_tables == answers.socket_ms.size();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bool brief = argc > 1 && std::string_view{argv[1]} == "--short";
+  try {
+    Run run;
+    run.calibrate();
+    return measure(run, brief ? 2 : 6, brief ? 3s : 8s) ? 0 : 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "live_status: {}\n", error.what());
+    return 2;
+  }
+}

@@ -8,8 +8,7 @@
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
-#include "decimal.hpp"
-#include "model_format.hpp"
+#include "model_reader.hpp"
 
 namespace abbe::daemon {
 
@@ -20,98 +19,9 @@ namespace {
 constexpr JsonBounds kModelBounds{
     .bytes = std::size_t{1} << 30, .depth = 16, .values = std::size_t{1} << 28};
 
-/// long double: see decimal.hpp.
-using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
-                                  std::uint64_t, long double>;
-
-/// Reads values by their path in the JSON text. For a value that cannot be read, a fault is added
-/// and a default value is returned; the first 20 faults are kept.
-class Reader {
- public:
-  Reader(const Json& root, std::string file) : root_(root), file_(std::move(file)) {}
-
-  void fault(std::string_view path, std::string_view what) {
-    constexpr std::size_t kShown = 20;
-    if (faults_.size() < kShown) faults_.push_back(fmt::format("{}: {}: {}", file_, path, what));
-  }
-  [[nodiscard]] bool any() const noexcept { return !faults_.empty(); }
-  [[nodiscard]] Error to_error() const {
-    return {ErrorCode::BadInput, fmt::format("{}: not a valid model", file_), faults_};
-  }
-
-  const Json* find(const Json& in, const std::string& path, const std::string& key) {
-    if (in.is_object() && in.contains(key)) return &in.at(key);
-    fault(path.empty() ? key : path + "." + key, "missing");
-    return nullptr;
-  }
-  std::string text(const std::string& key) {
-    const Json* value = find(root_, "", key);
-    if (value == nullptr) return {};
-    if (!value->is_string()) fault(key, "must be a string");
-    return value->is_string() ? value->get<std::string>() : std::string{};
-  }
-  double number(const Json& value, const std::string& path, int shift) {
-    if (!value.is_number()) {
-      fault(path, "must be a number");
-      return 0.0;
-    }
-    const double si = from_decimal(value.get<long double>(), shift);
-    if (!std::isfinite(si)) fault(path, "out of range");
-    return si;
-  }
-  double number_of(const Json& in, const std::string& path, const std::string& key, int shift) {
-    const Json* value = find(in, path, key);
-    return value == nullptr ? 0.0 : number(*value, path + "." + key, shift);
-  }
-  /// The number `key` of `in`, in SI. Adds a fault if it is not between `least` and `most`, both in
-  /// SI.
-  double number_within(const Json& in, const std::string& path, const std::string& key, int shift,
-                       double least, double most) {
-    const Json* value = find(in, path, key);
-    if (value == nullptr) return least;
-    const double si = number(*value, path + "." + key, shift);
-    if (std::isfinite(si) && (si < least || si > most))
-      fault(path + "." + key, fmt::format("is not plausible: {}", to_decimal(si, shift)));
-    return si;
-  }
-  std::size_t count_of(const Json& in, const std::string& path, const std::string& key) {
-    const Json* value = find(in, path, key);
-    if (value == nullptr) return 0;
-    if (!value->is_number_unsigned()) fault(path + "." + key, "must be a whole number");
-    return value->is_number_unsigned() ? value->get<std::size_t>() : 0;
-  }
-  std::vector<double> numbers(const Json& value, const std::string& path, int shift) {
-    std::vector<double> result;
-    if (!value.is_array()) fault(path, "must be an array of numbers");
-    if (value.is_array())
-      for (const auto& element : value) result.push_back(number(element, path, shift));
-    return result;
-  }
-  std::vector<calib::Vector3> vectors(const Json* value, const std::string& path) {
-    std::vector<calib::Vector3> result;
-    if (value == nullptr) return result;
-    if (!value->is_array()) fault(path, "must be an array of [x, y, z]");
-    if (value->is_array())
-      for (const auto& element : *value) {
-        const auto v = numbers(element, path, kMm);
-        if (v.size() == 3)
-          result.emplace_back(v[0], v[1], v[2]);
-        else
-          fault(path, "every element must be [x, y, z]");
-      }
-    return result;
-  }
-  [[nodiscard]] const Json& root() const noexcept { return root_; }
-
- private:
-  const Json& root_;
-  std::string file_;
-  std::vector<std::string> faults_;
-};
-
-calib::Vector3 read_vector(Reader& in, const Json& entry, const std::string& path,
+calib::Vector3 read_vector(ModelReader& in, const ModelJson& entry, const std::string& path,
                            const std::string& key) {
-  const Json* value = in.find(entry, path, key);
+  const ModelJson* value = in.find(entry, path, key);
   if (value == nullptr) return calib::Vector3::Zero();
   const auto v = in.numbers(*value, path + "." + key, kMm);
   if (v.size() == 3) return {v[0], v[1], v[2]};
@@ -119,7 +29,7 @@ calib::Vector3 read_vector(Reader& in, const Json& entry, const std::string& pat
   return calib::Vector3::Zero();
 }
 
-void read_polynomials(Reader& in, const Json& basis, calib::ModelDescription& out) {
+void read_polynomials(ModelReader& in, const ModelJson& basis, calib::ModelDescription& out) {
   calib::PolynomialForm form;
   form.order = static_cast<int>(std::min<std::size_t>(in.count_of(basis, "basis", "order"), 1000));
   form.box.centre_m = read_vector(in, basis, "basis", "centre_mm");
@@ -128,10 +38,10 @@ void read_polynomials(Reader& in, const Json& basis, calib::ModelDescription& ou
   out.polynomials = form;
 }
 
-void read_basis(Reader& in, calib::ModelDescription& out) {
-  const Json* basis = in.find(in.root(), "", "basis");
+void read_basis(ModelReader& in, calib::ModelDescription& out) {
+  const ModelJson* basis = in.find(in.root(), "", "basis");
   if (basis == nullptr) return;
-  const Json* kind = in.find(*basis, "basis", "kind");
+  const ModelJson* kind = in.find(*basis, "basis", "kind");
   if (kind != nullptr && *kind == kLegendre) return read_polynomials(in, *basis, out);
   const auto interpolation = kind != nullptr && kind->is_string()
                                  ? calib::estimation::table_interpolation(kind->get<std::string>())
@@ -141,43 +51,43 @@ void read_basis(Reader& in, calib::ModelDescription& out) {
              fmt::format("is {}, must be \"{}\", \"{}\" or \"{}\"; another kind needs a newer abbe",
                          kind->dump(), calib::kLinearBasis, calib::kCubicBasis, kLegendre));
   out.interpolation = interpolation.value_or(out.interpolation);
-  const Json* axes = in.find(*basis, "basis", "axes");
+  const ModelJson* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;
 
   for (const auto axis : calib::kAllAxes) {
     const auto path = fmt::format("basis.axes.{}", letter(axis));
-    const Json* entry = in.find(*axes, "basis.axes", std::string(1, letter(axis)));
+    const ModelJson* entry = in.find(*axes, "basis.axes", std::string(1, letter(axis)));
     if (entry == nullptr) continue;
     auto& nodes = out.nodes[index(axis)];
-    if (const Json* list = in.find(*entry, path, "nodes_mm"))
+    if (const ModelJson* list = in.find(*entry, path, "nodes_mm"))
       nodes.nodes_m = in.numbers(*list, path + ".nodes_mm", kMm);
     nodes.reference_m = in.number_of(*entry, path, "reference_mm", kMm);
   }
 }
 
-void read_parameters(Reader& in, calib::ModelDescription& out) {
-  const Json* list = in.find(in.root(), "", "parameters");
+void read_parameters(ModelReader& in, calib::ModelDescription& out) {
+  const ModelJson* list = in.find(in.root(), "", "parameters");
   if (list == nullptr || !list->is_array()) return;
   for (std::size_t i = 0; i < list->size(); ++i) {
     const auto path = fmt::format("parameters[{}]", i);
-    const Json& entry = (*list)[i];
+    const ModelJson& entry = (*list)[i];
     calib::Parameter p;
-    const Json* name = in.find(entry, path, "name");
+    const ModelJson* name = in.find(entry, path, "name");
     if (name != nullptr && name->is_string()) p.name = name->get<std::string>();
     if (entry.contains("position_mm"))
       p.position_m = in.number(entry.at("position_mm"), path + ".position_mm", kMm);
 
     p.value = in.number_of(entry, path, "value", kMicroUnit);
     p.u = in.number_of(entry, path, "u", kMicroUnit);
-    const Json* unit = in.find(entry, path, "unit");
+    const ModelJson* unit = in.find(entry, path, "unit");
     if (unit != nullptr && *unit != unit_of(p))
       in.fault(path + ".unit", fmt::format("must be \"{}\"", unit_of(p)));
     out.parameters.push_back(std::move(p));
   }
 }
 
-void read_covariance(Reader& in, calib::ModelDescription& out) {
-  const Json* list = in.find(in.root(), "", "covariance");
+void read_covariance(ModelReader& in, calib::ModelDescription& out) {
+  const ModelJson* list = in.find(in.root(), "", "covariance");
   if (list == nullptr) return;
   const auto n = static_cast<Eigen::Index>(out.parameters.size());
   const auto values = in.numbers(*list, "covariance", kMicroUnitSquared);
@@ -193,7 +103,7 @@ void read_covariance(Reader& in, calib::ModelDescription& out) {
     for (Eigen::Index j = i; j < n; ++j) out.covariance(i, j) = out.covariance(j, i) = values[k++];
 }
 
-void read_gauge(Reader& in, calib::ModelDescription& out) {
+void read_gauge(ModelReader& in, calib::ModelDescription& out) {
   const auto text = in.text("gauge");
   for (const auto gauge : {calib::Gauge::G1, calib::Gauge::Ball1Blocks, calib::Gauge::Ball1})
     if (text == name(gauge)) {
@@ -203,7 +113,7 @@ void read_gauge(Reader& in, calib::ModelDescription& out) {
   in.fault("gauge", "must be \"G1\", \"Ball1-blocks\" or \"Ball1\"");
 }
 
-calib::ModelDescription read_description(Reader& in) {
+calib::ModelDescription read_description(ModelReader& in) {
   calib::ModelDescription out;
   const auto chain = calib::KinematicChain::parse(in.text("chain"));
   if (chain)
@@ -214,7 +124,7 @@ calib::ModelDescription read_description(Reader& in) {
   if (in.text("squareness") != "travel") in.fault("squareness", "must be \"travel\"");
   out.tool_offsets_m = in.vectors(in.find(in.root(), "", "tool_offsets_mm"), "tool_offsets_mm");
   read_basis(in, out);
-  if (const Json* validity = in.find(in.root(), "", "validity"))
+  if (const ModelJson* validity = in.find(in.root(), "", "validity"))
     out.validity_hull_m = in.vectors(in.find(*validity, "validity", "hull_mm"), "validity.hull_mm");
   read_parameters(in, out);
   read_covariance(in, out);
@@ -222,8 +132,9 @@ calib::ModelDescription read_description(Reader& in) {
   return out;
 }
 
-ResidualFigures read_residuals(Reader& in, const Json& statistics, const std::string& key) {
-  const Json* figures = in.find(statistics, "statistics", key);
+ResidualFigures read_residuals(ModelReader& in, const ModelJson& statistics,
+                               const std::string& key) {
+  const ModelJson* figures = in.find(statistics, "statistics", key);
   if (figures == nullptr) return {};
   const auto path = "statistics." + key;
   return {in.number_of(*figures, path, "mae_um", kMicroUnit),
@@ -231,10 +142,10 @@ ResidualFigures read_residuals(Reader& in, const Json& statistics, const std::st
           in.number_of(*figures, path, "max_um", kMicroUnit)};
 }
 
-ModelStatistics read_statistics(Reader& in) {
+ModelStatistics read_statistics(ModelReader& in) {
   ModelStatistics s;
   const std::string path = "statistics";
-  const Json* statistics = in.find(in.root(), "", path);
+  const ModelJson* statistics = in.find(in.root(), "", path);
   if (statistics == nullptr) return s;
   s.samples = in.count_of(*statistics, path, "samples");
   s.lost_samples = in.count_of(*statistics, path, "lost_samples");
@@ -248,7 +159,7 @@ ModelStatistics read_statistics(Reader& in) {
   s.before = read_residuals(in, *statistics, "before");
   s.after = read_residuals(in, *statistics, "after");
   s.iterations = static_cast<int>(in.count_of(*statistics, path, "iterations"));
-  const Json* stop = in.find(*statistics, path, "stop_reason");
+  const ModelJson* stop = in.find(*statistics, path, "stop_reason");
   if (stop != nullptr && stop->is_string()) s.stop_reason = stop->get<std::string>();
 
   return s;
@@ -260,10 +171,10 @@ ModelStatistics read_statistics(Reader& in) {
 constexpr double kLowest_K = 173.15, kHighest_K = 523.15;
 constexpr double kMostAlpha_per_K = 100e-6;
 
-std::optional<calib::Expansion> read_artefact(Reader& in) {
+std::optional<calib::Expansion> read_artefact(ModelReader& in) {
   const std::string path = "artefact";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
-  const Json& artefact = in.root().at(path);
+  const ModelJson& artefact = in.root().at(path);
   const auto within = [&](const char* key, int shift, double least, double most) {
     return in.number_within(artefact, path, key, shift, least, most);
   };
@@ -276,21 +187,21 @@ std::optional<calib::Expansion> read_artefact(Reader& in) {
 
 /// `recording_gap` is absent in models with a complete recording, `mode` in models of other
 /// methods; both are absent in models of earlier versions.
-std::string read_optional(Reader& in, const std::string& key) {
+std::string read_optional(ModelReader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
 /// Absent in models without backlash.
-std::vector<calib::otf::Backlash> read_backlash(Reader& in) {
+std::vector<calib::otf::Backlash> read_backlash(ModelReader& in) {
   std::vector<calib::otf::Backlash> all;
   const std::string path = "backlash";
   if (!in.root().is_object() || !in.root().contains(path)) return all;
-  const Json& list = in.root().at(path);
+  const ModelJson& list = in.root().at(path);
   if (!list.is_array()) in.fault(path, "must be an array");
 
   for (std::size_t i = 0; list.is_array() && i < list.size(); ++i) {
     const std::string at = fmt::format("{}[{}]", path, i);
-    const Json* name = in.find(list[i], at, "name");
+    const ModelJson* name = in.find(list[i], at, "name");
     const auto motion = name != nullptr && name->is_string()
                             ? calib::error_motion(name->get<std::string>())
                             : std::nullopt;
@@ -306,20 +217,20 @@ std::vector<calib::otf::Backlash> read_backlash(Reader& in) {
   return all;
 }
 
-std::vector<InputFile> read_inputs(Reader& in) {
+std::vector<InputFile> read_inputs(ModelReader& in) {
   std::vector<InputFile> inputs;
-  const Json* list = in.find(in.root(), "", "inputs");
+  const ModelJson* list = in.find(in.root(), "", "inputs");
   if (list == nullptr || !list->is_array()) return inputs;
   for (const auto& entry : *list) {
-    const Json* file = in.find(entry, "inputs", "file");
-    const Json* hash = in.find(entry, "inputs", "sha256");
+    const ModelJson* file = in.find(entry, "inputs", "file");
+    const ModelJson* hash = in.find(entry, "inputs", "sha256");
     if (file != nullptr && hash != nullptr && file->is_string() && hash->is_string())
       inputs.push_back({file->get<std::string>(), hash->get<std::string>()});
   }
   return inputs;
 }
 
-Result<ModelDocument> read_document(Reader& in) {
+Result<ModelDocument> read_document(ModelReader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
     // In a file with another schema all further faults would be meaningless, so only this one is
@@ -358,10 +269,10 @@ Result<ModelDocument> parse_model(std::string_view text, const std::string& file
   if (auto within = check_json(text, file, kModelBounds); !within)
     return tl::make_unexpected(within.error());
   try {
-    const auto root = Json::parse(text);
-    Reader reader(root, file);
+    const auto root = ModelJson::parse(text);
+    ModelReader reader(root, file);
     return read_document(reader);
-  } catch (const Json::exception& exception) {
+  } catch (const ModelJson::exception& exception) {
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, cause_of(exception)));
   }
 }

@@ -87,7 +87,8 @@ double common_scale(std::span<const Vector3> points_m, std::span<const Vector3> 
 
 Result<ModelDifference> rigid_free_difference(const VolumetricModel& a, const VolumetricModel& b,
                                               const Vector3& tool_offset_m,
-                                              std::span<const Vector3> axis_positions_m) {
+                                              std::span<const Vector3> axis_positions_m,
+                                              const estimation::AxisTravel& travel) {
   if (!a.holds_for_tool(tool_offset_m) || !b.holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
                    message("comparison for tool offset ", mm_text(tool_offset_m),
@@ -96,7 +97,7 @@ Result<ModelDifference> rigid_free_difference(const VolumetricModel& a, const Vo
   std::vector<Vector3> points, difference;
   for (const Vector3& q : axis_positions_m) {
     points.push_back(q + tool_offset_m);
-    difference.push_back(a.V_at(q, tool_offset_m) - b.V_at(q, tool_offset_m));
+    difference.push_back(a.V_at(q, tool_offset_m, travel) - b.V_at(q, tool_offset_m, travel));
   }
   return rigid_free(points, difference);
 }

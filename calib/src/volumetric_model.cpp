@@ -9,6 +9,7 @@
 #include "abbe/calib/estimation/cell_form.hpp"
 #include "checked_nodes.hpp"
 #include "message.hpp"
+#include "stored_travel.hpp"
 #include "tool_span.hpp"
 
 namespace abbe::calib {
@@ -337,7 +338,8 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   }
 
   if (d.polynomials) {
-    return polynomials_from(d);
+    return polynomials_from(d).and_then(
+        [&](VolumetricModel model) { return with_stored_travel(std::move(model), d); });
   }
 
   Result<ParameterLayout> layout =
@@ -365,7 +367,8 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
   }
 
   return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity),
-                     d.interpolation);
+                     d.interpolation)
+      .and_then([&](VolumetricModel model) { return with_stored_travel(std::move(model), d); });
 }
 
 bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {
@@ -434,7 +437,8 @@ Vector3 VolumetricModel::V_at(const Vector3& axis_position_m, const Vector3& too
 }
 
 Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
-                                                       const Vector3& tool_offset_m) const {
+                                                       const Vector3& tool_offset_m,
+                                                       const estimation::AxisTravel& travel) const {
   if (!holds_for_tool(tool_offset_m)) {
     return failure(ErrorCode::NotApplicable,
                    message("correction for tool offset ", mm_text(tool_offset_m),
@@ -451,7 +455,7 @@ Result<Correction> VolumetricModel::command_correction(const Vector3& nominal_m,
   correction.inside = validity_.contains(nominal_m);
 
   while (correction.evaluations < kMostEvaluations) {
-    const Vector3 next = -V_at(nominal_m + correction.c_m, tool_offset_m);
+    const Vector3 next = -V_at(nominal_m + correction.c_m, tool_offset_m, travel);
     const double step_m = (next - correction.c_m).norm();
     correction.c_m = next;
     ++correction.evaluations;
@@ -488,6 +492,9 @@ ModelDescription VolumetricModel::description() const {
   if (const evemu::EvemuModel* model = polynomials()) {
     d.polynomials = PolynomialForm{model->design().equivalent().order(), model->design().box(),
                                    model->ball1_m()};
+  }
+  if (travel_) {
+    d.travel = travel_->differences;
   }
 
   return d;

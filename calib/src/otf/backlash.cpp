@@ -9,19 +9,36 @@
 namespace abbe::calib::otf {
 namespace {
 
-/// Calls use(motion, node, parameter) for each difference; `node`: absent for one value per table.
-template <class Use>
-void for_differences(const Observations& o, Use use) {
-  std::size_t parameter = o.layout().model_size();
-  for (const Table& table : o.layout().tables()) {
-    if (o.basis.travel() == estimation::TravelDependence::Backlash) {
-      use(table, std::optional<std::size_t>{}, parameter++);
-      continue;
-    }
-    for (std::size_t i = 0; i < o.layout().node_count(table.motion.axis); ++i) {
-      use(table, std::optional(i), parameter++);
+/// The differences D, of `basis`, with their values and uncertainties.
+std::vector<Backlash> listed_differences(const estimation::TableBasis& basis,
+                                         const Eigen::VectorXd& D,
+                                         const Eigen::MatrixXd& covariance) {
+  constexpr double kOfPrior = 0.5;  // three quarters of the information are the data's
+  const bool per_node = basis.travel() == estimation::TravelDependence::Tables;
+  std::vector<Backlash> all;
+  for (const Table& table : basis.layout().tables()) {
+    const std::vector<double>& nodes_m = basis.layout().nodes()[index(table.motion.axis)].nodes_m;
+    for (std::size_t node = 0; node < (per_node ? nodes_m.size() : 1); ++node) {
+      const auto i = std::ssize(all);
+      Backlash b{table.motion, {}, D(i), std::sqrt(covariance(i, i)), false};
+      b.determined = b.u < kOfPrior * kUOfBacklash;
+      if (per_node) {
+        b.position_m = nodes_m[node];
+      }
+      all.push_back(b);
     }
   }
+  return all;
+}
+
+TravelDifferences differences_in(const Observations& o, const Eigen::VectorXd& U,
+                                 const Eigen::MatrixXd& covariance) {
+  const auto n = static_cast<Eigen::Index>(o.layout().model_size()),
+             m = static_cast<Eigen::Index>(o.basis.size()) - n;
+  return {.kind = o.basis.travel(),
+          .D = U.segment(n, m),
+          .covariance = covariance.block(n, n, m, m),
+          .cov_U_D = covariance.block(0, n, n, m)};
 }
 
 /// Letters of the axes whose direction of travel is unknown: "Y, Z".
@@ -79,23 +96,18 @@ estimation::Information with_backlash_prior(estimation::Information data, const 
 
 std::vector<Backlash> backlash_of(const Observations& o, const Eigen::VectorXd& U,
                                   const Eigen::MatrixXd& covariance) {
-  constexpr double kOfPrior = 0.5;  // three quarters of the information are the data's
-  std::vector<Backlash> all;
   if (!estimates_backlash(o)) {
-    return all;
+    return {};
   }
+  const TravelDifferences d = differences_in(o, U, covariance);
+  return listed_differences(o.basis, d.D, d.covariance);
+}
 
-  for_differences(o,
-                  [&](const Table& table, std::optional<std::size_t> node, std::size_t parameter) {
-                    const auto i = static_cast<Eigen::Index>(parameter);
-                    Backlash b{table.motion, {}, U(i), std::sqrt(covariance(i, i)), false};
-                    b.determined = b.u < kOfPrior * kUOfBacklash;
-                    if (node) {
-                      b.position_m = o.layout().nodes()[index(table.motion.axis)].nodes_m[*node];
-                    }
-                    all.push_back(b);
-                  });
-  return all;
+std::vector<Backlash> backlash_of(const VolumetricModel& model) {
+  if (model.travel() == nullptr) {
+    return {};
+  }
+  return listed_differences(*model.travel_tables(), model.travel()->D, model.travel()->covariance);
 }
 
 std::vector<Backlash> largest_of_tables(std::span<const Backlash> all) {
@@ -132,8 +144,8 @@ std::vector<std::string> notes_on(std::span<const Backlash> all) {
   std::vector<std::string> notes;
   if (!found.empty()) {
     notes.push_back(message("backlash, forward minus backward: ", found,
-                            "; the model is the mean of both directions, and half the difference "
-                            "is in its uncertainty"));
+                            "; without the direction of travel the model is the mean of both, and "
+                            "half the difference is in its uncertainty"));
   }
   if (!undetermined.empty()) {
     notes.push_back(message("backlash that the path does not determine, because an axis moves in ",
@@ -142,27 +154,25 @@ std::vector<std::string> notes_on(std::span<const Backlash> all) {
   return notes;
 }
 
-Eigen::MatrixXd model_covariance(const Observations& o, const Eigen::VectorXd& U,
-                                 const Eigen::MatrixXd& covariance) {
+Result<VolumetricModel> model_of(const Observations& o, std::span<const Vector3> tool_offsets_m,
+                                 const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance,
+                                 ValidityVolume validity) {
   const auto n = static_cast<Eigen::Index>(o.layout().model_size());
-  Eigen::MatrixXd of_model = covariance.topLeftCorner(n, n);
-  if (!estimates_backlash(o)) {
-    return of_model;
+  Eigen::MatrixXd of_tables = covariance.topLeftCorner(n, n);
+  TravelDifferences differences;
+  if (estimates_backlash(o)) {
+    differences = differences_in(o, U, covariance);
+    const Eigen::MatrixXd half = half_differences(o.basis, differences.D);
+    of_tables += half * half.transpose();
   }
 
-  Eigen::MatrixXd half = Eigen::MatrixXd::Zero(n, 3);  // one column per axis
-  for_differences(
-      o, [&](const Table& table, std::optional<std::size_t> node, std::size_t parameter) {
-        const auto axis = static_cast<Eigen::Index>(index(table.motion.axis));
-        const double value = 0.5 * U(static_cast<Eigen::Index>(parameter));
-        const std::size_t nodes = o.layout().node_count(table.motion.axis);
-        const std::size_t first = table.offset + node.value_or(0), count = node ? 1 : nodes;
-        half.col(axis)
-            .segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count))
-            .setConstant(value);
-      });
-  of_model += half * half.transpose();
-  return of_model;
+  Result<VolumetricModel> model =
+      VolumetricModel::from_vector(o.layout(), Gauge::G1, tool_offsets_m, U.head(n), of_tables,
+                                   std::move(validity), o.basis.interpolation(Axis::X).kind());
+  if (!model || !estimates_backlash(o)) {
+    return model;
+  }
+  return model->with_travel(std::move(differences));
 }
 
 }  // namespace abbe::calib::otf

@@ -164,10 +164,7 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   }
 
   Result<VolumetricModel> model =
-      VolumetricModel::from_vector(o.layout(), Gauge::G1, std::array{o.target_offset_m},
-                                   w->U.head(static_cast<Eigen::Index>(o.layout().model_size())),
-                                   model_covariance(o, w->U, w->covariance), s.model.validity(),
-                                   o.basis.interpolation(Axis::X).kind());
+      model_of(o, std::array{o.target_offset_m}, w->U, w->covariance, s.model.validity());
   if (!model) {
     return tl::unexpected(model.error());
   }

@@ -163,10 +163,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   add_scale_effects(a->covariance, o, as_observed, a->cofactor_Q);
 
   Result<VolumetricModel> model =
-      VolumetricModel::from_vector(o.layout(), Gauge::G1, std::array{o.target_offset_m},
-                                   a->U.head(static_cast<Eigen::Index>(o.layout().model_size())),
-                                   model_covariance(o, a->U, a->covariance), *std::move(validity),
-                                   o.basis.interpolation(Axis::X).kind());
+      model_of(o, std::array{o.target_offset_m}, a->U, a->covariance, *std::move(validity));
 
   if (!model) {
     return tl::unexpected(model.error());

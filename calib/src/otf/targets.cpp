@@ -292,12 +292,8 @@ Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const 
     tools_m.push_back(o.target_offset_m);
   }
 
-  const estimation::TableBasis& basis = runs.front().basis;
-  const auto n = static_cast<Eigen::Index>(basis.layout().model_size());
   return ValidityVolume::hull_of(covered_m).and_then([&](ValidityVolume validity) {
-    return VolumetricModel::from_vector(basis.layout(), Gauge::G1, tools_m, a.U.head(n),
-                                        model_covariance(runs.front(), a.U, a.covariance),
-                                        std::move(validity), basis.interpolation(Axis::X).kind());
+    return model_of(runs.front(), tools_m, a.U, a.covariance, std::move(validity));
   });
 }
 

@@ -31,10 +31,11 @@ struct ModelDifference {
 /// translation and rotation then have no influence on s. 0 if all points coincide.
 [[nodiscard]] double common_scale(std::span<const Vector3> points_m, std::span<const Vector3> V_m);
 
-/// V of a minus V of b at `axis_positions_m`. NotApplicable if a model is not valid for the tool.
+/// V of a minus V of b at `axis_positions_m`, for a direction of travel (Unknown: the mean of both).
+/// NotApplicable if a model is not valid for the tool.
 [[nodiscard]] Result<ModelDifference> rigid_free_difference(
     const VolumetricModel& a, const VolumetricModel& b, const Vector3& tool_offset_m,
-    std::span<const Vector3> axis_positions_m);
+    std::span<const Vector3> axis_positions_m, const estimation::AxisTravel& travel = {});
 
 /// All combinations of the node positions of X, Y and Z; z varies fastest.
 [[nodiscard]] std::vector<Vector3> tensor_grid(const MachineNodes&);

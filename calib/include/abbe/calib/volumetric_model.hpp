@@ -9,6 +9,10 @@
 /// A rigid motion of the whole volume is not estimable and not part of a model; neither are errors
 /// outside the validity volume.
 ///
+/// With backlash (travel_differences.hpp) V depends on the direction in which each axis last moved.
+/// Functions without this direction give the mean of both directions, and the covariance contains
+/// half the difference.
+///
 /// A model has one of two forms: tables with nodes (rigid-body model; linear or natural cubic
 /// between the nodes), or polynomials without tables (equivalent model of a ball array). Gate,
 /// grid, comparison and export treat all forms alike: nodes() and linear_between_nodes() describe
@@ -27,6 +31,7 @@
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/parameter_layout.hpp"
+#include "abbe/calib/travel_differences.hpp"
 #include "abbe/calib/validity_volume.hpp"
 
 namespace abbe::calib {
@@ -74,6 +79,8 @@ struct ModelDescription {
   std::optional<PolynomialForm> polynomials{};
   /// of the tables of all axes, between `nodes`: Linear or NaturalCubic
   estimation::Interpolation interpolation = estimation::Interpolation::Linear;
+  /// Tables only. `covariance` contains half the differences (TravelDifferences).
+  std::optional<TravelDifferences> travel{};
 };
 
 /// Immutable value; all member functions are const and may be called from any thread.
@@ -100,6 +107,11 @@ class VolumetricModel {
                                                                 const Vector3& tool_offset_m,
                                                                 ValidityVolume);
 
+  /// The same model with differences between the directions of travel; `covariance()` must contain
+  /// half of them: half_differences() times its transpose. BadInput for polynomials or wrong sizes,
+  /// NotFinite for a value that is not a number.
+  [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
+
   /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.
   [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
                                          const Vector3& tool_offset_m) const;
@@ -108,8 +120,19 @@ class VolumetricModel {
   /// Solves c = -V(p + c) for the nominal position p, by iteration until c changes by less than
   /// 1e-9 m. NotApplicable for a tool for which the model is not valid. NotConverged after 50
   /// evaluations; this occurs only if |dV/dq| is close to 1 (implausible tables).
-  [[nodiscard]] Result<Correction> command_correction(const Vector3& nominal_m,
-                                                      const Vector3& tool_offset_m) const;
+  /// `travel`: the direction in which the axes reach the position.
+  [[nodiscard]] Result<Correction> command_correction(
+      const Vector3& nominal_m, const Vector3& tool_offset_m,
+      const estimation::AxisTravel& travel = {}) const;
+
+  /// The same for the direction in which each axis last moved. Where it is Unknown, V is the mean of
+  /// both directions, and the covariance contains half the difference and its uncertainty. Without
+  /// differences the direction has no effect. error_at() allocates with differences.
+  [[nodiscard]] VolumetricError error_at(const Vector3& axis_position_m,
+                                         const Vector3& tool_offset_m,
+                                         const estimation::AxisTravel&) const;
+  [[nodiscard]] Vector3 V_at(const Vector3& axis_position_m, const Vector3& tool_offset_m,
+                             const estimation::AxisTravel&) const;
 
   [[nodiscard]] bool holds_for_tool(const Vector3& tool_offset_m) const;
   [[nodiscard]] const KinematicChain& chain() const;
@@ -134,6 +157,14 @@ class VolumetricModel {
   [[nodiscard]] const evemu::EvemuModel* polynomials() const {
     return std::get_if<evemu::EvemuModel>(&form_);
   }
+  /// Null if V does not depend on the direction of travel.
+  [[nodiscard]] const TravelDifferences* travel() const {
+    return travel_ ? &travel_->differences : nullptr;
+  }
+  /// The tables with their dependence on travel; null without.
+  [[nodiscard]] const estimation::TableBasis* travel_tables() const {
+    return travel_ ? &travel_->basis : nullptr;
+  }
   [[nodiscard]] Gauge gauge() const { return gauge_; }
   [[nodiscard]] std::span<const Vector3> tool_offsets_m() const { return tool_offsets_m_; }
   [[nodiscard]] const ValidityVolume& validity() const { return validity_; }
@@ -148,6 +179,12 @@ class VolumetricModel {
       : form_(std::move(form)), nodes_(std::move(nodes)) {}
   [[nodiscard]] Vector3 lever_offset_m(const Vector3& offset_m) const;
 
+  struct TravelForm {
+    estimation::TableBasis basis;
+    TravelDifferences differences;
+    Eigen::VectorXd U_and_D;
+  };
+
   Form form_;
   MachineNodes nodes_;
   Gauge gauge_ = Gauge::G1;
@@ -160,6 +197,7 @@ class VolumetricModel {
   Eigen::VectorXd Z_;
   Eigen::MatrixXd cov_Z_;
   ValidityVolume validity_;
+  std::optional<TravelForm> travel_;
 };
 
 }  // namespace abbe::calib

@@ -10,12 +10,13 @@ namespace abbe::calib::estimation {
 /// Direction in which an axis last moved. It keeps its value while the axis rests; Unknown before
 /// the first motion.
 enum class Travel : signed char { Backward = -1, Unknown = 0, Forward = 1 };
+using AxisTravel = std::array<Travel, 3>;  ///< of X, Y, Z
 
 struct MachineState {
   Vector3 q_m = Vector3::Zero();            ///< scale readings of X, Y, Z
   Vector3 tool_offset_m = Vector3::Zero();  ///< tool reference point to functional point
-  std::array<Travel, 3> travel{};           ///< of X, Y, Z
-  double time_s = 0.0;                      ///< since the begin of the run
+  AxisTravel travel{};
+  double time_s = 0.0;  ///< since the begin of the run
   /// temperatures of the scales of X, Y, Z; 20 degC is the reference temperature of lengths
   std::array<double, 3> scale_temperature_K{293.15, 293.15, 293.15};
 };

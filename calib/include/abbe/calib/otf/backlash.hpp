@@ -2,9 +2,10 @@
 /// Backlash of the error tables as additional unknowns (Options::backlash). With the direction of
 /// travel s of an axis (travel.hpp) the value of each of its tables at position q is
 ///     U(q) + s b / 2    or    U(q) + s D(q) / 2,    s = 1 forward, -1 backward
-/// b: one value per table (TravelDependence::Backlash), D: one value per node (Tables). U, of which
-/// the VolumetricModel consists, is the mean of both directions. The covariance of the model
-/// contains half the difference, because V does not depend on the direction of travel.
+/// b: one value per table (TravelDependence::Backlash), D: one value per node (Tables). U is the
+/// mean of both directions. The VolumetricModel has the differences with their covariance
+/// (TravelDifferences): V for a direction of travel contains them, and the covariance of the mean
+/// contains half of them.
 ///
 /// Legs, or positions of standstills, before the first motion of an axis are not used: s of this
 /// axis is not known there.
@@ -24,6 +25,7 @@
 
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::calib::otf {
 
@@ -42,6 +44,9 @@ struct Backlash {
 /// "EXX", "EXX at -0.300 m"
 [[nodiscard]] std::string label(const Backlash&);
 
+/// The differences of a model in their order; empty without.
+[[nodiscard]] std::vector<Backlash> backlash_of(const VolumetricModel&);
+
 [[nodiscard]] bool estimates_backlash(const Observations&);
 /// The first leg (standstill: position) on which the direction of travel of all axes is known;
 /// those before it are not used with backlash, and a note names them. 0 without backlash.
@@ -58,9 +63,11 @@ struct Backlash {
 /// For the verdict: the tables with backlash beyond four standard uncertainties, each with its
 /// largest difference, and the differences that are not determined.
 [[nodiscard]] std::vector<std::string> notes_on(std::span<const Backlash>);
-/// The covariance of the model's parameters: that of the adjustment and, with backlash, the effect
-/// of half the difference, common to all tables of an axis.
-[[nodiscard]] Eigen::MatrixXd model_covariance(const Observations&, const Eigen::VectorXd& U,
-                                               const Eigen::MatrixXd& covariance);
+/// The model of an adjustment with the unknowns U: gauge G1, mean of both directions, with the
+/// differences if they were estimated. `covariance`: of U. `tool_offsets_m`: of all runs.
+[[nodiscard]] Result<VolumetricModel> model_of(const Observations&,
+                                               std::span<const Vector3> tool_offsets_m,
+                                               const Eigen::VectorXd& U,
+                                               const Eigen::MatrixXd& covariance, ValidityVolume);
 
 }  // namespace abbe::calib::otf

@@ -1,7 +1,6 @@
 #pragma once
 /// Direction of travel of each axis along a path, on which backlash depends.
 
-#include <array>
 #include <span>
 #include <vector>
 
@@ -10,7 +9,7 @@
 
 namespace abbe::calib::otf {
 
-using AxisTravel = std::array<estimation::Travel, 3>;  ///< of X, Y, Z
+using estimation::AxisTravel;
 
 /// On the fly: the travel with which each leg is driven. Standstill: the travel with which each
 /// vertex is reached. An axis that rests on a leg keeps its direction; Unknown before its first

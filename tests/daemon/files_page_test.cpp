@@ -181,6 +181,8 @@ TEST_F(FilesPage, NamesEveryKeyOfAModel) {
   document.artefact = calib::Expansion{};
   document.recording_gap = "damaged";
   document.mode = "standstill";
+  document.model = test::synthetic_travel_model(1);
+  document.backlash = calib::otf::backlash_of(document.model);
   const auto json = nlohmann::json::parse(to_json(document));
   for (const auto& [key, value] : json.items())
     EXPECT_THAT(sections_.at("model.json").text, HasSubstr("`" + key + "`"));

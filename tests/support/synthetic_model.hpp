@@ -41,6 +41,25 @@ inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0)
       .value();
 }
 
+/// synthetic_model() with backlash: one difference per table, `D` [m or rad] in all of them.
+inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7e-6 / 3) {
+  calib::ModelDescription d = synthetic_model(seed).description();
+  const auto layout = calib::ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
+  const auto kind = calib::estimation::TravelDependence::Backlash;
+  const auto basis = calib::estimation::TableBasis::of(layout, {.travel = kind}).value();
+  const auto n = static_cast<Eigen::Index>(layout.model_size()),
+             m = static_cast<Eigen::Index>(basis.size()) - n;
+
+  calib::TravelDifferences travel{kind, Eigen::VectorXd::Constant(m, D),
+                                  1e-14 / 3 * Eigen::MatrixXd::Identity(m, m),
+                                  Eigen::MatrixXd::Zero(n, m)};
+  travel.cov_U_D(0, 0) = 1e-17 / 3;
+  const Eigen::MatrixXd half = calib::half_differences(basis, travel.D);
+  d.covariance += half * half.transpose();
+  d.travel = std::move(travel);
+  return calib::VolumetricModel::from_description(std::move(d)).value();
+}
+
 inline ModelDocument synthetic_document(unsigned seed) {
   ModelStatistics statistics{.samples = 1000,
                              .lost_samples = 3,

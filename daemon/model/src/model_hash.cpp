@@ -84,6 +84,18 @@ void add_artefact(Canonical& out, const calib::Expansion& artefact) {
     out.number(value);
 }
 
+/// Only if V depends on the direction of travel: other models have the hash of earlier versions.
+void add_travel(Canonical& out, const calib::TravelDifferences& travel) {
+  out.text("travel");
+  out.text(calib::otf::backlash_name(travel.kind));
+  out.count(static_cast<std::size_t>(travel.D.size()));
+  for (Eigen::Index i = 0; i < travel.D.size(); ++i) {
+    out.number(travel.D[i]);
+    for (Eigen::Index j = 0; j < travel.cov_U_D.rows(); ++j) out.number(travel.cov_U_D(j, i));
+    for (Eigen::Index j = i; j < travel.D.size(); ++j) out.number(travel.covariance(i, j));
+  }
+}
+
 }  // namespace
 
 std::string model_hash(const ModelDocument& document) {
@@ -95,6 +107,7 @@ std::string model_hash(const ModelDocument& document) {
   add_values(out, model);
   out.vectors(model.validity().vertices_m());
   if (document.artefact) add_artefact(out, *document.artefact);
+  if (model.travel() != nullptr) add_travel(out, *model.travel());
   return out.hex();
 }
 

@@ -9,6 +9,7 @@
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
 #include "model_reader.hpp"
+#include "read_travel.hpp"
 
 namespace abbe::daemon {
 
@@ -191,32 +192,6 @@ std::string read_optional(ModelReader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
-/// Absent in models without backlash.
-std::vector<calib::otf::Backlash> read_backlash(ModelReader& in) {
-  std::vector<calib::otf::Backlash> all;
-  const std::string path = "backlash";
-  if (!in.root().is_object() || !in.root().contains(path)) return all;
-  const ModelJson& list = in.root().at(path);
-  if (!list.is_array()) in.fault(path, "must be an array");
-
-  for (std::size_t i = 0; list.is_array() && i < list.size(); ++i) {
-    const std::string at = fmt::format("{}[{}]", path, i);
-    const ModelJson* name = in.find(list[i], at, "name");
-    const auto motion = name != nullptr && name->is_string()
-                            ? calib::error_motion(name->get<std::string>())
-                            : std::nullopt;
-    if (!motion) in.fault(at + ".name", "must be an error such as EXX");
-    calib::otf::Backlash b{.motion = motion.value_or(calib::ErrorMotion{}),
-                           .value = in.number_of(list[i], at, "value", kMicroUnit),
-                           .u = in.number_of(list[i], at, "u", kMicroUnit),
-                           .determined = true};
-    if (list[i].is_object() && list[i].contains("position_mm"))
-      b.position_m = in.number_of(list[i], at, "position_mm", kMm);
-    all.push_back(b);
-  }
-  return all;
-}
-
 std::vector<InputFile> read_inputs(ModelReader& in) {
   std::vector<InputFile> inputs;
   const ModelJson* list = in.find(in.root(), "", "inputs");
@@ -243,8 +218,12 @@ Result<ModelDocument> read_document(ModelReader& in) {
   auto description = read_description(in);
   if (const auto valid = calib::check_covariance(description.covariance); !valid && !in.any())
     in.fault("covariance", valid.error().text);
+  const auto travel = read_travel(in, description.parameters.size());
+  if (travel) description.travel = travel->differences;
   auto model = calib::VolumetricModel::from_description(std::move(description));
-  if (!model && !in.any()) in.fault("parameters", model.error().text);
+  if (!model && !in.any())
+    in.fault(travel ? "parameters or travel" : "parameters", model.error().text);
+  if (model && travel) check_names(in, *travel, *model);
   const auto statistics = read_statistics(in);
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);

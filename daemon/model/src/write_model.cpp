@@ -90,18 +90,43 @@ std::string_view unit_of_backlash(const calib::otf::Backlash& b) {
   return calib::is_rotation(b.motion.motion) ? "urad" : "um";
 }
 
-void write_backlash(JsonText& out, const std::vector<calib::otf::Backlash>& backlash) {
-  out.key("backlash");
-  out.raw("[");
-  for (std::size_t i = 0; i < backlash.size(); ++i) {
-    const auto& b = backlash[i];
-    out.raw(fmt::format("{}\n    {{\"name\": \"{}\", ", i > 0 ? "," : "", calib::name(b.motion)));
-    if (b.position_m) out.raw(fmt::format("\"position_mm\": {}, ", to_decimal(*b.position_m, kMm)));
-    out.raw(fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}",
-                        to_decimal(b.value, kMicroUnit), to_decimal(b.u, kMicroUnit),
-                        unit_of_backlash(b)));
+std::string differences(std::span<const calib::otf::Backlash> list, std::string_view indent) {
+  std::string text = "[";
+  for (const auto& b : list) {
+    text += fmt::format("{}\n{}  {{\"name\": \"{}\", ", text.size() > 1 ? "," : "", indent,
+                        calib::name(b.motion));
+    if (b.position_m) text += fmt::format("\"position_mm\": {}, ", to_decimal(*b.position_m, kMm));
+    text +=
+        fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}", to_decimal(b.value, kMicroUnit),
+                    to_decimal(b.u, kMicroUnit), unit_of_backlash(b));
   }
-  out.raw("\n  ]");
+  return fmt::format("{}\n{}]", text, indent);
+}
+
+void write_backlash(JsonText& out, std::span<const calib::otf::Backlash> backlash) {
+  out.key("backlash");
+  out.raw(differences(backlash, "  "));
+}
+
+/// Covariance, row by row: of a difference with the parameters, with itself and with the
+/// differences after it.
+void write_travel(JsonText& out, const calib::VolumetricModel& model) {
+  const calib::TravelDifferences& d = *model.travel();
+  out.key("travel");
+  out.raw(fmt::format("{{\"kind\": \"{}\",\n    \"differences\": {},\n    \"covariance\": [",
+                      calib::otf::backlash_name(d.kind),
+                      differences(calib::otf::backlash_of(model), "    ")));
+
+  for (Eigen::Index i = 0; i < d.D.size(); ++i) {
+    std::string row;
+    const auto add = [&row](double value) {
+      row += (row.empty() ? "" : ",") + to_decimal(value, kMicroUnitSquared);
+    };
+    for (Eigen::Index j = 0; j < d.cov_U_D.rows(); ++j) add(d.cov_U_D(j, i));
+    for (Eigen::Index j = i; j < d.D.size(); ++j) add(d.covariance(i, j));
+    out.raw((i > 0 ? ",\n      " : "\n      ") + row);
+  }
+  out.raw("\n    ]}");
 }
 
 void write_covariance(JsonText& out, const Eigen::MatrixXd& covariance) {
@@ -192,6 +217,7 @@ std::string to_json(const ModelDocument& document) {
   out.raw(fmt::format("{{\"hull_mm\": {}}}", vectors_mm(model.validity().vertices_m())));
   write_parameters(out, model);
   if (!document.backlash.empty()) write_backlash(out, document.backlash);
+  if (model.travel() != nullptr) write_travel(out, model);
   write_covariance(out, model.covariance());
 
   return out.finish();

@@ -61,16 +61,18 @@ struct ModelDocument {
   /// Of method otf: "on-the-fly" or "standstill". Empty for other methods and in files of earlier
   /// versions.
   std::string mode{};
-  /// Of method otf with backlash: the differences that the run determined. They do not affect V, so
-  /// they are not in the hash.
+  /// Of method otf with backlash: the differences that the run determined, for people. All of them
+  /// are in model.travel(), on which V depends; models of earlier versions have only this list. It
+  /// is not in the hash.
   std::vector<calib::otf::Backlash> backlash{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 
 /// SHA-256 in hex over the content of the model: method, chain, basis, nodes, gauge, tools,
-/// parameters, covariance, validity, and the corrected thermal expansion of the ball array. Dates,
-/// inputs and statistics are not included, so that the live model and its replay have equal hashes.
+/// parameters, covariance, validity, the corrected thermal expansion of the ball array, and the
+/// differences between the directions of travel. Dates, inputs and statistics are not included, so
+/// that the live model and its replay have equal hashes.
 [[nodiscard]] std::string model_hash(const ModelDocument& document);
 
 /// The id of a model in commands and in the store: 16 digits of a hash over model_hash() and the

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "abbe/model/model_document.hpp"
 #include "abbe_command.hpp"
@@ -37,11 +38,11 @@ class CliBacklash : public ::testing::Test {
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  static test::Ran identify(const std::string& more) {
+  static test::Ran identify(const std::string& more, const std::string& out = "out") {
     return test::run_abbe(folder_,
                           "identify otf --machine machine.toml --path path.csv --tracker "
-                          "tracker.csv -o out " +
-                              more);
+                          "tracker.csv -o " +
+                              out + " " + more);
   }
   static std::string text_of(const std::string& file) { return test::text_of(folder_ / file); }
 
@@ -76,6 +77,63 @@ TEST_F(CliBacklash, IsInSummaryVerdictAndFiles) {
   const auto document = read_model(folder_ / "out/model.json");
   ASSERT_TRUE(document);
   EXPECT_EQ(document->backlash.size(), 14u);
+}
+
+/// Column `column` of the only point of eval.csv.
+double value_of(const test::Ran& ran, std::size_t column) {
+  std::istringstream row(ran.out.substr(ran.out.rfind('\n', ran.out.size() - 2) + 1));
+  std::string cell;
+  for (std::size_t i = 0; i <= column; ++i) std::getline(row, cell, ',');
+  return std::stod(cell);
+}
+
+TEST_F(CliBacklash, IsInVOfADirection) {
+  ASSERT_EQ(identify("--backlash").exit, 0);
+  test::write_text(folder_ / "point.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
+  test::write_text(folder_ / "back.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n10,20,-30,-,0,0\n");
+  const auto eval = [](const std::string& more) {
+    return test::run_abbe(folder_, "model eval out/model.json --points " + more);
+  };
+  constexpr std::size_t kEx = 3, kUx = 6;
+  const auto mean = eval("point.csv"), forth = eval("point.csv --direction +,0,0"),
+             back = eval("back.csv");
+  ASSERT_EQ(mean.exit + forth.exit + back.exit, 0) << forth.err << back.err;
+  EXPECT_NEAR(value_of(forth, kEx) - value_of(mean, kEx), 0.5e6 * kEXX_m, 0.1);
+  EXPECT_NEAR(value_of(back, kEx) - value_of(mean, kEx), -0.5e6 * kEXX_m, 0.1);
+  EXPECT_LT(value_of(forth, kUx), 0.8 * value_of(mean, kUx));
+}
+
+TEST_F(CliBacklash, DirectionIsRefusedWhereItHasNoMeaning) {
+  ASSERT_EQ(identify("--backlash").exit, 0);
+  ASSERT_EQ(identify("--backlash=none", "plain").exit, 0);
+  test::write_text(folder_ / "point.csv", "x_mm,y_mm,z_mm\n10,20,-30\n");
+  test::write_text(folder_ / "back.csv", "x_mm,y_mm,z_mm,dx,dy,dz\n10,20,-30,-,0,0\n");
+  const auto error = [](const std::string& more) {
+    return test::run_abbe(folder_, "model " + more).err;
+  };
+  EXPECT_THAT(error("eval out/model.json --points point.csv --direction +,1,0"),
+              HasSubstr("--direction \"+,1,0\": must be three of +, -, 0"));
+  EXPECT_THAT(error("eval out/model.json --points back.csv --direction +,+,+"),
+              HasSubstr("back.csv has the columns dx, dy, dz"));
+  EXPECT_THAT(error("eval plain/model.json --points back.csv"),
+              HasSubstr("plain/model.json: the model has no backlash"));
+  EXPECT_THAT(error("compare plain/model.json plain/model.json --direction +,+,+"),
+              HasSubstr("the model has no backlash"));
+}
+
+TEST_F(CliBacklash, IsShownAndCompared) {
+  ASSERT_EQ(identify("--backlash").exit, 0);
+  EXPECT_THAT(test::run_abbe(folder_, "model show out/model.json").out,
+              HasSubstr("V depends on the direction of travel (per-table)"));
+  const auto compared = [](const std::string& more) {
+    return nlohmann::json::parse(
+        test::run_abbe(folder_, "model compare out/model.json plain/model.json --json " + more)
+            .out);
+  };
+  ASSERT_EQ(identify("--backlash=none", "plain").exit, 0);
+  const auto mean = compared(""), forth = compared("--direction +,+,+");
+  EXPECT_GT(forth.at("as_stated").at("mean_um").get<double>(),
+            mean.at("as_stated").at("mean_um").get<double>() + 1.0);
 }
 
 TEST_F(CliBacklash, MayDependOnThePosition) {

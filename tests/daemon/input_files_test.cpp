@@ -137,6 +137,23 @@ TEST_F(InputFiles, ReadAnEncoderLog) {
   EXPECT_EQ(encoder->rows[1].reading_m, (AxisPosition{0.004, 0.005, 0.006}));
 }
 
+TEST_F(InputFiles, MayHaveADirectionOfTravelPerPoint) {
+  using calib::estimation::AxisTravel;
+  using calib::estimation::Travel;
+  const std::string header = "x_mm,y_mm,z_mm,dx,dy,dz\n";
+  const auto points = read_points_csv(write("p.csv", header + "1,2,3,+,-,0\n1,2,3,-,-,+\n"));
+  ASSERT_TRUE(points) << points.error().details.front();
+  EXPECT_THAT(points->travel,
+              ElementsAre(AxisTravel{Travel::Forward, Travel::Backward, Travel::Unknown},
+                          AxisTravel{Travel::Backward, Travel::Backward, Travel::Forward}));
+  const auto faulty = read_points_csv(write("p.csv", header + "1,2,3,+,1,0\n"));
+  ASSERT_FALSE(faulty);
+  EXPECT_THAT(faulty.error().details, ElementsAre(HasSubstr("p.csv:2:9: dy:")));
+  const auto partial = read_points_csv(write("p.csv", "x_mm,y_mm,z_mm,dx\n1,2,3,+\n"));
+  ASSERT_FALSE(partial);
+  EXPECT_THAT(partial.error().details.front(), HasSubstr("dy: missing column"));
+}
+
 TEST_F(InputFiles, CarryTheHashOfTheirBytes) {
   const std::string text = "x_mm,y_mm,z_mm\n1,2,3\n";
   const auto points = read_points_csv(write("p.csv", text));

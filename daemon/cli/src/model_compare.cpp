@@ -9,6 +9,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
+#include "direction_option.hpp"
 #include "figures.hpp"
 #include "measured_comparison.hpp"
 #include "store_option.hpp"
@@ -18,7 +19,7 @@ namespace abbe::daemon {
 namespace {
 
 struct ModelCompareArguments {
-  std::string a, b;
+  std::string a, b, direction;
   MeasuredOptions measured;
   StoreOption store;
   bool json = false;
@@ -47,9 +48,16 @@ Result<Comparison> compare(const ModelCompareArguments& arguments) {
   const auto b = model_named(arguments.b, arguments.store);
   if (!b) return tl::make_unexpected(b.error());
 
+  const auto travel = parse_direction(arguments.direction);
+  if (!travel) return tl::make_unexpected(travel.error());
+  if (!arguments.direction.empty() && b->model.travel() == nullptr) {
+    if (auto known = require_travel(a->model, arguments.a); !known)
+      return tl::make_unexpected(known.error());
+  }
+
   const auto points = common_points(a->model, b->model);
-  const auto difference =
-      calib::rigid_free_difference(a->model, b->model, a->model.tool_offsets_m().front(), points);
+  const auto difference = calib::rigid_free_difference(
+      a->model, b->model, a->model.tool_offsets_m().front(), points, *travel);
   if (!difference)
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
@@ -108,6 +116,9 @@ void add_model_compare(CLI::App& parent, int& exit) {
   auto* measured = add_measured_options(*command, arguments->measured);
   measured->excludes(b);
   add_store_options(*command, arguments->store);
+  command->add_option("--direction", arguments->direction,
+                      "direction in which X, Y and Z last moved, such as +,-,0 (0: not known); a "
+                      "model without backlash is the mean of both directions");
   command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] {
     if (!arguments->measured.file.empty())

@@ -9,6 +9,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "commands.hpp"
+#include "direction_option.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 #include "vector_option.hpp"
@@ -18,7 +19,7 @@ namespace abbe::daemon {
 namespace {
 
 struct ModelEvalArguments {
-  std::string model, points, tool;
+  std::string model, points, tool, direction;
   StoreOption store;
   bool correction = false;
 };
@@ -26,14 +27,15 @@ struct ModelEvalArguments {
 /// One row of the output: position, error V or correction, its standard uncertainty, inside. The
 /// correction is a function of V and has the same uncertainty.
 Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition& q,
-                        const calib::Vector3& tool_m, bool correction) {
+                        const calib::Vector3& tool_m, const calib::estimation::AxisTravel& travel,
+                        bool correction) {
   const calib::Vector3 position_m(q[0], q[1], q[2]);
-  const auto error = model.error_at(position_m, tool_m);
+  const auto error = model.error_at(position_m, tool_m, travel);
   calib::Vector3 vector_m = error.V_m;
   bool inside = error.inside;
 
   if (correction) {
-    const auto found = model.command_correction(position_m, tool_m);
+    const auto found = model.command_correction(position_m, tool_m, travel);
     if (!found) return tl::make_unexpected(error_of(found.error()));
     vector_m = found->c_m;
     inside = found->inside;
@@ -48,6 +50,24 @@ Result<std::string> row(const calib::VolumetricModel& model, const AxisPosition&
   return text + (inside ? "1\n" : "0\n");
 }
 
+/// The direction of travel at each point: of --direction, of the columns of points.csv, or unknown.
+Result<std::vector<calib::estimation::AxisTravel>> travel_of(const ModelEvalArguments& arguments,
+                                                             const PointsFile& points,
+                                                             const calib::VolumetricModel& model) {
+  const auto given = parse_direction(arguments.direction);
+  if (!given) return tl::make_unexpected(given.error());
+  const bool of_points = !points.travel.empty();
+  if (of_points && !arguments.direction.empty())
+    return fail(ErrorCode::Usage,
+                fmt::format("--direction: {} has the columns dx, dy, dz; give one of the two",
+                            arguments.points));
+  if (of_points || !arguments.direction.empty()) {
+    if (auto known = require_travel(model, arguments.model); !known)
+      return tl::make_unexpected(known.error());
+  }
+  return of_points ? points.travel : std::vector(points.points_m.size(), *given);
+}
+
 Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   const auto document = model_named(arguments.model, arguments.store);
   if (!document) return tl::make_unexpected(document.error());
@@ -56,13 +76,17 @@ Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
 
+  const auto travel = travel_of(arguments, *points, document->model);
+  if (!travel) return tl::make_unexpected(travel.error());
+
   std::string text = arguments.correction
                          ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
                          : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
   text += ",ux_um,uy_um,uz_um,inside\n";
 
-  for (const auto& q : points->points_m) {
-    const auto line = row(document->model, q, *tool_m, arguments.correction);
+  for (std::size_t i = 0; i < points->points_m.size(); ++i) {
+    const auto line =
+        row(document->model, points->points_m[i], *tool_m, (*travel)[i], arguments.correction);
     if (!line) return tl::make_unexpected(line.error());
     text += *line;
   }
@@ -95,10 +119,16 @@ void add_model_eval(CLI::App& parent, int& exit) {
                    "\"active\"")
       ->required();
   add_store_options(*command, arguments->store);
-  command->add_option("--points", arguments->points, "points.csv: x_mm,y_mm,z_mm, scale readings")
+  command
+      ->add_option("--points", arguments->points,
+                   "points.csv: x_mm,y_mm,z_mm, scale readings; dx,dy,dz (+, -, 0), if given: "
+                   "direction of travel")
       ->required();
   command->add_option("--tool", arguments->tool,
                       "x,y,z: tool offset in mm; default: that of the calibration");
+  command->add_option("--direction", arguments->direction,
+                      "direction in which X, Y and Z last moved, such as +,-,0 (0: not known), for "
+                      "a model with backlash; default: not known, the mean of both directions");
   command->add_flag("--correction", arguments->correction,
                     "print the correction c to be added to a commanded position p instead: c = "
                     "-e(p + c), solved to 1 nm");

@@ -95,7 +95,11 @@ void print_model(const ModelDocument& document) {
     fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
   if (!document.recording_gap.empty())
     fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
-  fmt::print("\n{}", to_tables_csv(document.model));
+  if (document.model.travel() != nullptr)
+    fmt::print(
+        "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
+        calib::otf::backlash_name(document.model.travel()->kind));
+  fmt::print("\n{}", to_tables_csv(document.model, document.backlash));
 }
 
 Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {

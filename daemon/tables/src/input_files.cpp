@@ -20,6 +20,16 @@ AxisPosition position_m(const NumberTable& table, std::size_t row, std::size_t f
           table.at(row, first + 2) / kMmPerM};
 }
 
+/// Directions in three columns with the words "-", "0", "+".
+calib::estimation::AxisTravel travel_in_row(const NumberTable& table, std::size_t row,
+                                            std::size_t first) {
+  calib::estimation::AxisTravel all{};
+  for (std::size_t axis = 0; axis < all.size(); ++axis)
+    all[axis] =
+        static_cast<calib::estimation::Travel>(std::lround(table.at(row, first + axis)) - 1);
+  return all;
+}
+
 // The check_...() functions below skip rows that already have a fault.
 
 void check_time_ascends(ParsedTable& parsed) {
@@ -142,13 +152,23 @@ Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
 }
 
 Result<PointsFile> read_points_csv(const std::filesystem::path& file) {
-  auto parsed = parse_table(file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}}});
+  constexpr std::size_t kWithDirection = 1;  // index of this variant of the file format
+  const auto direction = [](std::string_view name) {
+    return protocol::ColumnRule{.name = name, .words = {"-", "0", "+"}};
+  };
+  auto parsed = parse_table(
+      file, {{{"x_mm"}, {"y_mm"}, {"z_mm"}},
+             {{"x_mm"}, {"y_mm"}, {"z_mm"}, direction("dx"), direction("dy"), direction("dz")}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "points");
   if (parsed->faults.any()) return tl::make_unexpected(parsed->faults.to_error());
-  PointsFile points{parsed->source, {}};
-  for (std::size_t row = 0; row < parsed->table.rows(); ++row)
-    points.points_m.push_back(position_m(parsed->table, row, 0));
+
+  const auto& table = parsed->table;
+  PointsFile points{parsed->source, {}, {}};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    points.points_m.push_back(position_m(table, row, 0));
+    if (table.form() == kWithDirection) points.travel.push_back(travel_in_row(table, row, 3));
+  }
   return points;
 }
 

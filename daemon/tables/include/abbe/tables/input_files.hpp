@@ -17,6 +17,7 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
+#include "abbe/calib/estimation/machine_state.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/calib/verify/observe.hpp"
 
@@ -56,10 +57,12 @@ struct EncoderFile {
 [[nodiscard]] Result<EncoderFile> read_encoder_csv(const std::filesystem::path& file,
                                                    const ReadProgress& progress = {});
 
-/// points.csv: `x_mm,y_mm,z_mm`, scale readings, at least one row.
+/// points.csv: `x_mm,y_mm,z_mm[,dx,dy,dz]`, scale readings, at least one row. dx, dy, dz: direction
+/// in which the axis last moved, `+`, `-`, or `0` if it is not known.
 struct PointsFile {
   InputFile source;
   std::vector<AxisPosition> points_m;
+  std::vector<calib::estimation::AxisTravel> travel;  ///< empty without the columns dx, dy, dz
 };
 [[nodiscard]] Result<PointsFile> read_points_csv(const std::filesystem::path& file);
 

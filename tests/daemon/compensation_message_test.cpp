@@ -51,6 +51,32 @@ TEST(CompensationMessage, IsTheModelErrorAtTheMachinesPosition) {
   EXPECT_EQ(m.age_ns(), 3'000'000);
 }
 
+TEST(CompensationMessage, IsThatOfTheDirectionInWhichTheAxesMoved) {
+  using calib::estimation::Travel;
+  const PublishedModel with{.id = "b", .model = test::synthetic_travel_model(1)};
+  const auto of = [&](const calib::estimation::AxisTravel& travel) {
+    return compensation_message(ModelStatus::MODEL_ACTIVE, &with, view_inside(), kTool_m, 500ms, {},
+                                travel);
+  };
+  const auto forth = of({Travel::Forward, Travel::Forward, Travel::Forward}),
+             back = of({Travel::Backward, Travel::Backward, Travel::Backward}), unknown = of({});
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(unknown.vector_m()[i], 0.5 * (forth.vector_m()[i] + back.vector_m()[i]), 1e-15);
+    EXPECT_GT(std::abs(forth.vector_m()[i] - back.vector_m()[i]), 1e-6);
+  }
+  EXPECT_GT(unknown.cov_m2()[0], 10.0 * forth.cov_m2()[0]);
+}
+
+/// A subscriber of the grid does not know the direction: its uncertainty contains half of it.
+TEST(GridMessage, OfAModelWithBacklashIsTheMeanWithHalfTheDifference) {
+  const PublishedModel with{.id = "b", .model = test::synthetic_travel_model(1)};
+  const auto node = grid_messages(with, {.machine = "mill"}).front().nodes().front();
+  const calib::Vector3 q(node.position_m().data()), tool(kTool_m.data());
+  const auto e = with.model.error_at(q, tool, {});
+  EXPECT_EQ(node.error_m()[0], e.V_m.x());
+  EXPECT_NEAR(node.cov_m2()[0], e.cov_V_m2(0, 0), 1e-20);
+}
+
 TEST(CompensationMessage, IsStaleWithoutAVectorOnceAnAxisDoesNotAnswer) {
   auto view = view_inside();
   view.missing_mask = 0b001;

@@ -34,6 +34,22 @@ TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
   EXPECT_TRUE(taken) << taken.error().text;
 }
 
+TEST(OtfPath, WithBacklashMustMoveEveryAxis) {
+  using enum calib::estimation::TravelDependence;
+  const std::vector<AxisPosition> flat{
+      {0, 0, 0}, {0.05, 0, 0}, {0.05, 0.05, 0}, {0, 0.05, 0}, {0, 0, 0}};
+  using calib::otf::Mode;
+  EXPECT_TRUE(check_otf_path(flat, machine(), Mode::Standstill, None));
+  for (const auto mode : {Mode::Standstill, Mode::OnTheFly}) {
+    const auto refused = check_otf_path(flat, machine(), mode, Backlash);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(refused.error().text, HasSubstr("the path does not move Z"));
+  }
+  EXPECT_TRUE(
+      check_otf_path(test::synthetic_request_path_m(), machine(), Mode::OnTheFly, Backlash));
+}
+
 TEST(OtfInputs, TheConfigurationNamesTheEstimator) {
   using calib::otf::Estimator;
   for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {

@@ -54,6 +54,16 @@ Result<Identification> two_step(Observations observations, const Options& option
   return Identification{std::move(observations), *std::move(solution)};
 }
 
+/// Adds the legs that were not used because of backlash: the rest may be insufficient without them.
+auto naming_unused(const Observations& o) {
+  return [unused = note_on_unused(o)](Error error) {
+    if (!unused.empty()) {
+      error.text += "; " + unused;
+    }
+    return error;
+  };
+}
+
 Result<Identification> estimated(Observations across, const BlockSeries& series, const Noise& noise,
                                  const Options& options, AlongRows* along) {
   if (options.estimator == Estimator::Joint) {
@@ -65,13 +75,16 @@ Result<Identification> estimated(Observations across, const BlockSeries& series,
 
 Result<Identification> identify_observed(Observations observations, const BlockSeries& series,
                                          const Noise& noise, const Options& options) {
+  const auto name_unused = naming_unused(observations);
   if (options.encoders != nullptr) {
-    return identify_synchronised(observations, series, noise, options, [&](AlongRows* along) {
-      return estimated(observations, series, noise, options, along);
-    });
+    return identify_synchronised(observations, series, noise, options,
+                                 [&](AlongRows* along) {
+                                   return estimated(observations, series, noise, options, along);
+                                 })
+        .map_error(name_unused);
   }
 
-  return estimated(std::move(observations), series, noise, options, nullptr);
+  return estimated(std::move(observations), series, noise, options, nullptr).map_error(name_unused);
 }
 
 }  // namespace
@@ -80,7 +93,8 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
                                 const Path& path, const Noise& noise, const Options& options) {
   if (options.mode == Mode::Standstill) {
     return observe(samples, machine, path, noise, options).and_then([&](Observations o) {
-      return two_step(std::move(o), options);
+      const auto name_unused = naming_unused(o);
+      return two_step(std::move(o), options).map_error(name_unused);
     });
   }
 

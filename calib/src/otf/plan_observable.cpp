@@ -47,15 +47,23 @@ void clear_rows(Observations& o) {
 
 /// The columns of `null_space`, in gauge G1. A combination that no run determines is zero there.
 Eigen::MatrixXd in_gauge(const Observations& o, const Eigen::MatrixXd& null_space) {
-  const Eigen::MatrixXd of_gauge =
+  // unobservable_combinations() has no rows for differences between directions of travel.
+  const Eigen::MatrixXd of_layout =
       unobservable_combinations(o.layout(), std::array{o.target_offset_m});
+  const auto model = static_cast<Eigen::Index>(o.layout().model_size()),
+             rigid = static_cast<Eigen::Index>(kRigidUnknowns);
+  Eigen::MatrixXd of_gauge = Eigen::MatrixXd::Zero(null_space.rows(), of_layout.cols());
+  of_gauge.topRows(model) = of_layout.topRows(model);
+  of_gauge.middleRows(static_cast<Eigen::Index>(o.rigid_offset()), rigid) =
+      of_layout.middleRows(model, rigid);
   const Result<Eigen::MatrixXd> S = gauge_of(o).transformation(of_gauge);
   return S ? Eigen::MatrixXd(*S * null_space) : null_space;
 }
 
-/// Names of the tables and squareness errors with a value in a column of `undetermined`.
-std::vector<std::string> names_of(const ParameterLayout& layout,
-                                  const Eigen::MatrixXd& undetermined) {
+/// Names of the tables and squareness errors with a value in a column of `undetermined`; a table
+/// also if the difference between its directions of travel has one.
+std::vector<std::string> names_of(const Observations& o, const Eigen::MatrixXd& undetermined) {
+  const ParameterLayout& layout = o.layout();
   // Columns have unit length; rounding leaves 1e-12.
   constexpr double kZero = 1e-6;
   const auto occurs = [&](std::size_t first, std::size_t count) {
@@ -66,10 +74,14 @@ std::vector<std::string> names_of(const ParameterLayout& layout,
   };
 
   std::vector<std::string> names;
+  const bool per_node = o.basis.travel() == estimation::TravelDependence::Tables;
+  std::size_t of_travel = layout.model_size();
   for (const Table& table : layout.tables()) {
-    if (occurs(table.offset, layout.node_count(table.motion.axis))) {
+    const std::size_t nodes = layout.node_count(table.motion.axis);
+    if (occurs(table.offset, nodes) || (per_node && occurs(of_travel, nodes))) {
       names.push_back(name(table.motion));
     }
+    of_travel += per_node ? nodes : 0;
   }
   for (std::size_t i = 0; i < kSquarenessNames.size(); ++i) {
     if (occurs(layout.squareness_offset() + i, 1)) {
@@ -115,22 +127,32 @@ std::string listed(const std::vector<std::string>& names) {
 
 }  // namespace
 
-Result<Observability> observability(const Path& path, const Machine& machine) {
-  Result<estimation::TableBasis> basis =
-      ParameterLayout::observable_with_one_target(machine.chain, machine.nodes)
-          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
-  if (!basis) {
-    return tl::unexpected(basis.error());
+Result<Observability> observability(const Path& path, const Machine& machine,
+                                    estimation::TravelDependence backlash) {
+  Machine linear = machine;  // the rank hardly depends on the interpolation, the time does
+  linear.interpolation = estimation::Interpolation::Linear;
+  Result<Observations> empty = observations_without_rows(linear, path, {}, {}, backlash);
+  if (!empty) {
+    return tl::unexpected(empty.error());
   }
 
-  Observations o{.basis = *std::move(basis), .target_offset_m = machine.target_offset_m};
+  Observations o = *std::move(empty);
+  const Result<std::size_t> first = first_with_backlash(o);
+  if (!first) {
+    return tl::unexpected(first.error());
+  }
+
   const auto conditions = static_cast<std::size_t>(gauge_of(o).conditions().rows());
-  Observability result{.needed = o.unknowns() - conditions};
+  Observability result{.needed = o.unknowns() - conditions, .unused = note_on_unused(o)};
   estimation::Information data(o.unknowns());
+  if (backlash == estimation::TravelDependence::Backlash) {
+    data = with_backlash_prior(std::move(data), o);
+  }
 
   // Further legs never decrease the rank. Groups that grow keep the number of decompositions small.
   const std::size_t legs = path.vertices_m.empty() ? 0 : path.vertices_m.size() - 1;
-  for (std::size_t leg = 0, group = 32; leg < legs && result.rank < result.needed; group *= 2) {
+  for (std::size_t leg = *first, group = 32; leg < legs && result.rank < result.needed;
+       group *= 2) {
     for (const std::size_t end = std::min(legs, leg + group); leg < end; ++leg) {
       append_unit_rows(o, leg, path);
     }
@@ -140,13 +162,14 @@ Result<Observability> observability(const Path& path, const Machine& machine) {
   }
 
   if (result.rank < result.needed) {
-    result.undetermined = names_of(o.layout(), in_gauge(o, estimation::null_space(data).basis));
+    result.undetermined = names_of(o, in_gauge(o, estimation::null_space(data).basis));
   }
   return result;
 }
 
-Result<void> check_observable(const Path& path, const Machine& machine) {
-  const Result<Observability> seen = observability(path, machine);
+Result<void> check_observable(const Path& path, const Machine& machine,
+                              estimation::TravelDependence backlash) {
+  const Result<Observability> seen = observability(path, machine, backlash);
   if (!seen) {
     return tl::unexpected(seen.error());
   }
@@ -157,6 +180,7 @@ Result<void> check_observable(const Path& path, const Machine& machine) {
       ErrorCode::RankDeficient,
       message("path: it does not determine ", listed(seen->undetermined), " (rank ", seen->rank,
               ", needs ", seen->needed, ")", parts_not_reached(path, machine.nodes),
+              seen->unused.empty() ? "" : "; ", seen->unused,
               ": add legs in other directions and at other heights; `abbe plan otf` "
               "computes a path"));
 }

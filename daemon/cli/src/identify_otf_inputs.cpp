@@ -41,7 +41,8 @@ Result<void> check_path(const std::string& file, const PathFile& path, const Con
           check_travel(file, otf_path(path.vertices_m).vertices_m, path.lines, config.machine);
       !inside)
     return inside;
-  auto valid = check_otf_path(path.vertices_m, config.machine, config.otf.mode);
+  auto valid =
+      check_otf_path(path.vertices_m, config.machine, config.otf.mode, config.otf.backlash);
   if (!valid) valid.error().text = fmt::format("{}: {}", file, valid.error().text);
   return valid;
 }

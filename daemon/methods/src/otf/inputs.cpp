@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string>
 
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/orientation.hpp"
 #include "abbe/calib/otf/plan_observable.hpp"
@@ -52,15 +53,31 @@ calib::otf::Path otf_path(std::span<const AxisPosition> path_m) {
   return path;
 }
 
+namespace {
+
+/// Whether a run along the path determines the tables.
+calib::Result<void> determines_tables(const calib::otf::Path& path,
+                                      const calib::otf::Machine& machine, calib::otf::Mode mode,
+                                      calib::estimation::TravelDependence backlash) {
+  if (mode == calib::otf::Mode::OnTheFly)
+    return calib::otf::check_observable(path, machine, backlash);
+  if (backlash == calib::estimation::TravelDependence::None) return {};
+  const auto first =
+      calib::otf::first_with_known_travel(calib::otf::travel_along(path.vertices_m, mode));
+  if (!first) return tl::unexpected(first.error());
+  return {};
+}
+
+}  // namespace
+
 Result<void> check_otf_path(std::span<const AxisPosition> path_m, const MachineConfig& machine,
-                            calib::otf::Mode mode) {
+                            calib::otf::Mode mode, calib::estimation::TravelDependence backlash) {
   if (auto given = require_target(machine); !given) return given;
   const auto known = otf_machine(machine);
   if (!known) return tl::unexpected(known.error());
   const calib::otf::Path path = otf_path(path_m);
   auto valid = calib::otf::check(path, known->nodes);
-  if (valid && mode == calib::otf::Mode::OnTheFly)
-    valid = calib::otf::check_observable(path, *known);
+  if (valid) valid = determines_tables(path, *known, mode, backlash);
   if (!valid) return fail(ErrorCode::BadInput, "calibrate otf: " + valid.error().text);
   return {};
 }

@@ -47,7 +47,8 @@ Result<void> OtfMethod::check(const Request& request, const Config& config) {
         ErrorCode::Refused,
         fmt::format("calibrate otf: [{}] mode = \"stationary\" gives no points during motion",
                     tracker->key));
-  return check_otf_path(request.path_m, config.machine, request.mode.value_or(config.otf.mode));
+  return check_otf_path(request.path_m, config.machine, request.mode.value_or(config.otf.mode),
+                        config.otf.backlash);
 }
 
 Result<OtfMethod::Acquisition> OtfMethod::acquire(Request&& request, const Options& options) {

@@ -19,10 +19,12 @@ namespace abbe::daemon {
 [[nodiscard]] calib::otf::Path otf_path(std::span<const AxisPosition> path_m);
 /// Checks a path before it is driven. BadInput if no run along the path could be identified: too
 /// few vertices, vertices on one line or outside the travel, no [target], or, on the fly, tables that
-/// the path does not determine (named in the text).
-[[nodiscard]] Result<void> check_otf_path(std::span<const AxisPosition> path_m,
-                                          const MachineConfig& machine,
-                                          calib::otf::Mode mode = calib::otf::Mode::OnTheFly);
+/// the path does not determine (named in the text). With backlash the legs before the first motion
+/// of an axis do not count, and a path on which an axis does not move is BadInput.
+[[nodiscard]] Result<void> check_otf_path(
+    std::span<const AxisPosition> path_m, const MachineConfig& machine,
+    calib::otf::Mode mode = calib::otf::Mode::OnTheFly,
+    calib::estimation::TravelDependence backlash = calib::estimation::TravelDependence::None);
 /// Converts the points. Times are those of the tracker's clock, relative to the first point.
 [[nodiscard]] std::vector<calib::otf::TrackerObservation> otf_observations(
     std::span<const RunPoint> points);

@@ -1,0 +1,107 @@
+// Check and prediction of a path before a run that estimates backlash.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "abbe/calib/otf/identify.hpp"
+#include "abbe/calib/otf/plan.hpp"
+#include "abbe/calib/otf/plan_observable.hpp"
+#include "otf_run.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::otf;
+using namespace abbe::tests::otf;
+using estimation::TravelDependence;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+
+/// Edges and diagonals of X and Y at one height.
+std::vector<Vector3> flat_path_m(const MachineNodes& nodes, double z_m) {
+  std::vector<Vector3> flat = base_path(nodes).vertices_m;
+  for (Vector3& q : flat) {
+    q.z() = z_m;
+  }
+  std::erase_if(flat, [last = Vector3(9, 9, 9)](const Vector3& q) mutable {
+    return std::exchange(last, q) == q;
+  });
+  return flat;
+}
+
+/// X beyond 60 mm is driven at two heights: first at Z = 0, before Z has moved, then at -400 mm.
+Path path_with_a_late_start_of_Z(const MachineNodes& nodes) {
+  Path path{flat_path_m(nodes, 0.0)};
+  const std::vector<Vector3> low = flat_path_m(nodes, -0.4);
+  path.vertices_m.insert(path.vertices_m.end(), low.begin(), low.end());
+  for (Vector3 q : case_a_path().vertices_m) {
+    q.x() = 0.6 * q.x() - 0.12;
+    path.vertices_m.push_back(q);
+  }
+  return path;
+}
+
+TEST(PlanObservableWithBacklash, APathThatShowsBothDirectionsIsSufficient) {
+  for (const auto kind : {TravelDependence::Backlash, TravelDependence::Tables}) {
+    EXPECT_TRUE(check_observable(case_a_path(), coarse_machine("[w X' b Y Z (C1) t]"), kind));
+  }
+}
+
+TEST(PlanObservableWithBacklash, NamesTablesOfLegsThatAreNotUsed) {
+  const Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
+  const Path path = path_with_a_late_start_of_Z(machine.nodes);
+  const auto without = check_observable(path, machine);
+  EXPECT_TRUE(without) << without.error().text;
+  const auto with = check_observable(path, machine, TravelDependence::Backlash);
+  ASSERT_FALSE(with);
+  EXPECT_EQ(with.error().code, ErrorCode::RankDeficient);
+  EXPECT_THAT(with.error().text, AllOf(HasSubstr("does not determine EXX"), HasSubstr("EBX"),
+                                       HasSubstr("; the legs before "),
+                                       HasSubstr(" are not used: Z had not moved yet")));
+}
+
+/// The same is refused after the run, with the same legs.
+TEST(PlanObservableWithBacklash, RefusesWhatTheAdjustmentWouldRefuse) {
+  for (const Estimator estimator : {Estimator::TwoStep, Estimator::Joint}) {
+    const MadeRunOptions wanted;
+    MadeRun run = make_run(wanted);
+    run.path = path_with_a_late_start_of_Z(run.machine.nodes);
+    measure_run(run, wanted);
+    run.options.estimator = estimator;
+    run.options.backlash = TravelDependence::Backlash;
+    const auto id = identify(run.samples, run.machine, run.path, run.noise, run.options);
+    ASSERT_FALSE(id);
+    EXPECT_EQ(id.error().code, ErrorCode::RankDeficient) << id.error().text;
+    EXPECT_THAT(id.error().text, HasSubstr("; the legs before "));
+  }
+}
+
+/// X moves forward only: forward and backward tables are not told apart. One value per table would
+/// not change the model and is not refused.
+TEST(PlanObservableWithBacklash, NeedsBothDirectionsForTablesOfBoth) {
+  const Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
+  Path path;
+  for (const double x_m : machine.nodes[0].nodes_m) {
+    for (const Vector3& q : case_a_path().vertices_m) {
+      path.vertices_m.emplace_back(x_m, q.y(), q.z());
+    }
+  }
+  std::erase_if(path.vertices_m, [last = Vector3(9, 9, 9)](const Vector3& q) mutable {
+    return (std::exchange(last, q) - q).norm() < 0.03;
+  });
+  const auto seen = observability(path, machine, TravelDependence::Tables);
+  ASSERT_TRUE(seen) << seen.error().text;
+  EXPECT_THAT(seen->undetermined, AllOf(Contains("EXX"), Contains("EYX"), Contains("ECX")));
+}
+
+TEST(PlanObservableWithBacklash, NamesAnAxisThatDoesNotMove) {
+  const Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
+  const Path flat{flat_path_m(machine.nodes, 0.0)};
+  const auto refused = check_observable(flat, machine, TravelDependence::Backlash);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("backlash: the path does not move Z"));
+}
+
+}  // namespace

@@ -104,4 +104,31 @@ TEST(PlanObservableWithBacklash, NamesAnAxisThatDoesNotMove) {
   EXPECT_THAT(refused.error().text, HasSubstr("backlash: the path does not move Z"));
 }
 
+/// The uncertainties that the adjustment of a run states, in which noise does not matter.
+TEST(PlanPredictionWithBacklash, AgreesWithTheCovarianceOfARun) {
+  MadeRun made = make_run({.noise_factor = 0.0, .error_scale_m = 0.1e-6});
+  made.options.backlash = TravelDependence::Backlash;
+  const auto id = identify(made.samples, made.machine, made.path, made.noise, made.options);
+  ASSERT_TRUE(id) << id.error().text;
+  PlannedRun run{.machine = made.machine,
+                 .tracker_m = made.T_machine_tracker.t_m,
+                 .noise = made.noise,
+                 .drive = {.feed_m_per_s = 0.4, .acceleration_m_per_s2 = 100.0, .dwell_s = 0.1},
+                 .points_per_s = 250.0};
+  const auto without = predict(made.path, run);
+  run.backlash = TravelDependence::Backlash;
+  const auto with = predict(made.path, run);
+  ASSERT_TRUE(without && with) << with.error().text;
+  EXPECT_EQ(with->rank, without->rank + 14);
+  EXPECT_GT(with->rms_u_m, without->rms_u_m);
+
+  ASSERT_EQ(with->backlash.size(), id->solution.backlash.size());
+  for (std::size_t i = 0; i < with->backlash.size(); ++i) {
+    const Backlash& b = id->solution.backlash[i];
+    EXPECT_EQ(with->backlash[i].name, name(b.motion));
+    // blocks of 10 samples here, of 5 in the prediction: other blocks near the ends of the legs
+    EXPECT_NEAR(with->backlash[i].max_u, b.u, 0.1 * b.u) << label(b);
+  }
+}
+
 }  // namespace

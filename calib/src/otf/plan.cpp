@@ -32,8 +32,8 @@ Result<void> check_budget(const PathBudget& budget, const PlanOptions& options) 
 }
 
 /// Whether a run along the path can be aligned and identified.
-bool is_sufficient(const Path& path, const Machine& machine) {
-  return check(path) && check_observable(path, machine);
+bool is_sufficient(const Path& path, const PlannedRun& run) {
+  return check(path) && check_observable(path, run.machine, run.backlash);
 }
 
 Result<Path> walk(const PlanProblem& problem, std::span<const Vector3> lattice,
@@ -57,13 +57,13 @@ Result<Path> too_short(const PlanProblem& problem, std::span<const Vector3> latt
     if (!path) {
       return path;
     }
-    if (!is_sufficient(*path, problem.run().machine)) {
+    if (!is_sufficient(*path, problem.run())) {
       continue;
     }
     while (path->vertices_m.size() > 3) {
       Path shorter = *path;
       shorter.vertices_m.pop_back();
-      if (!is_sufficient(shorter, problem.run().machine)) {
+      if (!is_sufficient(shorter, problem.run())) {
         break;
       }
       *path = std::move(shorter);
@@ -148,7 +148,7 @@ Result<PlannedPath> plan(const PlannedRun& run, const PathBudget& budget,
   }
 
   *path = rounded(*std::move(path), nodes);
-  if (!is_sufficient(*path, run.machine)) {
+  if (!is_sufficient(*path, run)) {
     path = too_short(problem, lattice, options, lengths_to_vertices_m(*path).back());
     return tl::unexpected(path.error());
   }

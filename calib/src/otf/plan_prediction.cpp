@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/plan_observable.hpp"
 #include "abbe/calib/otf/polyline.hpp"
 #include "abbe/calib/otf/solve.hpp"
@@ -37,6 +38,23 @@ std::vector<TableUncertainty> uncertainties_of(const ParameterLayout& layout,
   for (std::size_t i = 0; i < kSquarenessNames.size(); ++i) {
     all.push_back(uncertainty_of(std::string(kSquarenessNames[i]), covariance,
                                  layout.squareness_offset() + i, 1));
+  }
+  return all;
+}
+
+/// One per table; empty without backlash.
+std::vector<TableUncertainty> uncertainties_of_backlash(const Observations& o,
+                                                        const Eigen::MatrixXd& covariance) {
+  std::vector<TableUncertainty> all;
+  std::size_t first = o.layout().model_size();
+  for (const Table& table : o.layout().tables()) {
+    const std::size_t count = o.basis.travel() == estimation::TravelDependence::Tables
+                                  ? o.layout().node_count(table.motion.axis)
+                                  : 1;
+    if (estimates_backlash(o)) {
+      all.push_back(uncertainty_of(name(table.motion), covariance, first, count));
+    }
+    first += count;
   }
   return all;
 }
@@ -89,7 +107,7 @@ Result<void> check_all(const Path& path, const PlannedRun& run) {
   if (Result<void> valid = check(run); !valid) {
     return valid;
   }
-  return check_observable(path, run.machine);
+  return check_observable(path, run.machine, run.backlash);
 }
 
 }  // namespace
@@ -111,6 +129,8 @@ Result<Prediction> predict(const Path& path, const PlannedRun& run, std::size_t 
   const RigidFreeVolume volume(o->layout(), run.machine.target_offset_m);
   Prediction p{.rms_u_m = volume.rms_u_m(a->covariance),
                .tables = uncertainties_of(o->layout(), a->covariance),
+               .backlash = uncertainties_of_backlash(*o, a->covariance),
+               .unused = note_on_unused(*o),
                .left_out = tables_left_out(o->layout()),
                .observations = o->rows.size(),
                .unknowns = o->unknowns(),

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/otf/blocks.hpp"
 
 namespace abbe::calib::otf {
@@ -50,6 +51,7 @@ struct PlannedLeg {
   std::size_t number = 0;
   Vector3 from, direction;
   double length_m = 0.0;
+  bool used = true;
 };
 
 void append_block(Observations& o, const PlannedLeg& leg, std::span<const double> along_m,
@@ -87,7 +89,7 @@ void append_leg(Observations& o, const PlannedLeg& leg, const PlannedRun& run,
     const auto block = std::span(along_m).subspan(first, samples);
     const double centre_m = mean_of(block);
     ++o.blocks;
-    if (centre_m >= corner_m && leg.length_m - centre_m >= corner_m) {
+    if (leg.used && centre_m >= corner_m && leg.length_m - centre_m >= corner_m) {
       append_block(o, leg, block, run, row_points);
     }
   }
@@ -111,19 +113,23 @@ double duration_s(const Path& path, const Drive& drive) {
 
 Result<Observations> planned_observations(const Path& path, const PlannedRun& run,
                                           std::size_t row_points) {
-  Result<estimation::TableBasis> basis =
-      ParameterLayout::observable_with_one_target(run.machine.chain, run.machine.nodes)
-          .and_then([](ParameterLayout layout) { return estimation::TableBasis::of(layout); });
-  if (!basis) {
-    return tl::unexpected(basis.error());
+  Machine linear = run.machine;
+  linear.interpolation = estimation::Interpolation::Linear;
+  Result<Observations> empty = observations_without_rows(linear, path, {}, {}, run.backlash);
+  if (!empty) {
+    return empty;
   }
 
-  Observations o{.basis = *std::move(basis), .target_offset_m = run.machine.target_offset_m};
+  Observations o = *std::move(empty);
   o.alignment.T_machine_tracker.t_m = run.tracker_m;
-  o.vertices_m = path.vertices_m;
+  const Result<std::size_t> first = first_with_backlash(o);
+  if (!first) {
+    return tl::unexpected(first.error());
+  }
   for (std::size_t i = 0; i + 1 < path.vertices_m.size(); ++i) {
     const Vector3 leg = path.vertices_m[i + 1] - path.vertices_m[i];
-    append_leg(o, {i, path.vertices_m[i], leg.normalized(), leg.norm()}, run, row_points);
+    append_leg(o, {i, path.vertices_m[i], leg.normalized(), leg.norm(), i >= *first}, run,
+               row_points);
   }
   return o;
 }

@@ -99,6 +99,7 @@ Result<otf::PlannedRun> run_of(const PlanOtfArguments& arguments, const Config& 
   const auto machine = otf_machine(config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
   otf::PlannedRun run{.machine = *machine, .noise = otf_noise(config.machine)};
+  run.backlash = config.otf.backlash;
   run.drive = arguments.drive;
   run.drive.feed_m_per_s = arguments.feed_mm_per_min / kMmPerM / kMinute_s;
   if (const auto tracker = tracker_source(config); tracker)
@@ -231,6 +232,12 @@ void print_prediction(const char* what, const otf::Prediction& p) {
              p.condition);
 }
 
+void print_uncertainty(const std::string& name, const otf::TableUncertainty& table) {
+  const bool angle = table.name[1] >= 'A' && table.name[1] <= 'C';
+  fmt::print("{:<11} u {:.4g} {} rms, {:.4g} largest\n", name, table.rms_u * kUmPerM,
+             angle ? "urad" : "um", table.max_u * kUmPerM);
+}
+
 void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
                 const std::string& folder) {
   for (const auto& [tracker_m, rms_u_m] : plan.trackers) {
@@ -249,11 +256,10 @@ void print_plan(const PathPlan& plan, const std::vector<std::string>& written,
              plan.prediction.unknowns, plan.prediction.datum_defect);
   fmt::print("no table    {} (one target does not show them)\n",
              fmt::join(plan.prediction.left_out, ", "));
-  for (const auto& table : plan.prediction.tables) {
-    const bool angle = table.name[1] >= 'A' && table.name[1] <= 'C';
-    fmt::print("{:<11} u {:.4g} {} rms, {:.4g} largest\n", table.name, table.rms_u * kUmPerM,
-               angle ? "urad" : "um", table.max_u * kUmPerM);
-  }
+  for (const auto& table : plan.prediction.tables) print_uncertainty(table.name, table);
+  for (const auto& table : plan.prediction.backlash)
+    print_uncertainty(table.name + ".backlash", table);
+  if (!plan.prediction.unused.empty()) fmt::print("note        {}\n", plan.prediction.unused);
   if (plan.corners_not_reached > 0)
     fmt::print(
         "note        {} corners of the travel are not reached: the model is not valid "

@@ -14,6 +14,19 @@ bool is_angle(const std::string& iso_name) {
   return iso_name.size() > 1 && iso_name[1] >= 'A' && iso_name[1] <= 'C';
 }
 
+nlohmann::json uncertainties_json(const std::vector<calib::otf::TableUncertainty>& all) {
+  nlohmann::json tables = nlohmann::json::array();
+  for (const auto& table : all) {
+    const bool angle = is_angle(table.name);
+    const double scale = angle ? kUradPerRad : kUmPerM;
+    tables.push_back({{"name", table.name},
+                      {"rms_u", table.rms_u * scale},
+                      {"max_u", table.max_u * scale},
+                      {"unit", angle ? "urad" : "um"}});
+  }
+  return tables;
+}
+
 }  // namespace
 
 std::string to_path_csv(const calib::otf::Path& path, double feed_m_per_s) {
@@ -36,26 +49,20 @@ std::string to_map_csv(const calib::otf::Prediction& prediction) {
 }
 
 nlohmann::json prediction_json(const calib::otf::Prediction& p) {
-  nlohmann::json tables = nlohmann::json::array();
-  for (const auto& table : p.tables) {
-    const bool angle = is_angle(table.name);
-    const double scale = angle ? kUradPerRad : kUmPerM;
-    tables.push_back({{"name", table.name},
-                      {"rms_u", table.rms_u * scale},
-                      {"max_u", table.max_u * scale},
-                      {"unit", angle ? "urad" : "um"}});
-  }
-  return {{"rms_u_um", p.rms_u_m * kUmPerM},
-          {"max_u_um", p.max_u_m * kUmPerM},
-          {"length_m", p.length_m},
-          {"duration_s", p.duration_s},
-          {"observations", p.observations},
-          {"unknowns", p.unknowns},
-          {"rank", p.rank},
-          {"gauge_conditions", p.datum_defect},
-          {"condition", p.condition},
-          {"not_observable", p.left_out},
-          {"tables", tables}};
+  nlohmann::json object{{"rms_u_um", p.rms_u_m * kUmPerM},
+                        {"max_u_um", p.max_u_m * kUmPerM},
+                        {"length_m", p.length_m},
+                        {"duration_s", p.duration_s},
+                        {"observations", p.observations},
+                        {"unknowns", p.unknowns},
+                        {"rank", p.rank},
+                        {"gauge_conditions", p.datum_defect},
+                        {"condition", p.condition},
+                        {"not_observable", p.left_out},
+                        {"tables", uncertainties_json(p.tables)}};
+  if (!p.backlash.empty()) object["backlash"] = uncertainties_json(p.backlash);
+  if (!p.unused.empty()) object["unused"] = p.unused;
+  return object;
 }
 
 }  // namespace abbe::daemon

@@ -34,6 +34,9 @@ struct PlannedRun {
   Noise noise;
   Drive drive;
   double points_per_s = 500.0;  ///< of the tracker
+  /// As Options::backlash: the differences are further unknowns of the prediction, and legs on
+  /// which a direction of travel is not known do not count.
+  estimation::TravelDependence backlash = estimation::TravelDependence::None;
 };
 
 /// BadInput for a feed, an acceleration, a point rate or a noise that is not positive, a negative
@@ -62,6 +65,10 @@ struct Prediction {
   double rms_u_m = 0.0;  ///< CRB_rms over the grid of the nodes (at most 13 for each axis)
   double max_u_m = 0.0;  ///< largest value in `map`
   std::vector<TableUncertainty> tables;
+  /// Of the differences between directions of travel, by table; 100 um or urad (kUOfBacklash): the
+  /// path does not determine them. Their size, which is not known before the run, is not predicted.
+  std::vector<TableUncertainty> backlash;
+  std::string unused;                 ///< legs that are not used because of backlash, or empty
   std::vector<PlaceUncertainty> map;  ///< kMapPlaces per axis, evenly spaced; z varies fastest
   /// Tables that no run with one target determines (ParameterLayout::observable_with_one_target).
   std::vector<std::string> left_out;

@@ -6,6 +6,7 @@
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/calib/otf/running_estimate.hpp"
+#include "backlash_run.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -17,7 +18,8 @@ constexpr double kRunningSpeed_m_s = 0.4, kRunningRate_hz = 250.0;
 constexpr std::size_t kRunningStand = 25;  // samples at a vertex, see drive()
 
 RunningEstimate estimate_of(const MadeRun& run) {
-  return *RunningEstimate::of({.machine = run.machine, .noise = run.noise});
+  return *RunningEstimate::of(
+      {.machine = run.machine, .noise = run.noise, .backlash = run.options.backlash});
 }
 
 /// The pairs of the first `legs` legs.
@@ -119,6 +121,34 @@ TEST(RunningEstimate, OfTheCompleteRunAgreesWithTruthAndIdentification) {
     U(i) = parameters[static_cast<std::size_t>(i)].value;
   }
   EXPECT_LT(largest_in_u(*tables, layout, U), 2.0);
+}
+
+/// Backlash of 8 um or urad in all tables: the mean of both directions is right within the noise,
+/// and half the difference is in the uncertainty.
+TEST(RunningEstimate, WithBacklashIsTheMeanOfBothDirections) {
+  const MadeRunOptions wanted{.speed_m_s = kRunningSpeed_m_s, .rate_hz = kRunningRate_hz};
+  MadeRun run = make_backlash_run(wanted, {Eigen::VectorXd::Constant(14, 8e-6)});
+  run.options.backlash = estimation::TravelDependence::Backlash;
+  const std::size_t legs = run.path.vertices_m.size() - 1;
+  const auto with = tables_after(run, legs);
+  run.options.backlash = estimation::TravelDependence::None;
+  const auto without = tables_after(run, legs);
+  ASSERT_TRUE(with && without) << with.error().text;
+
+  const Eigen::VectorXd truth = truth_in_gauge(run);
+  const ParameterLayout layout = layout_of(run.machine);
+  double error = 0.0, error_without = 0.0;
+  for (std::size_t t = 0; t < with->tables.size(); ++t) {
+    for (std::size_t i = 0; i < with->tables[t].nodes.size(); ++i) {
+      const NodeSoFar& node = with->tables[t].nodes[i];
+      const double value = truth(static_cast<Eigen::Index>(layout.tables()[t].offset + i));
+      EXPECT_TRUE(node.determined);
+      EXPECT_NEAR(node.u, 4e-6, 1.5e-6);
+      error = std::max(error, std::abs(node.value - value));
+      error_without = std::max(error_without, std::abs(without->tables[t].nodes[i].value - value));
+    }
+  }
+  EXPECT_LT(error, 0.5 * error_without);
 }
 
 TEST(RunningEstimate, OfOneLegDeterminesNothing) {

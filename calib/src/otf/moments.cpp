@@ -145,12 +145,7 @@ void MomentAccumulator::begin_leg(const Vector3& from_m, const Vector3& to_m) {
   leg_.e2 = frame.a3;
   leg_.crossing_m = crossings(setup_.basis.layout().nodes(), from_m, leg_.direction, leg_.length_m);
 
-  for (std::size_t a = 0; a < state_.travel.size(); ++a) {
-    const double d = way_m(static_cast<Eigen::Index>(a));
-    if (d != 0.0) {
-      state_.travel[a] = d > 0.0 ? estimation::Travel::Forward : estimation::Travel::Backward;
-    }
-  }
+  state_.travel = travel_after(state_.travel, way_m);
 }
 
 void MomentAccumulator::add(const Vector3& p_tracker_m) {

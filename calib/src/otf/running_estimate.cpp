@@ -8,6 +8,7 @@
 
 #include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/gauge.hpp"
+#include "abbe/calib/otf/backlash.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -105,7 +106,7 @@ Result<RunningEstimate> RunningEstimate::of(Setup setup) {
   if (!layout) {
     return tl::unexpected(layout.error());
   }
-  auto basis = estimation::TableBasis::of(*std::move(layout));
+  auto basis = estimation::TableBasis::of(*std::move(layout), {.travel = setup.backlash});
   if (!basis) {
     return tl::unexpected(basis.error());
   }
@@ -172,19 +173,42 @@ bool RunningEstimate::use(const RigidTransform& T) {
                                      .noise = setup_.noise,
                                      .corner_m = setup_.corner_m,
                                      .range_offset = setup_.noise.u_range_offset_m > 0.0});
+  travel_ = {};
   return true;
 }
 
 void RunningEstimate::begin_leg(const Vector3& from_m, const Vector3& to_m) {
   if (moments_ && from_m != to_m) {
     moments_->begin_leg(from_m, to_m);
+    travel_ = travel_after(travel_, to_m - from_m);
   }
 }
 
 void RunningEstimate::add(const Vector3& p_tracker_m) {
-  if (moments_) {
+  if (moments_ && knows_travel()) {
     moments_->add(p_tracker_m);
   }
+}
+
+bool RunningEstimate::knows_travel() const {
+  return setup_.backlash == estimation::TravelDependence::None ||
+         std::count(travel_.begin(), travel_.end(), estimation::Travel::Unknown) == 0;
+}
+
+/// 0 without backlash.
+double RunningEstimate::half_difference(std::size_t table, std::size_t node,
+                                        const Eigen::VectorXd& U) const {
+  const ParameterLayout& layout = basis_.layout();
+  switch (basis_.travel()) {
+    case estimation::TravelDependence::None:
+      return 0.0;
+    case estimation::TravelDependence::Backlash:
+      return 0.5 * U(static_cast<Eigen::Index>(layout.model_size() + table));
+    case estimation::TravelDependence::Tables:  // in the order of the nodes
+      return 0.5 * U(static_cast<Eigen::Index>(layout.model_size() + layout.tables()[table].offset +
+                                               node));
+  }
+  return 0.0;
 }
 
 void RunningEstimate::set_scale(double u_scale, const std::array<double, 3>& u_axis_scale) {
@@ -205,6 +229,9 @@ Result<TablesSoFar> RunningEstimate::tables() const {
   }
 
   const ParameterLayout& layout = basis_.layout();
+  for (std::size_t i = layout.model_size(); i < basis_.size(); ++i) {
+    data.add_prior(i, 0.0, kUOfBacklash);
+  }
   const auto rigid_at = static_cast<Eigen::Index>(basis_.size());
   Eigen::VectorXd prior =
       Eigen::VectorXd::Constant(static_cast<Eigen::Index>(data.unknowns()), kPrior);
@@ -228,12 +255,14 @@ Result<TablesSoFar> RunningEstimate::tables() const {
     return determined ? NodeSoFar{estimate.U(i), u, true} : NodeSoFar{};
   };
 
-  for (const Table& table : layout.tables()) {
+  for (std::size_t t = 0; t < layout.tables().size(); ++t) {
+    const Table& table = layout.tables()[t];
     TableSoFar& out = result.tables.emplace_back(TableSoFar{.motion = table.motion, .nodes = {}});
     const AxisNodes& nodes = layout.nodes()[index(table.motion.axis)];
     for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) {
       out.nodes.push_back(
-          node(table.offset + i, scale_effect(table.motion, nodes, i, setup_.noise)));
+          node(table.offset + i, std::hypot(scale_effect(table.motion, nodes, i, setup_.noise),
+                                            half_difference(t, i, estimate.U))));
     }
   }
   for (std::size_t i = 0; i < result.squareness.size(); ++i) {

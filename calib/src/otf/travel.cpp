@@ -4,8 +4,18 @@
 
 namespace abbe::calib::otf {
 
+AxisTravel travel_after(AxisTravel before, const Vector3& motion_m) {
+  constexpr double kRests_m = 1e-6;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    if (std::abs(motion_m(a)) > kRests_m) {
+      before[static_cast<std::size_t>(a)] =
+          motion_m(a) > 0.0 ? estimation::Travel::Forward : estimation::Travel::Backward;
+    }
+  }
+  return before;
+}
+
 std::vector<AxisTravel> travel_along(std::span<const Vector3> vertices_m, Mode mode) {
-  constexpr double kRests_m = 1e-6;  // an axis that moves less keeps its direction
   std::vector<AxisTravel> all;
   AxisTravel now{};
   if (mode == Mode::Standstill) {
@@ -13,13 +23,7 @@ std::vector<AxisTravel> travel_along(std::span<const Vector3> vertices_m, Mode m
   }
 
   for (std::size_t leg = 0; leg + 1 < vertices_m.size(); ++leg) {
-    const Vector3 way_m = vertices_m[leg + 1] - vertices_m[leg];
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      if (std::abs(way_m(a)) > kRests_m) {
-        now[static_cast<std::size_t>(a)] =
-            way_m(a) > 0.0 ? estimation::Travel::Forward : estimation::Travel::Backward;
-      }
-    }
+    now = travel_after(now, vertices_m[leg + 1] - vertices_m[leg]);
     all.push_back(now);
   }
 

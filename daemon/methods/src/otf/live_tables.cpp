@@ -48,8 +48,8 @@ LiveTables live_tables(const calib::otf::TablesSoFar& found, const calib::Machin
 Result<OtfLiveTables> OtfLiveTables::of(const Config& config) {
   auto machine = otf_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
-  auto estimate =
-      calib::otf::RunningEstimate::of({.machine = *machine, .noise = otf_noise(config.machine)});
+  auto estimate = calib::otf::RunningEstimate::of(
+      {.machine = *machine, .noise = otf_noise(config.machine), .backlash = config.otf.backlash});
   if (!estimate) return tl::unexpected(error_of(estimate.error()));
   return OtfLiveTables(config, std::move(*machine), std::move(*estimate));
 }

@@ -19,6 +19,10 @@
 /// prior), scale of the ranges and of the axes. The factor is the larger of chi2/dof of all rows and
 /// chi2/dof of the cells against each other, which noise that is correlated over the time of a cell
 /// (turbulence) increases; it is never less than 1.
+///
+/// With Setup::backlash the differences between the directions of travel are unknowns, too, with
+/// their prior (backlash.hpp); legs on which a direction is not known are not used. The tables are
+/// the mean of both directions, and their uncertainty contains half the difference.
 
 #include <Eigen/Core>
 #include <array>
@@ -27,6 +31,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/moments.hpp"
+#include "abbe/calib/otf/travel.hpp"
 
 namespace abbe::calib::otf {
 
@@ -57,6 +62,7 @@ class RunningEstimate {
     Machine machine;
     Noise noise;
     double corner_m = 0.010;  ///< Options::corner_m
+    estimation::TravelDependence backlash = estimation::TravelDependence::None;
   };
   /// Errors: those of the layout of the machine and of MomentAccumulator.
   [[nodiscard]] static Result<RunningEstimate> of(Setup);
@@ -87,12 +93,16 @@ class RunningEstimate {
   [[nodiscard]] bool take_if_better(const RigidTransform& T_machine_tracker);
   [[nodiscard]] std::optional<double> second_order_m(const RigidTransform& T) const;
   [[nodiscard]] bool use(const RigidTransform& T_machine_tracker);
+  [[nodiscard]] bool knows_travel() const;
+  [[nodiscard]] double half_difference(std::size_t table, std::size_t node,
+                                       const Eigen::VectorXd& U) const;
 
   Setup setup_;
   estimation::TableBasis basis_;
   std::vector<Vector3> at_m_, seen_m_;  ///< pairs: target in the machine, in the tracker frame
   bool corrected_ = false;
   RigidTransform T_machine_tracker_;
+  AxisTravel travel_{};  ///< on the present leg
   std::optional<MomentAccumulator> moments_;
 };
 

@@ -11,6 +11,9 @@ namespace abbe::calib::otf {
 
 using estimation::AxisTravel;
 
+/// The direction after a motion: an axis that moves by less than 1 um keeps it.
+[[nodiscard]] AxisTravel travel_after(AxisTravel before, const Vector3& motion_m);
+
 /// On the fly: the travel with which each leg is driven. Standstill: the travel with which each
 /// vertex is reached. An axis that rests on a leg keeps its direction; Unknown before its first
 /// motion.

@@ -116,9 +116,11 @@ void add_model_compare(CLI::App& parent, int& exit) {
   auto* measured = add_measured_options(*command, arguments->measured);
   measured->excludes(b);
   add_store_options(*command, arguments->store);
-  command->add_option("--direction", arguments->direction,
-                      "direction in which X, Y and Z last moved, such as +,-,0 (0: not known); a "
-                      "model without backlash is the mean of both directions");
+  auto* direction = command->add_option(
+      "--direction", arguments->direction,
+      "direction in which X, Y and Z last moved, such as +,-,0 (0: not known); a "
+      "model without backlash is the mean of both directions");
+  measured->excludes(direction);  // measurements are the mean of both directions
   command->add_flag("--json", arguments->json, "print one JSON object");
   command->callback([arguments, &exit] {
     if (!arguments->measured.file.empty())

@@ -44,7 +44,7 @@ class Information {
   [[nodiscard]] Result<void> add(const Block&);
   /// Adds the prior U_unknown ~ N(value, u^2) as one row.
   void add_prior(std::size_t unknown, double value, double u);
-  /// Adds `rows` rows that no unknown can change, with the sum of squares `squares`.
+  /// Adds `rows` rows without unknowns, with the sum of squares `squares` of their y.
   void add_rest(double squares, std::size_t rows) {
     rest_ += squares;
     rows_ += rows;

@@ -38,8 +38,8 @@ namespace abbe::drivers {
 
 struct CounterCardReceiverOptions {
   CounterCardWiring wiring;
-  /// Model of the card's clock. FIFO, USB bus and host controller delay a scan by 1 ms at most, apart
-  /// from variable delays.
+  /// Model of the card's clock. The constant part of the delay of a scan in FIFO, USB bus and host
+  /// controller is at most 1 ms; the variable part is not limited.
   ClockModelOptions clock{.max_constant_delay = std::chrono::milliseconds{1}};
   /// State of the counters at the end of an earlier run of the program. Scans are withheld until
   /// the clock channel agrees for 0.25 s with the count expected of counters that ran on since then

@@ -165,9 +165,8 @@ Result<VolumetricModel> update_model(const VolumetricModel& previous, const Volu
   const Eigen::MatrixXd covariance = root * root.transpose() + N_G * N_G.transpose();
 
   return VolumetricModel::from_vector(
-      layout, Gauge::G1, run.tool_offsets_m(), U, covariance,
-      options.renewed.empty() ? previous.validity() : run.validity(),
-      run.tables()->interpolation(Axis::X).kind());
+      *run.tables(), Gauge::G1, run.tool_offsets_m(), U, covariance,
+      options.renewed.empty() ? previous.validity() : run.validity());
 }
 
 }  // namespace abbe::calib

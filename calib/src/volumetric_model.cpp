@@ -196,6 +196,13 @@ Result<void> check_covariance(const Eigen::MatrixXd& C) {
   return {};
 }
 
+Result<VolumetricModel> VolumetricModel::from_vector(
+    const estimation::TableBasis& basis, Gauge gauge, std::span<const Vector3> tool_offsets_m,
+    const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume validity) {
+  return from_vector(basis.layout(), gauge, tool_offsets_m, U, covariance, std::move(validity),
+                     basis.interpolation(Axis::X).kind());
+}
+
 Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layout, Gauge gauge,
                                                      std::span<const Vector3> tool_offsets_m,
                                                      const Eigen::VectorXd& U,

@@ -176,9 +176,8 @@ Result<VolumetricModel> model_of(const Observations& o, std::span<const Vector3>
     of_tables += half * half.transpose();
   }
 
-  Result<VolumetricModel> model =
-      VolumetricModel::from_vector(o.layout(), Gauge::G1, tool_offsets_m, U.head(n), of_tables,
-                                   std::move(validity), o.basis.interpolation(Axis::X).kind());
+  Result<VolumetricModel> model = VolumetricModel::from_vector(
+      o.basis, Gauge::G1, tool_offsets_m, U.head(n), of_tables, std::move(validity));
   if (!model || !estimates_backlash(o)) {
     return model;
   }

@@ -101,6 +101,12 @@ class VolumetricModel {
       const ParameterLayout&, Gauge, std::span<const Vector3> tool_offsets_m,
       const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,
       estimation::Interpolation interpolation = estimation::Interpolation::Linear);
+  /// The same with the tables of a basis, and their interpolation.
+  [[nodiscard]] static Result<VolumetricModel> from_vector(const estimation::TableBasis&, Gauge,
+                                                           std::span<const Vector3> tool_offsets_m,
+                                                           const Eigen::VectorXd& U,
+                                                           const Eigen::MatrixXd& covariance,
+                                                           ValidityVolume);
 
   /// A polynomial model, valid for one tool. Gauge Ball1 or Ball1Blocks.
   [[nodiscard]] static Result<VolumetricModel> from_polynomials(evemu::EvemuModel, Gauge,

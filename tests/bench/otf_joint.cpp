@@ -85,8 +85,8 @@ CaseA case_a(const std::vector<TrackerObservation>& samples, Estimator estimator
   const CaseA result{mean_error_m(found.solution.model), seconds, from_blocks,
                      found.solution.statistics.iterations};
   std::printf(
-      "  %-8s blocks of %3zu: mean error %.6f um, %d adjustments, %.3f s, of these %.3f s from "
-      "the blocks\n",
+      "  %-8s blocks of %3zu: mean error %.6f um, %d adjustments, %.3f s; again from the "
+      "blocks: %.3f s\n",
       std::string(name(estimator)).c_str(), block_samples, 1e6 * result.error_m, result.adjustments,
       result.seconds, result.seconds_from_blocks);
   return result;

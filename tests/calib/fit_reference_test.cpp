@@ -3,27 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "abbe/calib/fit/circle.hpp"
 #include "abbe/calib/fit/cylinder.hpp"
 #include "abbe/calib/fit/line.hpp"
 #include "abbe/calib/fit/plane.hpp"
 #include "abbe/calib/fit/sphere.hpp"
+#include "mfb_reference.hpp"
 
 namespace {
 using namespace abbe::calib;
 using namespace abbe::calib::fit;
 using nlohmann::json;
-
-json fit_reference(const char* name) {
-  std::ifstream in(std::filesystem::path(ABBE_TEST_DATA) / "mfb" / name);
-  EXPECT_TRUE(in) << name;
-  return json::parse(in);
-}
 
 double number_of(const json& text) {
   return text.is_string() ? std::stod(text.get<std::string>()) : text.get<double>();
@@ -111,7 +103,7 @@ void compare_with_reference(const json& set, bool start) {
 }
 
 TEST(FitReference, AllSetsAgreeWithinTheirTolerances) {
-  const json sets = fit_reference("geomfit_reference.json").at("sets");
+  const json sets = abbe::tests::mfb::reference("geomfit_reference.json").at("sets");
   EXPECT_EQ(sets.size(), 101u);
   for (const json& set : sets) {
     SCOPED_TRACE(set.at("name").get<std::string>());
@@ -120,7 +112,7 @@ TEST(FitReference, AllSetsAgreeWithinTheirTolerances) {
 }
 
 TEST(FitReference, CylindersAreFoundWithoutAnApproximateDirection) {
-  const json sets = fit_reference("geomfit_reference.json").at("sets");
+  const json sets = abbe::tests::mfb::reference("geomfit_reference.json").at("sets");
   std::size_t cylinders = 0;
   for (const json& set : sets) {
     if (set.at("kind") == "cylinder") {
@@ -157,7 +149,7 @@ void expect_status(const json& set, const Fit& fit) {
 }
 
 TEST(FitReference, DegeneratePointsAreRefusedByName) {
-  const json sets = fit_reference("degenerate_reference.json");
+  const json sets = abbe::tests::mfb::reference("degenerate_reference.json");
   for (const json& set : sets.at("cylinder")) {
     if (set.at("status") == "EXACT_5") {  // four of the five are in one section: rank 4 of 5
       EXPECT_EQ(fit_cylinder(points_of<3>(set), Vector3(Vector3::UnitZ())).error().code,

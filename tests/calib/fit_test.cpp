@@ -308,6 +308,8 @@ TEST(CylinderFit, RefusesPointsThatLeaveItOpen) {
 
   const auto points = on_cylinder(truth, 3, 4, 6.2832, [] { return 0.0; });
   EXPECT_EQ(fit_cylinder(points, Vector3(Vector3::Zero())).error().code, ErrorCode::BadInput);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fit_cylinder(points, Vector3(nan, 0, 1)).error().code, ErrorCode::NotFinite);
 }
 
 }  // namespace

@@ -48,6 +48,29 @@ TEST(PointsOfInterest, AgreeWithTheReference) {
   }
 }
 
+/// Bar axes as columns, far from those of the frame.
+const Matrix3 kOblique = (Eigen::AngleAxisd(0.7, Vector3(1, 2, -1).normalized()) *
+                          Eigen::AngleAxisd(0.3, Vector3::UnitX()))
+                             .toRotationMatrix();
+
+/// The same bar with its axes along kOblique.
+BarTouches turned(BarTouches touches) {
+  const auto turn = [](std::vector<Vector3>& feature) {
+    for (Vector3& p : feature) {
+      p = kOblique * p;
+    }
+  };
+  for (std::size_t i = 0; i < touches.holes_m.size(); ++i) {
+    turn(touches.holes_m[i]);
+  }
+  for (std::size_t j = 0; j < touches.rods_m.size(); ++j) {
+    turn(touches.rods_m[j]);
+    turn(touches.planes_m[j][0]);
+    turn(touches.planes_m[j][1]);
+  }
+  return touches;
+}
+
 /// Moves touch k of a bar along `normal`; the touches are counted as in BarTouches::count().
 void move_touch(BarTouches& touches, std::size_t k, const Vector3& by_m) {
   const auto in = [&](std::vector<Vector3>& feature) {
@@ -71,18 +94,19 @@ void move_touch(BarTouches& touches, std::size_t k, const Vector3& by_m) {
 
 TEST(PointsOfInterest, DerivativesAreThoseOfDifferences) {
   constexpr double kStep_m = 1e-6;
-  const BarTouches touches = nominal_touches();
-  const auto at = points_of_interest(touches, Matrix3::Identity());
+  const BarTouches touches = turned(nominal_touches());
+  const auto at = points_of_interest(touches, kOblique);
   ASSERT_TRUE(at) << at.error().text;
   ASSERT_EQ(at->normals.size(), touches.count());
   double largest = 0.0;
 
-  for (std::size_t k = 0; k < touches.count(); k += 5) {  // every feature: each has 4 or more
+  for (std::size_t k = 0; k < touches.count(); k += 3) {  // every feature: each has 4 or more
     BarTouches more = touches, less = touches;
     move_touch(more, k, kStep_m * at->normals[k]);
     move_touch(less, k, -kStep_m * at->normals[k]);
-    const auto plus = points_of_interest(more, Matrix3::Identity());
-    const auto minus = points_of_interest(less, Matrix3::Identity());
+    const auto plus = points_of_interest(more, kOblique),
+               minus = points_of_interest(less, kOblique);
+    ASSERT_TRUE(plus && minus);
     for (std::size_t i = 0; i < at->O_m.size(); ++i) {
       const auto column = static_cast<Eigen::Index>(k);
       const auto row = 3 * static_cast<Eigen::Index>(i);
@@ -116,6 +140,14 @@ TEST(PointsOfInterest, CovarianceAgreesWithTheReference) {
   const Eigen::MatrixXd covariance_um2 =
       variance_um2 * found->dO_dtouch * found->dO_dtouch.transpose();
   EXPECT_LT((covariance_um2 - expected).norm(), 1e-4 * expected.norm());
+
+  // In the bar frame it does not depend on how the bar lies; the origin has none.
+  const Eigen::MatrixXd of_bar = found->covariance_bar_m2(1.0);
+  const auto oblique = points_of_interest(turned(nominal_touches()), kOblique);
+  ASSERT_TRUE(oblique) << oblique.error().text;
+  EXPECT_LT((oblique->covariance_bar_m2(1.0) - of_bar).norm(), 1e-9 * of_bar.norm());
+  EXPECT_LT(of_bar.topRows<3>().norm(), 1e-9 * of_bar.norm());
+  EXPECT_GT(of_bar.norm(), 0.1);
 }
 
 TEST(PointsOfInterest, RadiusOfTheTipDoesNotMoveThem) {
@@ -146,6 +178,21 @@ TEST(PointsOfInterest, BadTouchesAreRefusedByFeature) {
   touches = nominal_touches();
   touches.rods_m.pop_back();
   EXPECT_EQ(points_of_interest(touches, I).error().code, ErrorCode::BadInput);
+
+  touches = nominal_touches();
+  touches.holes_m[11] = touches.holes_m[0];  // the first hole instead of the last one
+  EXPECT_EQ(points_of_interest(touches, I).error().text.substr(0, 7), "rod 11:");
+
+  touches = nominal_touches();
+  std::swap(touches.planes_m[6][0], touches.planes_m[6][1]);
+  EXPECT_EQ(points_of_interest(touches, I).error().text.substr(0, 10), "plane 7 L:");
+
+  Matrix3 left_handed = I, turned_about_z = I;
+  left_handed(2, 2) = -1.0;
+  turned_about_z(0, 0) = turned_about_z(1, 1) = -1.0;
+  EXPECT_EQ(points_of_interest(nominal_touches(), left_handed).error().code, ErrorCode::BadInput);
+  EXPECT_EQ(points_of_interest(nominal_touches(), turned_about_z).error().code,
+            ErrorCode::BadInput);
 
   touches = nominal_touches();
   std::swap(touches.planes_m[0][0], touches.holes_m[0]);  // a hole in place of a plane
@@ -206,20 +253,20 @@ TEST(Reversal, SeparatesBarAndMachine) {
   const auto expected_m = points_in(r.at("E_MFB"), kUm), truth_m = points_in(r.at("truth"), kUm);
   ASSERT_EQ(bar->error_m.size(), expected_m.size());
   EXPECT_EQ(bar->degrees_of_freedom, 4u);
-  double squares = 0.0, count = 0.0;
+  int beyond = 0, count = 0;
 
   for (std::size_t i = 0; i < expected_m.size(); ++i) {
     EXPECT_LT((bar->error_m[i] - expected_m[i]).norm(), 2e-12) << i;  // 1e-6 um in the file
     for (Eigen::Index k = 1; k < 3 && i > 0 && i + 1 < expected_m.size(); ++k) {
       const double off = (bar->error_m[i](k) - truth_m[i](k)) / bar->u_m[i](k);
-      squares += off * off;
+      constexpr double kCoverage = 2.776;  // Student's t, 95 %, 4 degrees of freedom
+      beyond += std::abs(off) > kCoverage ? 1 : 0;
       ++count;
     }
   }
 
-  // Student's t with 4 degrees of freedom has the variance 2; 20 values scatter by 0.9 about it.
-  EXPECT_GT(squares / count, 0.3);
-  EXPECT_LT(squares / count, 5.0);
+  EXPECT_EQ(count, 20);
+  EXPECT_LE(beyond, 4);  // 20 independent values: more than 4 with a probability of 0.3 %
 }
 
 TEST(Reversal, RefusesRunsThatDoNotBelongTogether) {
@@ -240,6 +287,20 @@ TEST(Reversal, RefusesRunsThatDoNotBelongTogether) {
   runs = reference_runs();
   runs.u_machine_x_m.assign(12, -1e-7);
   EXPECT_EQ(calibrate_by_reversal(runs).error().code, ErrorCode::BadInput);
+  runs.u_machine_x_m[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(calibrate_by_reversal(runs).error().text.find("hole 1"), std::string::npos);
+  EXPECT_EQ(calibrate_by_reversal({{{}, {}}, {{}, {}}, {}, {}}).error().code, ErrorCode::BadInput);
+}
+
+TEST(Reversal, UncertaintyOfThePositioningContainsThatOfTheMachine) {
+  ReversalRuns runs = reference_runs();
+  runs.u_machine_x_m.assign(12, 0.15e-6);
+  const auto bar = calibrate_by_reversal(runs);
+  ASSERT_TRUE(bar) << bar.error().text;
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_NEAR(bar->u_m[i].x(), std::hypot(bar->u_mean_m[i].x(), 0.15e-6), 1e-15);
+    EXPECT_EQ(bar->u_m[i].y(), bar->u_mean_m[i].y());
+  }
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ FoundCylinder find(const PointSet& set, const Eigen::Matrix3Xd& p,
   if (near) {
     return find_from(p, *near);
   }
-  FoundCylinder best;
+  FoundCylinder best = find_from(p, set.directions.col(0));
   for (const Vector3& direction : starting_directions(set.directions)) {
     const FoundCylinder other = find_from(p, direction);
     if (other.is_cylinder() && (!best.is_cylinder() || other.squares < best.squares)) {
@@ -143,7 +143,9 @@ Result<Cylinder> fit_cylinder(std::span<const Vector3> points, std::optional<Vec
                            set->singular_values.transpose(), ")"));
   }
   if (near && !(near->allFinite() && near->norm() > 0.0)) {
-    return failure(ErrorCode::BadInput, "cylinder: the approximate direction of the axis is zero");
+    return failure(
+        near->allFinite() ? ErrorCode::BadInput : ErrorCode::NotFinite,
+        message("cylinder: the approximate direction of the axis is ", near->transpose()));
   }
 
   const Eigen::Matrix3Xd p = set->centred / set->size;
@@ -151,7 +153,7 @@ Result<Cylinder> fit_cylinder(std::span<const Vector3> points, std::optional<Vec
   const Frame& f = found.frame;
   const Linearised<5> at = linearised(p, f);
   const Cofactor<5> of = cofactor<5>(at.J);
-  if (!(of.condition < kUndetermined)) {
+  if (at.J.allFinite() && !(of.condition < kUndetermined)) {
     return failure(
         ErrorCode::DegenerateGeometry,
         message("cylinder: the ", points.size(), " points do not determine it (condition ",

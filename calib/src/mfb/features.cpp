@@ -18,8 +18,10 @@ Result<void> check_numbers(const BarTouches& touches, const Matrix3& axes) {
                 " pairs of planes; N holes have N - 1 rods and pairs, N at least ", kFewestHoles));
   }
   constexpr double kOrthonormal = 1e-3;
-  if (!((axes.transpose() * axes - Matrix3::Identity()).norm() < kOrthonormal)) {
-    return failure(ErrorCode::BadInput, "bar: the approximate axes of the bar are not orthonormal");
+  if (!((axes.transpose() * axes - Matrix3::Identity()).norm() < kOrthonormal) ||
+      !(axes.determinant() > 0.0)) {
+    return failure(ErrorCode::BadInput,
+                   "bar: the approximate axes of the bar are not orthonormal and right-handed");
   }
   return {};
 }
@@ -61,6 +63,39 @@ Result<void> fit_planes(BarFeatures& features, const BarTouches& touches, const 
   return {};
 }
 
+/// Rod j must lie between hole j and hole j + 1.
+Result<void> check_order(const BarFeatures& f, const Vector3& x) {
+  for (std::size_t j = 0; j < f.rods.size(); ++j) {
+    const double before = x.dot(f.rods[j].point - f.holes[j].point);
+    const double after = x.dot(f.holes[j + 1].point - f.rods[j].point);
+    if (!(before > 0.0) || !(after > 0.0)) {
+      return failure(
+          ErrorCode::BadInput,
+          message(rod_name(j), ": is not between ", hole_name(j), " and ", hole_name(j + 1),
+                  " along x of the bar (", 1e3 * before, " mm and ", 1e3 * after,
+                  " mm): touches of another feature, or the bar is turned"));
+    }
+  }
+  return {};
+}
+
+/// The plane on the left must lie at +y of its rod, the other one at -y.
+Result<void> check_sides(const BarFeatures& f, const Vector3& y) {
+  for (std::size_t j = 0; j < f.planes.size(); ++j) {
+    for (const Side side : {Side::Left, Side::Right}) {
+      const Vector3& plane = f.planes[j][static_cast<std::size_t>(side)].point;
+      const Vector3& other = f.planes[j][side == Side::Left ? 1 : 0].point;
+      const double away = (side == Side::Left ? 1.0 : -1.0) * y.dot(plane - other);
+      if (!(away > 0.0)) {
+        return failure(ErrorCode::BadInput,
+                       message(plane_name(j, side), ": lies on the other side of ", rod_name(j),
+                               ": touches of another plane, or the bar is turned"));
+      }
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::size_t BarTouches::count() const {
@@ -98,7 +133,9 @@ Result<BarFeatures> fit_features(const BarTouches& touches, const Matrix3& axes)
           })
           .and_then(
               [&] { return fit_cylinders(features.rods, touches.rods_m, axes.col(1), rod_name); })
-          .and_then([&] { return fit_planes(features, touches, axes.col(1)); });
+          .and_then([&] { return fit_planes(features, touches, axes.col(1)); })
+          .and_then([&] { return check_order(features, axes.col(0)); })
+          .and_then([&] { return check_sides(features, axes.col(1)); });
   if (!done) {
     return tl::unexpected(done.error());
   }

@@ -60,6 +60,11 @@ Result<OrientationFit> orientation_of(std::span<const Vector3> O_bar_m,
                    message("orientation of the bar: ", O_bar_m.size(), " points of interest, but ",
                            signature_m.size(), " nominal holes"));
   }
+  if (signature_m.front() != 0.0 || signature_m.back() != 0.0) {
+    return failure(ErrorCode::BadInput,
+                   message("orientation of the bar: the nominal y of the first and last hole is ",
+                           signature_m.front(), " m and ", signature_m.back(), " m, must be 0"));
+  }
 
   std::array<OrientationFit, 4> fits;
   constexpr std::array kAll{Orientation::Normal, Orientation::TurnedAboutX,

@@ -40,7 +40,7 @@ Result<Derived> intersection(const AxisOfFeature& axis, const PlaneOfFeature& pl
   const double nd = n.dot(d);
   if (!(std::abs(nd) > kParallel)) {
     return failure(ErrorCode::DegenerateGeometry,
-                   message(name, ": its axis is parallel to the plane that it has to meet"));
+                   message(name, ": the axis is parallel to the plane that it has to meet"));
   }
 
   const Vector3 to_plane = plane.point.value - p;
@@ -145,7 +145,9 @@ Result<std::vector<std::array<Derived, 2>>> ends_of_rods(const DerivedFeatures& 
   for (std::size_t j = 0; j < f.rods.size(); ++j) {
     std::array<Derived, 2>& pair = ends.emplace_back();
     for (std::size_t side = 0; side < 2; ++side) {
-      Result<Derived> end = intersection(f.rods[j], f.planes[j][side], rod_name(j));
+      Result<Derived> end =
+          intersection(f.rods[j], f.planes[j][side],
+                       message(rod_name(j), " and ", plane_name(j, static_cast<Side>(side))));
       if (!end) {
         return tl::unexpected(end.error());
       }

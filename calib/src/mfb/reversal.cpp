@@ -28,7 +28,12 @@ Result<void> check_passes(const std::vector<BarPass>& passes, std::size_t holes,
 
 Result<void> check(const ReversalRuns& runs) {
   constexpr std::size_t kFewestRepeats = 2;
+  constexpr std::size_t kFewestHoles = 2;
   const std::size_t holes = runs.machine_x_m.size();
+  if (holes < kFewestHoles) {
+    return failure(ErrorCode::BadInput, message("reversal: E_XX of the machine is given for ",
+                                                holes, " holes, needs at least ", kFewestHoles));
+  }
   if (runs.normal.size() != runs.reversed.size()) {
     return failure(ErrorCode::BadInput,
                    message("reversal: ", runs.normal.size(), " normal passes, but ",
@@ -45,8 +50,9 @@ Result<void> check(const ReversalRuns& runs) {
   }
   for (std::size_t i = 0; i < holes; ++i) {
     const double u_m = runs.u_machine_x_m.empty() ? 0.0 : runs.u_machine_x_m[i];
-    if (!std::isfinite(runs.machine_x_m[i]) || !(u_m >= 0.0) || !std::isfinite(u_m)) {
-      return failure(ErrorCode::BadInput,
+    const bool finite = std::isfinite(runs.machine_x_m[i]) && std::isfinite(u_m);
+    if (!finite || u_m < 0.0) {
+      return failure(finite ? ErrorCode::BadInput : ErrorCode::NotFinite,
                      message("reversal: E_XX at hole ", i + 1, " is ", runs.machine_x_m[i],
                              " m with u ", u_m, " m: must be finite, u not negative"));
     }
@@ -89,6 +95,7 @@ Result<CalibratedBar> calibrate_by_reversal(const ReversalRuns& runs) {
     }
 
     Vector3 variance = squares / (repeats * (repeats - 1.0));
+    bar.u_mean_m.emplace_back(variance.cwiseSqrt());
     const double u_x_m = runs.u_machine_x_m.empty() ? 0.0 : runs.u_machine_x_m[i];
     variance.x() += u_x_m * u_x_m;
     const Vector3 positioning(runs.machine_x_m[i], 0.0, 0.0);

@@ -21,6 +21,8 @@ namespace {
 
 constexpr double kLongestHold_s = 1.5;
 constexpr double kReturn_s = 10.0;
+/// Until a started subscriber applies: a lost handshake is repeated after the lease of 40 s.
+constexpr double kConnect_s = 90.0;
 constexpr HostNs kVectorClock_ns = 1'000'000'000'000;  // what the feeder's vectors are modulo of
 
 HostNs now_ns() {
@@ -150,8 +152,7 @@ LiveTruth::LiveTruth(Parts parts) : parts_(std::move(parts)) {
 LiveTruth::~LiveTruth() = default;
 
 bool LiveTruth::begin() {
-  constexpr double kPatienceS = 90;  // a lost handshake is repeated after the lease of 40 s
-  return all_apply(now_ns(), kPatienceS);
+  return all_apply(now_ns(), kConnect_s);
 }
 
 bool LiveTruth::all_apply(HostNs since, double patience_s) {
@@ -193,7 +194,7 @@ void LiveTruth::expect_all_apply(HostNs since, const std::string& what) {
       figures_.failures.push_back(fmt::format("{}: {} is orphaned", what, s->name));
       s->start();
     }
-    static_cast<void>(all_apply(now_ns(), 20.0));
+    static_cast<void>(all_apply(now_ns(), kConnect_s));
     return;
   }
 

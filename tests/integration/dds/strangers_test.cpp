@@ -157,7 +157,7 @@ TEST_F(StrangersWithSecurity, BothSubscribersReturnAfterEveryKillOfAbbeDds) {
     const auto killed = Clock::now();
     ::kill(abbe_dds_pid(), SIGKILL);
     for (Process* subscriber : {&fast, &cyclone})
-      EXPECT_TRUE(subscriber->wait_for("vmc-3: publisher is ", killed, kHandshake))
+      ASSERT_TRUE(subscriber->wait_for("vmc-3: publisher is ", killed, kHandshake))
           << "after kill " << kill + 1 << "\n" << subscriber->transcript();
   }
 }

@@ -1,11 +1,10 @@
 #pragma once
-/// The features of a Multi-Feature Bar (Viprey et al.): N holes along the bar with axes across it,
+/// The features of a Multi-Feature Bar [Viprey 2016]: N holes along the bar with axes across it,
 /// a rod midway between two holes with its axis across both, and two planes beside each rod. Bar
 /// axes: x along the bar from hole 1 to hole N, z along the axes of the holes towards the probing
 /// side, y = z x x along the axes of the rods. Lengths in m, in any common Cartesian frame.
 
 #include <array>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -33,8 +32,9 @@ struct BarFeatures {
   std::vector<std::array<fit::Plane, 2>> planes;  ///< the normals point away from the bar
 };
 
-/// `axes`: approximate bar axes as columns, orthonormal within 1e-3. BadInput: the numbers of holes,
-/// rods and planes do not belong together, or there are fewer than 3 holes. Other errors are those of
+/// `axes`: approximate bar axes as columns, right-handed, orthonormal within 1e-3. BadInput: the
+/// numbers of holes, rods and planes do not belong together, there are fewer than 3 holes, a rod is
+/// not between its holes, or a plane is not on its side. Other errors are those of
 /// the fits; the text begins with the feature ("hole 3", "plane 5 L"), counted from 1.
 [[nodiscard]] Result<BarFeatures> fit_features(const BarTouches&, const Matrix3& axes);
 

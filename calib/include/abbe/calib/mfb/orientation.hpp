@@ -1,5 +1,5 @@
 #pragma once
-/// How a Multi-Feature Bar lies, told by its signature: some holes are shifted in y. Turned about
+/// Orientation of a Multi-Feature Bar, determined from its signature: some holes are shifted in y. Turned about
 /// the bar axis x the signature changes its sign, turned about z its order and sign, turned about y
 /// its order.
 
@@ -22,7 +22,8 @@ struct OrientationFit {
 };
 
 /// `O_bar_m`: points of interest in the bar frame, which follows from the touches and not from the
-/// way the bar lies; `signature_m`: nominal y of each hole. BadInput: the sizes differ. NotApplicable:
+/// way the bar lies; `signature_m`: nominal y of each hole, 0 at both ends, as y of
+/// the points is. BadInput: the sizes differ, or an end of the signature is not 0. NotApplicable:
 /// the signature is the same in two orientations, or the second best orientation is not at least 5
 /// times worse than the best (no signature, another bar, or errors of its size); the text states both
 /// values.

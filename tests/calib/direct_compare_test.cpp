@@ -13,10 +13,8 @@
 namespace abbe::calib::direct {
 namespace {
 
-using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::StartsWith;
 using tests::direct::all_measured;
 using tests::direct::DirectDevice;
@@ -32,6 +30,9 @@ class DirectComparison : public ::testing::Test {
     static const VolumetricModel found = tests::joint::model_of(machine());
     return found;
   }
+  static std::vector<TableComparison> tables(const std::vector<MeasuredError>& errors) {
+    return compare(errors, model()).value();
+  }
   static TableComparison compared(const MeasuredError& error, const CompareOptions& options = {}) {
     return compare(std::vector{error}, model(), options).value().front();
   }
@@ -40,7 +41,7 @@ class DirectComparison : public ::testing::Test {
 TEST_F(DirectComparison, AgreesForTheSameMachine) {
   int contradictions = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
-    for (const TableComparison& t : *compare(all_measured(machine(), {.seed = seed}), model())) {
+    for (const TableComparison& t : tables(all_measured(machine(), {.seed = seed}))) {
       contradictions += t.finding == Finding::Contradicts ? 1 : 0;
       EXPECT_LT(t.largest, 5e-6) << t.name;
     }
@@ -53,7 +54,7 @@ TEST_F(DirectComparison, StatesTheUncertaintyThatTheDifferencesHave) {
   double squares = 0.0, count = 0.0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     DirectDevice device{.seed = seed, .runs = 10, .noise = 3e-6};
-    for (const TableComparison& t : *compare(all_measured(machine(), device), model())) {
+    for (const TableComparison& t : tables(all_measured(machine(), device))) {
       squares += t.rms_normalised * t.rms_normalised;
       count += 1.0;
     }
@@ -67,7 +68,7 @@ TEST_F(DirectComparison, FindsAChangeOfOneTable) {
   for (Reading& r : errors[1].readings) {  // EYX: a bow of 6 um
     r.value += 6e-6 * (1.0 - r.position_m * r.position_m / 0.09);
   }
-  for (const TableComparison& t : *compare(errors, model())) {
+  for (const TableComparison& t : tables(errors)) {
     EXPECT_EQ(t.finding == Finding::Contradicts, t.name == "EYX") << t.name;
   }
 }
@@ -162,8 +163,8 @@ TEST_F(DirectComparison, RefersSquarenessToTheCommonLines) {
   const MeasuredError squareness{
       .name = "EC0Y",
       .readings = {{0.0, EC0Y - slope - 0.1e-6, 1, true}, {0.0, EC0Y - slope + 0.1e-6, 2, true}}};
-  const auto tables = *compare(std::vector{squareness, straightness}, model());
-  EXPECT_LT(tables[0].largest, 2e-6);
+  const auto both = tables({squareness, straightness});
+  EXPECT_LT(both[0].largest, 2e-6);
   EXPECT_GT(std::abs(slope), 20e-6) << "the test shows nothing";
 }
 

@@ -18,9 +18,6 @@ using tests::direct::all_measured;
 
 class DirectVolume : public ::testing::Test {
  protected:
-  DirectVolume()
-      : run_(tests::otf::make_run({.in_gauge = true})), model_(tests::joint::model_of(run_)) {}
-
   /// Squareness of the truth, in three runs.
   void add_squareness(std::vector<MeasuredError>& errors) const {
     const auto layout = tests::otf::layout_of(run_.machine);
@@ -34,8 +31,18 @@ class DirectVolume : public ::testing::Test {
     }
   }
 
-  tests::otf::MadeRun run_;
-  VolumetricModel model_;
+  /// Identified once: it takes seconds.
+  static const tests::otf::MadeRun& machine() {
+    static const auto run = tests::otf::make_run({.in_gauge = true});
+    return run;
+  }
+  static const VolumetricModel& identified() {
+    static const VolumetricModel model = tests::joint::model_of(machine());
+    return model;
+  }
+
+  const tests::otf::MadeRun& run_ = machine();
+  const VolumetricModel& model_ = identified();
 };
 
 TEST_F(DirectVolume, AgreesWithinTheUncertaintyOfBoth) {

@@ -36,8 +36,7 @@ TEST(OtfPath, ThatCanBeIdentifiedIsTaken) {
 
 TEST(OtfPath, WithBacklashMustMoveEveryAxis) {
   using enum calib::estimation::TravelDependence;
-  const std::vector<AxisPosition> flat{
-      {0, 0, 0}, {0.05, 0, 0}, {0.05, 0.05, 0}, {0, 0.05, 0}, {0, 0, 0}};
+  const std::vector<AxisPosition> flat{{0, 0, 0}, {0.05, 0, 0}, {0.05, 0.05, 0}, {0, 0.05, 0}};
   using calib::otf::Mode;
   EXPECT_TRUE(check_otf_path(flat, machine(), Mode::Standstill, None));
   for (const auto mode : {Mode::Standstill, Mode::OnTheFly}) {

@@ -71,6 +71,8 @@ TEST(TravelDocument, IsNamedWhereItIsUnreadable) {
   EXPECT_THAT(faults_after("\"covariance\": [", "\"covariances\": ["),
               Contains(HasSubstr("travel.covariance: missing")));
   EXPECT_THAT(faults_after("\"value\": 2.3", "\"value\": 2.4"),
+              Contains(HasSubstr("is not positive semidefinite together with that of the tables")));
+  EXPECT_THAT(faults_after("0.0033333", "0.0043333"),
               Contains(HasSubstr("hash: is not the hash of the content")));
 }
 

@@ -64,7 +64,11 @@ class CauseSearch {
         line_(line),
         P_(reduction(curve.motion(), positions_m, curve.nodes().reference_m, line)),
         z_(P_ * measured),
-        y_(P_ * curve.values(positions_m)) {}
+        y_(P_ * curve.values(positions_m)) {
+    for (const double node_m : curve.nodes().nodes_m) {
+      shapes_ += node_m >= positions_m.front() && node_m <= positions_m.back() ? 1 : 0;
+    }
+  }
 
   [[nodiscard]] double rms_as_given() const { return rms(given_); }
 
@@ -74,7 +78,8 @@ class CauseSearch {
     const double least = (1.0 - kMostOutside) * static_cast<double>(given_.positions_m.size());
     const std::size_t used = conditions_of(curve_.motion()) + c.parameters;
     if (static_cast<double>(c.positions_m.size()) < least ||
-        c.positions_m.size() < used + kLeastDof) {
+        c.positions_m.size() < used + kLeastDof ||
+        (c.parameters > 0 && shapes_ <= conditions_of(curve_.motion()) + c.parameters)) {
       return kNeverFits;
     }
     const Eigen::MatrixXd P =
@@ -222,7 +227,7 @@ class CauseSearch {
                         axes[static_cast<std::size_t>(i)]);
     }
     c.text += " from that of the table (rotations times levers)";
-    constexpr double kLongestLever_m = 5.0;
+    constexpr double kLongestLever_m = 2.0;
     if (lever_m.cwiseAbs().maxCoeff() < kLongestLever_m) {
       all.push_back(c);
     }
@@ -232,7 +237,8 @@ class CauseSearch {
   CorrectedValues given_;
   StraightnessLine line_;
   Eigen::MatrixXd P_;
-  Eigen::VectorXd z_, y_;  // measured values and model in the convention
+  Eigen::VectorXd z_, y_;   // measured values and model in the convention
+  std::size_t shapes_ = 0;  // nodes of the model in the range: its curve has no more parameters
 };
 
 }  // namespace

@@ -13,7 +13,9 @@ namespace abbe::calib::direct {
 /// The corrections of the measured values with which they fit the model: the rms difference is at
 /// most a third of that of the given values, and at most 1.5 times that of the best correction.
 /// Degrees of freedom: positions without the conditions of the convention and without the parameters
-/// of the correction. Empty if nothing helps, or with fewer than 3 degrees of freedom.
+/// of the correction. Empty if nothing helps, or with fewer than 3 degrees of freedom. A correction
+/// with as many parameters as the model has nodes in the range, without those conditions, would fit
+/// anything and is not tried.
 ///
 /// Tried: the sign; the positions reversed or counted from the other end, with either sign; a factor
 /// (unit); a slope of a positioning error (temperature, wavelength, scales); an offset of the

@@ -17,12 +17,13 @@ namespace {
 using calib::otf::PlacedResidual;
 using ComponentNames = std::array<const char*, 3>;
 
-constexpr ComponentNames kAcrossPath{"across the path, a2", "across the path, a3", "along the path"};
+constexpr ComponentNames kAcrossPath{"across the path, a2", "across the path, a3",
+                                     "along the path"};
 constexpr ComponentNames kOfBeam{"along the beam", "horizontally across the beam",
-                            "vertically across the beam"};
+                                 "vertically across the beam"};
 constexpr double kMostSigmas = 5.0;  // of the histogram of normalised residuals
 
-bool stands(const ModelDocument& document) {
+bool of_standstills(const ModelDocument& document) {
   return document.mode == calib::otf::name(calib::otf::Mode::Standstill);
 }
 
@@ -127,7 +128,8 @@ LineChart chart_along_path(std::span<const RunResiduals> runs, std::string title
   return chart;
 }
 
-void add_along_path(HtmlReport& page, std::span<const RunResiduals> runs, const ComponentNames& names) {
+void add_along_path(HtmlReport& page, std::span<const RunResiduals> runs,
+                    const ComponentNames& names) {
   page.paragraph(
       "Along the path: mean of each interval of the path (line) and range from its smallest to its "
       "largest value (band).");
@@ -169,7 +171,7 @@ void add_residual_figures(HtmlReport& page, const ModelDocument& document,
                           std::span<const RunResiduals> runs) {
   constexpr int kDigits = 3;
   const ModelStatistics& s = document.statistics;
-  const bool standing = stands(document);
+  const bool standing = of_standstills(document);
   page.heading("Residuals of the fit");
   const auto row = [](const char* what, const ResidualFigures& f) {
     return std::vector<std::string>{what, um_text(f.mean_abs_m, kDigits), um_text(f.rms_m, kDigits),

@@ -12,9 +12,9 @@ namespace {
 /// displacements along the face of points that do not lie in the fitted plane (a curved V deforms
 /// the face).
 Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3> points_m,
-                               const ScaledDesign& design) {
+                               const VolumetricDesign& design) {
   Matrix3 spread = Matrix3::Zero();
-  Eigen::Matrix3Xd moment = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
+  Eigen::Matrix3Xd moment = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.unknowns));
   const Matrix3 in_plane = Matrix3::Identity() - plane.normal * plane.normal.transpose();
 
   for (const Vector3& p : points_m) {
@@ -34,7 +34,7 @@ Eigen::Matrix3Xd normal_change(const fit::Plane& plane, std::span<const Vector3>
 
 }  // namespace
 
-Eigen::Matrix3Xd block_rotation(const TouchedArtefact& seen, const ScaledDesign& design) {
+Eigen::Matrix3Xd block_rotation(const TouchedArtefact& seen, const VolumetricDesign& design) {
   const Vector3 z = seen.T_self_uni.R.col(2), y = seen.T_self_uni.R.col(1);
   const Vector3 &n1 = seen.blocks[0].normal, &n2 = seen.blocks[1].normal;
   const Eigen::Matrix3Xd dn1 = normal_change(seen.blocks[0], seen.block_points_m[0], design);
@@ -54,7 +54,7 @@ Eigen::Matrix3Xd block_rotation(const TouchedArtefact& seen, const ScaledDesign&
 }
 
 Eigen::Matrix3Xd ball_displacement(const TouchedArtefact& seen, std::size_t ball,
-                                   const ScaledDesign& design) {
+                                   const VolumetricDesign& design) {
   const Vector3& centre = seen.balls[ball].centre;
   const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
 
@@ -62,7 +62,7 @@ Eigen::Matrix3Xd ball_displacement(const TouchedArtefact& seen, std::size_t ball
   // and radius, n: outward normal at p). The changes of c and r are the least-squares solution that
   // compensates the changes of all residuals.
   Eigen::MatrixX4d N(static_cast<Eigen::Index>(points_m.size()), 4);
-  Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.size()));
+  Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.unknowns));
   for (std::size_t k = 0; k < points_m.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     const Vector3 n = (points_m[k] - centre).normalized();
@@ -73,9 +73,9 @@ Eigen::Matrix3Xd ball_displacement(const TouchedArtefact& seen, std::size_t ball
   return N.colPivHouseholderQr().solve(along).topRows<3>();
 }
 
-Eigen::MatrixXd design_rows(const Observations& o, const ScaledDesign& design, RowsFrom from) {
+Eigen::MatrixXd design_rows(const Observations& o, const VolumetricDesign& design, RowsFrom from) {
   Eigen::MatrixXd X(static_cast<Eigen::Index>(3 * o.rows.size()),
-                    static_cast<Eigen::Index>(design.size()));
+                    static_cast<Eigen::Index>(design.unknowns));
   if (from == RowsFrom::Centres) {
     for (std::size_t i = 0; i < o.rows.size(); ++i) {
       X.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = design.B(o.rows[i].reading_m);
@@ -96,7 +96,8 @@ Eigen::MatrixXd design_rows(const Observations& o, const ScaledDesign& design, R
   return X;
 }
 
-Eigen::MatrixXd relative_rows(const Observations& o, const ScaledDesign& design, RowsFrom from) {
+Eigen::MatrixXd relative_rows(const Observations& o, const VolumetricDesign& design,
+                              RowsFrom from) {
   Eigen::MatrixXd X = design_rows(o, design, from);
   const Eigen::Matrix3Xd at_ball1 = design.B(o.ball1_m);
   for (const PositionRows& p : position_rows(o)) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/calib/evemu/artefact_rows.hpp"
+#include "abbe/calib/evemu/design_rows.hpp"
 #include "abbe/calib/evemu/noise.hpp"
 #include "elementary.hpp"
 #include "message.hpp"
@@ -18,23 +19,6 @@ const TouchedArtefact* touched_at(const Observations& o, int position) {
   const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
                                  [&](const TouchedArtefact& s) { return s.position == position; });
   return seen == o.seen.end() ? nullptr : &*seen;
-}
-
-/// D of the centre of a touched ball: a displacement delta of a touched point p changes its
-/// residual |p - c| - r by n . delta (n: outward normal at p); c and r change by the least-squares
-/// solution that compensates the changes of all residuals.
-Eigen::Matrix3Xd touched_centre_rows(const TouchedArtefact& seen, std::size_t ball,
-                                     const VolumetricDesign& design) {
-  const std::vector<Vector3>& points_m = seen.ball_points_m[ball];
-  Eigen::MatrixX4d N(std::ssize(points_m), 4);
-  Eigen::MatrixXd along(N.rows(), static_cast<Eigen::Index>(design.unknowns));
-  for (Eigen::Index k = 0; k < N.rows(); ++k) {
-    const Vector3& p = points_m[static_cast<std::size_t>(k)];
-    const Vector3 n = (p - seen.balls[ball].centre).normalized();
-    N.row(k) << n.transpose(), 1.0;
-    along.row(k) = n.transpose() * design.B(p);
-  }
-  return N.colPivHouseholderQr().solve(along).topRows<3>();
 }
 
 /// Covariance of one component of the ball centres of a position, not relative to Ball1: the
@@ -90,27 +74,13 @@ void fill_pose_block(estimation::Block& block, const Observations& o, const Posi
     const Vector3& reading_m = o.rows[p.first + b].reading_m;
     block.y.segment<3>(row) = pose * places[b] - reading_m;
     block.A.block(row, 0, 3, model) =
-        has_points ? touched_centre_rows(*seen, b, design) : design.B(reading_m);
+        has_points ? ball_displacement(*seen, b, design) : design.B(reading_m);
     block.L.block<3, 3>(row, 0).setIdentity();
     block.L.block<3, 3>(row, 3) = rotation_effect(reading_m - ball1_m);
   }
 }
 
 }  // namespace
-
-VolumetricDesign design_of(const estimation::ModelBasis& basis, const Vector3& tool_offset_m) {
-  return {basis.size(), [basis, tool_offset_m](const Vector3& reading_m) {
-            std::vector<estimation::Column> memory(basis.most_columns());
-            estimation::ModelColumns columns(memory);
-            basis.columns({.q_m = reading_m, .tool_offset_m = tool_offset_m}, columns);
-
-            Eigen::Matrix3Xd B = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(basis.size()));
-            for (const estimation::Column& c : columns.span()) {
-              B.col(static_cast<Eigen::Index>(c.parameter)) += c.dV_dU;
-            }
-            return B;
-          }};
-}
 
 Result<std::vector<estimation::Block>> pose_blocks(const Observations& o,
                                                    const VolumetricDesign& design,

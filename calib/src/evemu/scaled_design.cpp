@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "evemu/function_value.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -138,13 +139,9 @@ ScaledDesign::Factors ScaledDesign::factors(const Vector3& reading_m) const {
 
 Eigen::Matrix3Xd ScaledDesign::B(const Vector3& reading_m) const {
   const Factors at = factors(reading_m);
-  Eigen::Matrix3Xd B = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(size()));
+  Eigen::Matrix3Xd B(3, static_cast<Eigen::Index>(size()));
   for (std::size_t j = 0; j < size(); ++j) {
-    const DesignFunction& f = functions_[j];
-    for (std::size_t p = 0; p < f.parts; ++p) {
-      B(static_cast<Eigen::Index>(f.part[p].component), static_cast<Eigen::Index>(j)) +=
-          value(f, f.part[p], at);
-    }
+    B.col(static_cast<Eigen::Index>(j)) = function_value(functions_[j], at);
   }
   return B;
 }

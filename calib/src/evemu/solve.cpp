@@ -31,9 +31,9 @@ std::vector<Vector3> readings_m(const Observations& o) {
   return readings;
 }
 
-/// block_rotation() (Theta of observe.hpp) averaged over the positions, 3 x size().
-Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const ScaledDesign& design) {
-  Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.size()));
+/// block_rotation() (Theta of observe.hpp) averaged over the positions, 3 x design.unknowns.
+Eigen::Matrix3Xd mean_block_rotation(const Observations& o, const VolumetricDesign& design) {
+  Eigen::Matrix3Xd mean = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(design.unknowns));
   for (const TouchedArtefact& seen : o.seen) {
     mean += block_rotation(seen, design) / static_cast<double>(o.seen.size());
   }

@@ -20,19 +20,10 @@
 #include <vector>
 
 #include "abbe/calib/estimation/block.hpp"
-#include "abbe/calib/estimation/model_basis.hpp"
 #include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/evemu/volumetric_design.hpp"
 
 namespace abbe::calib::evemu {
-
-/// The design matrix of a model: V(r) = B(r) U at the reading r, for the stylus.
-struct VolumetricDesign {
-  std::size_t unknowns = 0;  ///< columns of B
-  std::function<Eigen::Matrix3Xd(const Vector3& reading_m)> B;
-};
-/// The design of a basis, for the tool offset of the stylus.
-[[nodiscard]] VolumetricDesign design_of(const estimation::ModelBasis&,
-                                         const Vector3& tool_offset_m);
 
 struct PoseBlockOptions {
   /// Standard deviation of a ball centre per coordinate, must be positive. Slow noise is that of

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "abbe/calib/estimation/dense_information.hpp"
 #include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/estimation/sparse_information.hpp"
 
@@ -69,6 +70,27 @@ constexpr double kRounding = 1e-13;
 TEST(Information, HasTheTriangleOfADenseQrOfAllRows) {
   const Rows r = random_rows(300, 20, 1);
   EXPECT_LT(difference(triangle(of_rows(r)), dense_triangle(r)), kRounding);
+}
+
+TEST(Information, IsTheSameFromAllRowsAtOnce) {
+  const Rows r = random_rows(300, 20, 1);
+  const Information added = of_rows(r), at_once = information_of(r.A, r.y);
+  EXPECT_LT(difference(triangle(at_once), triangle(added)), kRounding);
+  EXPECT_NEAR(at_once.rest(), added.rest(), 1e-11);
+  EXPECT_EQ(at_once.rows(), added.rows());
+  EXPECT_GE(at_once.R().diagonal().minCoeff(), 0.0);
+}
+
+// Fewer rows than unknowns, and an unknown without data: R^T R and R^T z are those of the rows.
+TEST(Information, FromAllRowsAtOnceMayLeaveUnknownsOpen) {
+  Rows r = random_rows(12, 20, 2);
+  r.A.col(3).setZero();
+  const Information information = information_of(r.A, r.y);
+  const Eigen::MatrixXd R = information.R();
+  EXPECT_LT(difference(R.transpose() * R, r.A.transpose() * r.A), kRounding);
+  EXPECT_LT(difference(R.transpose() * information.z(), r.A.transpose() * r.y), kRounding);
+  EXPECT_NEAR(information.z().squaredNorm() + information.rest(), r.y.squaredNorm(), 1e-12);
+  EXPECT_EQ(information.rows(), 12u);
 }
 
 TEST(Information, HasTheResidualsOfLeastSquares) {

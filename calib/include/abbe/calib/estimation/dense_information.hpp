@@ -1,0 +1,13 @@
+#pragma once
+/// Information of dense rows that are all in memory, by one QR decomposition in blocks of columns.
+
+#include <Eigen/Core>
+
+#include "abbe/calib/estimation/information.hpp"
+
+namespace abbe::calib::estimation {
+
+/// Whitened rows A and y; any number of rows.
+[[nodiscard]] Information information_of(const Eigen::MatrixXd& A, const Eigen::VectorXd& y);
+
+}  // namespace abbe::calib::estimation

@@ -86,4 +86,19 @@ TEST(LinearGaussian, HasThePosteriorOfTheFullCovariance) {
   EXPECT_NEAR(posterior.effective_parameters, hat, 1e-10);
 }
 
+TEST(LinearGaussian, StatesWhatAQuantityInTheObservationsDoesToThePosterior) {
+  const SmallProblem p = small_problem();
+  const double noise = 0.3;
+  const Eigen::MatrixXd A = Eigen::MatrixXd::Random(20, 2);
+  const Eigen::VectorXd a = Eigen::VectorXd::Random(2);
+  const LinearGaussian problem(p.X, p.S, A, p.y);
+  const auto before = problem.posterior(p.prior, noise),
+             after = LinearGaussian(p.X, p.S, p.y + A * a).posterior(p.prior, noise);
+  EXPECT_LT((problem.response(p.prior, noise) * a - (after.mean - before.mean)).norm(), 1e-13);
+  EXPECT_LT((LinearGaussian(p.X, p.S, p.y).posterior(p.prior, noise).mean - before.mean).norm(),
+            1e-13);
+  EXPECT_NEAR(problem.evidence(p.prior, noise).log_likelihood,
+              LinearGaussian(p.X, p.S, p.y).evidence(p.prior, noise).log_likelihood, 1e-12);
+}
+
 }  // namespace

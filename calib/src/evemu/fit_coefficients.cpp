@@ -30,6 +30,13 @@ LinearGaussian gaussian_of(const FitProblem& problem) {
   return {white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)), white_rows(o, problem.y)};
 }
 
+/// The same, with the errors of the array.
+LinearGaussian gaussian_with_array(const FitProblem& problem) {
+  const Observations& o = problem.observations;
+  return {white_rows(o, problem.X), white_rows(o, pose_rotation_rows(o)), white_rows(o, problem.A),
+          white_rows(o, problem.y)};
+}
+
 }  // namespace
 
 Eigen::MatrixXd white_rows(const Observations& o, const Eigen::MatrixXd& rows) {
@@ -117,7 +124,7 @@ Result<Fit> fit_prior(PriorKind kind, const FitProblem& problem) {
   fit.covariance_m2 = p.covariance.topLeftCorner(n, n);
 
   if (problem.A.cols() > 0) {
-    fit.artefact_m = gaussian.response(prior, h.s_m * h.s_m, white_rows(o, problem.A)).topRows(n);
+    fit.artefact_m = gaussian_with_array(problem).response(prior, h.s_m * h.s_m).topRows(n);
   }
 
   fit.s_m = h.s_m;

@@ -1,11 +1,11 @@
 #include "abbe/calib/evemu/linear_gaussian.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <algorithm>
+#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 
+#include "abbe/calib/estimation/considered.hpp"
+#include "abbe/calib/estimation/dense_information.hpp"
 #include "elementary.hpp"
 
 namespace abbe::calib::evemu {
@@ -17,22 +17,28 @@ constexpr double kLog2Pi = 1.8378770664093454836;  // log(2 pi)
 
 LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S,
                                const Eigen::VectorXd& y)
+    : LinearGaussian(X, S, Eigen::MatrixXd(X.rows(), 0), y) {}
+
+LinearGaussian::LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S,
+                               const Eigen::MatrixXd& A, const Eigen::VectorXd& y)
     : unknowns_(X.cols()), rows_(X.rows()) {
-  Eigen::MatrixXd Z(X.rows(), X.cols() + S.cols());
-  Z << X, S;
-  qr_.compute(Z);
-  const Eigen::Index m = std::min(Z.rows(), Z.cols());
-  R_ = qr_.matrixQR().topRows(m).triangularView<Eigen::Upper>();
-  const Eigen::VectorXd turned = qr_.householderQ().adjoint() * y;
-  z_ = turned.head(m);
-  rest_ = turned.tail(Z.rows() - m).squaredNorm();
+  const Eigen::Index n = X.cols() + S.cols();
+  Eigen::MatrixXd Z(X.rows(), n + A.cols());
+  Z << X, S, A;
+  const estimation::Information data = estimation::information_of(Z, y);
+  const Eigen::MatrixXd R = data.R();
+  const Eigen::VectorXd z = data.z();
+  R_ = R.topLeftCorner(n, n);
+  R_a_ = R.topRightCorner(n, A.cols());
+  z_ = z.head(n);
+  rest_ = data.rest() + z.tail(A.cols()).squaredNorm();
 }
 
 LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
                                                   double noise) const {
   const Eigen::Index m = R_.rows(), out_of_reach = rows_ - m;
-  // With [X S] = Q R and z = Q^T y, K = R diag(prior) R^T + s^2 I is the covariance of z. The part
-  // of y perpendicular to Q contains only noise.
+  // K = R diag(prior) R^T + s^2 I is the covariance of z. The part of y outside the span of [X S]
+  // contains only noise.
   const Eigen::MatrixXd scaled = R_ * prior.cwiseSqrt().asDiagonal();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m, m);
   K.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
@@ -65,54 +71,44 @@ LinearGaussian::Evidence LinearGaussian::evidence(const Eigen::VectorXd& prior,
   return e;
 }
 
-/// Posterior information matrix of the unknowns divided by their prior standard deviations. In this
-/// scale no large and small variances are subtracted from each other.
-struct LinearGaussian::Information {
-  Eigen::VectorXd root;
-  Eigen::MatrixXd scaled;
-  Eigen::LLT<Eigen::MatrixXd> llt;
-};
-
-LinearGaussian::Information LinearGaussian::information(const Eigen::VectorXd& prior,
-                                                        double noise) const {
-  const Eigen::VectorXd root = prior.cwiseSqrt();
-  const Eigen::MatrixXd scaled = R_ * root.asDiagonal() / std::sqrt(noise);
+/// Information about the unknowns divided by their prior standard deviations, and about quantities
+/// with the columns `considered` (R_a_ or none). In this scale no large and small variances are
+/// subtracted from each other.
+estimation::Information LinearGaussian::with_prior(const Eigen::VectorXd& prior, double noise,
+                                                   const Eigen::MatrixXd& considered) const {
   const Eigen::Index n = R_.cols();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(n, n);
-  information.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
-  return {root, scaled, Eigen::LLT<Eigen::MatrixXd>(information)};
+  Eigen::MatrixXd rows(n, n + considered.cols());
+  rows << R_ * prior.cwiseSqrt().asDiagonal(), considered;
+  estimation::Information information(static_cast<std::size_t>(rows.cols()));
+  information.add_rows(rows / std::sqrt(noise), z_ / std::sqrt(noise));
+
+  rows.setIdentity();
+  information.add_rows(rows, Eigen::VectorXd::Zero(n));
+  return information;
 }
 
-Eigen::MatrixXd LinearGaussian::response(const Eigen::VectorXd& prior, double noise,
-                                         const Eigen::MatrixXd& rows) const {
-  const auto [root, scaled, llt] = information(prior, noise);
-  if (llt.info() != Eigen::Success) {
-    return Eigen::MatrixXd::Constant(R_.cols(), rows.cols(),
-                                     std::numeric_limits<double>::quiet_NaN());
-  }
-  const Eigen::MatrixXd turned = qr_.householderQ().adjoint() * rows;
-  return root.asDiagonal() *
-         llt.solve(scaled.transpose() * (turned.topRows(R_.rows()) / std::sqrt(noise)));
+Eigen::MatrixXd LinearGaussian::response(const Eigen::VectorXd& prior, double noise) const {
+  return prior.cwiseSqrt().asDiagonal() *
+         estimation::sensitivity(with_prior(prior, noise, R_a_),
+                                 static_cast<std::size_t>(R_.cols()));
 }
 
 LinearGaussian::Posterior LinearGaussian::posterior(const Eigen::VectorXd& prior,
                                                     double noise) const {
-  const auto [root, scaled, llt] = information(prior, noise);
   const Eigen::Index n = R_.cols();
+  const estimation::Information information = with_prior(prior, noise, Eigen::MatrixXd(n, 0));
+  const Eigen::MatrixXd R_inverse =
+      information.R().triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd root = prior.cwiseSqrt().asDiagonal() * R_inverse;
+
   Posterior p;
+  p.mean = root * information.z();
+  p.covariance = Eigen::MatrixXd::Zero(n, n);
+  p.covariance.selfadjointView<Eigen::Lower>().rankUpdate(root);
+  p.covariance.triangularView<Eigen::StrictlyUpper>() = p.covariance.transpose();
 
-  if (llt.info() != Eigen::Success) {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-    return {Eigen::VectorXd::Constant(n, kNaN), Eigen::MatrixXd::Constant(n, n, kNaN), kNaN, kNaN};
-  }
-
-  const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
-  p.covariance = root.asDiagonal() * inverse * root.asDiagonal();
-  p.covariance = 0.5 * (p.covariance + p.covariance.transpose()).eval();
-  p.mean = root.cwiseProduct(llt.solve(scaled.transpose() * (z_ / std::sqrt(noise))));
-
-  // Degrees of freedom of column j: (inverse * scaled^T scaled)_jj = 1 - inverse_jj.
-  const Eigen::VectorXd used = Eigen::VectorXd::Ones(n) - inverse.diagonal();
+  // Degrees of freedom of column j: 1 - (posterior variance / prior variance).
+  const Eigen::VectorXd used = 1.0 - R_inverse.rowwise().squaredNorm().array();
   p.effective_parameters = used.head(unknowns_).sum();
   p.effective_pose_parameters = used.tail(n - unknowns_).sum();
 

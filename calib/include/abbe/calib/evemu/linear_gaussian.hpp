@@ -3,12 +3,15 @@
 /// observations y, unknowns b and omega, and noise n
 ///     y = X b + S omega + n,
 ///     b ~ N(0, diag v),  omega ~ N(0, w^2 I),  n ~ N(0, s^2 I)  after whitening.
-/// One QR decomposition of [X S] reduces the cost of each evaluation of the marginal likelihood,
-/// with gradient, from N^3 to (columns)^3.
+/// All that y states about b and omega is in one Information (estimation/information.hpp). This
+/// reduces the cost of each evaluation of the marginal likelihood, with gradient, from N^3 to
+/// (columns)^3. The likelihood has no counterpart in the estimation core, because v, w and s are
+/// unknown: with them, neither prior nor noise is part of the Information.
 
 #include <Eigen/Core>
-#include <Eigen/QR>
-#include <span>
+#include <cstddef>
+
+#include "abbe/calib/estimation/information.hpp"
 
 namespace abbe::calib::evemu {
 
@@ -16,6 +19,9 @@ namespace abbe::calib::evemu {
 class LinearGaussian {
  public:
   LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S, const Eigen::VectorXd& y);
+  /// `A`: columns of quantities that y may contain and that are not estimated (response()).
+  LinearGaussian(const Eigen::MatrixXd& X, const Eigen::MatrixXd& S, const Eigen::MatrixXd& A,
+                 const Eigen::VectorXd& y);
 
   [[nodiscard]] Eigen::Index columns() const { return R_.cols(); }   ///< number of columns of [X S]
   [[nodiscard]] Eigen::Index unknowns() const { return unknowns_; }  ///< number of columns of X
@@ -39,23 +45,20 @@ class LinearGaussian {
     double effective_parameters = 0.0;       ///< trace of d(X b)/dy: degrees of freedom of b
     double effective_pose_parameters = 0.0;  ///< trace of d(S omega)/dy: freedoms of omega
   };
-  /// All values are NaN if the posterior information matrix is not positive definite after
-  /// rounding.
+  /// Not finite if the noise is zero.
   [[nodiscard]] Posterior posterior(const Eigen::VectorXd& prior, double noise_variance) const;
 
-  /// The posterior mean for each column of `rows` (whitened) in place of y: the mean is linear in
-  /// y. NaN if the posterior information matrix is not positive definite after rounding.
-  [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance,
-                                         const Eigen::MatrixXd& rows) const;
+  /// Effect of each column of A in y on the posterior mean: columns() x columns of A.
+  [[nodiscard]] Eigen::MatrixXd response(const Eigen::VectorXd& prior, double noise_variance) const;
 
  private:
-  struct Information;
-  [[nodiscard]] Information information(const Eigen::VectorXd& prior, double noise_variance) const;
+  [[nodiscard]] estimation::Information with_prior(const Eigen::VectorXd& prior,
+                                                   double noise_variance,
+                                                   const Eigen::MatrixXd& considered) const;
 
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
-  Eigen::MatrixXd R_;  ///< [X S] = Q R
-  Eigen::VectorXd z_;  ///< Q^T y
-  double rest_ = 0.0;  ///< |y|^2 - |z|^2, the part of y outside the columns' span
+  Eigen::MatrixXd R_, R_a_;  ///< [X S A] = Q [R R_a; 0 ...]
+  Eigen::VectorXd z_;        ///< part of Q^T y that belongs to R
+  double rest_ = 0.0;        ///< |y|^2 - |z|^2, the part of y outside the span of [X S]
   Eigen::Index unknowns_ = 0, rows_ = 0;
 };
 

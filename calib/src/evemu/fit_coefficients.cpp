@@ -2,6 +2,9 @@
 
 #include <Eigen/Dense>
 
+#include "abbe/calib/estimation/considered.hpp"
+#include "abbe/calib/estimation/datum.hpp"
+#include "abbe/calib/estimation/dense_information.hpp"
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/norm_over_balls.hpp"
@@ -37,6 +40,24 @@ LinearGaussian gaussian_with_array(const FitProblem& problem) {
           white_rows(o, problem.y)};
 }
 
+/// Trace of the covariance of the residuals of least squares with equal weights, in units of s^2:
+/// their expected sum of squares. The residuals are (1 - Q Q^T) noise, X = Q R, so it is
+///     trace C0 - trace Q^T C0 Q = trace C0 - |R_n R^-1|^2,    X^T C0 X = R_n^T R_n
+/// 0 if the difference is not above rounding.
+double trace_of_residuals(const Observations& o, const estimation::Information& data,
+                          const estimation::Information& noise) {
+  double trace_C0 = 0.0;
+  for (const PositionRows& p : position_rows(o)) {
+    trace_C0 += 3.0 * ball_covariance(o, p).trace();
+  }
+
+  constexpr double kRounding = 1e-10;
+  const Eigen::MatrixXd R = data.R();
+  const double left =
+      trace_C0 - R.triangularView<Eigen::Upper>().solve<Eigen::OnTheRight>(noise.R()).squaredNorm();
+  return left > kRounding * trace_C0 ? left : 0.0;
+}
+
 }  // namespace
 
 Eigen::MatrixXd white_rows(const Observations& o, const Eigen::MatrixXd& rows) {
@@ -44,51 +65,38 @@ Eigen::MatrixXd white_rows(const Observations& o, const Eigen::MatrixXd& rows) {
 }
 
 Result<Fit> fit_ols(const FitProblem& problem) {
-  const Eigen::Index n = problem.X.cols();
-  const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(problem.X * scale.asDiagonal());
+  const Observations& o = problem.observations;
+  const std::size_t n = problem.design.size();
+  const estimation::Information data = estimation::information_of(problem.X, problem.y);
 
-  // With columns of unit length, determined coefficients have pivots above 1e-4 even for a flat
-  // array; rounding leaves 1e-15.
-  constexpr double kZero = 1e-10;
-  qr.setThreshold(kZero);
-  if (qr.rank() < n) {
-    return failure(ErrorCode::RankDeficient,
-                   message("least squares: rank ", qr.rank(), " of ", n,
-                           " coefficients; the positions do not determine all of them"));
+  // All rows have the same weight, although their noise has the covariance s^2 C0 (noise.hpp).
+  const estimation::Information noise = estimation::information_of(
+      times_noise_root(o, problem.X), Eigen::VectorXd::Zero(problem.y.size()));
+  const estimation::Datum without_conditions(Eigen::MatrixXd(0, problem.X.cols()));
+  const Result<estimation::DatumSolution> adjusted = without_conditions.solve(
+      data, {.noise = &noise,
+             .label = [&](std::size_t j) { return problem.design.equivalent().names()[j]; }});
+
+  if (!adjusted) {
+    return failure(adjusted.error().code, "least squares: " + adjusted.error().text);
   }
 
-  Fit fit;
-  fit.c_m = scale.cwiseProduct(qr.solve(problem.y));
-  const Eigen::MatrixXd Q = qr.householderQ() * Eigen::MatrixXd::Identity(problem.X.rows(), n);
-
-  // The residuals are (I - Q Q^T) noise, Q: orthonormal basis of the columns of X. Noise with the
-  // covariance s^2 C0 has the expected sum of squared residuals s^2 (trace C0 - trace Q^T C0 Q).
-  const Eigen::MatrixXd C0_Q = times_ball_covariance(problem.observations, Q);
-  double trace_C0 = 0.0;
-  for (const PositionRows& p : position_rows(problem.observations)) {
-    trace_C0 += 3.0 * ball_covariance(problem.observations, p).trace();
-  }
-
-  const Eigen::MatrixXd Qt_C0_Q = Q.transpose() * C0_Q;
-  const double left = trace_C0 - Qt_C0_Q.trace();
-  if (!(left > kZero * trace_C0)) {
+  const double left = trace_of_residuals(o, data, noise);
+  if (!(left > 0.0)) {
     return failure(ErrorCode::TooFewObservations,
                    message("least squares: ", problem.X.rows(), " components for ", n,
                            " coefficients are too few to estimate the noise"));
   }
 
-  const double s2 = (problem.y - problem.X * fit.c_m).squaredNorm() / left;
-  // (X D P) = Q R: c = D P R^-1 Q^T y.
-  const Eigen::MatrixXd R = qr.matrixR().topLeftCorner(n, n).triangularView<Eigen::Upper>();
-  const Eigen::MatrixXd R_inv =
-      R.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
-  const Eigen::MatrixXd G = scale.asDiagonal() * (qr.colsPermutation() * R_inv);
-  fit.covariance_m2 = s2 * G * Qt_C0_Q * G.transpose();
-  fit.covariance_m2 = 0.5 * (fit.covariance_m2 + fit.covariance_m2.transpose()).eval();
+  const double s2 = data.rest() / left;
+  Fit fit;
+  fit.c_m = adjusted->U;
+  fit.covariance_m2 = s2 * adjusted->covariance;
 
   if (problem.A.cols() > 0) {
-    fit.artefact_m = scale.asDiagonal() * qr.solve(problem.A);
+    Eigen::MatrixXd with_array(problem.X.rows(), problem.X.cols() + problem.A.cols());
+    with_array << problem.X, problem.A;
+    fit.artefact_m = estimation::sensitivity(estimation::information_of(with_array, problem.y), n);
   }
 
   fit.s_m = std::sqrt(s2);

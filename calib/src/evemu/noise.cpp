@@ -108,9 +108,9 @@ Eigen::MatrixXd whitened(const Observations& o, const Eigen::MatrixXd& rows) {
   });
 }
 
-Eigen::MatrixXd times_ball_covariance(const Observations& o, const Eigen::MatrixXd& rows) {
+Eigen::MatrixXd times_noise_root(const Observations& o, const Eigen::MatrixXd& rows) {
   return by_position(o, rows, [](const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::MatrixXd& m) {
-    return Eigen::MatrixXd(llt.reconstructedMatrix() * m);
+    return Eigen::MatrixXd(llt.matrixU() * m);
   });
 }
 

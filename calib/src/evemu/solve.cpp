@@ -6,11 +6,12 @@
 #include <cmath>
 #include <utility>
 
+#include "abbe/calib/estimation/dense_information.hpp"
+#include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
 #include "message.hpp"
-#include "singular_values.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -133,8 +134,8 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   s.balls = o.rows.size();
   s.observations = 3 * (o.rows.size() - s.positions);
   s.unknowns = problem.design.size();
-  const Eigen::VectorXd scale = problem.X.colwise().norm().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::VectorXd sv = singular_values(problem.X * scale.asDiagonal());
+  const Eigen::VectorXd sv =
+      estimation::spectrum(estimation::information_of(problem.X, problem.y)).singular_values;
 
   // Singular values relative to the largest are about 1e-7 for the unobservable rotations (not 0,
   // because readings of Ball1 differ by nanometres), and 1e-4 and more for determined coefficients.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "evemu/constant_fields.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -140,16 +141,7 @@ std::vector<NamedCoefficient> EvemuModel::named_coefficients() const {
 
 Eigen::MatrixXd zero_at(const ScaledDesign& design, const Vector3& place_m) {
   const auto n = static_cast<Eigen::Index>(design.size());
-  Eigen::MatrixXd T = Eigen::MatrixXd::Identity(n, n);
-  const Eigen::Matrix3Xd B = design.B(place_m);
-  for (std::size_t j = 0; j < design.size(); ++j) {
-    const DesignFunction& f = design.functions()[j];
-    if (f.kind == FunctionKind::Constant) {
-      T.row(static_cast<Eigen::Index>(j)) -=
-          f.part[0].sign * B.row(static_cast<Eigen::Index>(f.part[0].component));
-    }
-  }
-  return T;
+  return Eigen::MatrixXd::Identity(n, n) - constant_fields(design) * design.B(place_m);
 }
 
 }  // namespace abbe::calib::evemu

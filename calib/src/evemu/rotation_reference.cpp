@@ -122,7 +122,7 @@ double chi2_of_one_in_1000(double dof) {
 }
 
 /// Covariance of the coefficients without the uncertainty of the rotation about Ball1, which
-/// set_gauge() (solve.cpp) added.
+/// set_datum() (solve.cpp) added.
 Eigen::MatrixXd shape_covariance(const EvemuModel& model, const MeanRotation& rotation) {
   const Eigen::MatrixX3d G = model.design().rotation_about(model.ball1_m());
   return rotation.referenced

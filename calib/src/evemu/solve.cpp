@@ -6,9 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "abbe/calib/estimation/datum.hpp"
 #include "abbe/calib/estimation/dense_information.hpp"
 #include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
+#include "evemu/constant_fields.hpp"
 #include "evemu/fit_coefficients.hpp"
 #include "evemu/slow_noise.hpp"
 #include "message.hpp"
@@ -48,21 +50,34 @@ Matrix3 prior_rotation_rad2(const ScaledDesign& design) {
   return u_rad * u_rad * Matrix3::Identity();
 }
 
-/// Sets V(Ball1) = 0 and sets the rotation to that of the blocks; adds the rotation's uncertainty
-/// to the covariance.
-MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
+/// Matrix of the S-transformation (estimation/datum.hpp) of the coefficients to the datum
+///     V(Ball1) = 0, and with touches: mean rotation of the blocks = 0
+/// `mean`: mean_block_rotation(), used with touches only.
+Result<Eigen::MatrixXd> to_datum(const FitProblem& problem, const Eigen::Matrix3Xd& mean) {
+  const ScaledDesign& design = problem.design;
+  const Vector3& ball1_m = problem.observations.ball1_m;
+  if (!problem.from_touches) {
+    return estimation::Datum(design.B(ball1_m)).transformation(constant_fields(design));
+  }
+
+  Eigen::MatrixXd conditions(6, mean.cols()), free(mean.cols(), 6);
+  conditions << design.B(ball1_m), mean;
+  free << constant_fields(design), design.rotation_about(ball1_m);
+  return estimation::Datum(conditions).transformation(free);
+}
+
+/// Transforms the fit to_datum() and adds the uncertainty of the rotation to the covariance.
+Result<MeanRotation> set_datum(const FitProblem& problem, Fit& fit) {
   const Observations& o = problem.observations;
   const Eigen::MatrixX3d G = problem.design.rotation_about(o.ball1_m);
-  const Eigen::MatrixXd Z = zero_at(problem.design, o.ball1_m);
   MeanRotation rotation;
   rotation.referenced = o.rotation == RotationOrigin::Independent;
-  Eigen::MatrixXd T = Z;
+  Eigen::Matrix3Xd mean;
 
   if (problem.from_touches) {
-    const Eigen::Matrix3Xd mean = mean_block_rotation(o, problem.design);
+    mean = mean_block_rotation(o, problem.design);
     rotation.removed_rad = mean * fit.c_m;
     rotation.cov_rad2 = mean * fit.covariance_m2 * mean.transpose();
-    T = Z * (Eigen::MatrixXd::Identity(Z.rows(), Z.cols()) - G * mean);
   } else {
     for (const Vector3& theta : fit.pose_rotations_rad) {
       rotation.removed_rad += theta / static_cast<double>(fit.pose_rotations_rad.size());
@@ -71,10 +86,15 @@ MeanRotation set_gauge(const FitProblem& problem, Fit& fit) {
         rotation.referenced ? fit.cov_mean_pose_rotation_rad2 : prior_rotation_rad2(problem.design);
   }
 
-  fit.c_m = T * fit.c_m;
-  fit.covariance_m2 = T * fit.covariance_m2 * T.transpose();
+  const Result<Eigen::MatrixXd> S = to_datum(problem, mean);
+  if (!S) {
+    return tl::unexpected(S.error());
+  }
+
+  fit.c_m = *S * fit.c_m;
+  fit.covariance_m2 = *S * fit.covariance_m2 * S->transpose();
   if (fit.artefact_m.cols() > 0) {
-    const Eigen::MatrixXd off_m = T * fit.artefact_m;
+    const Eigen::MatrixXd off_m = *S * fit.artefact_m;
     fit.covariance_m2 += off_m * off_m.transpose();
   }
 
@@ -258,7 +278,11 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   }
 
   const Eigen::VectorXd raw_c_m = fit->c_m;
-  const MeanRotation rotation = set_gauge(problem, *fit);
+  const Result<MeanRotation> rotation = set_datum(problem, *fit);
+  if (!rotation) {
+    return tl::unexpected(rotation.error());
+  }
+
   Result<ValidityVolume> validity = ValidityVolume::hull_of(readings_m(o));
 
   if (!validity) {
@@ -271,7 +295,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
   }
 
   return VolumetricModel::from_polynomials(*std::move(evemu),
-                                           rotation.referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
+                                           rotation->referenced ? Gauge::Ball1 : Gauge::Ball1Blocks,
                                            o.machine.tool_offset_m, *std::move(validity))
       .map([&](VolumetricModel model) {
         return Solution{.model = std::move(model),
@@ -282,7 +306,7 @@ Result<Solution> solve(const Observations& o, const SolveOptions& options) {
                         .sparse = fit->sparse,
                         .residuals_m = by_ball(residuals),
                         .pose_rotations_rad = fit->pose_rotations_rad,
-                        .rotation = rotation,
+                        .rotation = *rotation,
                         .artefact = o.artefact,
                         .slow_noise = o.slow_noise,
                         .statistics = statistics};

@@ -29,24 +29,23 @@ Eigen::MatrixXd by_position(const Observations& o, const Eigen::MatrixXd& rows, 
 
 /// Matrix with the elements k_ij - k_i1 - k_1j + k_11 (noise.hpp), i, j: balls of a position.
 Eigen::MatrixXd slow_covariance(const TouchedArtefact& seen) {
-  constexpr double kPerPosition = 4.0;  // touching one position takes 4 correlation times
-  const std::vector<double> t = times_in_position(seen);
-  const auto k = [&](Eigen::Index i, Eigen::Index j) {
-    return exponential(-kPerPosition *
-                       std::abs(t[static_cast<std::size_t>(i)] - t[static_cast<std::size_t>(j)]));
-  };
-
-  Eigen::MatrixXd C(std::ssize(t), std::ssize(t));
+  const Eigen::MatrixXd k = slow_correlation(seen);
+  Eigen::MatrixXd C(k.rows(), k.cols());
   for (Eigen::Index i = 0; i < C.rows(); ++i) {
     for (Eigen::Index j = 0; j < C.cols(); ++j) {
       C(i, j) = k(i, j) - k(i, 0) - k(0, j) + 1.0;
     }
   }
-
   return C;
 }
 
 }  // namespace
+
+const TouchedArtefact* touched_at(const Observations& o, int position) {
+  const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
+                                 [&](const TouchedArtefact& s) { return s.position == position; });
+  return seen == o.seen.end() ? nullptr : &*seen;
+}
 
 std::vector<double> times_in_position(const TouchedArtefact& s) {
   double first = std::min(s.block_index[0], s.block_index[1]);
@@ -59,6 +58,19 @@ std::vector<double> times_in_position(const TouchedArtefact& s) {
     t.push_back(last > first ? (index - first) / (last - first) : 0.0);
   }
   return t;
+}
+
+Eigen::MatrixXd slow_correlation(const TouchedArtefact& seen) {
+  constexpr double kPerPosition = 4.0;  // touching one position takes 4 correlation times
+  const std::vector<double> t = times_in_position(seen);
+  Eigen::MatrixXd k(std::ssize(t), std::ssize(t));
+  for (Eigen::Index i = 0; i < k.rows(); ++i) {
+    for (Eigen::Index j = 0; j < k.cols(); ++j) {
+      k(i, j) = exponential(-kPerPosition * std::abs(t[static_cast<std::size_t>(i)] -
+                                                     t[static_cast<std::size_t>(j)]));
+    }
+  }
+  return k;
 }
 
 double log_det_of_noise(const Observations& o) {
@@ -90,10 +102,8 @@ Eigen::MatrixXd ball_covariance(const Observations& o, const PositionRows& p) {
   const auto n = static_cast<Eigen::Index>(p.count),
              first = static_cast<Eigen::Index>(p.ball1 - p.first);
   Eigen::MatrixXd C = Eigen::MatrixXd::Ones(n, n) + Eigen::MatrixXd::Identity(n, n);
-  const auto seen = std::find_if(o.seen.begin(), o.seen.end(), [&](const TouchedArtefact& s) {
-    return s.position == p.position;
-  });
-  if (o.slow_noise > 0.0 && seen != o.seen.end()) {
+  const TouchedArtefact* seen = touched_at(o, p.position);
+  if (o.slow_noise > 0.0 && seen != nullptr) {
     C += o.slow_noise * o.slow_noise * slow_covariance(*seen);
   }
   C.row(first).setZero();

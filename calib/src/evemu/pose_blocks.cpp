@@ -1,7 +1,6 @@
 #include "abbe/calib/evemu/pose_blocks.hpp"
 
-#include <Eigen/Dense>
-#include <algorithm>
+#include <Eigen/Core>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -9,34 +8,19 @@
 #include "abbe/calib/evemu/artefact_rows.hpp"
 #include "abbe/calib/evemu/design_rows.hpp"
 #include "abbe/calib/evemu/noise.hpp"
-#include "elementary.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
 
-const TouchedArtefact* touched_at(const Observations& o, int position) {
-  const auto seen = std::find_if(o.seen.begin(), o.seen.end(),
-                                 [&](const TouchedArtefact& s) { return s.position == position; });
-  return seen == o.seen.end() ? nullptr : &*seen;
-}
-
 /// Covariance of one component of the ball centres of a position, not relative to Ball1: the
 /// translation of the pose is free.
 Eigen::MatrixXd centre_covariance_m2(const Observations& o, const TouchedArtefact* seen,
                                      std::size_t balls, double s_m) {
-  constexpr double kPerPosition = 4.0;  // as in noise.hpp
   const auto n = static_cast<Eigen::Index>(balls);
   Eigen::MatrixXd C = Eigen::MatrixXd::Identity(n, n);
   if (seen != nullptr && o.slow_noise > 0.0) {
-    const std::vector<double> t = times_in_position(*seen);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const double apart =
-            std::abs(t[static_cast<std::size_t>(i)] - t[static_cast<std::size_t>(j)]);
-        C(i, j) += o.slow_noise * o.slow_noise * exponential(-kPerPosition * apart);
-      }
-    }
+    C += o.slow_noise * o.slow_noise * slow_correlation(*seen);
   }
   return s_m * s_m * C;
 }

@@ -26,10 +26,14 @@ struct PositionRows {
   std::size_t ball1 = 0;  ///< index of Ball1's row
 };
 [[nodiscard]] std::vector<PositionRows> position_rows(const Observations&);
+/// The touched artefact at a position; null if only ball errors were given.
+[[nodiscard]] const TouchedArtefact* touched_at(const Observations&, int position);
 
 /// Relative time of each ball by the order of the touches: 0 for the first ball or block of its
 /// position, 1 for the last.
 [[nodiscard]] std::vector<double> times_in_position(const TouchedArtefact&);
+/// The matrix k_ij of slow noise, balls x balls.
+[[nodiscard]] Eigen::MatrixXd slow_correlation(const TouchedArtefact&);
 
 /// Covariance C0 of one position, count x count, in units of s^2. Slow noise requires
 /// Observations::seen.

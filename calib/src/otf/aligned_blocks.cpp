@@ -141,12 +141,34 @@ class Screening {
   SetAside found_;
 };
 
+AlignedBlocks with_nests(AlignedBlocks run, NestVisits nests) {
+  run.series.lost_samples -= nests.samples.size();
+  run.nests = std::move(nests);
+  return run;
+}
+
 }  // namespace
 
 Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples,
                                      const Machine& machine, const Path& path, const Noise& noise,
                                      const Options& options) {
-  return Screening(samples, machine, path, noise, options).blocks();
+  Result<NestVisits> nests = find_nest_visits(samples, options.nests, noise);
+  if (!nests) {
+    return tl::unexpected(nests.error());
+  }
+  if (nests->samples.empty()) {
+    return Screening(samples, machine, path, noise, options).blocks().map([&](AlignedBlocks run) {
+      return with_nests(std::move(run), *std::move(nests));
+    });
+  }
+
+  KeptSamples without(samples.begin(), samples.end());
+  for (const std::size_t i : nests->samples) {
+    without[i].valid = false;
+  }
+  return Screening(without, machine, path, noise, options).blocks().map([&](AlignedBlocks run) {
+    return with_nests(std::move(run), *std::move(nests));
+  });
 }
 
 }  // namespace abbe::calib::otf

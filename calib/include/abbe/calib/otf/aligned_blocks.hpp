@@ -29,14 +29,17 @@
 
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/blocks.hpp"
+#include "abbe/calib/otf/nest_visits.hpp"
 
 namespace abbe::calib::otf {
 
 struct AlignedBlocks {
   BlockSeries series;
   Alignment alignment;
+  NestVisits nests{};  ///< their samples are not in the blocks
 };
-/// Errors of make_blocks(), check(Noise) and align(); BadInput if a block travels further than
+/// Samples at reference nests (nest_visits.hpp) are taken out before all this.
+/// Errors of find_nest_visits(), make_blocks(), check(Noise) and align(); BadInput if a block travels further than
 /// twice Options::corner_m. Pure.
 [[nodiscard]] Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation>,
                                                    const Machine&, const Path&, const Noise&,

@@ -19,6 +19,7 @@
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/kinematic_chain.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
+#include "abbe/calib/otf/nest_options.hpp"
 #include "abbe/calib/otf/standstill_options.hpp"
 
 namespace abbe::calib::otf {
@@ -163,6 +164,9 @@ struct Options {
   /// component along the direction of travel (along_rows.hpp). Null: it is not used. Must outlive
   /// the computation.
   const EncoderLog* encoders = nullptr;
+  /// Reference nests that the tracker visits between the legs, for Mode::OnTheFly: the drift of the
+  /// tracker is then estimated (tracker_drift.hpp).
+  NestOptions nests{};
   Progress progress;  ///< may be empty
   Stopped stopped;    ///< may be empty: the computation is never stopped
 };

@@ -95,4 +95,10 @@ AddedColumns::Estimate AddedColumns::estimate_with_prior(const Eigen::MatrixXd& 
   return e;
 }
 
+AddedColumns::Reduced AddedColumns::reduced(const Eigen::MatrixXd& Q) const {
+  const Eigen::MatrixXd QAWC = Q * CWA_.transpose();
+  const Eigen::MatrixXd S = CWC_ - CWA_ * QAWC;
+  return {0.5 * (S + S.transpose()), CWr_, QAWC};
+}
+
 }  // namespace abbe::calib::otf

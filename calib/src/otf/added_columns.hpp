@@ -9,11 +9,10 @@
 
 namespace abbe::calib::otf {
 
-/// Sums over the rows of an adjustment that the normal equations for at most kMost added columns C
-/// need.
+/// Sums over the rows of an adjustment that the normal equations for added columns C need.
 class AddedColumns {
  public:
-  static constexpr std::size_t kMost = 18;
+  static constexpr std::size_t kMost = 18;  ///< of an alternative (AlternativeColumns)
 
   AddedColumns(std::size_t columns, std::size_t unknowns);
   /// `values`: one value per added column in this row.
@@ -38,6 +37,16 @@ class AddedColumns {
   /// times the stated ones.
   [[nodiscard]] Estimate estimate_with_prior(const Eigen::MatrixXd& Q, double u,
                                              double factor) const;
+
+  /// The normal equations S d = g of the added columns after elimination of U, and the effect of d
+  /// on U:
+  ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   g = C^T W^2 r,   dU = dU_dd d
+  struct Reduced {
+    Eigen::MatrixXd S;
+    Eigen::VectorXd g;
+    Eigen::MatrixXd dU_dd;
+  };
+  [[nodiscard]] Reduced reduced(const Eigen::MatrixXd& Q) const;
 
  private:
   Eigen::MatrixXd CWC_, CWA_;

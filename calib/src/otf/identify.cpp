@@ -102,10 +102,9 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
   if (!run) {
     return tl::unexpected(run.error());
   }
-  return observe_aligned(run->series, std::move(run->alignment), machine, path, noise, options)
-      .and_then([&](Observations o) {
-        return identify_observed(std::move(o), run->series, noise, options);
-      });
+  return observe_with_nests(*run, machine, path, noise, options).and_then([&](Observations o) {
+    return identify_observed(std::move(o), run->series, noise, options);
+  });
 }
 
 Result<Identification> identify_blocks(const BlockSeries& series, const Machine& machine,

@@ -91,6 +91,24 @@ void note_set_aside(Verdict& verdict, const Observations& o, const std::string& 
   }
 }
 
+void note_drift(Verdict& verdict, const Observations& o, const Solution& solution,
+                const std::string& run) {
+  if (!solution.drift) {
+    return;
+  }
+  for (const std::string& note : solution.drift->notes) {
+    verdict.notes.push_back(run + note);
+  }
+
+  constexpr double kSlightlyLarger = 1.2;
+  const double stated_m = o.drift->u_repeatability_m, used_m = solution.drift->u_repeatability_m;
+  if (used_m > kSlightlyLarger * stated_m) {
+    verdict.notes.push_back(message(run, "reference nests: their visits scatter more than stated; ",
+                                    "they were used with a repeatability of ", 1e6 * used_m,
+                                    " um instead of ", 1e6 * stated_m, " um"));
+  }
+}
+
 }  // namespace
 
 Result<Verdict> judge(const Observations& measured, const Solution& solution,
@@ -106,7 +124,7 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
   std::vector<Observations> runs;
   std::vector<std::vector<Alternative>> others;
   for (std::size_t k = 0; k < measured.size(); ++k) {
-    runs.push_back(without_range_offset(measured[k], solutions[k].range_offset.value_m));
+    runs.push_back(without_run_effects(measured[k], solutions[k]));
     Result<std::vector<Alternative>> of_run =
         alternatives(runs.back(), solutions[k], options, tables);
     if (!of_run) {
@@ -127,6 +145,7 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     for (const std::string& note : runs[k].notes) {
       verdict.notes.push_back(run + note);
     }
+    note_drift(verdict, runs[k], solutions[k], run);
     add_alternatives(verdict, others[k], run);
     note_set_aside(verdict, runs[k], run);
   }

@@ -10,6 +10,7 @@
 #include "check_stopped.hpp"
 #include "median.hpp"
 #include "message.hpp"
+#include "otf/drift_observations.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/rigid_columns.hpp"
 
@@ -302,8 +303,15 @@ Result<Observations> observe(std::span<const TrackerObservation> samples, const 
     return observe_standstills(samples, machine, path, noise, options);
   }
   return aligned_blocks(samples, machine, path, noise, options).and_then([&](AlignedBlocks run) {
-    return observe_aligned(run.series, std::move(run.alignment), machine, path, noise, options);
+    return observe_with_nests(run, machine, path, noise, options);
   });
+}
+
+Result<Observations> observe_with_nests(const AlignedBlocks& run, const Machine& machine,
+                                        const Path& path, const Noise& noise,
+                                        const Options& options) {
+  return observe_aligned(run.series, run.alignment, machine, path, noise, options)
+      .and_then([&](Observations o) { return with_nest_visits(std::move(o), run, options.nests); });
 }
 
 Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,

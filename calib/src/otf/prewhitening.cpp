@@ -11,6 +11,7 @@
 #include "otf/row_residuals.hpp"
 #include "otf/systematic_effects.hpp"
 #include "otf/whitened_rows.hpp"
+#include "otf/with_drift.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -122,8 +123,14 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
   Whitened w{a->U, {}, residuals_m(o, a->U)};
   w.variance_factor = factor(w.residual_m);
   Eigen::MatrixXd of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+  std::optional<WithDrift> drift;
 
-  if (o.u_range_offset_m > 0.0) {
+  if (o.drift) {
+    drift = with_drift(o, rows, *a, w.residual_m, factor);
+    w.U = std::move(drift->U);
+    w.residual_m = std::move(drift->residual_m);
+    w.variance_factor = factor(w.residual_m);
+  } else if (o.u_range_offset_m > 0.0) {
     WithRangeOffset with = with_range_offset(o, rows, *a, w.residual_m, w.variance_factor);
     w.U = std::move(with.U);
     w.residual_m = std::move(with.residual_m);
@@ -133,6 +140,9 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
 
   w.covariance = w.variance_factor * a->covariance;
   w.covariance += of_offset * of_offset.transpose();
+  if (drift) {
+    w.covariance += drift->added_covariance;
+  }
   add_scale_effects(w.covariance, o, rows, a->cofactor_Q);
   return w;
 }

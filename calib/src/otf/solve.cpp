@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
@@ -12,6 +13,7 @@
 #include "otf/run_statistics.hpp"
 #include "otf/systematic_effects.hpp"
 #include "otf/whitened_rows.hpp"
+#include "otf/with_drift.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -147,8 +149,18 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   Statistics figures = statistics(o, *a, residuals);
   RangeOffset offset;
   Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+  std::optional<WithDrift> drift;
 
-  if (o.u_range_offset_m > 0.0) {
+  if (o.drift) {
+    drift = with_drift(o, as_observed, *a, residuals.after_m, [&](std::span<const double> r_m) {
+      return variance_factor(residual_noise(o, r_m, figures.degrees_of_freedom),
+                             figures.degrees_of_freedom);
+    });
+    offset = drift->offset;
+    a->U = std::move(drift->U);
+    residuals.after_m = std::move(drift->residual_m);
+    figures = statistics(o, *a, residuals);
+  } else if (o.u_range_offset_m > 0.0) {
     WithRangeOffset with =
         with_range_offset(o, as_observed, *a, residuals.after_m, figures.variance_factor);
     offset = with.offset;
@@ -160,6 +172,9 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
 
   a->covariance *= figures.variance_factor;
   a->covariance += root_of_offset * root_of_offset.transpose();
+  if (drift) {
+    a->covariance += drift->added_covariance;
+  }
   add_scale_effects(a->covariance, o, as_observed, a->cofactor_Q);
 
   Result<VolumetricModel> model =
@@ -181,7 +196,8 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
       .statistics = figures,
       .residuals = std::move(residuals),
       .range_offset = offset,
-      .backlash = backlash_of(o, a->U, a->covariance)};
+      .backlash = backlash_of(o, a->U, a->covariance),
+      .drift = drift ? std::optional(std::move(drift->drift)) : std::nullopt};
 }
 
 }  // namespace abbe::calib::otf

@@ -68,7 +68,15 @@ Result<Observations> observe_run(const TargetRun& run, Machine machine, const No
       .and_then([&](AlignedBlocks blocks) {
         series.push_back(std::move(blocks.series));
         return observe_aligned(series.back(), std::move(blocks.alignment), machine, run.path, noise,
-                               options);
+                               options)
+            .map([&](Observations o) {
+              if (!blocks.nests.found.empty()) {
+                o.notes.emplace_back(
+                    "reference nests are not used in a run with several targets: the drift of the "
+                    "tracker is not estimated");
+              }
+              return o;
+            });
       });
 }
 

@@ -79,8 +79,8 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
         "the offset of the ranges is known from its stated uncertainty only; it counts as "
         "independent between runs: state a smaller u_range_offset_um, or use a longer path");
 
-  input.observations.push_back(calib::otf::without_range_offset(std::move(run->found.observations),
-                                                                solution.range_offset.value_m));
+  input.observations.push_back(
+      calib::otf::without_run_effects(std::move(run->found.observations), solution));
   input.runs.push_back({input.parts.size(), &input.observations.back(), effects});
   input.parts.push_back(std::move(*part));
   input.facts.push_back({files.name, "otf", file_names({files.path, files.tracker, files.encoder}),

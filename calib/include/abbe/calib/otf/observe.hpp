@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/path_frame.hpp"
+#include "abbe/calib/otf/tracker_drift.hpp"
 #include "abbe/calib/otf/travel.hpp"
 
 namespace abbe::calib::otf {
@@ -76,7 +78,8 @@ struct Observations {
   std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
   std::vector<std::size_t> beam_returned{};  ///< see BlockSeries
   SetAside set_aside{};
-  std::vector<std::string> notes{};  ///< for the verdict
+  std::optional<DriftObservations> drift{};  ///< if nests were visited repeatedly
+  std::vector<std::string> notes{};          ///< for the verdict
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the

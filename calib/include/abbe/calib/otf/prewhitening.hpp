@@ -43,8 +43,8 @@ struct NoiseFilter {
 [[nodiscard]] NoiseFilter noise_filter(const Observations&, std::span<const double> residual_m);
 
 /// The solution of the prewhitened rows: model, rigid unknowns, their covariance, and in the
-/// statistics `variance_factor` and `noise_correlation`. `adjustment`, residuals, range offset and
-/// the other statistics remain those of the rows themselves, which judge() tests for lack of fit.
+/// statistics `variance_factor` and `noise_correlation`. `adjustment`, residuals, range offset,
+/// drift of the tracker and the other statistics remain those of the rows themselves, which judge() tests for lack of fit.
 /// The coefficients are estimated twice: from the residuals of `solution`, then from those of the
 /// prewhitened solution. `solution` itself if its residuals are white, or if they are so small that
 /// the stated noise covers them with their correlation (statistics.variance_factor is 1): the

@@ -24,6 +24,8 @@
 /// unknown with the column C (its derivative) and the residuals r:
 ///     S = C^T W^2 C - C^T W^2 A Q A^T W^2 C,   d = C^T W^2 r / (S + 1/u^2)
 ///     U changes by -Q A^T W^2 C d
+/// The drift of the tracker (tracker_drift.hpp) enters as further columns C, with the information of
+/// the visits of nests and the prior in place of 1/u^2.
 ///
 /// VolumetricModel lists what is not estimable. Rank and condition refer to the column-scaled data,
 /// without the gauge.
@@ -134,11 +136,14 @@ struct Solution {
   Adjustment adjustment;                  ///< of the rows alone: white noise, no range offset
   RigidTransform T_machine_tracker;
   Statistics statistics;
-  Residuals residuals;  ///< after_m: model and effect of the range offset subtracted
+  Residuals residuals;  ///< after_m: model, range offset and drift subtracted
   RangeOffset range_offset;
   std::optional<Synchronisation> synchronisation{};  ///< with scale readings
   std::vector<Backlash> backlash{};                  ///< with Options::backlash
+  std::optional<TrackerDrift> drift{};               ///< with Options::nests
 };
+/// The observations that result without the estimated range offset and the drift of the tracker.
+[[nodiscard]] Observations without_run_effects(Observations, const Solution&);
 
 [[nodiscard]] Result<Solution> solve(const Observations&, const Options& = {});
 /// The same with information_of() all rows, where it is known.

@@ -1,0 +1,147 @@
+#include "otf/drift_observations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "abbe/calib/otf/polyline.hpp"
+#include "message.hpp"
+
+namespace abbe::calib::otf {
+namespace {
+
+std::vector<std::size_t> visits_by_nest(const NestVisits& nests) {
+  std::vector<std::size_t> count(nests.names.size(), 0);
+  for (const NestVisit& visit : nests.found) {
+    ++count[visit.nest];
+  }
+  return count;
+}
+
+Vector3 position_of(const NestVisits& nests, std::size_t nest) {
+  return std::find_if(nests.found.begin(), nests.found.end(),
+                      [&](const NestVisit& v) { return v.nest == nest; })
+      ->mean_tracker_m;
+}
+
+/// BadInput if the target is in a nest while it is on the path.
+Result<void> check_apart(const Observations& o, const NestVisits& nests,
+                         const std::vector<std::size_t>& visits, const NestOptions& options) {
+  for (std::size_t n = 0; n < visits.size(); ++n) {
+    if (visits[n] == 0) {
+      continue;
+    }
+    const Vector3 q = o.alignment.T_machine_tracker * position_of(nests, n) - o.target_offset_m;
+    for (std::size_t leg = 0; leg + 1 < o.vertices_m.size(); ++leg) {
+      const Vector3 c = closest_on_leg(o.vertices_m[leg], o.vertices_m[leg + 1], q).closest_m;
+      if ((q - c).norm() <= options.nests[n].radius_m) {
+        return failure(ErrorCode::BadInput,
+                       message("reference nest ", nests.names[n], " is ", 1e3 * (q - c).norm(),
+                               " mm from leg ", leg, " of the path, its radius is ",
+                               1e3 * options.nests[n].radius_m,
+                               " mm: use a smaller radius, or place the nest elsewhere"));
+      }
+    }
+  }
+  return {};
+}
+
+/// True if three nests with at least two visits are not on a line.
+bool determine_rotation(const NestVisits& nests, const std::vector<std::size_t>& visits) {
+  constexpr double kLeastHeight = 0.1;
+  std::vector<Vector3> at;
+  for (std::size_t n = 0; n < visits.size(); ++n) {
+    if (visits[n] > 1) {
+      at.push_back(position_of(nests, n));
+    }
+  }
+
+  for (std::size_t a = 0; a < at.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      for (std::size_t c = 0; c < b; ++c) {
+        const Vector3 u = at[b] - at[a], v = at[c] - at[a];
+        const double longest2 = std::max({u.squaredNorm(), v.squaredNorm(), (u - v).squaredNorm()});
+        if (u.cross(v).norm() > kLeastHeight * longest2) {
+          return true;
+        }
+      }
+    }
+  }
+  return false;
+}
+
+/// Evenly spaced times from begin to end, and at `datum_s` between them.
+void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t count) {
+  const double datum_s = d.visits.front().time_s, duration_s = end_s - begin_s;
+  const auto between = [&](double from_s, double to_s) {
+    const double share = (to_s - from_s) / duration_s;
+    const auto steps = std::max(1L, std::lround(share * static_cast<double>(count)));
+    for (long i = 0; i < steps; ++i) {
+      d.knots_s.push_back(from_s +
+                          (to_s - from_s) * static_cast<double>(i) / static_cast<double>(steps));
+    }
+  };
+
+  constexpr double kNegligible = 1e-3;
+  if (datum_s - begin_s > kNegligible * duration_s) {
+    between(begin_s, datum_s);
+  }
+  d.datum = d.knots_s.size();
+  between(datum_s, end_s);
+  d.knots_s.push_back(end_s);
+}
+
+DriftObservations drift_of(const AlignedBlocks& run, const std::vector<std::size_t>& visits,
+                           const NestOptions& options) {
+  constexpr std::size_t kFewestKnots = 32, kMostKnots = 64;
+  const NestVisits& nests = run.nests;
+  DriftObservations d{.visits = nests.found,
+                      .names = nests.names,
+                      .u_repeatability_m = options.u_repeatability_m,
+                      .rotates = determine_rotation(nests, visits),
+                      .length_m = 0.0};
+  double end_s = nests.found.back().time_s;
+  for (const Block& block : run.series.blocks) {
+    d.block_s.push_back(block.time_s);
+    end_s = std::max(end_s, block.last_s);
+  }
+  for (const NestVisit& visit : nests.found) {
+    d.length_m += visit.mean_tracker_m.norm() / static_cast<double>(nests.found.size());
+  }
+
+  const std::size_t most = *std::max_element(visits.begin(), visits.end());
+  set_knots(d, run.series.first_time_s, end_s, std::clamp(2 * most, kFewestKnots, kMostKnots));
+  return d;
+}
+
+}  // namespace
+
+Result<Observations> with_nest_visits(Observations o, const AlignedBlocks& run,
+                                      const NestOptions& options) {
+  const NestVisits& nests = run.nests;
+  o.notes.insert(o.notes.end(), nests.notes.begin(), nests.notes.end());
+  if (nests.found.empty()) {
+    return o;
+  }
+
+  const std::vector<std::size_t> visits = visits_by_nest(nests);
+  if (Result<void> apart = check_apart(o, nests, visits, options); !apart) {
+    return tl::unexpected(apart.error());
+  }
+  if (*std::max_element(visits.begin(), visits.end()) < 2) {
+    o.notes.emplace_back(
+        "no reference nest was visited twice: the drift of the tracker is not estimated");
+    return o;
+  }
+
+  for (std::size_t n = 0; n < visits.size(); ++n) {
+    if (visits[n] == 1) {
+      o.notes.push_back(
+          message("reference nest ", nests.names[n], " was visited once only: it shows no drift"));
+    }
+  }
+  o.drift = drift_of(run, visits, options);
+  return o;
+}
+
+}  // namespace abbe::calib::otf

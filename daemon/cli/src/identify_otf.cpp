@@ -28,6 +28,7 @@
 #include "identify_otf.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
+#include "tracker_drift_lines.hpp"
 
 namespace abbe::daemon {
 
@@ -218,6 +219,8 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"gate", verdict_json(outcome.verdict)}};
   if (!outcome.document.backlash.empty())
     object["backlash"] = backlash_json(outcome.document.backlash);
+  if (outcome.document.tracker_drift)
+    object["tracker_drift"] = tracker_drift_json(*outcome.document.tracker_drift);
   if (outcome.synchronisation)
     object["clocks"] = clock_json(*outcome.synchronisation, arguments.encoder_u_time_us);
   fmt::print("{}\n", object.dump(1));
@@ -243,6 +246,8 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
   print_backlash(outcome.document.backlash);
+  if (outcome.document.tracker_drift)
+    fmt::print("{}", tracker_drift_text(*outcome.document.tracker_drift));
   if (outcome.synchronisation)
     fmt::print("{}", clock_text(*outcome.synchronisation, arguments.encoder_u_time_us));
   print_verdict(outcome.verdict);

@@ -192,6 +192,28 @@ std::string read_optional(ModelReader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
+calib::Vector3 read_vector_um(ModelReader& in, const ModelJson& entry, const std::string& path,
+                              const std::string& key) {
+  const ModelJson* value = in.find(entry, path, key);
+  const auto v = value != nullptr ? in.numbers(*value, path + "." + key, kMicroUnit)
+                                  : std::vector<double>{0.0, 0.0, 0.0};
+  if (v.size() == 3) return {v[0], v[1], v[2]};
+  in.fault(path + "." + key, "must be [x, y, z]");
+  return calib::Vector3::Zero();
+}
+
+/// Absent in models without reference nests.
+std::optional<TrackerDriftFigures> read_tracker_drift(ModelReader& in) {
+  const std::string path = "tracker_drift";
+  if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
+  const ModelJson& entry = in.root().at(path);
+  return TrackerDriftFigures{
+      .largest_m = read_vector_um(in, entry, path, "largest_um"),
+      .u_largest_m = read_vector_um(in, entry, path, "u_um"),
+      .u_repeatability_m = in.number_of(entry, path, "nest_repeatability_um", kMicroUnit),
+      .visits = in.count_of(entry, path, "visits")};
+}
+
 std::vector<InputFile> read_inputs(ModelReader& in) {
   std::vector<InputFile> inputs;
   const ModelJson* list = in.find(in.root(), "", "inputs");
@@ -228,6 +250,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto inputs = read_inputs(in);
   const auto artefact = read_artefact(in);
   const auto backlash = read_backlash(in);
+  const auto tracker_drift = read_tracker_drift(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
@@ -235,7 +258,8 @@ Result<ModelDocument> read_document(ModelReader& in) {
   if (in.any()) return tl::make_unexpected(in.to_error());
   ModelDocument document{std::move(*model), method,        estimator,  machine,
                          machine_hash,      *created,      statistics, inputs,
-                         artefact,          recording_gap, mode,       backlash};
+                         artefact,          recording_gap, mode,       backlash,
+                         tracker_drift};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

@@ -161,6 +161,18 @@ void write_statistics(JsonText& out, const ModelStatistics& s) {
       residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
 }
 
+std::string vector_um(const calib::Vector3& v_m) {
+  return numbers({v_m.data(), 3}, kMicroUnit);
+}
+
+void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
+  out.key("tracker_drift");
+  out.raw(fmt::format(
+      "{{\"largest_um\": {}, \"u_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
+      vector_um(drift.largest_m), vector_um(drift.u_largest_m),
+      to_decimal(drift.u_repeatability_m, kMicroUnit), drift.visits));
+}
+
 void write_artefact(JsonText& out, const calib::Expansion& artefact) {
   out.key("artefact");
   out.raw(fmt::format(
@@ -210,6 +222,7 @@ std::string to_json(const ModelDocument& document) {
   else
     write_axes(out, model);
   write_statistics(out, document.statistics);
+  if (document.tracker_drift) write_tracker_drift(out, *document.tracker_drift);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);
   if (!document.recording_gap.empty()) out.member("recording_gap", document.recording_gap);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "abbe/calib/otf/nest_visits.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
 #include "config_kind.hpp"
@@ -37,6 +38,33 @@ void read_placement(Section& tracker, MachineConfig& machine) {
     machine.tracker_position_m = {position_m[0], position_m[1], position_m[2]};
   else
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
+}
+
+calib::otf::Nest read_nest(Section& section) {
+  constexpr Bounds kRadius_mm{0.5, 200.0};
+  calib::otf::Nest nest;
+  std::vector<double> position_m;
+  section.get("name", nest.name, Need::Required);
+  if (section.get("position_mm", position_m, kMilli, Need::Required)) {
+    if (position_m.size() == 3)
+      nest.position_tracker_m = {position_m[0], position_m[1], position_m[2]};
+    else
+      section.fault("position_mm", "must be three numbers, x, y, z in the tracker frame");
+  }
+  section.get("radius_mm", nest.radius_m, kMilli, kRadius_mm);
+  section.close();
+  return nest;
+}
+
+void read_nests(Section& tracker, calib::otf::NestOptions& out) {
+  constexpr Bounds kRepeatability_um{0.1, 100.0};
+  tracker.get("nest_repeatability_um", out.u_repeatability_m, kMicro, kRepeatability_um);
+  for (auto& section : tracker.children("nest")) {
+    out.nests.push_back(read_nest(section));
+    if (out.nests.back().name.empty()) continue;
+    if (const auto valid = calib::otf::find_nest_visits({}, out, {}); !valid)
+      section.fault("", valid.error().text);
+  }
 }
 
 /// Reads point_rate_hz. The measurement period of emScon is a whole number of milliseconds; a rate
@@ -124,6 +152,7 @@ void read_tracker(Section& root, Config& out, StreamNames& names) {
   Section tracker = root.child("tracker");
   read_noise(tracker, out.machine);
   read_placement(tracker, out.machine);
+  read_nests(tracker, out.otf.nests);
   TrackerConfig config;
   const bool has_host = get_host(tracker, "host", config.host);
   get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));

@@ -36,6 +36,14 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
           .stop_reason = std::string{calib::otf::stop_reason(solution.estimator)}};
 }
 
+TrackerDriftFigures drift_figures(const calib::otf::TrackerDrift& drift) {
+  const calib::otf::DriftPoint largest = drift.largest();
+  return {.largest_m = largest.value_m,
+          .u_largest_m = largest.u_m,
+          .u_repeatability_m = drift.u_repeatability_m,
+          .visits = drift.visits};
+}
+
 }  // namespace
 
 ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mode mode,
@@ -52,6 +60,7 @@ ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mod
   document.mode = calib::otf::name(mode);
   std::copy_if(solution.backlash.begin(), solution.backlash.end(),
                std::back_inserter(document.backlash), [](const auto& b) { return b.determined; });
+  if (solution.drift) document.tracker_drift = drift_figures(*solution.drift);
   return document;
 }
 

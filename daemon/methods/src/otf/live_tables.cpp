@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "abbe/calib/error_parameters.hpp"
+#include "abbe/calib/otf/nest_visits.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf/inputs.hpp"
@@ -58,6 +59,7 @@ OtfLiveTables::OtfLiveTables(const Config& config, calib::otf::Machine machine,
                              calib::otf::RunningEstimate estimate)
     : environment_use_(environment_use(config)),
       nodes_(std::move(machine.nodes)),
+      nests_(config.otf.nests.nests),
       estimate_(std::move(estimate)) {}
 
 void OtfLiveTables::take(RunNews&& news) {
@@ -78,7 +80,8 @@ const RunPoint& OtfLiveTables::point(std::size_t i) const {
 
 void OtfLiveTables::add(const RunPoint& point) {
   const calib::Vector3 p_m = vector_of(point.p_tracker_m);
-  if (point.usable && p_m.allFinite()) estimate_.add(p_m);
+  const bool at_nest = calib::otf::nest_at(p_m, nests_).has_value();
+  if (point.usable && p_m.allFinite() && !at_nest) estimate_.add(p_m);
 }
 
 /// The vertices of a leg are corrected by the mean temperature of the scales up to the time of its

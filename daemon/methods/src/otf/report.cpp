@@ -98,6 +98,22 @@ void add_backlash(HtmlReport& page, const std::vector<calib::otf::Backlash>& bac
   if (!rows.empty()) page.table({"", "um or urad", "u, um or urad"}, rows);
 }
 
+void add_tracker_drift(HtmlReport& page, const std::optional<TrackerDriftFigures>& drift) {
+  if (!drift) return;
+  page.heading("Drift of the tracker");
+  page.paragraph(fmt::format(
+      "From {} visits of reference nests and the run itself, estimated together with the tables "
+      "and "
+      "removed. Largest value since the first visit, at the centre of the path; repeatability of a "
+      "visit {:.1f} um.",
+      drift->visits, drift->u_repeatability_m * kUmPerM));
+  std::vector<std::vector<std::string>> rows;
+  for (Eigen::Index k = 0; k < 3; ++k)
+    rows.push_back({std::string(1, "XYZ"[k]), fmt::format("{:.3f}", drift->largest_m(k) * kUmPerM),
+                    fmt::format("{:.3f}", drift->u_largest_m(k) * kUmPerM)});
+  page.table({"", "um", "u, um"}, rows);
+}
+
 }  // namespace
 
 std::string otf_report(const ModelDocument& document, std::span<const RunResiduals> runs,
@@ -109,6 +125,7 @@ std::string otf_report(const ModelDocument& document, std::span<const RunResidua
   add_residual_figures(page, document, runs);
   add_error_tables(page, document.model);
   add_backlash(page, document.backlash);
+  add_tracker_drift(page, document.tracker_drift);
   add_volume_maps(page, document.model, left_errors(runs));
   add_origin(page, document);
   return page.text();

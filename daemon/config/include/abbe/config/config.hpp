@@ -177,6 +177,7 @@ struct OtfConfig {
   calib::otf::Estimator estimator = calib::otf::Estimator::Joint;  ///< of on-the-fly mode
   /// See calib::otf::Options.
   calib::estimation::TravelDependence backlash = calib::otf::Options{}.backlash;
+  calib::otf::NestOptions nests{};  ///< [[tracker.nest]]
 };
 
 /// [drift]: comparison of the tables of a new run with those of the active model, and continuous

@@ -41,6 +41,15 @@ struct ModelStatistics {
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
 
+/// Drift of the tracker estimated with reference nests (calib/otf/tracker_drift.hpp).
+struct TrackerDriftFigures {
+  calib::Vector3 largest_m = calib::Vector3::Zero();  ///< machine axes, at the centre of the path
+  calib::Vector3 u_largest_m = calib::Vector3::Zero();
+  double u_repeatability_m = 0.0;  ///< of a visit of a nest, as used
+  std::size_t visits = 0;
+  friend bool operator==(const TrackerDriftFigures&, const TrackerDriftFigures&) = default;
+};
+
 /// A model and its origin.
 struct ModelDocument {
   calib::VolumetricModel model;
@@ -65,6 +74,8 @@ struct ModelDocument {
   /// are in model.travel(), on which V depends; models of earlier versions have only this list. It
   /// is not in the hash.
   std::vector<calib::otf::Backlash> backlash{};
+  /// Of method otf with reference nests. Not in the hash, as other statistics.
+  std::optional<TrackerDriftFigures> tracker_drift{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);

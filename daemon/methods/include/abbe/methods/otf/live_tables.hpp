@@ -35,6 +35,7 @@ class OtfLiveTables {
   EnvironmentUseOptions environment_use_;
   EnvironmentEffect environment_;
   calib::MachineNodes nodes_;
+  std::vector<calib::otf::Nest> nests_;  // points in a nest are not of the path
   calib::otf::RunningEstimate estimate_;
   std::vector<RunPoints::Block> blocks_;
   std::vector<RunPoint> tail_;

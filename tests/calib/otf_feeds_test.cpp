@@ -70,9 +70,6 @@ TEST(OtfFeeds, FourFeedsPredictStandstillPoints) {
     EXPECT_LT(c->after.rms_m, 1.3 * expected_m) << feed;
     EXPECT_GT(c->after.rms_m, 0.7 * reference.noise_m) << feed;
     EXPECT_EQ(verify::effect_at_points(*c), verify::Effect::Better);
-    ::testing::Test::RecordProperty("mae_um_at_" + std::to_string(static_cast<int>(feed)),
-                                    std::to_string(1e6 * c->after.mean_m));
-    std::printf("%6.0f mm/min: MAE %.3f um, rms %.3f um (expected %.3f), without %.1f um\n", feed, 1e6 * c->after.mean_m, 1e6 * c->after.rms_m, 1e6 * expected_m, 1e6 * c->before.mean_m);
   }
 }
 

@@ -27,15 +27,6 @@ Result<AxisTravel> parse_direction(const std::string& text) {
   return travel;
 }
 
-std::string direction_text(const AxisTravel& travel) {
-  std::string text;
-  for (const Travel one : travel) {
-    text += text.empty() ? "" : ",";
-    text += one == Travel::Forward ? '+' : one == Travel::Backward ? '-' : '0';
-  }
-  return text;
-}
-
 Result<void> require_travel(const calib::VolumetricModel& model, const std::string& name) {
   if (model.travel() != nullptr) return {};
   return fail(ErrorCode::DataInsufficient,

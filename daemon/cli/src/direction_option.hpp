@@ -11,9 +11,6 @@ namespace abbe::daemon {
 /// Error Usage unless `text` is three of "+", "-", "0", separated by commas; empty: all unknown.
 [[nodiscard]] Result<calib::estimation::AxisTravel> parse_direction(const std::string& text);
 
-/// "+,-,0"
-[[nodiscard]] std::string direction_text(const calib::estimation::AxisTravel&);
-
 /// DataInsufficient for a model that has no backlash: what it is in one direction is not known.
 /// `name` of the model is for the message.
 [[nodiscard]] Result<void> require_travel(const calib::VolumetricModel&, const std::string& name);

@@ -87,7 +87,7 @@ json point_json(const direct::TableComparison& table, const direct::PointDiffere
 json table_json(const direct::TableComparison& table) {
   json object{{"name", table.name},
               {"unit", unit_of(table)},
-              {"verdict", direct::name(table.finding)},
+              {"verdict", std::string(direct::name(table.finding))},
               {"reason", table.reason},
               {"causes", table.causes},
               {"convention", table.convention},
@@ -147,8 +147,8 @@ void print_row(const direct::TableComparison& table) {
   const std::string reversal =
       table.reversal ? fmt::format("{:.2f}", kMicroUnits * table.reversal->mean) : "-";
   fmt::print("  {:>8.2f}  {:>8.2f}  {:>8.2f}  {:>8}  {:<4}  {:>7.2f}  {:>7.2f}  {:>8}\n",
-             kMicroUnits * table.mae, kMicroUnits * table.rms, kMicroUnits * table.largest, place, unit_of(table),
-             table.rms_normalised, table.largest_normalised, reversal);
+             kMicroUnits * table.mae, kMicroUnits * table.rms, kMicroUnits * table.largest, place,
+             unit_of(table), table.rms_normalised, table.largest_normalised, reversal);
 }
 
 void print_remarks(const direct::TableComparison& table) {
@@ -169,9 +169,13 @@ void print_conventions(const MeasuredComparison& found) {
     if (table.points.empty()) continue;
     const std::string text = fmt::format(
         "{}{}", table.is_squareness ? "" : fmt::format("{}: ", table.name[2]), table.convention);
-    auto at = std::ranges::find(tables_of, text, [](const auto& entry) { return entry.first; });
-    if (at == tables_of.end()) at = tables_of.insert(tables_of.end(), {text, {}});
-    at->second.push_back(table.name);
+    const auto at =
+        std::ranges::find(tables_of, text, [](const auto& entry) { return entry.first; });
+    if (at != tables_of.end()) {
+      at->second.push_back(table.name);
+    } else {
+      tables_of.emplace_back(text, std::vector<std::string>{table.name});
+    }
   }
   for (const auto& [text, tables] : tables_of)
     fmt::print("{}  ({})\n", text, fmt::join(tables, ", "));
@@ -244,10 +248,10 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
 }
 
 Result<int> compare_with_measured(const calib::VolumetricModel& model,
-                                  const MeasuredOptions& options, bool json) {
+                                  const MeasuredOptions& options, bool as_json) {
   const auto found = compared(model, options);
   if (!found) return tl::make_unexpected(found.error());
-  json ? print_measured_json(*found, options) : print_measured_text(*found);
+  as_json ? print_measured_json(*found, options) : print_measured_text(*found);
 
   if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);
   const bool none =

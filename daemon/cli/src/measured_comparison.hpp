@@ -22,6 +22,6 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options);
 /// Prints the comparison as text or as one JSON object. The exit code: 0; 5 if a table contradicts;
 /// 1 if none could be compared.
 [[nodiscard]] Result<int> compare_with_measured(const calib::VolumetricModel& model,
-                                                const MeasuredOptions& options, bool json);
+                                                const MeasuredOptions& options, bool as_json);
 
 }  // namespace abbe::daemon

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kMostDof = 10'000;
 
-/// 1 / B(k/2, 1/2) = Gamma((k + 1)/2) / (Gamma(k/2) Gamma(1/2)), from the values for k = 1 and k = 2
-/// and Gamma(a + 1) = a Gamma(a).
+/// 1 / B(k/2, 1/2) = Gamma((k + 1)/2) / (Gamma(k/2) Gamma(1/2)), from the values for k = 1 and k =
+/// 2 and Gamma(a + 1) = a Gamma(a).
 double inverse_beta(std::size_t k) noexcept {
   double value = k % 2 == 1 ? 1.0 / std::numbers::pi : 0.5;
   for (std::size_t i = k % 2 == 1 ? 1 : 2; i < k; i += 2) {

@@ -165,7 +165,8 @@ TEST(PlaneFit, RefusesWhatIsNoPlane) {
   EXPECT_EQ(fit_plane(points, Vector3::UnitX()).error().code, ErrorCode::DegenerateGeometry);
 }
 
-/// Mean of squared errors and of the stated covariance over many fits of the same places with noise.
+/// Mean of squared errors and of the stated covariance over many fits of the same places with
+/// noise.
 template <int Size>
 struct SeenAndStated {
   using Square = Eigen::Matrix<double, Size, Size>;

@@ -1,5 +1,5 @@
-/// `[[tracker.nest]]` in the configuration, and the drift of the tracker in what `abbe identify otf`
-/// prints and writes.
+/// `[[tracker.nest]]` in the configuration, and the drift of the tracker in what `abbe identify
+/// otf` prints and writes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -16,8 +16,8 @@ constexpr std::size_t kUnknownsOfCylinder = 5;  // alpha, beta, u, v, w
 /// Condition of the Jacobian above which rounding decides the result.
 constexpr double kUndetermined = 1e10;
 
-/// A cylinder and the axes x, y, z of its frame: origin on the axis, z along it. Lengths relative to
-/// the centroid of the points, in units of their size.
+/// A cylinder and the axes x, y, z of its frame: origin on the axis, z along it. Lengths relative
+/// to the centroid of the points, in units of their size.
 struct Frame {
   Vector3 origin = Vector3::Zero();
   Matrix3 axes = Matrix3::Identity();

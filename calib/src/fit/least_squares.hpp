@@ -1,6 +1,6 @@
 #pragma once
-/// Gauss-Newton for the fits of a form to points. Lengths are in units of the size of the point set,
-/// so that all unknowns are of the order of one.
+/// Gauss-Newton for the fits of a form to points. Lengths are in units of the size of the point
+/// set, so that all unknowns are of the order of one.
 
 #include <Eigen/Dense>
 #include <cmath>

@@ -14,7 +14,8 @@ struct Radial {
   double radius = 1.0;
 };
 
-/// Algebraic fit (Kasa): |p|^2 = 2 c . p + (r^2 - |c|^2) is linear in c and in the term in brackets.
+/// Algebraic fit (Kasa): |p|^2 = 2 c . p + (r^2 - |c|^2) is linear in c and in the term in
+/// brackets.
 template <int Dimensions>
 Radial<Dimensions> algebraic(const Points<Dimensions>& p) {
   Eigen::Matrix<double, Eigen::Dynamic, Dimensions + 1> A(p.cols(), Dimensions + 1);

@@ -7,10 +7,10 @@
 namespace abbe::calib::otf {
 
 /// Adds Observations::drift if a nest was visited at least twice, and notes. The rotation of the
-/// tracker is estimated, too, if three such nests are not on a line: the height of their triangle is
-/// more than a tenth of its longest side. There are two knots for each visit of the nest with the
-/// most visits, 32 to 64 in all. BadInput if a leg of the path passes within the radius of a visited
-/// nest.
+/// tracker is estimated, too, if three such nests are not on a line: the height of their triangle
+/// is more than a tenth of its longest side. There are two knots for each visit of the nest with
+/// the most visits, 32 to 64 in all. BadInput if a leg of the path passes within the radius of a
+/// visited nest.
 [[nodiscard]] Result<Observations> with_nest_visits(Observations, const AlignedBlocks&,
                                                     const NestOptions&);
 

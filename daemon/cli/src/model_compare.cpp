@@ -1,5 +1,5 @@
-/// `abbe model compare A B`: the difference of two models, in the volume where both are valid; or of
-/// a model and directly measured error motions.
+/// `abbe model compare A B`: the difference of two models, in the volume where both are valid; or
+/// of a model and directly measured error motions.
 
 #include <fmt/format.h>
 

@@ -152,13 +152,15 @@ TEST_F(StrangersWithSecurity, BothSubscribersReturnAfterEveryKillOfAbbeDds) {
   for (int kill = 0; kill < 4; ++kill) {
     for (Process* subscriber : {&fast, &cyclone})
       ASSERT_TRUE(subscriber->wait_for("vmc-3: apply V", Clock::now(), kHandshake))
-          << "before kill " << kill + 1 << "\n" << subscriber->transcript();
+          << "before kill " << kill + 1 << "\n"
+          << subscriber->transcript();
     EXPECT_FALSE(cyclone.wait_for("nothing", Clock::now(), 2s));  // time for announcements
     const auto killed = Clock::now();
     ::kill(abbe_dds_pid(), SIGKILL);
     for (Process* subscriber : {&fast, &cyclone})
       ASSERT_TRUE(subscriber->wait_for("vmc-3: publisher is ", killed, kHandshake))
-          << "after kill " << kill + 1 << "\n" << subscriber->transcript();
+          << "after kill " << kill + 1 << "\n"
+          << subscriber->transcript();
   }
 }
 

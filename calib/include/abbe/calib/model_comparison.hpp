@@ -31,8 +31,8 @@ struct ModelDifference {
 /// translation and rotation then have no influence on s. 0 if all points coincide.
 [[nodiscard]] double common_scale(std::span<const Vector3> points_m, std::span<const Vector3> V_m);
 
-/// V of a minus V of b at `axis_positions_m`, for a direction of travel (Unknown: the mean of both).
-/// NotApplicable if a model is not valid for the tool.
+/// V of a minus V of b at `axis_positions_m`, for a direction of travel (Unknown: the mean of
+/// both). NotApplicable if a model is not valid for the tool.
 [[nodiscard]] Result<ModelDifference> rigid_free_difference(
     const VolumetricModel& a, const VolumetricModel& b, const Vector3& tool_offset_m,
     std::span<const Vector3> axis_positions_m, const estimation::AxisTravel& travel = {});

@@ -1,8 +1,8 @@
 #pragma once
 /// Least-squares cylinder: minimises the sum of (distance of p_i from the axis - radius)^2 by
-/// Gauss-Newton with small displacements of the axis. In the frame of the present axis, with
-/// p_i = (r_i cos t_i, r_i sin t_i, z_i), a rotation (alpha, beta) about x and y, a shift (u, v) and
-/// a change of the radius by w reduce the residuals r_i - radius by
+/// Gauss-Newton with small displacements of the axis. In the frame of the present axis, with p_i =
+/// (r_i cos t_i, r_i sin t_i, z_i), a rotation (alpha, beta) about x and y, a shift (u, v) and a
+/// change of the radius by w reduce the residuals r_i - radius by
 ///     -z_i sin t_i alpha + z_i cos t_i beta + cos t_i u + sin t_i v + w
 /// [Viprey 2016, appendix A]. The covariance assumes equal, independent noise of the points along
 /// the normal, with a standard deviation computed from the residuals.
@@ -19,9 +19,9 @@ struct Cylinder {
   Vector3 point = Vector3::Zero();  ///< projection of the centroid of the points on the axis
   Vector3 direction = Vector3::UnitZ();
   double radius = 0.0;
-  /// of point x y z, direction x y z and radius: rank 5; zero for 5 points. For the point it is that
-  /// of the axis there: displacements along the axis do not count. For the direction it is zero along
-  /// the axis.
+  /// of point x y z, direction x y z and radius: rank 5; zero for 5 points. For the point it is
+  /// that of the axis there: displacements along the axis do not count. For the direction it is
+  /// zero along the axis.
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
   ResidualStatistics residuals;  ///< negative: point inside
   /// condition number of the Jacobian with lengths in units of the size of the points
@@ -41,8 +41,9 @@ struct Cylinder {
                                             std::optional<Vector3> near = {},
                                             std::optional<double> known_sigma = {});
 
-/// Derivatives of point, direction and radius, in the order of Cylinder::covariance, with respect to
-/// a displacement of each point along the outward normal: 7 x points. `points` are those of the fit.
+/// Derivatives of point, direction and radius, in the order of Cylinder::covariance, with respect
+/// to a displacement of each point along the outward normal: 7 x points. `points` are those of the
+/// fit.
 [[nodiscard]] Eigen::Matrix<double, 7, Eigen::Dynamic> derivatives_by_points(
     const Cylinder&, std::span<const Vector3> points);
 

@@ -65,8 +65,8 @@ struct Part {
 /// counts as independent between the parts: if it is not, the joint uncertainty of n parts is too
 /// small by up to sqrt(n).
 struct CommonEffects {
-  /// Relative, of the scale of the ranges (otf::Noise::u_scale). Parts with the same `ranges_of` had
-  /// the same tracker.
+  /// Relative, of the scale of the ranges (otf::Noise::u_scale). Parts with the same `ranges_of`
+  /// had the same tracker.
   double u_ranges = 0.0;
   std::string ranges_of = "tracker";
   /// Relative, of the length of the scales of X, Y, Z (otf::Noise::u_axis_scale): the same in all

@@ -24,8 +24,8 @@ struct PointsOfInterest {
   /// Outward normals of the touched surfaces, in the order of BarTouches::count(): away from the
   /// axis of a cylinder, away from the bar for a plane.
   std::vector<Vector3> normals;
-  /// Derivatives of O_m and of O_bar_m (x1 y1 z1 x2 ...) with respect to a displacement of each touch
-  /// along its normal. Displacements along the surface have no effect to first order.
+  /// Derivatives of O_m and of O_bar_m (x1 y1 z1 x2 ...) with respect to a displacement of each
+  /// touch along its normal. Displacements along the surface have no effect to first order.
   Eigen::MatrixXd dO_dtouch, dO_bar_dtouch;
 
   /// Covariance of O_bar_m in m^2, for independent touches with the standard deviation `u_m` along

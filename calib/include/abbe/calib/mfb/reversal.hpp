@@ -1,12 +1,12 @@
 #pragma once
 /// Calibration of a Multi-Feature Bar by reversal on a measuring machine [Viprey 2016, eq. 5 to 7]:
-/// the bar is measured as it lies (normal) and turned by 180 degrees about its axis (reversed), which
-/// changes the sign of its straightness errors but not that of the machine:
+/// the bar is measured as it lies (normal) and turned by 180 degrees about its axis (reversed),
+/// which changes the sign of its straightness errors but not that of the machine:
 ///     E_y = (M_y normal - M_y reversed) / 2,   E_y of the machine = -(M_y normal + M_y reversed) / 2
 /// and the same in z. Positioning is not separable by reversal:
 ///     E_x = (M_x normal + M_x reversed) / 2 + E_XX of the machine
-/// E_XX is measured on the line of the bar, with a step gauge. The sag of the bar cancels: the result
-/// is the shape of the weightless bar.
+/// E_XX is measured on the line of the bar, with a step gauge. The sag of the bar cancels: the
+/// result is the shape of the weightless bar.
 
 #include <vector>
 
@@ -14,9 +14,9 @@
 
 namespace abbe::calib::mfb {
 
-/// Deviations M of the points of interest of one pass, one per hole, in the axes of the machine, after
-/// end-point levelling; x without the nominal position, y without the nominal shift of the hole,
-/// which has the opposite sign in a reversed pass. m.
+/// Deviations M of the points of interest of one pass, one per hole, in the axes of the machine,
+/// after end-point levelling; x without the nominal position, y without the nominal shift of the
+/// hole, which has the opposite sign in a reversed pass. m.
 using BarPass = std::vector<Vector3>;
 
 struct ReversalRuns {

@@ -38,9 +38,9 @@ struct AlignedBlocks {
   Alignment alignment;
   NestVisits nests{};  ///< their samples are not in the blocks
 };
-/// Samples at reference nests (nest_visits.hpp) are taken out before all this.
-/// Errors of find_nest_visits(), make_blocks(), check(Noise) and align(); BadInput if a block travels further than
-/// twice Options::corner_m. Pure.
+/// Samples at reference nests (nest_visits.hpp) are taken out before all this. Errors of
+/// find_nest_visits(), make_blocks(), check(Noise) and align(); BadInput if a block travels further
+/// than twice Options::corner_m. Pure.
 [[nodiscard]] Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation>,
                                                    const Machine&, const Path&, const Noise&,
                                                    const Options&);

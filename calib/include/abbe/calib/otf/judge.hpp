@@ -22,7 +22,8 @@
 namespace abbe::calib::otf {
 
 /// Called once for each held-out row: residuals [m] of no compensation and of the candidate that
-/// remain after removal of the best-fit rigid motion. `row`: index in Observations::rows of the run.
+/// remain after removal of the best-fit rigid motion. `row`: index in Observations::rows of the
+/// run.
 using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double no_compensation_m,
                                       double candidate_m)>;
 
@@ -34,7 +35,8 @@ using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double n
 [[nodiscard]] Result<HeldOutFigures> held_out(const Observations&, const VolumetricModel* active,
                                               const Options& = {});
 
-/// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each run.
+/// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each
+/// run.
 [[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
                                               const VolumetricModel* active, const Options& = {},
                                               const HeldOutRow& row = {});

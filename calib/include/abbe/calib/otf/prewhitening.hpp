@@ -44,11 +44,12 @@ struct NoiseFilter {
 
 /// The solution of the prewhitened rows: model, rigid unknowns, their covariance, and in the
 /// statistics `variance_factor` and `noise_correlation`. `adjustment`, residuals, range offset,
-/// drift of the tracker and the other statistics remain those of the rows themselves, which judge() tests for lack of fit.
-/// The coefficients are estimated twice: from the residuals of `solution`, then from those of the
-/// prewhitened solution. `solution` itself if its residuals are white, or if they are so small that
-/// the stated noise covers them with their correlation (statistics.variance_factor is 1): the
-/// correlation then is not that of the stated noise. Errors of adjust().
+/// drift of the tracker and the other statistics remain those of the rows themselves, which judge()
+/// tests for lack of fit. The coefficients are estimated twice: from the residuals of `solution`,
+/// then from those of the prewhitened solution. `solution` itself if its residuals are white, or if
+/// they are so small that the stated noise covers them with their correlation
+/// (statistics.variance_factor is 1): the correlation then is not that of the stated noise. Errors
+/// of adjust().
 [[nodiscard]] Result<Solution> prewhitened(Solution, const Observations&, const Options& = {});
 
 }  // namespace abbe::calib::otf

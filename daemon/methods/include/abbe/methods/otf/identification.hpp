@@ -1,7 +1,7 @@
 #pragma once
 /// Identifies a model from an acquired run with the estimator of [otf], and judges it. A live
-/// session and its replay use the same function. Pure and deterministic: equal points give bit-identical
-/// results. It takes about a second; the daemon runs it in a separate thread.
+/// session and its replay use the same function. Pure and deterministic: equal points give
+/// bit-identical results. It takes about a second; the daemon runs it in a separate thread.
 
 #include <array>
 #include <functional>

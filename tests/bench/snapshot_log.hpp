@@ -62,7 +62,7 @@ struct HubCycle {
   std::int64_t hub_ns = 0;
 };
 
-/// Latency of a device's real-time part: from the arrival of its bytes to its samples in the ring.
+/// Time in receive() of a device: from the return of wait() to its samples in the ring.
 struct DeviceLatency {
   double p50_s = 0.0;
   double p99_s = 0.0;

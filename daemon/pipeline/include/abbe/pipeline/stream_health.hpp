@@ -13,8 +13,8 @@ struct StreamHealth {
   double rate_hz = 0.0;
   double latency_p50_s = 0.0;
   double latency_p99_s = 0.0;
-  /// Latency of the acquisition thread since its start: from the arrival of data to the end of
-  /// their processing. Empty for a part that is not a device.
+  /// Durations of Device::receive() since the thread started, also of calls without data. They do
+  /// not contain the time from arrival to the return of wait(). Empty if it is not a device.
   drivers::LatencyHistogram::Counts latency{};
 };
 

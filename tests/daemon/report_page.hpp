@@ -1,6 +1,7 @@
 #pragma once
 /// The data of the figures of a report, read from its HTML.
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -45,18 +46,22 @@ inline std::vector<std::vector<double>> maps_of(std::string_view page) {
   return rows;
 }
 
-/// True if the page has charts and maps, every dataset of a chart has points, and every row of maps
-/// has a value.
+/// True if the page has charts and maps, every dataset of a chart has a number (a value that is not
+/// finite is null in JSON), and every row of maps has a value that is not zero.
 inline bool every_figure_has_data(std::string_view page) {
   const auto charts = charts_of(page);
   const auto maps = maps_of(page);
+  const auto is_number = [](const nlohmann::json& point) { return point["y"].is_number(); };
+  const auto has_numbers = [&is_number](const nlohmann::json& dataset) {
+    return std::ranges::any_of(dataset["data"], is_number);
+  };
+
   for (const auto& chart : charts) {
-    if (chart["data"]["datasets"].empty()) return false;
-    for (const auto& dataset : chart["data"]["datasets"])
-      if (dataset["data"].empty()) return false;
+    const auto& datasets = chart["data"]["datasets"];
+    if (datasets.empty() || !std::ranges::all_of(datasets, has_numbers)) return false;
   }
   for (const auto& values : maps)
-    if (values.empty()) return false;
+    if (std::ranges::none_of(values, [](double v) { return v > 0.0; })) return false;
   return !charts.empty() && !maps.empty();
 }
 

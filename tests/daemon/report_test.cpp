@@ -126,6 +126,35 @@ TEST(Report, ATableIsDrawnAsTheModelInterpolatesIt) {
   }
 }
 
+/// Of a model in which only EXX is uncertain, the variance of V_x is that of EXX.
+TEST(Report, TheBandsBetweenNodesAreTwoStandardUncertaintiesOfV) {
+  using calib::estimation::Interpolation;
+  for (const auto kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
+    auto description = with_interpolation(kind).description();
+    for (std::size_t i = 0; i < description.parameters.size(); ++i) {
+      if (description.parameters[i].name == "EXX") continue;
+      description.parameters[i].u = 0.0;
+      description.covariance.row(static_cast<Eigen::Index>(i)).setZero();
+      description.covariance.col(static_cast<Eigen::Index>(i)).setZero();
+    }
+    const auto model = calib::VolumetricModel::from_description(description).value();
+    HtmlReport page("one table");
+    add_table_charts(page, model);
+
+    const auto datasets = charts_of(page.text())[0]["data"]["datasets"];
+    ASSERT_EQ(datasets[0]["data"].size(), 25u);  // five nodes, five points between two of them
+    for (std::size_t i = 0; i < 25; ++i) {
+      const Vector3 q(1e-3 * datasets[0]["data"][i]["x"].get<double>(), 0.1, -0.2);
+      const auto e = model.error_at(q, model.tool_offsets_m().front());
+      const double U_um = 2e6 * std::sqrt(e.cov_V_m2(0, 0));
+      const double low = datasets[0]["data"][i]["y"], high = datasets[1]["data"][i]["y"];
+      EXPECT_GT(U_um, 0.0);
+      EXPECT_NEAR(high - low, 2.0 * U_um, 1e-9) << i;
+      EXPECT_NEAR(0.5 * (low + high), datasets[2]["data"][i]["y"].get<double>(), 1e-9) << i;
+    }
+  }
+}
+
 TEST(Report, TheMapsHaveErrorAndUncertaintyOfTheModel) {
   const auto model = test::synthetic_model(3);
   HtmlReport page("maps");
@@ -164,6 +193,28 @@ TEST(Report, TheMapOfHeldOutObservationsIsTheirRmsInACell) {
   ASSERT_EQ(maps[2].size(), 2u);
   EXPECT_NEAR(maps[2][0], std::sqrt(12.5), 1e-4);
   EXPECT_NEAR(maps[2][1], 2.0, 1e-4);
+}
+
+std::string page_of(double chart_y, double map_value) {
+  HtmlReport page("figures");
+  page.chart(LineChart{.title = "t",
+                       .x_label = "x",
+                       .y_label = "y",
+                       .curves = {{.name = "a", .x = {0.0, 1.0}, .y = {chart_y, chart_y}}}});
+  page.maps(
+      {.title = "t",
+       .x_label = "x",
+       .y_label = "y",
+       .scale_label = "um",
+       .maps = {{.title = "m", .x_edges = {0, 1}, .y_edges = {0, 1}, .values = {map_value}}}});
+  return page.text();
+}
+
+TEST(Report, AFigureWithoutNumbersOrAMapOfZerosHasNoData) {
+  EXPECT_TRUE(test::every_figure_has_data(page_of(1.0, 1.0)));
+  EXPECT_FALSE(test::every_figure_has_data(page_of(std::nan(""), 1.0)));
+  EXPECT_FALSE(test::every_figure_has_data(page_of(1.0, 0.0)));
+  EXPECT_FALSE(test::every_figure_has_data(page_of(1.0, std::nan(""))));
 }
 
 TEST(Report, TheCutsAreAcrossTheShortestAxis) {

@@ -17,6 +17,7 @@ using calib::Axis;
 using calib::Vector3;
 using test::charts_of;
 using test::dataset_of;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -193,6 +194,20 @@ TEST(Report, TheMapOfHeldOutObservationsIsTheirRmsInACell) {
   ASSERT_EQ(maps[2].size(), 2u);
   EXPECT_NEAR(maps[2][0], std::sqrt(12.5), 1e-4);
   EXPECT_NEAR(maps[2][1], 2.0, 1e-4);
+}
+
+TEST(Report, TheMapsStateWhatTheyDoNotContain) {
+  HtmlReport without("maps"), with("maps");
+  const std::vector<LeftError> left{{Vector3(0.0, 0.0, -0.2), 20e-6, 3e-6, 1e-6}};
+  add_volume_maps(without, test::synthetic_model(3));
+  add_volume_maps(with, test::synthetic_model(3), left);
+  const char* const removed = "shown without a rigid motion, which is fitted to these same";
+  EXPECT_THAT(without.text(),
+              AllOf(HasSubstr("in the gauge of the model. After compensation, an "
+                              "error of at least this size is to be expected"),
+                    HasSubstr("does not contain errors between the nodes"),
+                    HasSubstr("lack of fit"), HasSubstr("temperature"), Not(HasSubstr(removed))));
+  EXPECT_THAT(with.text(), HasSubstr(removed));
 }
 
 std::string page_of(double chart_y, double map_value) {

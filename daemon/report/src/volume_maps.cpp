@@ -144,6 +144,22 @@ ValueMaps map_of(std::span<const LeftError> left, const calib::ValidityVolume& v
   return maps;
 }
 
+void add_left_errors(HtmlReport& page, const calib::ValidityVolume& volume,
+                     std::span<const LeftError> left) {
+  page.maps(map_of(left, volume));
+  page.facts(
+      {{"before, rms of one component", um_text(rms(left, &LeftError::before_m), 3)},
+       {"after", um_text(rms(left, &LeftError::after_m), 3)},
+       {"standard uncertainty of these observations", um_text(rms(left, &LeftError::sigma_m), 3)}});
+  page.paragraph(fmt::format(
+      "{} observations, each predicted by a model that was fitted without it. The observations of "
+      "a run that are held out together are shown without a rigid motion, which is fitted to these "
+      "same observations, before as well as after: errors that look like such a motion are not "
+      "contained. The noise of the measurement is contained: with a perfect model the rms would be "
+      "about the standard uncertainty of the observations.",
+      left.size()));
+}
+
 }  // namespace
 
 VolumeCuts volume_cuts(const calib::ValidityVolume& volume, std::size_t most) {
@@ -191,22 +207,14 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
   page.maps(maps.V);
   page.maps(maps.U);
   page.facts({{"before, |V|", summary(maps.V)},
-              {"after, U(V): what remains, as far as the model states it", summary(maps.U)}});
+              {"after, U(V): at least this is to be expected", summary(maps.U)}});
   page.paragraph(
       "U(V): twice the root of the sum of the variances of the three components (coverage factor k "
-      "= 2). The error that is left after compensation is not zero but of this size.");
-  if (left.empty()) return;
-
-  page.maps(map_of(left, model.validity()));
-  page.facts(
-      {{"before, rms of one component", um_text(rms(left, &LeftError::before_m), 3)},
-       {"after", um_text(rms(left, &LeftError::after_m), 3)},
-       {"standard uncertainty of these observations", um_text(rms(left, &LeftError::sigma_m), 3)}});
-  page.paragraph(fmt::format(
-      "{} observations, each predicted by a model that was fitted without it. They contain the "
-      "noise of the measurement: with a perfect model their rms would be their standard "
-      "uncertainty.",
-      left.size()));
+      "= 2), in the gauge of the model. After compensation, an error of at least this size is to "
+      "be expected. U(V) does not contain errors between the nodes or of a higher degree than the "
+      "model has, lack of fit that the residuals do not show, and changes of the machine after the "
+      "measurement, for example with temperature.");
+  if (!left.empty()) add_left_errors(page, model.validity(), left);
 }
 
 }  // namespace abbe::daemon

@@ -11,7 +11,8 @@
 
 namespace abbe::daemon {
 
-/// What is left of one observation to which a model was not fitted.
+/// What is left of one observation to which a model was not fitted, without the rigid motion that
+/// fits best to the observations held out together with it (calib/otf/judge.hpp).
 struct LeftError {
   calib::Vector3 axis_position_m = calib::Vector3::Zero();
   double before_m = 0.0;  ///< without compensation

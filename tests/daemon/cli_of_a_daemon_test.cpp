@@ -95,9 +95,22 @@ TEST_F(CliOfADaemon, CalibratePrintsHowManyTablesTheRunDetermines) {
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_EQ(ran.err,
             "acquiring: driving the path\n"
-            "tables: 1 of 2 determined, largest u 0.80 um, 0.00 urad\n"
+            "tables: 1 of 2 determined, largest u 0.80 um\n"
             "tables: 2 of 2 determined, largest u 0.60 um, 1.50 urad\n"
             "tables: 2 of 2 determined, largest u 0.20 um, 1.20 urad\n");
+}
+
+TEST_F(CliOfADaemon, CalibratePrintsUncertaintiesOfDeterminedTablesOnly) {
+  const nlohmann::json rotation{{"unit", "rad"}, {"determined", true}, {"u", {1.5e-6, 0.0}}};
+  const nlohmann::json open{{"unit", "m"}, {"determined", false}, {"u", {0.5e-6, nullptr}}};
+  const auto socket = folder_.path() / "units.sock";
+  const auto daemon = ControlServer::open(
+      socket, ScriptedDaemon{{acquiring_with({open, open}), acquiring_with({rotation, open}),
+                              session("active", "accepted")}});
+  ASSERT_TRUE(daemon);
+  EXPECT_EQ(calibrate(socket).err,
+            "acquiring: driving the path\n"
+            "tables: 1 of 2 determined, largest u 1.50 urad\n");
 }
 
 nlohmann::json refused_as(const std::string& code) {
@@ -208,6 +221,26 @@ TEST_F(CliOfADaemon, StatusShowsThePositionsOfTheAxes) {
       test::run_abbe(folder_.path(), fmt::format("status --socket '{}'", socket.string()));
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("position   X 10.0000 mm  Y -  C 28.6479 deg\n"));
+}
+
+TEST_F(CliOfADaemon, StatusShowsTheRemainingTimeInSecondsOrMinutes) {
+  const std::vector<std::pair<nlohmann::json, std::string>> cases{{380.0, "about 6.3 min left\n"},
+                                                                  {59.7, "about 1.0 min left\n"},
+                                                                  {44.8, "about 45 s left\n"},
+                                                                  {-1.0, "about 0 s left\n"},
+                                                                  {nullptr, "position"}};
+  const auto socket = folder_.path() / "remaining.sock";
+  for (const auto& [remaining_s, shown] : cases) {
+    auto status = status_with_positions();
+    status["session"]["remaining_s"] = remaining_s;
+    const auto daemon = ControlServer::open(
+        socket, [&status](const nlohmann::json&, const ControlPeer&) { return status; });
+    ASSERT_TRUE(daemon);
+    const auto ran =
+        test::run_abbe(folder_.path(), fmt::format("status --socket '{}'", socket.string()));
+    EXPECT_EQ(ran.exit, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr(shown));
+  }
 }
 
 TEST_F(CliOfADaemon, ADaemonThatRestartedLosesTheReferenceSearch) {

@@ -13,6 +13,7 @@
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/units.hpp"
 #include "follow.hpp"
+#include "remaining_time.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -39,7 +40,9 @@ int print_session_verdict(const json& session, bool as_json) {
 /// What the run determines so far.
 struct TablesSoFar {
   std::size_t tables = 0, determined = 0;
-  double u_m = 0.0, u_rad = 0.0;  ///< largest standard uncertainty of the determined tables
+  /// Largest standard uncertainty of the determined tables in m and in rad; empty without such a
+  /// table.
+  std::optional<double> u_m{}, u_rad{};
 };
 
 TablesSoFar tables_so_far(const json& live) {
@@ -48,28 +51,43 @@ TablesSoFar tables_so_far(const json& live) {
     ++found.tables;
     if (!table.value("determined", false)) continue;
     ++found.determined;
-    double& largest = table.value("unit", "") == "rad" ? found.u_rad : found.u_m;
+    auto& largest = table.value("unit", "") == "rad" ? found.u_rad : found.u_m;
     for (const json& u : table.value("u", json::array()))
-      if (u.is_number()) largest = std::max(largest, u.get<double>());
+      if (u.is_number()) largest = std::max(largest.value_or(0.0), u.get<double>());
   }
 
   return found;
 }
 
-/// "acquiring, 3 min left"
+/// "tables: 3 of 17 determined, largest u 0.80 um"; a unit without a determined table is left out.
+std::string text_of(const TablesSoFar& so_far) {
+  std::string text = fmt::format("tables: {} of {} determined", so_far.determined, so_far.tables);
+  const char* separator = ", largest u ";
+  if (so_far.u_m) {
+    text += fmt::format("{}{:.2f} um", separator, *so_far.u_m * kUmPerM);
+    separator = ", ";
+  }
+  if (so_far.u_rad) text += fmt::format("{}{:.2f} urad", separator, *so_far.u_rad * kUradPerRad);
+
+  return text;
+}
+
+/// True if the largest u is less than half of the earlier one.
+bool much_better(const std::optional<double>& now, const std::optional<double>& earlier) {
+  constexpr double kMuchBetter = 0.5;
+  return now && earlier && *now < kMuchBetter * *earlier;
+}
+
+/// "acquiring, about 3.3 min left"
 std::string with_remaining_time(const std::string& state, const json& session) {
-  const auto remaining = session.find("remaining_s");
-  if (remaining == session.end() || !remaining->is_number()) return state;
-  constexpr double kSecondsInMinute = 60.0;
-  const double seconds = remaining->get<double>();
-  return seconds < kSecondsInMinute
-             ? fmt::format("{}, {:.0f} s left", state, seconds)
-             : fmt::format("{}, {:.0f} min left", state, seconds / kSecondsInMinute);
+  const std::string remaining = remaining_time(session);
+  return remaining.empty() ? state : fmt::format("{}, {}", state, remaining);
 }
 
 /// Prints one line whenever state or reason of the session change, for example "warming: waiting
-/// for the machine to stand at ...", one line per new note, and one line whenever the run
-/// determines more tables, or all of them twice as well as printed before.
+/// for the machine to stand at ...", and one line per new note. Prints the tables whenever the run
+/// determines more of them than printed before. Once it determines all, also whenever the largest u
+/// in um or that in urad is less than half of that printed before.
 class SessionLog {
  public:
   void print_notes(ProgressBar& bar, const json& session) {
@@ -94,13 +112,10 @@ class SessionLog {
     const auto live = session.find("live");
     if (live == session.end() || !live->is_object()) return;
     const TablesSoFar now = tables_so_far(*live);
-    constexpr double kMuchBetter = 0.5;
-    const bool better =
-        now.u_m < kMuchBetter * tables_.u_m || now.u_rad < kMuchBetter * tables_.u_rad;
+    const bool better = much_better(now.u_m, tables_.u_m) || much_better(now.u_rad, tables_.u_rad);
     if (now.determined <= tables_.determined && !(now.determined == now.tables && better)) return;
     bar.clear();
-    fmt::print(stderr, "tables: {} of {} determined, largest u {:.2f} um, {:.2f} urad\n",
-               now.determined, now.tables, now.u_m * kUmPerM, now.u_rad * kUradPerRad);
+    fmt::print(stderr, "{}\n", text_of(now));
     tables_ = now;
   }
 

@@ -16,6 +16,7 @@
 #include "abbe/base/units.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
+#include "remaining_time.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -167,8 +168,8 @@ void print_status(const json& status) {
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
              session["reason"].get<std::string>());
-  if (session.contains("remaining_s"))
-    fmt::print("           about {:.1f} min left\n", session["remaining_s"].get<double>() / 60.0);
+  if (const auto remaining = remaining_time(session); !remaining.empty())
+    fmt::print("           {}\n", remaining);
   if (session.contains("next")) print_next(session["next"]);
   if (session.contains("live")) print_live(session["live"]);
   for (const json& note : session["notes"]) fmt::print("           {}\n", note.get<std::string>());

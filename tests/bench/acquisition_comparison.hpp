@@ -1,0 +1,102 @@
+#pragma once
+/// Compares phases of a run with requests to those without. The peer is the same comparison between
+/// the odd and the even phases without requests: it shows what other load on the computer changes.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "acquisition_phase.hpp"
+#include "figure.hpp"
+
+namespace abbe::bench {
+
+/// In order of severity.
+enum class Outcome { Met, Inconclusive, Missed };
+
+inline Outcome worse(Outcome a, Outcome b) {
+  return std::max(a, b);
+}
+
+/// A figure with and without requests, as a ratio to that without.
+struct Compared {
+  double quiet_odd = 0.0, quiet_even = 0.0, quiet = 0.0, requested = 0.0;
+
+  [[nodiscard]] bool has_data() const {
+    return std::min({quiet_odd, quiet_even, quiet, requested}) > 0.0;
+  }
+  [[nodiscard]] double ratio() const { return requested / quiet; }
+  /// At least 1.
+  [[nodiscard]] double peer() const {
+    return std::max(quiet_odd, quiet_even) / std::min(quiet_odd, quiet_even);
+  }
+  /// The limit is a bucket of the histogram, or the peer if it is larger. With a peer above 1.5
+  /// the computer is too busy for a statement.
+  [[nodiscard]] Outcome outcome() const {
+    constexpr double kBucket = 1.26, kMostPeer = 1.5;  // the widest bucket: 1.25, plus rounding
+    if (!has_data() || peer() > kMostPeer) return Outcome::Inconclusive;
+    return ratio() <= std::max(kBucket, peer()) ? Outcome::Met : Outcome::Missed;
+  }
+};
+
+/// The phases of one acquisition thread.
+struct AcquisitionComparison {
+  AcquisitionPhase quiet_odd, quiet_even, requested;
+
+  [[nodiscard]] AcquisitionPhase quiet() const {
+    AcquisitionPhase all = quiet_odd;
+    add(all, quiet_even);
+    return all;
+  }
+  template <class Figure>
+  [[nodiscard]] Compared of(Figure figure) const {
+    return {std::invoke(figure, quiet_odd), std::invoke(figure, quiet_even),
+            std::invoke(figure, quiet()), std::invoke(figure, requested)};
+  }
+  /// The phases with requests last as long as those without.
+  [[nodiscard]] Outcome outcome_of_losses() const {
+    if (requested.lost <= quiet().lost) return Outcome::Met;
+    return requested.lost > 2 * quiet().lost ? Outcome::Missed : Outcome::Inconclusive;
+  }
+};
+
+inline const char* suffix(Outcome outcome) {
+  return outcome == Outcome::Inconclusive ? ", INCONCLUSIVE: too much other load, or no data"
+         : outcome == Outcome::Missed     ? ", NOT MET"
+                                          : "";
+}
+
+inline Outcome report_ratio(const std::string& what, const Compared& of) {
+  tests::print_figure(what, "ratio 1",
+                      "{:.1f} us without requests, {:.1f} us with, ratio {:.2f}, "
+                      "without requests among themselves {:.2f}{}",
+                      of.quiet, of.requested, of.ratio(), of.peer(), suffix(of.outcome()));
+  return of.outcome();
+}
+
+inline Outcome report_acquisition(const std::string& stream, const AcquisitionComparison& of) {
+  const auto receive = [](double share) {
+    return [share](const AcquisitionPhase& phase) { return quantile_us(phase.receive, share); };
+  };
+  for (const double share : {0.5, 0.999}) {
+    const Compared each = of.of(receive(share));
+    fmt::print("{}: time in receive(), {:.1f} %: without requests {:.1f} us, with {:.1f} us\n",
+               stream, 100.0 * share, each.quiet, each.requested);
+  }
+
+  const auto figure = [&stream](const char* what) {
+    return fmt::format("live status, {} of {}", what, stream);
+  };
+  Outcome outcome = report_ratio(figure("time in receive(), p99,"), of.of(receive(0.99)));
+  outcome = worse(outcome, report_ratio(figure("mean scheduling delay"),
+                                        of.of(&AcquisitionPhase::mean_delay_us)));
+  tests::print_figure(figure("gaps and dropped samples"), "no more than without requests",
+                      "{} without requests, {} with{}", of.quiet().lost, of.requested.lost,
+                      suffix(of.outcome_of_losses()));
+
+  return worse(outcome, of.outcome_of_losses());
+}
+
+}  // namespace abbe::bench

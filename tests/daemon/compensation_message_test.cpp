@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "abbe/publishing/idl_messages.hpp"
 #include "synthetic_model.hpp"
 
@@ -51,30 +53,30 @@ TEST(CompensationMessage, IsTheModelErrorAtTheMachinesPosition) {
   EXPECT_EQ(m.age_ns(), 3'000'000);
 }
 
-TEST(CompensationMessage, IsThatOfTheDirectionInWhichTheAxesMoved) {
-  using calib::estimation::Travel;
-  const PublishedModel with{.id = "b", .model = test::synthetic_travel_model(1)};
-  const auto of = [&](const calib::estimation::AxisTravel& travel) {
-    return compensation_message(ModelStatus::MODEL_ACTIVE, &with, view_inside(), kTool_m, 500ms, {},
-                                travel);
+/// Neither direction may be published as known, nor the difference as exact.
+TEST(CompensationMessage, OfAModelWithBacklashIsTheMeanWithHalfTheDifference) {
+  constexpr double kD = 80e-6, kU = 60e-6;
+  const auto with = [](double u_D) {
+    const PublishedModel model{.id = "b", .model = test::synthetic_travel_model(1, kD, u_D)};
+    return compensation_message(ModelStatus::MODEL_ACTIVE, &model, view_inside(), kTool_m, 500ms,
+                                {.machine = "mill"});
   };
-  const auto forth = of({Travel::Forward, Travel::Forward, Travel::Forward}),
-             back = of({Travel::Backward, Travel::Backward, Travel::Backward}), unknown = of({});
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(unknown.vector_m()[i], 0.5 * (forth.vector_m()[i] + back.vector_m()[i]), 1e-15);
-    EXPECT_GT(std::abs(forth.vector_m()[i] - back.vector_m()[i]), 1e-6);
-  }
-  EXPECT_GT(unknown.cov_m2()[0], 10.0 * forth.cov_m2()[0]);
+  const auto known = with(1e-9), uncertain = with(kU);
+  EXPECT_EQ(known.vector_m(), message(view_inside()).vector_m());
+  EXPECT_EQ(uncertain.vector_m(), known.vector_m());
+  EXPECT_GT(known.cov_m2()[0], 0.25 * kD * kD);
+  EXPECT_GT(uncertain.cov_m2()[0] - known.cov_m2()[0], 0.25 * kU * kU);  // of EXX alone
 }
 
-/// A subscriber of the grid does not know the direction: its uncertainty contains half of it.
-TEST(GridMessage, OfAModelWithBacklashIsTheMeanWithHalfTheDifference) {
-  const PublishedModel with{.id = "b", .model = test::synthetic_travel_model(1)};
+/// The grid and the vector are two forms of one statement.
+TEST(GridMessage, OfAModelWithBacklashIsThatOfTheCompensation) {
+  const PublishedModel with{.id = "b", .model = test::synthetic_travel_model(1, 80e-6, 60e-6)};
   const auto node = grid_messages(with, {.machine = "mill"}).front().nodes().front();
-  const calib::Vector3 q(node.position_m().data()), tool(kTool_m.data());
-  const auto e = with.model.error_at(q, tool, {});
-  EXPECT_EQ(node.error_m()[0], e.V_m.x());
-  EXPECT_NEAR(node.cov_m2()[0], e.cov_V_m2(0, 0), 1e-20);
+  auto view = view_inside();
+  std::ranges::copy(node.position_m(), view.position.begin());
+  const auto m = compensation_message(ModelStatus::MODEL_ACTIVE, &with, view, kTool_m, 500ms, {});
+  EXPECT_EQ(node.error_m(), m.vector_m());
+  EXPECT_EQ(node.cov_m2(), m.cov_m2());
 }
 
 TEST(CompensationMessage, IsStaleWithoutAVectorOnceAnAxisDoesNotAnswer) {

@@ -105,18 +105,6 @@ TEST(LiveView, ExpiresValuesByTheClockWhileOnlyTheEnvironmentReports) {
   EXPECT_EQ(live.view().missing_mask, 0) << "the encoders are back";
 }
 
-TEST(LiveView, KnowsTheDirectionInWhichTheAxesMovedUntilTheyExpire) {
-  using calib::estimation::Travel;
-  LiveView live{AssemblerOptions{}, kTime};
-  live.take(of(axes_at(kViewStart, 0.1)));
-  live.take(of(axes_at(kViewStart + 1ms, 0.0999)));
-  live.take(of(axes_at(kViewStart + 2ms, 0.0999)));
-  EXPECT_EQ(live.travel()[0], Travel::Backward);
-  EXPECT_EQ(live.travel()[1], Travel::Unknown);
-  live.take(of(axes_at(kViewStart + 1s, 0.0999)));
-  EXPECT_EQ(live.travel()[0], Travel::Unknown);
-}
-
 TEST(LiveView, ReportsOnceThatTheAxesExpiredWithoutNewInput) {
   LiveView live{AssemblerOptions{}, kTime};
   live.take(of(axes_at(kViewStart, 0.1)));

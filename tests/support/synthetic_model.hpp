@@ -41,8 +41,10 @@ inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0)
       .value();
 }
 
-/// synthetic_model() with backlash: one difference per table, `D` [m or rad] in all of them.
-inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7e-6 / 3) {
+/// synthetic_model() with backlash: one difference per table, `D` [m or rad] in all of them, with
+/// the standard uncertainty `u_D`.
+inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7e-6 / 3,
+                                                     double u_D = 1e-7 / 3) {
   calib::ModelDescription d = synthetic_model(seed).description();
   const auto layout = calib::ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
   const auto kind = calib::estimation::TravelDependence::Backlash;
@@ -51,7 +53,7 @@ inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7
              m = static_cast<Eigen::Index>(basis.size()) - n;
 
   calib::TravelDifferences travel{kind, Eigen::VectorXd::Constant(m, D),
-                                  1e-14 / 3 * Eigen::MatrixXd::Identity(m, m),
+                                  u_D * u_D * Eigen::MatrixXd::Identity(m, m),
                                   Eigen::MatrixXd::Zero(n, m)};
   travel.cov_U_D(0, 0) = 1e-17 / 3;
   const Eigen::MatrixXd half = calib::half_differences(basis, travel.D);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "abbe/config/linear_axes.hpp"
 
@@ -33,8 +32,7 @@ LiveView::LiveView(const AssemblerOptions& options, const drivers::TimeSource& t
       use_(options.environment),
       environment_(use_, {}),
       current_for_(time.host(kCurrentFor)),
-      axes_patience_(time.host(kAxesTimeout)),
-      travel_(axes_patience_) {
+      axes_patience_(time.host(kAxesTimeout)) {
   view_.axes_compensated = options.axes_compensated;
 }
 
@@ -74,9 +72,7 @@ void LiveView::take(const protocol::AxisSample& sample) {
   view_.u_position = axes.u_position;
   correct_for_temperature(view_, use_);
   previous_ = sample;
-  if (!axes_known(view_)) return;
-  axes_known_at_ = sample.head.time;
-  travel_.take(std::span(axes.position).first(kLinearAxes), sample.head.time);
+  if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }
 
 /// Removes a tracker point and a touch that are older than kCurrentFor. The published message has a

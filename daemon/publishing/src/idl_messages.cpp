@@ -49,10 +49,19 @@ std::vector<v1::HullVertex> hull_of(const calib::ValidityVolume& validity) {
   return hull;
 }
 
+/// The mean of both directions of travel: the gate and the held-out legs test the mean, and a vector
+/// that steps at a reversal could move the axis back and step again.
+calib::VolumetricError error_in_either_direction(const calib::VolumetricModel& model,
+                                                 const calib::Vector3& q_m,
+                                                 const calib::Vector3& tool_m) {
+  constexpr calib::estimation::AxisTravel kUnknown{};
+  return model.error_at(q_m, tool_m, kUnknown);
+}
+
 v1::GridNode grid_node(const PublishedModel& m, const calib::InterpolationGrid& grid,
                        const std::array<std::size_t, 3>& at, const calib::Vector3& tool_m) {
   const calib::Vector3 q_m(grid.axes_m[0][at[0]], grid.axes_m[1][at[1]], grid.axes_m[2][at[2]]);
-  const auto e = m.model.error_at(q_m, tool_m, {});
+  const auto e = error_in_either_direction(m.model, q_m, tool_m);
   v1::GridNode node;
   node.position_m(array(q_m));
   node.error_m(array(e.V_m));
@@ -183,8 +192,7 @@ v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
 v1::Compensation compensation_message(v1::ModelStatus status, const PublishedModel* active,
                                       const protocol::Snapshot& s,
                                       const std::array<double, 3>& tool_offset_m,
-                                      nanoseconds validity, const Stamp& stamp,
-                                      const calib::estimation::AxisTravel& travel) {
+                                      nanoseconds validity, const Stamp& stamp) {
   v1::Compensation m;
   m.machine(std::string{stamp.machine});
   m.sequence_number(stamp.sequence_number);
@@ -205,8 +213,8 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   m.model_id(active->id);
   if (!known) return m;  // a vector at an old position must not be published as valid
   const auto e =
-      active->model.error_at({s.position[0], s.position[1], s.position[2]},
-                             {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]}, travel);
+      error_in_either_direction(active->model, {s.position[0], s.position[1], s.position[2]},
+                                {tool_offset_m[0], tool_offset_m[1], tool_offset_m[2]});
   m.tool_ok(e.tool_ok);
   if (!e.tool_ok) return m;  // the vector stays zero
   m.inside(e.inside);

@@ -56,12 +56,11 @@ void Publisher::snapshot(const protocol::Snapshot& view, protocol::HostTime now,
 }
 
 void Publisher::compensation(const protocol::Snapshot& view, const ActiveModelState& active,
-                             protocol::HostTime now, WallTime wall,
-                             const calib::estimation::AxisTravel& travel) {
+                             protocol::HostTime now, WallTime wall) {
   if (view.axis_count < 3 || !due(compensations_, view, wall, options_.compensation_hz)) return;
   send(Topic::Compensation,
        compensation_message(active.status, active.model, view, options_.tool_offset_m,
-                            options_.validity, stamp(now), travel),
+                            options_.validity, stamp(now)),
        wall);
 }
 

@@ -172,7 +172,7 @@ void Hub::publish(bool fresh, HostTime now) {
   const WallTime wall = cycle_began_;
   if (fresh && publisher != nullptr) {
     publisher->snapshot(live_.view(), now, wall);
-    publisher->compensation(live_.view(), model_state(), now, wall, live_.travel());
+    publisher->compensation(live_.view(), model_state(), now, wall);
   }
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;

@@ -11,7 +11,6 @@
 #include "abbe/pipeline/assembler.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/environment_use.hpp"
-#include "abbe/pipeline/live_travel.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -42,10 +41,6 @@ class LiveView {
   [[nodiscard]] std::optional<protocol::HostTime> axes_known_at() const noexcept {
     return axes_known_at_;
   }
-  /// Direction in which X, Y and Z last moved (live_travel.hpp).
-  [[nodiscard]] const calib::estimation::AxisTravel& travel() const noexcept {
-    return travel_.travel();
-  }
 
  private:
   void take(const protocol::AxisSample& sample);
@@ -56,7 +51,6 @@ class LiveView {
   EnvironmentUseOptions use_;
   EnvironmentMerge environment_;
   std::chrono::nanoseconds current_for_, axes_patience_;
-  LiveTravel travel_;
   protocol::Snapshot view_{};
   std::optional<protocol::AxisSample> previous_;
   std::optional<protocol::HostTime> axes_known_at_;

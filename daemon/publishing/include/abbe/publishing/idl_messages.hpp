@@ -40,20 +40,21 @@ struct Stamp {
 /// The volumetric error V at the nodes of calib::interpolation_grid(), of which there are at most
 /// 4096, in slices of the size that the IDL allows. If the grid has fewer nodes than the model
 /// (every_node is false), cov_m2 includes the error of the linear interpolation. Of a model with
-/// backlash V is the mean of both directions of travel, and cov_m2 includes half the difference.
+/// backlash V and cov_m2 are those of compensation_message().
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const PublishedModel&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
                                            const PublishedModel*, std::chrono::nanoseconds validity,
                                            const Stamp&);
-/// The volumetric error V at the axis position of the live view, for the given tool and, of a model
-/// with backlash, the direction in which each axis last moved (unknown: mean of both). V is zero and
+/// The volumetric error V at the axis position of the live view, for the given tool. V is zero and
 /// `inside` is false if there is no model, if the model is not valid for this tool, or if the axis
-/// positions are not known. In the last case this message also has STALE instead of ACTIVE.
+/// positions are not known. In the last case this message also has STALE instead of ACTIVE. Of a
+/// model with backlash V is the mean of both directions of travel, whatever the axes do, and cov_m2
+/// includes half the difference and its uncertainty.
 [[nodiscard]] v1::Compensation compensation_message(v1::ModelStatus, const PublishedModel*,
                                                     const protocol::Snapshot&,
                                                     const std::array<double, 3>& tool_offset_m,
-                                                    std::chrono::nanoseconds validity, const Stamp&,
-                                                    const calib::estimation::AxisTravel& = {});
+                                                    std::chrono::nanoseconds validity,
+                                                    const Stamp&);
 [[nodiscard]] v1::Health health_message(const drivers::DeviceStatus&, double rate_hz,
                                         double latency_p50_s, double latency_p99_s, const Stamp&);
 [[nodiscard]] v1::CalibrationEvent event_message(const SessionEvent&, std::string_view machine);

@@ -52,12 +52,10 @@ class Publisher {
   /// Polls the link to abbe-dds and sends a beat. Call it in every cycle, after the live topics:
   /// subscribers wait for live samples, not for beats.
   void beat(WallTime wall);
-  /// Call snapshot(), then compensation(), in every cycle that has new data. `travel`: direction in
-  /// which the axes last moved.
+  /// Call snapshot(), then compensation(), in every cycle that has new data.
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
   void compensation(const protocol::Snapshot& view, const ActiveModelState& active,
-                    protocol::HostTime now, WallTime wall,
-                    const calib::estimation::AxisTravel& travel = {});
+                    protocol::HostTime now, WallTime wall);
   /// Call it in every cycle. Sends the model if another model has become active, and the state if
   /// it changed or is due.
   void model(const ActiveModelState& active, protocol::HostTime now, WallTime wall);

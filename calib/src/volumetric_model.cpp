@@ -9,7 +9,6 @@
 #include "abbe/calib/estimation/cell_form.hpp"
 #include "checked_nodes.hpp"
 #include "message.hpp"
-#include "stored_travel.hpp"
 #include "tool_span.hpp"
 
 namespace abbe::calib {
@@ -337,18 +336,7 @@ Result<VolumetricModel> polynomials_from(const ModelDescription& d) {
       });
 }
 
-}  // namespace
-
-Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
-  if (Result<void> valid = check_covariance(d.covariance); !valid) {
-    return tl::unexpected(valid.error());
-  }
-
-  if (d.polynomials) {
-    return polynomials_from(d).and_then(
-        [&](VolumetricModel model) { return with_stored_travel(std::move(model), d); });
-  }
-
+Result<VolumetricModel> tables_from(const ModelDescription& d) {
   Result<ParameterLayout> layout =
       ParameterLayout::with_tables(d.chain, d.nodes, tables_named(d.parameters));
   if (!layout) {
@@ -373,9 +361,22 @@ Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
     return tl::unexpected(validity.error());
   }
 
-  return from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance, *std::move(validity),
-                     d.interpolation)
-      .and_then([&](VolumetricModel model) { return with_stored_travel(std::move(model), d); });
+  return VolumetricModel::from_vector(*layout, d.gauge, d.tool_offsets_m, U, d.covariance,
+                                      *std::move(validity), d.interpolation);
+}
+
+}  // namespace
+
+Result<VolumetricModel> VolumetricModel::from_description(ModelDescription d) {
+  if (Result<void> valid = check_covariance(d.covariance); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  Result<VolumetricModel> model = d.polynomials ? polynomials_from(d) : tables_from(d);
+  if (!model || !d.travel) {
+    return model;
+  }
+  return model->with_travel(*std::move(d.travel));
 }
 
 bool VolumetricModel::holds_for_tool(const Vector3& tool_offset_m) const {

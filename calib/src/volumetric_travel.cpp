@@ -4,7 +4,6 @@
 #include "abbe/calib/volumetric_model.hpp"
 #include "effect_of_travel.hpp"
 #include "message.hpp"
-#include "stored_travel.hpp"
 
 namespace abbe::calib {
 namespace {
@@ -67,23 +66,12 @@ Result<VolumetricModel> VolumetricModel::with_travel(TravelDifferences differenc
   Eigen::VectorXd U_and_D(U_.size() + differences.D.size());
   U_and_D << U_, differences.D;
   model.travel_ = TravelForm{*std::move(basis), std::move(differences), std::move(U_and_D)};
-  return model;
-}
-
-Result<VolumetricModel> with_stored_travel(VolumetricModel model, const ModelDescription& d) {
-  if (!d.travel) {
-    return model;
-  }
-  Result<VolumetricModel> with = model.with_travel(*d.travel);
-  if (!with) {
-    return with;
-  }
-  if (!check_covariance(joint_covariance(*with))) {
+  if (!check_covariance(joint_covariance(model))) {
     return failure(ErrorCode::BadInput,
                    "model: covariance of the differences between the directions of travel is not "
                    "positive semidefinite together with that of the tables");
   }
-  return with;
+  return model;
 }
 
 VolumetricError VolumetricModel::error_at(const Vector3& axis_position_m,

@@ -148,6 +148,7 @@ TEST_P(DirectionOfTravel, IsRefusedWithAnotherCovariance) {
   const auto refused = VolumetricModel::from_description(d);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, HasSubstr("is not positive semidefinite together with"));
+  EXPECT_EQ(made_.model.with_travel(*d.travel).error().text, refused.error().text);
   d = made_.model.description();
   d.travel->D.conservativeResize(3);
   EXPECT_THAT(VolumetricModel::from_description(d).error().text,

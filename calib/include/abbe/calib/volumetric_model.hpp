@@ -10,8 +10,8 @@
 /// outside the validity volume.
 ///
 /// With backlash (travel_differences.hpp) V depends on the direction in which each axis last moved.
-/// Functions without this direction give the mean of both directions, and the covariance contains
-/// half the difference.
+/// Functions without this direction give the mean of both directions; the covariance contains half
+/// the difference, not its uncertainty. error_at() with all directions unknown contains both.
 ///
 /// A model has one of two forms: tables with nodes (rigid-body model; linear or natural cubic
 /// between the nodes), or polynomials without tables (equivalent model of a ball array). Gate,
@@ -114,8 +114,8 @@ class VolumetricModel {
                                                                 ValidityVolume);
 
   /// The same model with differences between the directions of travel; `covariance()` must contain
-  /// half of them: half_differences() times its transpose. BadInput for polynomials or wrong sizes,
-  /// NotFinite for a value that is not a number.
+  /// half of them: half_differences() times its transpose. BadInput for polynomials, wrong sizes, or
+  /// a covariance, with that of the tables, not positive semidefinite; NotFinite for NaN.
   [[nodiscard]] Result<VolumetricModel> with_travel(TravelDifferences) const;
 
   /// V with its covariance. Takes about 1 us, 4 us for cubic tables. No allocation.

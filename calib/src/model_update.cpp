@@ -128,6 +128,13 @@ Result<VolumetricModel> update_model(const VolumetricModel& previous, const Volu
     return tl::unexpected(same.error());
   }
 
+  if (previous.travel() != nullptr || run.travel() != nullptr) {
+    return failure(ErrorCode::NotApplicable,
+                   message("update: the ", run.travel() == nullptr ? "previous" : "new",
+                           " model depends on the direction of travel, which an update does not "
+                           "contain; use the new model, or identify both without backlash"));
+  }
+
   const ParameterLayout& layout = run.tables()->layout();
   const GaugeCoordinates c = gauge_coordinates(*run.tables());
   if (Result<void> valid = check_update_options(options, c); !valid) {

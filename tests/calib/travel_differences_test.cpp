@@ -6,8 +6,11 @@
 
 #include <array>
 #include <limits>
+#include <utility>
 
+#include "abbe/calib/joint/part.hpp"
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/calib/model_update.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -173,6 +176,24 @@ TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
     const auto e = model.error_at(kTravelPlace, kTravelTool, {x, kForth, kForth});
     EXPECT_GE(std::sqrt(e.cov_V_m2(0, 0)), 50e-6);
   }
+}
+
+/// An update, or common tables, would lose the differences without a message.
+TEST(ModelWithDifferences, IsNeitherUpdatedNorJoined) {
+  const WithTravel made =
+      model_with_travel(TravelDependence::Backlash, estimation::Interpolation::Linear);
+  ModelDescription d = made.model.description();
+  d.travel.reset();
+  const VolumetricModel without = *VolumetricModel::from_description(d);
+  for (const auto& [previous, run] :
+       {std::pair{&made.model, &without}, std::pair{&without, &made.model}}) {
+    const auto updated = update_model(*previous, *run);
+    ASSERT_FALSE(updated);
+    EXPECT_EQ(updated.error().code, ErrorCode::NotApplicable);
+    EXPECT_THAT(updated.error().text, HasSubstr("depends on the direction of travel"));
+  }
+  EXPECT_THAT(joint::tables_of(made.model).error().text,
+              HasSubstr("depends on the direction of travel"));
 }
 
 TEST(ModelWithoutDifferences, IsTheSameInEveryDirection) {

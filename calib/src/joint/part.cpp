@@ -22,8 +22,10 @@ Result<CommonTables> tables_of(const VolumetricModel& model) {
     return not_applicable(
         message("has ", model.tool_offsets_m().size(), " tool offsets, must have one"));
   }
-  if (tables->travel() != estimation::TravelDependence::None) {
-    return not_applicable("depends on the direction of travel, which parts do not");
+  if (model.travel() != nullptr) {
+    return not_applicable(
+        "depends on the direction of travel, which the common tables do not: identify the runs "
+        "without backlash");
   }
   if (!is_in_gauge(gauge_coordinates(*tables), model.covariance())) {
     return not_applicable(

@@ -57,9 +57,9 @@ struct UpdateOptions {
 
 /// Chain, nodes, gauge and tool offsets are those of `run`. The validity volume is that of
 /// `previous`, and that of `run` if a table is renewed. Pure.
-/// NotApplicable as check_same_parameters(), and if a covariance is not larger than the part that is
-/// stated as common, or leaves a combination without uncertainty. BadInput for an option out of its
-/// range or an unknown table.
+/// NotApplicable as check_same_parameters(), if a model depends on the direction of travel, and if a
+/// covariance is not larger than the part that is stated as common, or leaves a combination without
+/// uncertainty. BadInput for an option out of its range or an unknown table.
 [[nodiscard]] Result<VolumetricModel> update_model(const VolumetricModel& previous,
                                                    const VolumetricModel& run,
                                                    const UpdateOptions& = {});

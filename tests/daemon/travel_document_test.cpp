@@ -66,6 +66,8 @@ TEST(TravelDocument, IsNamedWhereItIsUnreadable) {
               Contains(HasSubstr("travel.differences[0].name: must be an error such as EXX")));
   EXPECT_THAT(faults_after("\"EXX\"", "\"EYX\""),
               Contains(HasSubstr("travel.differences[0]: is EYX, expected EXX")));
+  EXPECT_THAT(faults_after("\"unit\": \"um\"", "\"unit\": \"urad\""),
+              Contains(HasSubstr("travel.differences[0].unit: must be \"um\"")));
   EXPECT_THAT(faults_after("\"covariance\": [", "\"covariance\": [1,"),
               Contains(HasSubstr("travel.covariance: ")));
   EXPECT_THAT(faults_after("\"covariance\": [", "\"covariances\": ["),

@@ -31,5 +31,9 @@ inline constexpr int kMicroUnitSquared = 12;  // their products
 [[nodiscard]] inline std::string_view unit_of(const calib::Parameter& p) {
   return p.is_angle() ? "urad" : "um";
 }
+/// Of a difference between the directions of travel.
+[[nodiscard]] inline std::string_view unit_of(const calib::ErrorMotion& m) {
+  return calib::is_rotation(m.motion) ? "urad" : "um";
+}
 
 }  // namespace abbe::daemon

@@ -15,6 +15,9 @@ calib::otf::Backlash read_difference(ModelReader& in, const ModelJson& entry,
                           ? calib::error_motion(name->get<std::string>())
                           : std::nullopt;
   if (!motion) in.fault(path + ".name", "must be an error such as EXX");
+  const ModelJson* unit = in.find(entry, path, "unit");
+  if (unit != nullptr && motion && *unit != unit_of(*motion))
+    in.fault(path + ".unit", fmt::format("must be \"{}\"", unit_of(*motion)));
 
   calib::otf::Backlash b{.motion = motion.value_or(calib::ErrorMotion{}),
                          .value = in.number_of(entry, path, "value", kMicroUnit),

@@ -86,10 +86,6 @@ void write_parameters(JsonText& out, const calib::VolumetricModel& model) {
   out.raw("\n  ]");
 }
 
-std::string_view unit_of_backlash(const calib::otf::Backlash& b) {
-  return calib::is_rotation(b.motion.motion) ? "urad" : "um";
-}
-
 std::string differences(std::span<const calib::otf::Backlash> list, std::string_view indent) {
   std::string text = "[";
   for (const auto& b : list) {
@@ -98,7 +94,7 @@ std::string differences(std::span<const calib::otf::Backlash> list, std::string_
     if (b.position_m) text += fmt::format("\"position_mm\": {}, ", to_decimal(*b.position_m, kMm));
     text +=
         fmt::format("\"value\": {}, \"u\": {}, \"unit\": \"{}\"}}", to_decimal(b.value, kMicroUnit),
-                    to_decimal(b.u, kMicroUnit), unit_of_backlash(b));
+                    to_decimal(b.u, kMicroUnit), unit_of(b.motion));
   }
   return fmt::format("{}\n{}]", text, indent);
 }
@@ -254,7 +250,7 @@ std::string to_tables_csv(const calib::VolumetricModel& model,
     text += fmt::format("{}.backlash,{},{},{},{}\n", calib::name(b.motion),
                         b.position_m ? to_decimal(*b.position_m, kMm) : "",
                         to_decimal(b.value, kMicroUnit), to_decimal(b.u, kMicroUnit),
-                        unit_of_backlash(b));
+                        unit_of(b.motion));
   return text;
 }
 

@@ -152,6 +152,32 @@ TEST(OtfAcquisition, EstimatesTheRemainingTime) {
   FAIL() << "the run ended at " << acquisition.progress() << ": " << acquisition.reason();
 }
 
+/// A leg of 1 mm ends before the machine is seen on it, but it reverses X.
+TEST(OtfAcquisition, BeginsLegsBetweenTwoTrackerPoints) {
+  const std::vector<AxisPosition> path{{0, 0, 0}, {0.05, 0, 0}, {0.049, 0, 0}, {0.049, 0.05, 0}};
+  OtfAcquisition acquisition{path};
+  HostTime now{10s};
+  const auto take = [&](const AxisPosition& q_m) {
+    protocol::Snapshot s;
+    s.head.time = now += 10ms;
+    s.axis_count = 3;
+    s.has_tracker_point = true;
+    s.tracker_point.device_time = protocol::DeviceTime{now.time_since_epoch()};
+    std::ranges::copy(q_m, s.position.begin());
+    std::ranges::copy(q_m, s.tracker_point.p_tracker_m.begin());
+    acquisition.take(s);
+  };
+  for (int i = 0; i < 50; ++i) take(path[0]);
+  for (int mm = 1; mm < 50; ++mm) take({1e-3 * mm, 0, 0});
+  for (int mm = 0; mm < 40; ++mm) take({0.049, 1e-3 * mm, 0});
+
+  const auto legs = acquisition.take_news().legs;
+  ASSERT_EQ(legs.size(), 3u) << acquisition.reason();
+  EXPECT_EQ(legs[1].to_m, path[2]);
+  EXPECT_EQ(legs[2].to_m, path[3]);
+  EXPECT_EQ(legs[1].first_point, legs[2].first_point);
+}
+
 TEST(LiveTables, AreInTheStatusOfTheSessionWhileTheMachineMoves) {
   const TemporaryFolder folder;
   const Config config = live_config();

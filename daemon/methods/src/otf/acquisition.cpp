@@ -97,10 +97,10 @@ void OtfAcquisition::mark_way(HostTime time) {
   ++marked_;
 }
 
-void OtfAcquisition::begin_leg(const RunPoint& point, const Vector3& q) {
-  begun_leg_ = leg_;
-  legs_.push_back({.from_m = path_m_[leg_],
-                   .to_m = path_m_[leg_ + 1],
+void OtfAcquisition::begin_leg(std::size_t leg, const RunPoint& point, const Vector3& q) {
+  begun_leg_ = leg;
+  legs_.push_back({.from_m = path_m_[leg],
+                   .to_m = path_m_[leg + 1],
                    .first_point = points_.size() - 1,
                    .q_m = {q[0], q[1], q[2]},
                    .p_tracker_m = point.p_tracker_m});
@@ -248,7 +248,7 @@ void OtfAcquisition::wait_at_start(const RunPoint& point, const Vector3& q) {
     reason_ = "driving the path";
     on_leg_at_ = point.time;
     points_.push_back(point);
-    begin_leg(point, q);
+    begin_leg(leg_, point, q);
     return;
   }
 
@@ -309,7 +309,9 @@ void OtfAcquisition::follow_path(const RunPoint& point, const Vector3& q) {
     here = on_leg(leg_);
   }
 
-  if (begun_leg_ != leg_) begin_leg(point, q);
+  // Short legs that were driven between two tracker points, too: the direction of travel behind them
+  // depends on them.
+  while (begun_leg_ < leg_) begin_leg(begun_leg_ + 1, point, q);
   on_leg_at_ = point.time;
   driven_m_ = driven_at_m_[leg_] + here.along_m;
   mark_way(point.time);

@@ -67,7 +67,8 @@ void OtfLiveTables::take(RunNews&& news) {
   tail_ = std::move(news.tail);
   environment_ = news.environment;
   for (const LegBegun& leg : news.legs) {
-    estimate_.add_pair(vector_of(leg.q_m), vector_of(leg.p_tracker_m));
+    if (legs_.empty() || legs_.back().first_point != leg.first_point)
+      estimate_.add_pair(vector_of(leg.q_m), vector_of(leg.p_tracker_m));
     legs_.push_back(leg);
   }
 }
@@ -89,7 +90,7 @@ void OtfLiveTables::add(const RunPoint& point) {
 void OtfLiveTables::add_points() {
   const std::size_t end = blocks_.size() * RunPoints::kPointsInBlock + tail_.size();
   for (; next_point_ < end; ++next_point_) {
-    if (next_leg_ < legs_.size() && legs_[next_leg_].first_point <= next_point_) {
+    while (next_leg_ < legs_.size() && legs_[next_leg_].first_point <= next_point_) {
       const LegBegun& leg = legs_[next_leg_++];
       estimate_.begin_leg(vector_of(at_temperature(leg.from_m, environment_, environment_use_)),
                           vector_of(at_temperature(leg.to_m, environment_, environment_use_)));

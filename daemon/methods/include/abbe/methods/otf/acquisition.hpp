@@ -64,7 +64,8 @@ class RunPoints {
   std::size_t size_ = 0;
 };
 
-/// The machine has reached a leg of the path.
+/// The machine has reached a leg of the path, or has driven it between two tracker points. Several
+/// legs then have the same point.
 struct LegBegun {
   AxisPosition from_m{}, to_m{};      ///< vertices of the request
   std::size_t first_point = 0;        ///< number of the point in the run
@@ -167,7 +168,7 @@ class OtfAcquisition {
   void run(const RunPoint& point, const calib::Vector3& q);
   void track_standstill(const RunPoint& point, const calib::Vector3& q);
   void follow_path(const RunPoint& point, const calib::Vector3& q);
-  void begin_leg(const RunPoint& point, const calib::Vector3& q);
+  void begin_leg(std::size_t leg, const RunPoint& point, const calib::Vector3& q);
   void mark_way(protocol::HostTime time);
   /// Fails the run if the scale readings at a vertex differ from the path.
   void compare_with_path(const protocol::Snapshot& snapshot, const calib::Vector3& q);

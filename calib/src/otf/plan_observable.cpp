@@ -60,8 +60,8 @@ Eigen::MatrixXd in_gauge(const Observations& o, const Eigen::MatrixXd& null_spac
   return S ? Eigen::MatrixXd(*S * null_space) : null_space;
 }
 
-/// Names of the tables and squareness errors with a value in a column of `undetermined`; a table
-/// also if the difference between its directions of travel has one.
+/// Names of the tables and squareness errors with a value in a column of `undetermined`. Differences
+/// between the directions of travel have a prior and so have none.
 std::vector<std::string> names_of(const Observations& o, const Eigen::MatrixXd& undetermined) {
   const ParameterLayout& layout = o.layout();
   // Columns have unit length; rounding leaves 1e-12.
@@ -74,14 +74,10 @@ std::vector<std::string> names_of(const Observations& o, const Eigen::MatrixXd& 
   };
 
   std::vector<std::string> names;
-  const bool per_node = o.basis.travel() == estimation::TravelDependence::Tables;
-  std::size_t of_travel = layout.model_size();
   for (const Table& table : layout.tables()) {
-    const std::size_t nodes = layout.node_count(table.motion.axis);
-    if (occurs(table.offset, nodes) || (per_node && occurs(of_travel, nodes))) {
+    if (occurs(table.offset, layout.node_count(table.motion.axis))) {
       names.push_back(name(table.motion));
     }
-    of_travel += per_node ? nodes : 0;
   }
   for (std::size_t i = 0; i < kSquarenessNames.size(); ++i) {
     if (occurs(layout.squareness_offset() + i, 1)) {
@@ -144,10 +140,7 @@ Result<Observability> observability(const Path& path, const Machine& machine,
 
   const auto conditions = static_cast<std::size_t>(gauge_of(o).conditions().rows());
   Observability result{.needed = o.unknowns() - conditions, .unused = note_on_unused(o)};
-  estimation::Information data(o.unknowns());
-  if (backlash == estimation::TravelDependence::Backlash) {
-    data = with_backlash_prior(std::move(data), o);
-  }
+  estimation::Information data = with_backlash_prior(estimation::Information(o.unknowns()), o);
 
   // Further legs never decrease the rank. Groups that grow keep the number of decompositions small.
   const std::size_t legs = path.vertices_m.empty() ? 0 : path.vertices_m.size() - 1;

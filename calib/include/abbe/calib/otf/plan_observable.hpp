@@ -1,9 +1,9 @@
 #pragma once
 /// Whether a run along a path determines the model, judged before the machine moves. Feed, noise
 /// and place of the tracker are of no importance: they change weights, not the rank. With backlash
-/// only the legs count on which the direction of travel of all axes is known (backlash.hpp); with
-/// forward and backward tables a node counts as determined if both are. One value per table that
-/// the path does not determine is no error: it does not change the model. Pure.
+/// only the legs count on which the direction of travel of all axes is known (backlash.hpp). A
+/// difference between the directions that the path does not determine is no error: it has its prior,
+/// in the adjustment, too, and the notes of the adjustment name it. Pure.
 
 #include <cstddef>
 #include <string>

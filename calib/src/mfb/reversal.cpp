@@ -28,11 +28,12 @@ Result<void> check_passes(const std::vector<BarPass>& passes, std::size_t holes,
 
 Result<void> check(const ReversalRuns& runs) {
   constexpr std::size_t kFewestRepeats = 2;
-  constexpr std::size_t kFewestHoles = 2;
+  constexpr std::size_t kFewestHolesOfPass = 2;
   const std::size_t holes = runs.machine_x_m.size();
-  if (holes < kFewestHoles) {
-    return failure(ErrorCode::BadInput, message("reversal: E_XX of the machine is given for ",
-                                                holes, " holes, needs at least ", kFewestHoles));
+  if (holes < kFewestHolesOfPass) {
+    return failure(ErrorCode::BadInput,
+                   message("reversal: E_XX of the machine is given for ", holes,
+                           " holes, needs at least ", kFewestHolesOfPass));
   }
   if (runs.normal.size() != runs.reversed.size()) {
     return failure(ErrorCode::BadInput,

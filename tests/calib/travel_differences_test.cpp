@@ -166,8 +166,7 @@ TEST(UndeterminedDifference, IsInTheUncertaintyOfEachDirection) {
   const WithTravel made =
       model_with_travel(TravelDependence::Backlash, estimation::Interpolation::Linear);
   TravelDifferences d = *made.model.travel();
-  d.D(0) = 0.0;  // EXX
-  d.cov_U_D.col(0).setZero();
+  d.cov_U_D.col(0).setZero();  // EXX
   d.covariance.row(0).setZero();
   d.covariance.col(0).setZero();
   d.covariance(0, 0) = 1e-8;  // (100 um)^2

@@ -2,6 +2,7 @@
 /// A model whose numbers are all different and not round, for tests of files and stores.
 
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -44,7 +45,7 @@ inline calib::VolumetricModel synthetic_model(unsigned seed, double finer = 1.0)
 /// synthetic_model() with backlash: one difference per table, `D` [m or rad] in all of them, with
 /// the standard uncertainty `u_D`.
 inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7e-6 / 3,
-                                                     double u_D = 1e-7 / 3) {
+                                                     double u_D = 1e-7 * std::numbers::inv_sqrt3) {
   calib::ModelDescription d = synthetic_model(seed).description();
   const auto layout = calib::ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
   const auto kind = calib::estimation::TravelDependence::Backlash;

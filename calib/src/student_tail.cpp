@@ -66,6 +66,21 @@ double student_tail(double t, std::size_t dof) noexcept {
                                    : 1.0 - factor * beta_fraction(0.5, a, rest) / 0.5;
 }
 
+double student_quantile(double p, std::size_t dof) noexcept {
+  double low = 0.0, high = 1.0;
+  while (student_tail(high, dof) > p) {
+    low = high;
+    high *= 2.0;
+  }
+
+  constexpr double kRelative = 1e-10;
+  while (high - low > kRelative * high) {
+    const double middle = 0.5 * (low + high);
+    (student_tail(middle, dof) > p ? low : high) = middle;
+  }
+  return high;
+}
+
 double student_over_normal(double dof) noexcept {
   constexpr double z = 1.959964;
   constexpr std::array kT95{12.706205, 4.302653, 3.182446, 2.776445, 2.570582};

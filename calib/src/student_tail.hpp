@@ -10,6 +10,9 @@ namespace abbe::calib {
 /// More than 10,000 degrees of freedom count as 10,000. The same bits on every processor.
 [[nodiscard]] double student_tail(double t, std::size_t dof) noexcept;
 
+/// t >= 0 with student_tail(t, dof) = p, 0 < p <= 1, to 1e-10 of its value.
+[[nodiscard]] double student_quantile(double p, std::size_t dof) noexcept;
+
 /// Student's t for 95 % divided by the quantile of the normal distribution: [GUM] table G.2, and
 /// from 6 degrees of freedom the Cornish-Fisher series, accurate to 0.1 %. dof >= 1.
 [[nodiscard]] double student_over_normal(double dof) noexcept;

@@ -53,5 +53,14 @@ TEST(StudentTail, HasLimits) {
   EXPECT_TRUE(std::isnan(student_tail(std::nan(""), 4)));
 }
 
+TEST(StudentQuantile, InvertsTheTail) {
+  for (const std::size_t dof : {1u, 2u, 12u, 1000u}) {
+    for (const double p : {0.5, 0.05, 1e-4}) {
+      EXPECT_NEAR(student_tail(student_quantile(p, dof), dof) / p, 1.0, 1e-8) << dof << " " << p;
+    }
+  }
+  EXPECT_NEAR(student_quantile(0.05, 1) / std::tan(0.475 * std::numbers::pi), 1.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace abbe::calib

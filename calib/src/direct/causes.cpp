@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <limits>
 #include <numeric>
 
@@ -27,12 +26,6 @@ struct CorrectedValues {
   Eigen::VectorXd values;
   std::size_t parameters = 0;  // of the correction, estimated from the values
 };
-
-std::string three_digits(double value) {
-  std::ostringstream out;
-  out << std::setprecision(3) << value;
-  return out.str();
-}
 
 /// Those positions that the model covers, ascending.
 CorrectedValues covered(const ModelCurve& curve, const CorrectedValues& all) {

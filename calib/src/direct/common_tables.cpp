@@ -6,6 +6,7 @@
 #include "direct/convention.hpp"
 #include "direct/device.hpp"
 #include "direct/model_curve.hpp"
+#include "direct/scatter.hpp"
 #include "direct/squareness.hpp"
 #include "message.hpp"
 #include "rigid_body_effects.hpp"
@@ -130,27 +131,28 @@ class CommonTables {
     return layout_.nodes()[index(motion.axis)].reference_m;
   }
 
-  [[nodiscard]] static double few_runs(const Runs& runs) {
-    const double dof = static_cast<double>(runs.values.size()) - 1.0;
-    return dof >= 1.0 ? student_over_normal(dof) : 1.0;
+  /// Covariance of W mean() from the scatter, enlarged for its few degrees of freedom.
+  [[nodiscard]] static Eigen::MatrixXd scatter_covariance(const UsedError& u,
+                                                          const Eigen::MatrixXd& W) {
+    const Scatter scatter = scatter_of(u.runs, u.motion);
+    const double t = scatter.dof > 0 ? student_over_normal(static_cast<double>(scatter.dof)) : 1.0;
+    return t * t * covariance_of_runs(u.runs, scatter, W);
   }
 
   void add_table(TableValues& raw, const UsedError& u) const {
     const auto [first, count] = place_of(*u.motion);
     const auto nodes_m = nodes_of(*u.motion);
     const Eigen::MatrixXd W = interpolation_matrix(u.runs.positions_m, nodes_m);
-    const double t = few_runs(u.runs);
     raw.U.segment(first, count) = W * u.runs.mean();
     raw.cov_U.block(first, first, count, count) =
-        t * t * u.runs.covariance_of_mean(W) +
+        scatter_covariance(u, W) +
         covariance_of_device(*u.motion, Eigen::MatrixXd::Identity(count, count), nodes_m, device_);
   }
 
   void add_squareness(TableValues& raw, const UsedError& u) const {
     const Eigen::Index i = squareness_place(u.error->name);
-    const double t = few_runs(u.runs);
     raw.U(i) = u.runs.mean()(0) + squareness_change(u.error->name, lines_);
-    raw.cov_U(i, i) = t * t * u.runs.covariance_of_mean(Eigen::MatrixXd::Identity(1, 1))(0, 0) +
+    raw.cov_U(i, i) = scatter_covariance(u, Eigen::MatrixXd::Identity(1, 1))(0, 0) +
                       device_.u_rad * device_.u_rad;
   }
 

@@ -9,6 +9,7 @@
 #include "direct/device.hpp"
 #include "direct/judge.hpp"
 #include "direct/model_curve.hpp"
+#include "direct/scatter.hpp"
 #include "direct/squareness.hpp"
 #include "message.hpp"
 #include "units.hpp"
@@ -22,6 +23,7 @@ struct Reduced {
   Runs runs;                 // at the common positions
   Eigen::VectorXd measured;  // mean over the runs, before the convention
   std::optional<LineChange> lines{};
+  Scatter scatter{};
 };
 
 bool is_squareness_name(std::string_view name) {
@@ -102,9 +104,13 @@ Result<Reduced> compare_motion(const MeasuredError& error, ErrorMotion motion,
   out.measured = out.runs.mean();
   out.table.convention = convention_text(motion, p, reference_m, options.line);
   out.lines = line_change(motion, *all, p, options.line);
-  add_points(out.table, out.runs, P * out.measured, B * model.U(),
-             {out.runs.covariance_of_mean(P), covariance_of_device(motion, P, p, options.device),
-              B * model.covariance() * B.transpose()});
+  out.scatter = scatter_of(out.runs, motion);
+  out.table.dof = out.scatter.dof;
+  add_points(
+      out.table, out.runs, P * out.measured, B * model.U(),
+      {covariance_of_runs(out.runs, out.scatter, P),
+       covariance_of_device(motion, P, p, options.device), B * model.covariance() * B.transpose()},
+      uncertainty_known(motion, out.scatter, options.device));
   return out;
 }
 
@@ -140,9 +146,13 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
   const Eigen::MatrixXd row = squareness_row(error.name, model, lines, options.line);
   out.measured.array() += squareness_change(error.name, lines);
   out.table.convention = squareness_text(error.name, lines);
+  out.scatter = scatter_of(*runs, std::nullopt);
+  out.table.dof = out.scatter.dof;
   add_points(out.table, *runs, out.measured, row * model.U(),
-             {runs->covariance_of_mean(one), options.device.u_rad * options.device.u_rad * one,
-              row * model.covariance() * row.transpose()});
+             {covariance_of_runs(*runs, out.scatter, one),
+              options.device.u_rad * options.device.u_rad * one,
+              row * model.covariance() * row.transpose()},
+             uncertainty_known(std::nullopt, out.scatter, options.device));
   return out;
 }
 
@@ -218,9 +228,10 @@ Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> erro
   for (const Reduced& r : all) {
     tests += count_tests(r.table);
   }
+  const double p = options.false_alarm / static_cast<double>(std::max<std::size_t>(1, tests));
   std::vector<TableComparison> tables;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    judge(all[i].table, options.false_alarm / static_cast<double>(std::max<std::size_t>(1, tests)));
+    judge(all[i].table, limits_of(p, all[i].scatter.dof));
     add_causes(all[i], model, errors[i], options.line);
     tables.push_back(std::move(all[i].table));
   }

@@ -1,6 +1,7 @@
 #include "direct/convention.hpp"
 
-#include <algorithm>
+#include <iomanip>
+#include <sstream>
 
 #include "abbe/calib/basis.hpp"
 #include "message.hpp"
@@ -27,6 +28,12 @@ Eigen::RowVectorXd value_row(std::span<const double> positions_m, StraightnessLi
 }
 
 }  // namespace
+
+std::string three_digits(double value) {
+  std::ostringstream out;
+  out << std::setprecision(3) << value;
+  return out.str();
+}
 
 std::size_t conditions_of(ErrorMotion motion) {
   return is_straightness(motion) ? 2 : 1;

@@ -13,6 +13,9 @@ namespace abbe::calib::direct {
 /// Fewer positions leave nothing to compare after the conditions of a convention.
 inline constexpr std::size_t kLeastPositions = 3;
 
+/// For messages.
+[[nodiscard]] std::string three_digits(double value);
+
 /// Number of conditions that the convention imposes on a table: 2 for straightness, else 1.
 [[nodiscard]] std::size_t conditions_of(ErrorMotion);
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "direct/convention.hpp"
+#include "message.hpp"
 #include "student_tail.hpp"
+#include "units.hpp"
 
 namespace abbe::calib::direct {
 namespace {
@@ -17,15 +20,7 @@ struct PointInput {
   double variance_runs = 0.0, variance_device = 0.0, variance_model = 0.0;
 };
 
-/// [GUM] G.4.1: only the scatter of the runs has a limited number of degrees of freedom.
-std::size_t effective_dof(double variance, double variance_runs, std::size_t runs) {
-  constexpr double kUnlimited = 1e6;
-  const double ratio = variance_runs > 0.0 ? variance / variance_runs : kUnlimited;
-  const double dof = ratio * ratio * static_cast<double>(runs - 1);
-  return static_cast<std::size_t>(std::clamp(dof, 1.0, kUnlimited));
-}
-
-PointDifference tested_point(const PointInput& in, std::size_t runs) {
+PointDifference tested_point(const PointInput& in, bool known) {
   PointDifference out;
   out.position_m = in.position_m;
   out.measured = in.measured;
@@ -37,13 +32,8 @@ PointDifference tested_point(const PointInput& in, std::size_t runs) {
   out.u_model = std::sqrt(std::max(0.0, in.variance_model));
   out.u = std::sqrt(std::max(0.0, variance));
 
-  const bool scatter_known = runs > 1 || in.variance_device > 0.0;
-  out.tested = scatter_known && out.u > kFixedByConvention;
-  if (out.tested) {
-    const std::size_t dof = runs > 1 ? effective_dof(variance, in.variance_runs, runs)
-                                     : effective_dof(variance, 0.0, 2);
-    out.p = student_tail(out.difference / out.u, dof);
-  }
+  out.u_runs = std::sqrt(in.variance_runs);
+  out.tested = known && out.u > kFixedByConvention;
   return out;
 }
 
@@ -68,15 +58,29 @@ void add_statistics(TableComparison& table) {
   table.rms_normalised = tested > 0.0 ? std::sqrt(normalised / tested) : 0.0;
 }
 
+std::string too_coarse(const TableComparison& table, double largest_of_model) {
+  const char* unit = table.is_angle ? " urad" : " um";
+  return message("differences up to ", three_digits(kUmPerM * table.revealed), unit,
+                 " would not be found, the largest value of the model is ",
+                 three_digits(kUmPerM * largest_of_model), unit,
+                 "; measure more runs, or state the uncertainty of the device");
+}
+
+std::string why_not_tested(const TableComparison& table) {
+  return table.runs < 2 ? "one run shows no scatter; state the uncertainty of the device"
+                        : "neither the runs nor the model show an uncertainty; state that of the "
+                          "device";
+}
+
 }  // namespace
 
 void add_points(TableComparison& table, const Runs& runs, const Eigen::VectorXd& measured,
-                const Eigen::VectorXd& model, const PointCovariances& cov) {
+                const Eigen::VectorXd& model, const PointCovariances& cov, bool known) {
   for (std::size_t k = 0; k < runs.positions_m.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     table.points.push_back(tested_point({runs.positions_m[k], measured(i), model(i), cov.runs(i, i),
                                          cov.device(i, i), cov.model(i, i)},
-                                        runs.values.size()));
+                                        known));
   }
   add_statistics(table);
   table.finding = Finding::NotTested;  // judged later
@@ -88,22 +92,40 @@ std::size_t count_tests(const TableComparison& table) {
                     [](const PointDifference& point) { return point.tested; }));
 }
 
-void judge(TableComparison& table, double limit) {
+Limits limits_of(double p, std::size_t dof) {
+  constexpr std::size_t kNormal = 1000;  // up to 1 % above the normal quantile, and fast
+  return {dof > 0 ? student_quantile(p, dof) : 0.0, student_quantile(p, kNormal)};
+}
+
+double limit_of(const Limits& limits, double variance_runs, double variance) {
+  return std::sqrt(limits.student * limits.student * variance_runs +
+                   limits.normal * limits.normal * std::max(0.0, variance - variance_runs));
+}
+
+void judge(TableComparison& table, const Limits& limits) {
   if (table.points.empty()) {
     table.finding = Finding::NotCompared;
     return;
   }
-  double least_p = 1.0;
-  bool tested = false;
-  for (const PointDifference& point : table.points) {
-    tested = tested || point.tested;
-    least_p = std::min(least_p, point.p);
+  bool tested = false, contradicts = false, model_seen = false;
+  double largest_of_model = 0.0;
+  for (PointDifference& point : table.points) {
+    largest_of_model = std::max(largest_of_model, std::abs(point.model));
+    if (point.tested) {
+      point.limit = limit_of(limits, point.u_runs * point.u_runs, point.u * point.u);
+      table.revealed = std::max(table.revealed, point.limit);
+      tested = true;
+      contradicts = contradicts || std::abs(point.difference) > point.limit;
+      model_seen = model_seen || std::abs(point.model) > point.limit;
+    }
   }
-  table.finding = least_p < limit ? Finding::Contradicts : Finding::Agrees;
-  if (!tested) {
-    table.finding = Finding::NotTested;
-    table.reason = table.runs < 2 ? "one run shows no scatter; state the uncertainty of the device"
-                                  : "neither the runs nor the model show an uncertainty";
+
+  if (contradicts) {
+    table.finding = Finding::Contradicts;
+  } else if (tested && model_seen) {
+    table.finding = Finding::Agrees;
+  } else if (table.reason.empty()) {
+    table.reason = tested ? too_coarse(table, largest_of_model) : why_not_tested(table);
   }
 }
 

@@ -14,11 +14,20 @@ struct PointCovariances {
 
 /// Fills points and statistics of the table; `measured` and `model` are after the convention.
 void add_points(TableComparison&, const Runs&, const Eigen::VectorXd& measured,
-                const Eigen::VectorXd& model, const PointCovariances&);
+                const Eigen::VectorXd& model, const PointCovariances&, bool uncertainty_known);
 
 [[nodiscard]] std::size_t count_tests(const TableComparison&);
 
-/// Sets the finding; `limit`: of the probability of each test.
-void judge(TableComparison&, double limit);
+/// Quantiles of one test; see compare.hpp.
+struct Limits {
+  double student = 0.0, normal = 0.0;
+};
+/// p: probability of a false alarm of one test; dof: 0 if the scatter of the runs is not known.
+[[nodiscard]] Limits limits_of(double p, std::size_t dof);
+/// Of a |difference| with this variance, `variance_runs` of it from the scatter of the runs.
+[[nodiscard]] double limit_of(const Limits&, double variance_runs, double variance);
+
+/// Sets the limits of the points and the finding.
+void judge(TableComparison&, const Limits&);
 
 }  // namespace abbe::calib::direct

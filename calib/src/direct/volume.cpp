@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "direct/common_tables.hpp"
+#include "direct/scatter.hpp"
 
 namespace abbe::calib::direct {
 namespace {
@@ -44,11 +45,6 @@ std::vector<Vector3> grid_of(const MachineNodes& nodes, const VolumetricModel& m
   std::vector<Vector3> grid = tensor_grid(few);
   std::erase_if(grid, [&](const Vector3& q) { return !model.validity().contains(q); });
   return grid;
-}
-
-bool uncertainty_known(const UsedError& u, const DeviceUncertainty& device) {
-  const bool is_angle = !u.motion || is_rotation(u.motion->motion);
-  return u.runs.values.size() > 1 || (is_angle ? device.u_rad : device.u_m) > 0.0;
 }
 
 void add_uncertainty(VolumeComparison& out, std::span<const Vector3> grid) {
@@ -122,8 +118,9 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
   out.V_measured = vector_statistics(errors_on(grid, out.measured));
   out.V_model = vector_statistics(errors_on(grid, out.model));
   add_names(out, *used, model);
-  if (std::all_of(used->begin(), used->end(),
-                  [&](const UsedError& u) { return uncertainty_known(u, device); })) {
+  if (std::all_of(used->begin(), used->end(), [&](const UsedError& u) {
+        return uncertainty_known(u.motion, scatter_of(u.runs, u.motion), device);
+      })) {
     add_uncertainty(out, grid);
   }
   return out;

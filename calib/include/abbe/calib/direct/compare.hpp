@@ -14,9 +14,19 @@
 ///
 /// The difference d = P (measured - model) at a position has the standard uncertainty u,
 ///     u^2 = u_runs^2 + u_device^2 + u_model^2
-/// u_runs: [GUM] 4.2.3, scatter of the runs after P; u_device: DeviceUncertainty; u_model: from the
-/// covariance of the model, P B C B^T P^T. d / u is compared with Student's t; its effective degrees
-/// of freedom are those of the runs, by [GUM] G.4.1 (Welch-Satterthwaite), truncated.
+/// u_runs: scatter of the runs; u_device: DeviceUncertainty; u_model: from the covariance of the
+/// model, P B C B^T P^T. The scatter is pooled over the m positions of a table: n runs, c conditions
+/// of the convention (2 for straightness, else 1), rho: correlation of neighbouring positions,
+///     s^2 = sum |r|^2 / ((n - 1)(m - c)),   u_runs^2 = s^2 / n diag(P P^T)
+///     nu = (n - 1)(m - c) (1 - rho^2) / (1 + rho^2),   at least n - 1 degrees of freedom
+/// r: deviation of a run from the mean of the runs after the least-squares removal of what the
+/// convention removes. A position with more scatter than s has its own ([GUM] 4.2.3).
+/// A difference contradicts if it exceeds
+///     limit = sqrt((t_nu u_runs)^2 + z^2 (u_device^2 + u_model^2))
+/// t_nu, z: quantiles of Student's and of the normal distribution at the probability of one test. It
+/// is exceeded by chance with at most this probability, whatever the ratio of the terms: the
+/// distribution function of chi-square with 1 degree of freedom is concave. With the effective
+/// degrees of freedom of [GUM] G.4.1 it is exceeded more often if a small s is estimated by chance.
 ///
 /// What u leaves out, so that a contradiction can be its effect: errors of the machine between the
 /// nodes of the model, thermal changes between the two measurements, levers of the measured line
@@ -58,7 +68,9 @@ struct CompareOptions {
 enum class Finding {
   Agrees,       ///< no difference exceeds its limit
   Contradicts,  ///< at least one does
-  NotTested,    ///< no uncertainty is known: one run, and none stated of the device
+  /// No uncertainty is known, or no value of the model exceeds its limit: then the measurement does
+  /// not distinguish the model from a machine without errors.
+  NotTested,
   NotCompared,  ///< see TableComparison::reason
 };
 /// "agrees", "contradicts", "not tested", "not compared".
@@ -70,7 +82,8 @@ struct PointDifference {
   double measured = 0.0, u_measured = 0.0;  ///< u: runs and device
   double model = 0.0, u_model = 0.0;
   double difference = 0.0, u = 0.0;
-  double p = 1.0;  ///< probability of a larger |difference| by chance; 1 if not tested
+  double u_runs = 0.0;  ///< part of u
+  double limit = 0.0;   ///< a larger |difference| contradicts; 0 if not tested
   bool tested = false;
 };
 
@@ -82,12 +95,15 @@ struct TableComparison {
   std::string reason;               ///< why it is not compared or not tested; else empty
   std::vector<std::string> causes;  ///< corrections of the measured values that make them fit
   std::size_t runs = 0;
+  std::size_t dof = 0;       ///< of the scatter of the runs
   std::size_t left_out = 0;  ///< positions that some run or direction does not have
   std::size_t outside = 0;   ///< positions outside the nodes of the model
   std::string convention;    ///< "zero at 0 mm", "line through -300 and 300 mm removed"
   std::vector<PointDifference> points;
   double mae = 0.0, rms = 0.0, largest = 0.0;  ///< of |difference| over the points; m or rad
   double largest_at_m = 0.0;
+  /// A larger difference contradicts at whatever position: the largest limit; 0 if not tested.
+  double revealed = 0.0;
   /// |difference| / u over the tested points
   double rms_normalised = 0.0, largest_normalised = 0.0;
   std::optional<Reversal> reversal{};

@@ -1,0 +1,27 @@
+#pragma once
+/// Scatter of the runs of one error, pooled over its positions; see compare.hpp.
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "abbe/calib/direct/compare.hpp"
+
+namespace abbe::calib::direct {
+
+struct Scatter {
+  double variance = 0.0;  // of one value of one run
+  std::size_t dof = 0;    // 0: not known
+};
+/// Of a squareness: nullopt. Not known for one run, and if the values of all runs are the same.
+[[nodiscard]] Scatter scatter_of(const Runs&, const std::optional<ErrorMotion>&);
+
+/// Covariance of P mean() from the pooled scatter, enlarged at positions with more scatter.
+[[nodiscard]] Eigen::MatrixXd covariance_of_runs(const Runs&, const Scatter&,
+                                                 const Eigen::MatrixXd& P);
+
+/// Whether the uncertainty of the measured values is known: from the scatter, or stated as
+/// DeviceUncertainty::u_m or u_rad. An uncertainty of the scale alone is not enough.
+[[nodiscard]] bool uncertainty_known(const std::optional<ErrorMotion>&, const Scatter&,
+                                     const DeviceUncertainty&);
+
+}  // namespace abbe::calib::direct

@@ -51,6 +51,18 @@ TEST_F(DirectCauses, NamesAReversedSign) {
   }
 }
 
+/// The sign explains most of the difference, not all: a bow of 6 um is left.
+TEST_F(DirectCauses, CallsCloserWhatStillContradicts) {
+  const auto bow = [](double p) { return 6e-6 * std::sin(20.0 * p); };
+  const auto t = with("EXX", [&](Reading& r) { r.value = bow(r.position_m) - r.value; });
+  EXPECT_THAT(t.causes, ::testing::Contains(
+                            ::testing::StartsWith("closer with the sign of the values reversed")));
+  const auto plain = with("EXX", [](Reading& r) { r.value = -r.value; });
+  EXPECT_THAT(
+      plain.causes,
+      ::testing::Contains(::testing::StartsWith("fits with the sign of the values reversed")));
+}
+
 TEST_F(DirectCauses, NamesReversedPositions) {
   const auto t = with("EXX", [](Reading& r) { r.position_m = -r.position_m; });
   EXPECT_THAT(t.causes, ElementsAre(HasSubstr("with the sign of the positions reversed: ")));

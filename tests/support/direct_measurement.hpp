@@ -81,11 +81,51 @@ inline calib::direct::MeasuredError measured_table(const otf::MadeRun& run, cons
       [&](double p) { return table_value(run, motion, p); }, device);
 }
 
+/// V of the simulated machine along the line of an axis through `at_m`: one component.
+inline double V_on_line(const otf::MadeRun& run, calib::ErrorMotion translation,
+                        calib::Vector3 at_m, double position_m) {
+  const calib::ParameterLayout layout = otf::layout_of(run.machine);
+  at_m(static_cast<Eigen::Index>(calib::index(translation.axis))) = position_m;
+  const calib::Vector3 V = calib::volumetric_error(layout, {run.truth.data(), layout.model_size()},
+                                                   at_m, run.machine.target_offset_m);
+  return V(static_cast<Eigen::Index>(calib::direction(translation.motion)));
+}
+
+/// Slope of V_on_line() between two positions.
+inline double slope_on_line(const otf::MadeRun& run, calib::ErrorMotion translation,
+                            const calib::Vector3& at_m, double first_m, double last_m) {
+  return (V_on_line(run, translation, at_m, last_m) - V_on_line(run, translation, at_m, first_m)) /
+         (last_m - first_m);
+}
+
+/// What a device measures between the lines of X, Y, Z through `at_m` from `first_m` to `last_m`: the
+/// rotation of the direction of travel, in three runs.
+inline calib::direct::MeasuredError measured_squareness(const otf::MadeRun& run,
+                                                        const std::string& name,
+                                                        const calib::Vector3& at_m,
+                                                        const calib::Vector3& first_m,
+                                                        const calib::Vector3& last_m) {
+  using calib::Axis, calib::Motion;
+  const auto slope = [&](Motion motion, Axis axis) {
+    const auto a = static_cast<Eigen::Index>(calib::index(axis));
+    return slope_on_line(run, {motion, axis}, at_m, first_m(a), last_m(a));
+  };
+  const double value = name == "EC0Y"   ? -slope(Motion::X, Axis::Y) - slope(Motion::Y, Axis::X)
+                       : name == "EB0Z" ? slope(Motion::X, Axis::Z) + slope(Motion::Z, Axis::X)
+                                        : -slope(Motion::Y, Axis::Z) - slope(Motion::Z, Axis::Y);
+  calib::direct::MeasuredError error{.name = name, .readings = {}, .line_m = at_m};
+  for (int r = 1; r <= 3; ++r) {
+    error.readings.push_back({0.0, value + 0.1e-6 * (r - 2), r, true});
+  }
+  return error;
+}
+
 /// All tables of the simulated machine.
 inline std::vector<calib::direct::MeasuredError> all_measured(const otf::MadeRun& run,
                                                               const DirectDevice& device = {}) {
   std::vector<calib::direct::MeasuredError> errors;
-  for (const calib::Table& table : otf::layout_of(run.machine).tables()) {
+  const calib::ParameterLayout layout = otf::layout_of(run.machine);
+  for (const calib::Table& table : layout.tables()) {
     errors.push_back(measured_table(run, calib::name(table.motion), device));
   }
   return errors;

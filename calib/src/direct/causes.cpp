@@ -7,15 +7,17 @@
 #include <numeric>
 
 #include "direct/convention.hpp"
+#include "direct/device.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::direct {
 namespace {
 
+constexpr double kRounding = 1e-12;  // m or rad
 constexpr double kNeverFits = std::numeric_limits<double>::infinity();
 constexpr std::size_t kLeastDof = 3;
-constexpr double kFits = 1.0 / 3.0;    // of the rms difference of the values as given
+constexpr double kCloser = 1.0 / 3.0;  // of the rms difference of the values as given
 constexpr double kAsGoodAsBest = 1.5;  // times the best rms difference
 constexpr double kMostOutside = 0.3;   // share of positions that a correction may lose
 
@@ -79,6 +81,27 @@ class CauseSearch {
         reduction(curve_.motion(), c.positions_m, curve_.nodes().reference_m, line_);
     const Eigen::VectorXd left = P * (c.values - curve_.values(c.positions_m));
     return std::sqrt(left.squaredNorm() / static_cast<double>(c.positions_m.size() - used));
+  }
+
+  /// Repeats the test of the table with corrected values.
+  [[nodiscard]] bool fits(const CorrectedValues& corrected, const CauseTest& test) const {
+    const CorrectedValues c = covered(curve_, corrected);
+    const Eigen::MatrixXd P =
+        reduction(curve_.motion(), c.positions_m, curve_.nodes().reference_m, line_);
+    const Eigen::VectorXd left = P * (c.values - curve_.values(c.positions_m));
+    const double n = static_cast<double>(test.runs);
+    const Eigen::VectorXd runs = test.scatter.variance / n * (P * P.transpose()).diagonal();
+    const Eigen::MatrixXd B = P * curve_.rows(c.positions_m);
+    const Eigen::VectorXd rest =
+        curve_.covariance(B).diagonal() +
+        covariance_of_device(curve_.motion(), P, c.positions_m, test.device).diagonal();
+
+    for (Eigen::Index i = 0; i < left.size(); ++i) {
+      if (std::abs(left(i)) > limit_of(test.limits, runs(i), runs(i) + rest(i)) + kRounding) {
+        return false;
+      }
+    }
+    return true;
   }
 
   [[nodiscard]] std::vector<CorrectedValues> corrections() const {
@@ -237,7 +260,8 @@ class CauseSearch {
 }  // namespace
 
 std::vector<std::string> likely_causes(const ModelCurve& curve, std::span<const double> positions_m,
-                                       const Eigen::VectorXd& measured, StraightnessLine line) {
+                                       const Eigen::VectorXd& measured, StraightnessLine line,
+                                       const std::optional<CauseTest>& test) {
   const CauseSearch search(curve, positions_m, measured, line);
   const double given = search.rms_as_given();
   if (!std::isfinite(given)) {
@@ -256,9 +280,11 @@ std::vector<std::string> likely_causes(const ModelCurve& curve, std::span<const 
   const char* unit = is_rotation(curve.motion().motion) ? " urad" : " um";
   std::vector<std::string> causes;
   for (const std::size_t i : order) {
-    if (left[i] <= kFits * given && left[i] <= kAsGoodAsBest * left[order.front()]) {
-      causes.push_back(message(corrections[i].text, ": ", three_digits(kUmPerM * left[i]), unit,
-                               " rms left of ", three_digits(kUmPerM * given), unit));
+    if (left[i] <= kCloser * given && left[i] <= kAsGoodAsBest * left[order.front()]) {
+      const bool fits = test && search.fits(corrections[i], *test);
+      causes.push_back(message(fits ? "fits " : "closer ", corrections[i].text, ": ",
+                               three_digits(kUmPerM * left[i]), unit, " rms left of ",
+                               three_digits(kUmPerM * given), unit));
     }
   }
   return causes;

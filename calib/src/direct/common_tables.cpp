@@ -51,25 +51,16 @@ Result<AxisNodes> common_nodes(const std::vector<UsedError>& used, Axis axis,
   return nodes;
 }
 
-/// W such that W * values at the positions is the linear interpolation at the nodes.
-Eigen::MatrixXd interpolation_matrix(std::span<const double> positions_m,
-                                     std::span<const double> nodes_m) {
-  Eigen::MatrixXd W = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(nodes_m.size()),
-                                            static_cast<Eigen::Index>(positions_m.size()));
-  for (std::size_t i = 0; i < nodes_m.size(); ++i) {
-    const BasisRow row = basis_row(positions_m, nodes_m[i]);
-    W(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(row.first)) = row.weight[0];
-    W(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(row.first + 1)) = row.weight[1];
-  }
-  return W;
-}
-
 /// Builds the parameters of both sides in the common layout.
 class CommonTables {
  public:
   CommonTables(const std::vector<UsedError>& used, const ParameterLayout& layout,
                const VolumetricModel& model, const DeviceUncertainty& device)
-      : used_(used), layout_(layout), model_(model), device_(device) {
+      : used_(used),
+        layout_(layout),
+        model_(model),
+        device_(device),
+        basis_(estimation::TableBasis::of(layout).value()) {  // linear: no limit of nodes
     const auto n = static_cast<Eigen::Index>(layout.model_size());
     convention_ = Eigen::MatrixXd::Identity(n, n);
     for (const UsedError& u : used_) {
@@ -77,11 +68,13 @@ class CommonTables {
         const auto [first, count] = place_of(*u.motion);
         convention_.block(first, first, count, count) =
             reduction(*u.motion, nodes_of(*u.motion), reference_of(*u.motion), kLine);
-        if (const auto change = line_change(*u.motion, u.runs, nodes_of(*u.motion), kLine)) {
+        if (const auto change =
+                line_change(*u.motion, u.all, u.error->line_m, nodes_of(*u.motion), kLine)) {
           lines_.push_back(*change);
         }
       }
     }
+    add_squareness_rows();
   }
 
   [[nodiscard]] TableValues measured() const {
@@ -92,7 +85,7 @@ class CommonTables {
       u.motion ? add_table(raw, u) : add_squareness(raw, u);
       add_levers(T, u);
     }
-    T = convention_ * T;
+    T = squareness_ * convention_ * T;
     return {T * raw.U, T * raw.cov_U * T.transpose()};
   }
 
@@ -103,11 +96,11 @@ class CommonTables {
         const auto [first, count] = place_of(*u.motion);
         B.middleRows(first, count) = ModelCurve(model_, *u.motion).rows(nodes_of(*u.motion));
       } else {
-        B.row(squareness_place(u.error->name)) =
-            squareness_row(u.error->name, model_, lines_, kLine);
+        B.row(squareness_place(u.error->name)) = squareness_row(
+            u.error->name, *model_.tables(), tool_m(), *u.error->line_m, lines_, kLine);
       }
     }
-    B = convention_ * B;
+    B = squareness_ * convention_ * B;
     return {B * model_.U(), B * model_.covariance() * B.transpose()};
   }
 
@@ -123,6 +116,18 @@ class CommonTables {
     const auto found = std::find(kSquarenessNames.begin(), kSquarenessNames.end(), name);
     return static_cast<Eigen::Index>(layout_.squareness_offset()) +
            (found - kSquarenessNames.begin());
+  }
+  [[nodiscard]] const Vector3& tool_m() const { return model_.tool_offsets_m().front(); }
+  /// From the slopes of V along the measured lines to the squareness parameter of the common tables.
+  void add_squareness_rows() {
+    squareness_ = Eigen::MatrixXd::Identity(convention_.rows(), convention_.rows());
+    for (const UsedError& u : used_) {
+      if (!u.motion) {
+        squareness_.row(squareness_place(u.error->name)) *= 2.0;  // its own coefficient is 1
+        squareness_.row(squareness_place(u.error->name)) -=
+            squareness_row(u.error->name, basis_, tool_m(), *u.error->line_m, lines_, kLine);
+      }
+    }
   }
   [[nodiscard]] std::span<const double> nodes_of(ErrorMotion motion) const {
     return layout_.nodes()[index(motion.axis)].nodes_m;
@@ -178,32 +183,55 @@ class CommonTables {
   const ParameterLayout& layout_;
   const VolumetricModel& model_;
   DeviceUncertainty device_;
-  Eigen::MatrixXd convention_;
+  estimation::TableBasis basis_;
+  Eigen::MatrixXd convention_, squareness_;
   std::vector<LineChange> lines_;
 };
 
 }  // namespace
 
-Result<std::vector<UsedError>> used_errors(std::span<const MeasuredError> errors,
-                                           const VolumetricModel& model) {
-  std::vector<UsedError> used;
+Result<UsableErrors> usable_errors(std::span<const MeasuredError> errors,
+                                   const VolumetricModel& model) {
+  UsableErrors out;
   for (const MeasuredError& error : errors) {
     const auto motion = error_motion(error.name);
-    const auto runs = runs_of(error);
+    auto runs = runs_of(error);
     if (!runs) {
       return tl::make_unexpected(runs.error());
     }
     if (!motion) {
-      used.push_back({&error, std::nullopt, *runs});
+      out.used.push_back({&error, std::nullopt, *runs, *runs});
     } else if (model.tables()->layout().find(*motion)) {
       const ModelCurve curve(model, *motion);
       Runs covered = at_positions(*runs, [&](double p) { return curve.covers(p); });
-      if (covered.positions_m.size() >= kLeastPositions) {
-        used.push_back({&error, motion, std::move(covered)});
+      if (covered.positions_m.size() < kLeastPositions) {
+        out.left_out.push_back({error.name, "too few common positions"});
+      } else {
+        out.used.push_back({&error, motion, std::move(covered), std::move(*runs)});
       }
     }
   }
-  return used;
+  return out;
+}
+
+void leave_out_squareness(UsableErrors& errors, const ParameterLayout& layout) {
+  std::vector<LineChange> lines;
+  for (const UsedError& u : errors.used) {
+    if (u.motion) {
+      const auto change = line_change(*u.motion, u.all, u.error->line_m,
+                                      layout.nodes()[index(u.motion->axis)].nodes_m, kLine);
+      if (change) {
+        lines.push_back(*change);
+      }
+    }
+  }
+  std::erase_if(errors.used, [&](const UsedError& u) {
+    const std::string reason = u.motion ? "" : why_not_comparable(*u.error, layout.nodes(), lines);
+    if (!reason.empty()) {
+      errors.left_out.push_back({u.error->name, reason});
+    }
+    return !reason.empty();
+  });
 }
 
 Result<ParameterLayout> common_layout(const std::vector<UsedError>& used,

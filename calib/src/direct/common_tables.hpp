@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "abbe/calib/direct/compare.hpp"
+#include "abbe/calib/direct/volume.hpp"
 
 namespace abbe::calib::direct {
 
@@ -16,10 +16,17 @@ struct UsedError {
   const MeasuredError* error;
   std::optional<ErrorMotion> motion;  // nullopt: squareness
   Runs runs;                          // within the nodes of the model
+  Runs all;
 };
-/// Those with at least three positions within the nodes of the model.
-[[nodiscard]] Result<std::vector<UsedError>> used_errors(std::span<const MeasuredError>,
-                                                         const VolumetricModel&);
+struct UsableErrors {
+  std::vector<UsedError> used;
+  std::vector<LeftOut> left_out;  // of those that the model has
+};
+/// Used: those with at least three positions within the nodes of the model, and every squareness.
+[[nodiscard]] Result<UsableErrors> usable_errors(std::span<const MeasuredError>,
+                                                 const VolumetricModel&);
+/// Leaves out each squareness that cannot be compared on the common nodes.
+void leave_out_squareness(UsableErrors&, const ParameterLayout&);
 /// The tables of the used errors, on the nodes that they have in common.
 [[nodiscard]] Result<ParameterLayout> common_layout(const std::vector<UsedError>&,
                                                     const VolumetricModel&);

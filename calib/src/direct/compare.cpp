@@ -24,6 +24,7 @@ struct Reduced {
   Eigen::VectorXd measured;  // mean over the runs, before the convention
   std::optional<LineChange> lines{};
   Scatter scatter{};
+  double change = 0.0;  // squareness: part of `measured` that is not in the readings
 };
 
 bool is_squareness_name(std::string_view name) {
@@ -53,8 +54,8 @@ Result<void> check_options(const CompareOptions& options) {
   const DeviceUncertainty& u = options.device;
   for (const double value : {u.u_m, u.u_rad, u.u_scale}) {
     if (!(value >= 0.0 && std::isfinite(value))) {
-      return failure(ErrorCode::BadInput,
-                     message("comparison: uncertainty of the device ", value, " is negative"));
+      return failure(ErrorCode::BadInput, message("comparison: uncertainty of the device ", value,
+                                                  " must be finite and >= 0"));
     }
   }
   return {};
@@ -103,7 +104,7 @@ Result<Reduced> compare_motion(const MeasuredError& error, ErrorMotion motion,
   const Eigen::MatrixXd B = P * curve.rows(p);
   out.measured = out.runs.mean();
   out.table.convention = convention_text(motion, p, reference_m, options.line);
-  out.lines = line_change(motion, *all, p, options.line);
+  out.lines = line_change(motion, *all, error.line_m, p, options.line);
   out.scatter = scatter_of(out.runs, motion);
   out.table.dof = out.scatter.dof;
   add_points(
@@ -142,9 +143,17 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
   out.table.is_angle = out.table.is_squareness = true;
   out.table.runs = runs->values.size();
   const std::vector<LineChange> lines = lines_of(motions);
+  out.table.reason = why_not_comparable(error, model.tables()->layout().nodes(), lines);
+  if (!out.table.reason.empty()) {
+    return out;
+  }
+
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
-  const Eigen::MatrixXd row = squareness_row(error.name, model, lines, options.line);
-  out.measured.array() += squareness_change(error.name, lines);
+  const Eigen::MatrixXd row =
+      squareness_row(error.name, *model.tables(), model.tool_offsets_m().front(), *error.line_m,
+                     lines, options.line);
+  out.change = squareness_change(error.name, lines);
+  out.measured.array() += out.change;
   out.table.convention = squareness_text(error.name, lines);
   out.scatter = scatter_of(*runs, std::nullopt);
   out.table.dof = out.scatter.dof;
@@ -157,25 +166,31 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
 }
 
 /// Causes of a squareness: only its sign can be told from one value.
-void add_squareness_cause(TableComparison& table) {
-  const PointDifference& point = table.points.front();
-  const double reversed = std::abs(-point.measured - point.model);
-  if (reversed <= std::max(point.u, std::abs(point.difference) / 3.0)) {
-    table.causes.emplace_back("with the sign of the value reversed");
+void add_squareness_cause(Reduced& r) {
+  const PointDifference& point = r.table.points.front();
+  const double reversed = std::abs(2.0 * r.change - point.measured - point.model);
+  if (reversed <= std::max(point.limit, std::abs(point.difference) / 3.0)) {
+    const bool fits = r.table.finding == Finding::Contradicts && reversed <= point.limit;
+    r.table.causes.push_back(
+        message(fits ? "fits" : "closer", " with the sign of the value reversed"));
   }
 }
 
 void add_causes(Reduced& r, const VolumetricModel& model, const MeasuredError& error,
-                StraightnessLine line) {
+                const CompareOptions& options, const Limits& limits) {
   if (r.table.finding == Finding::Agrees || r.table.points.empty()) {
     return;
   }
   if (r.table.is_squareness) {
-    add_squareness_cause(r.table);
+    add_squareness_cause(r);
     return;
   }
   const ModelCurve curve(model, *error_motion(error.name), error.line_m);
-  r.table.causes = likely_causes(curve, r.runs.positions_m, r.measured, line);
+  std::optional<CauseTest> test;
+  if (r.table.finding == Finding::Contradicts) {
+    test = CauseTest{r.scatter, r.table.runs, options.device, limits};
+  }
+  r.table.causes = likely_causes(curve, r.runs.positions_m, r.measured, options.line, test);
 }
 
 }  // namespace
@@ -231,8 +246,9 @@ Result<std::vector<TableComparison>> compare(std::span<const MeasuredError> erro
   const double p = options.false_alarm / static_cast<double>(std::max<std::size_t>(1, tests));
   std::vector<TableComparison> tables;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    judge(all[i].table, limits_of(p, all[i].scatter.dof));
-    add_causes(all[i], model, errors[i], options.line);
+    const Limits limits = limits_of(p, all[i].scatter.dof);
+    judge(all[i].table, limits);
+    add_causes(all[i], model, errors[i], options, limits);
     tables.push_back(std::move(all[i].table));
   }
   return tables;

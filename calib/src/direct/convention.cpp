@@ -76,6 +76,19 @@ Eigen::MatrixXd reduction(ErrorMotion motion, std::span<const double> positions_
   return P;
 }
 
+/// W such that W * values at the positions is the linear interpolation at the nodes.
+Eigen::MatrixXd interpolation_matrix(std::span<const double> positions_m,
+                                     std::span<const double> nodes_m) {
+  Eigen::MatrixXd W = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(nodes_m.size()),
+                                            static_cast<Eigen::Index>(positions_m.size()));
+  for (std::size_t i = 0; i < nodes_m.size(); ++i) {
+    const BasisRow row = basis_row(positions_m, nodes_m[i]);
+    W(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(row.first)) = row.weight[0];
+    W(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(row.first + 1)) = row.weight[1];
+  }
+  return W;
+}
+
 std::string convention_text(ErrorMotion motion, std::span<const double> positions_m,
                             double reference_m, StraightnessLine line) {
   if (!is_straightness(motion)) {

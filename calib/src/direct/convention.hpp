@@ -28,6 +28,10 @@ inline constexpr std::size_t kLeastPositions = 3;
 [[nodiscard]] std::string convention_text(ErrorMotion, std::span<const double> positions_m,
                                           double reference_m, StraightnessLine);
 
+/// W such that W * values at the positions is the linear interpolation at the nodes.
+[[nodiscard]] Eigen::MatrixXd interpolation_matrix(std::span<const double> positions_m,
+                                                   std::span<const double> nodes_m);
+
 /// s such that s * values is the slope that reduction() removes from a straightness.
 [[nodiscard]] Eigen::RowVectorXd slope_row(std::span<const double> positions_m, StraightnessLine);
 

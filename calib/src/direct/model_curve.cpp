@@ -15,14 +15,13 @@ Eigen::RowVectorXd table_row(const VolumetricModel& model, ErrorMotion motion, d
   return row;
 }
 
-/// Row of one component of V at an axis position, for the tool of the model.
-Eigen::RowVectorXd component_row(const VolumetricModel& model, const Vector3& q_m,
-                                 std::size_t component) {
-  const estimation::TableBasis& basis = *model.tables();
+/// Row of one component of V at an axis position.
+Eigen::RowVectorXd component_row(const estimation::TableBasis& basis, const Vector3& tool_m,
+                                 const Vector3& q_m, std::size_t component) {
   std::vector<estimation::Column> memory(basis.most_columns());
   estimation::ModelColumns columns(memory);
-  basis.append_columns({.q_m = q_m, .tool_offset_m = model.tool_offsets_m().front()}, columns);
-  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(model.U().size());
+  basis.append_columns({.q_m = q_m, .tool_offset_m = tool_m}, columns);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(basis.size()));
   for (const estimation::Column& column : columns.span()) {
     row(static_cast<Eigen::Index>(column.parameter)) =
         column.dV_dU(static_cast<Eigen::Index>(component));
@@ -31,6 +30,20 @@ Eigen::RowVectorXd component_row(const VolumetricModel& model, const Vector3& q_
 }
 
 }  // namespace
+
+Eigen::MatrixXd rows_along(const estimation::TableBasis& basis, const Vector3& tool_m,
+                           ErrorMotion translation, const Vector3& line_m,
+                           std::span<const double> positions_m) {
+  Eigen::MatrixXd A(static_cast<Eigen::Index>(positions_m.size()),
+                    static_cast<Eigen::Index>(basis.size()));
+  Vector3 q_m = line_m;
+  for (std::size_t i = 0; i < positions_m.size(); ++i) {
+    q_m(static_cast<Eigen::Index>(index(translation.axis))) = positions_m[i];
+    A.row(static_cast<Eigen::Index>(i)) =
+        component_row(basis, tool_m, q_m, direction(translation.motion));
+  }
+  return A;
+}
 
 ModelCurve::ModelCurve(const VolumetricModel& model, ErrorMotion motion,
                        const std::optional<Vector3>& line_m)
@@ -47,16 +60,13 @@ bool ModelCurve::covers(double position_m) const {
 }
 
 Eigen::MatrixXd ModelCurve::rows(std::span<const double> positions_m) const {
+  if (line_m_ && !is_rotation(motion_.motion)) {
+    return rows_along(*model_->tables(), model_->tool_offsets_m().front(), motion_, *line_m_,
+                      positions_m);
+  }
   Eigen::MatrixXd A(static_cast<Eigen::Index>(positions_m.size()), model_->U().size());
   for (std::size_t i = 0; i < positions_m.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (!line_m_ || is_rotation(motion_.motion)) {
-      A.row(row) = table_row(*model_, motion_, positions_m[i]);
-      continue;
-    }
-    Vector3 q_m = *line_m_;
-    q_m(static_cast<Eigen::Index>(index(motion_.axis))) = positions_m[i];
-    A.row(row) = component_row(*model_, q_m, direction(motion_.motion));
+    A.row(static_cast<Eigen::Index>(i)) = table_row(*model_, motion_, positions_m[i]);
   }
   return A;
 }

@@ -10,6 +10,12 @@
 
 namespace abbe::calib::direct {
 
+/// Rows A such that A * U is the component of V of a translation error along its axis, on the line
+/// through line_m.
+[[nodiscard]] Eigen::MatrixXd rows_along(const estimation::TableBasis&, const Vector3& tool_m,
+                                         ErrorMotion translation, const Vector3& line_m,
+                                         std::span<const double> positions_m);
+
 /// Refers to the model and must not outlive it.
 class ModelCurve {
  public:
@@ -25,6 +31,10 @@ class ModelCurve {
   /// values(p) = rows(p) * U of the model.
   [[nodiscard]] Eigen::MatrixXd rows(std::span<const double> positions_m) const;
   [[nodiscard]] Eigen::VectorXd values(std::span<const double> positions_m) const;
+  /// Of rows B of values().
+  [[nodiscard]] Eigen::MatrixXd covariance(const Eigen::MatrixXd& B) const {
+    return B * model_->covariance() * B.transpose();
+  }
   /// The table of another motion of the same axis; nullopt if the model does not have it.
   [[nodiscard]] std::optional<ModelCurve> of_same_axis(Motion) const;
 

@@ -71,7 +71,11 @@ void add_names(VolumeComparison& out, const std::vector<UsedError>& used,
     out.compared.push_back(u.error->name);
   }
   const auto add = [&](const std::string& of_model) {
-    if (std::find(out.compared.begin(), out.compared.end(), of_model) == out.compared.end()) {
+    const bool is_left_out =
+        std::any_of(out.left_out.begin(), out.left_out.end(),
+                    [&](const LeftOut& error) { return error.name == of_model; });
+    if (!is_left_out &&
+        std::find(out.compared.begin(), out.compared.end(), of_model) == out.compared.end()) {
       out.not_measured.push_back(of_model);
     }
   };
@@ -91,15 +95,16 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
   if (const auto tables = compare(errors, model, {.device = device}); !tables) {
     return tl::make_unexpected(tables.error());  // names, options, runs
   }
-  const auto used = used_errors(errors, model);
-  if (!used) {
-    return tl::make_unexpected(used.error());
+  auto usable = usable_errors(errors, model);
+  if (!usable) {
+    return tl::make_unexpected(usable.error());
   }
-  const auto layout = common_layout(*used, model);
+  const auto layout = common_layout(usable->used, model);
   if (!layout) {
     return tl::make_unexpected(layout.error());
   }
-  const CommonValues values = common_values(*used, *layout, model, device);
+  leave_out_squareness(*usable, *layout);
+  const CommonValues values = common_values(usable->used, *layout, model, device);
   auto measured = model_of(*layout, values.measured, model);
   auto modelled = model_of(*layout, values.model, model);
   if (!measured || !modelled) {
@@ -117,8 +122,9 @@ Result<VolumeComparison> compare_in_volume(std::span<const MeasuredError> errors
   out.difference = *difference;
   out.V_measured = vector_statistics(errors_on(grid, out.measured));
   out.V_model = vector_statistics(errors_on(grid, out.model));
-  add_names(out, *used, model);
-  if (std::all_of(used->begin(), used->end(), [&](const UsedError& u) {
+  out.left_out = usable->left_out;
+  add_names(out, usable->used, model);
+  if (std::all_of(usable->used.begin(), usable->used.end(), [&](const UsedError& u) {
         return uncertainty_known(u.motion, scatter_of(u.runs, u.motion), device);
       })) {
     add_uncertainty(out, grid);

@@ -7,10 +7,13 @@
 ///   range, else at the smallest common position.
 /// - Straightness: the line through the first and the last common position removed (section 2.3.2),
 ///   or the least-squares line.
-/// - Squareness: the model's value, corrected for the slopes that this convention removes from its
-///   two straightness errors, if they are measured, too:
-///       C0Y - s(EXY) - s(EYX),   B0Z + s(EXZ) + s(EZX),   A0Z - s(EYZ) - s(EZY)
-///   A measured squareness has the sign of the model: rotation of the direction of travel.
+/// - Squareness: the model's value from the slopes of its V along the two measured lines, which meet
+///   at MeasuredError::line_m:
+///       C0Y: -V_x / y - V_y / x,   B0Z: V_x / z + V_z / x,   A0Z: -V_y / z - V_z / y
+///   over the common positions of the straightness errors, or the nodes of the model if these were
+///   not measured. It contains the rotations there, for example ECX(x) in C0Y, so that a squareness
+///   without line_m is not compared. A measured squareness has the sign of the model: rotation of
+///   the direction of travel.
 ///
 /// The difference d = P (measured - model) at a position has the standard uncertainty u,
 ///     u^2 = u_runs^2 + u_device^2 + u_model^2
@@ -92,8 +95,10 @@ struct TableComparison {
   bool is_angle = false;
   bool is_squareness = false;
   Finding finding = Finding::NotCompared;
-  std::string reason;               ///< why it is not compared or not tested; else empty
-  std::vector<std::string> causes;  ///< corrections of the measured values that make them fit
+  std::string reason;  ///< why it is not compared or not tested; else empty
+  /// Corrections of the measured values: "fits ..." if none exceeds its limit then, "closer ..." if
+  /// the rms difference is a third or less. Which of them is the cause, no comparison can tell.
+  std::vector<std::string> causes;
   std::size_t runs = 0;
   std::size_t dof = 0;       ///< of the scatter of the runs
   std::size_t left_out = 0;  ///< positions that some run or direction does not have

@@ -31,6 +31,7 @@ struct MeasuredError {
   /// at the tool offset of the model; the component of the moving axis has no effect. A rotation
   /// changes the translations by rotation times lever, and the lever depends on these positions.
   /// nullopt: the levers of the measured line are zero, so that the values are those of the tables.
+  /// Squareness: where its two lines meet, all three components; nullopt: it is not compared.
   std::optional<Vector3> line_m{};
 };
 

@@ -10,6 +10,8 @@
 ///   positions; the model is taken at the nodes.
 /// - A translation measured on a known line (MeasuredError::line_m) is converted to the table with
 ///   the measured rotations of the same axis; rotations that are not measured count as zero there.
+/// - A measured squareness is converted to the parameter with the measured rotations and
+///   straightness, so that V has the measured slopes along its two lines.
 /// - The rotations that no run with one tool determines (the model does not have them) are part of
 ///   the translations of both.
 /// Uncertainty of the measured tables: scatter of the runs times Student's t for its degrees of
@@ -24,10 +26,16 @@
 
 namespace abbe::calib::direct {
 
+/// A measured error that is not compared.
+struct LeftOut {
+  std::string name, reason;
+};
+
 struct VolumeComparison {
   VolumetricModel measured, model;          ///< on the same tables and nodes, for the model's tool
   std::vector<std::string> compared{};      ///< errors in both
   std::vector<std::string> not_measured{};  ///< errors of the model that were not measured
+  std::vector<LeftOut> left_out{};          ///< measured, but not compared
   std::size_t points = 0;
   VectorStatistics V_measured{}, V_model{};
   ModelDifference difference{};  ///< measured minus model

@@ -107,7 +107,8 @@ TEST_F(MeasuredCli, PrintsTablesConventionsAndVolume) {
       compare().out,
       AllOf(HasSubstr("EXX    agrees"), HasSubstr("X: zero at 0 mm  (EXX, EBX)"),
             HasSubstr("line through -300 and 300 mm removed  (EYX)"), HasSubstr("no columns x_mm"),
-            HasSubstr("difference without rigid motion"), HasSubstr("(not measured)")));
+            HasSubstr("difference without rigid motion"), HasSubstr("(not measured)"),
+            HasSubstr("reveals"), HasSubstr("tool offset of the model: (")));
   EXPECT_THAT(compare("--straightness least-squares").out, HasSubstr("least-squares line"));
 }
 
@@ -128,6 +129,28 @@ TEST_F(MeasuredCli, NamesAnOffsetOfThePositions) {
   EXPECT_EQ(ran.exit, 5);
   EXPECT_THAT(ran.out, AllOf(HasSubstr(" mm added to the positions"),
                              HasSubstr("1 positions left out: outside the nodes")));
+}
+
+TEST_F(MeasuredCli, ReportsOneDirectionAndATooSmallRange) {
+  auto all = rows();
+  std::erase_if(all, [](const MeasuredRow& r) {
+    return r.direction == "-" || (r.name == "EBX" && std::abs(r.position_mm) > 60.0 &&
+                                  r.position_mm < 600.0 && r.position_mm != 300.0);
+  });
+  for (auto& row : all)
+    if (row.name == "EBX") row.position_mm += 260.0;
+  write_rows(all);
+  EXPECT_THAT(compare().out,
+              AllOf(HasSubstr("EXX: one direction of travel only: the values contain half of the "
+                              "backlash"),
+                    HasSubstr("left out of both: EBX (too few common positions)")));
+}
+
+TEST_F(MeasuredCli, DoesNotCompareASquarenessOfUnknownPlace) {
+  write("name,position_mm,value,unit,run,direction\nC0Y,,12,urad,1,\nC0Y,,12.4,urad,2,\n");
+  const auto ran = compare();
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("not compared"), HasSubstr("is not stated (x_mm")));
 }
 
 TEST_F(MeasuredCli, IgnoresAnOffsetOfTheValues) {
@@ -182,7 +205,7 @@ class MeasuredCsv : public MeasuredCli {
 TEST_F(MeasuredCsv, ReadsErrorsWithTheirLines) {
   write(
       "name,position_mm,value,unit,run,direction,x_mm,y_mm,z_mm\n"
-      "EXX,-300,1.5,um,1,+,,20,-200\nC0Y,,12,urad,2,,,,\nEXX,0,2.5,um,1,-,0,20,-200\n");
+      "EXX,-300,1.5,um,1,+,,20,-200\nC0Y,,12,urad,2,,100,0,-50\nEXX,0,2.5,um,1,-,0,20,-200\n");
   const auto file = read_measured_csv(folder_.path() / "measured.csv");
   ASSERT_TRUE(file) << test::faults_text(file);
   ASSERT_EQ(file->errors.size(), 2u);
@@ -192,7 +215,7 @@ TEST_F(MeasuredCsv, ReadsErrorsWithTheirLines) {
   EXPECT_FALSE(EXX.readings[1].forward);
   EXPECT_EQ(*EXX.line_m, calib::Vector3(0.0, 0.02, -0.2));
   EXPECT_EQ(file->errors[1].name, "EC0Y");
-  EXPECT_FALSE(file->errors[1].line_m);
+  EXPECT_EQ(file->errors[1].line_m, calib::Vector3(0.1, 0.0, -0.05));
 }
 
 TEST_F(MeasuredCsv, NamesEveryFaultWithItsLine) {
@@ -227,6 +250,7 @@ TEST_F(MeasuredCsv, NamesARepeatedRun) {
 TEST_F(MeasuredCsv, NamesAMeasuredLineThatChanges) {
   const std::string header = "name,position_mm,value,unit,run,direction,x_mm,y_mm,z_mm\n";
   EXPECT_THAT(faults("EXX,0,1,um,1,+,,20,\n", header), HasSubstr("one axis of the measured line"));
+  EXPECT_THAT(faults("C0Y,,1,urad,1,,10,20,\n", header), HasSubstr("needs x, y and z"));
   EXPECT_THAT(faults("EXX,0,1,um,1,+,,20,0\nEXX,1,1,um,1,+,,25,0\n", header),
               HasSubstr(":3:1: x_mm: another measured line"));
 }

@@ -145,7 +145,13 @@ TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {
   EXPECT_THAT(abbe("verify good.json other.json --points points.csv").out,
               AllOf(HasSubstr("at 64 of 65 points"), HasSubstr("without a model"),
                     HasSubstr("other.json")));
-  EXPECT_EQ(abbe("verify good.json other.json --points points.csv -o out").exit, 2);
+  for (const char* option : {"-o out", "--grid-mm 1,1,1", "--origin-mm 0,0,0", "--planes-mm 0,0,0",
+                             "--least-distance-mm 1"}) {
+    const auto refused =
+        abbe(fmt::format("verify good.json other.json --points points.csv {}", option));
+    EXPECT_EQ(refused.exit, 2) << option;
+    EXPECT_THAT(refused.err, HasSubstr("is for one model")) << option;
+  }
 }
 
 /// Nodes every 50 mm, points farther apart: what interpolating between them costs is far above

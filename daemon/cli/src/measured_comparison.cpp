@@ -22,12 +22,11 @@ namespace {
 namespace direct = calib::direct;
 using nlohmann::json;
 
-constexpr double kMicroUnits = 1e6;  // um per m, urad per rad
-
 struct MeasuredComparison {
   MeasuredFile file;
   std::vector<direct::TableComparison> tables;
   calib::Result<direct::VolumeComparison> volume;
+  calib::Vector3 tool_m;
 };
 
 direct::CompareOptions compare_options(const MeasuredOptions& options) {
@@ -35,8 +34,7 @@ direct::CompareOptions compare_options(const MeasuredOptions& options) {
                                                           : direct::StraightnessLine::EndPoints,
           .device = {.u_m = options.u_um / kUmPerM,
                      .u_rad = options.u_urad / kUradPerRad,
-                     .u_scale = options.u_ppm / kMicroUnits},
-          .false_alarm = options.false_alarm};
+                     .u_scale = options.u_ppm / kUmPerM}};
 }
 
 Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
@@ -50,7 +48,8 @@ Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
     return fail(error.code, fmt::format("{}: {}", options.file, error.text));
   }
   auto volume = direct::compare_in_volume(file->errors, model, wanted.device);
-  return MeasuredComparison{std::move(*file), std::move(*tables), std::move(volume)};
+  return MeasuredComparison{std::move(*file), std::move(*tables), std::move(volume),
+                            model.tool_offsets_m().front()};
 }
 
 bool any_with(const MeasuredComparison& found, direct::Finding finding) {
@@ -66,20 +65,20 @@ const char* unit_of(const direct::TableComparison& table) {
 
 json reversal_json(const std::optional<direct::Reversal>& reversal) {
   if (!reversal) return {};
-  return {{"mean", kMicroUnits * reversal->mean},
-          {"u", reversal->u ? json(kMicroUnits * *reversal->u) : json()},
-          {"largest", kMicroUnits * reversal->largest},
+  return {{"mean", kUmPerM * reversal->mean},
+          {"u", reversal->u ? json(kUmPerM * *reversal->u) : json()},
+          {"largest", kUmPerM * reversal->largest},
           {"largest_at_mm", kMmPerM * reversal->at_m}};
 }
 
 json point_json(const direct::TableComparison& table, const direct::PointDifference& point) {
-  json object{{"measured", kMicroUnits * point.measured},
-              {"u_measured", kMicroUnits * point.u_measured},
-              {"model", kMicroUnits * point.model},
-              {"u_model", kMicroUnits * point.u_model},
-              {"difference", kMicroUnits * point.difference},
-              {"u", kMicroUnits * point.u},
-              {"p", point.tested ? json(point.p) : json()}};
+  json object{{"measured", kUmPerM * point.measured},
+              {"u_measured", kUmPerM * point.u_measured},
+              {"model", kUmPerM * point.model},
+              {"u_model", kUmPerM * point.u_model},
+              {"difference", kUmPerM * point.difference},
+              {"u", kUmPerM * point.u},
+              {"limit", point.tested ? json(kUmPerM * point.limit) : json()}};
   if (!table.is_squareness) object["position_mm"] = kMmPerM * point.position_m;
   return object;
 }
@@ -87,11 +86,12 @@ json point_json(const direct::TableComparison& table, const direct::PointDiffere
 json table_json(const direct::TableComparison& table) {
   json object{{"name", table.name},
               {"unit", unit_of(table)},
-              {"verdict", std::string(direct::name(table.finding))},
+              {"verdict", direct::name(table.finding)},
               {"reason", table.reason},
               {"causes", table.causes},
               {"convention", table.convention},
               {"runs", table.runs},
+              {"degrees_of_freedom", table.dof},
               {"positions_left_out", table.left_out},
               {"positions_outside", table.outside},
               {"reversal", reversal_json(table.reversal)},
@@ -99,12 +99,20 @@ json table_json(const direct::TableComparison& table) {
   for (const auto& point : table.points) object["points"].push_back(point_json(table, point));
   if (table.points.empty()) return object;
 
-  object["mae"] = kMicroUnits * table.mae;
-  object["rms"] = kMicroUnits * table.rms;
-  object["max"] = kMicroUnits * table.largest;
+  object["mae"] = kUmPerM * table.mae;
+  object["rms"] = kUmPerM * table.rms;
+  object["max"] = kUmPerM * table.largest;
+  object["revealed"] = table.revealed > 0.0 ? json(kUmPerM * table.revealed) : json();
   object["rms_normalised"] = table.rms_normalised;
   object["max_normalised"] = table.largest_normalised;
   return object;
+}
+
+json left_out_json(const direct::VolumeComparison& volume) {
+  json list = json::array();
+  for (const auto& [name, reason] : volume.left_out)
+    list.push_back({{"name", name}, {"reason", reason}});
+  return list;
 }
 
 json volume_json(const calib::Result<direct::VolumeComparison>& volume) {
@@ -112,6 +120,7 @@ json volume_json(const calib::Result<direct::VolumeComparison>& volume) {
   return {{"points", volume->points},
           {"compared", volume->compared},
           {"not_measured", volume->not_measured},
+          {"left_out", left_out_json(*volume)},
           {"measured", vector_figures(volume->V_measured)},
           {"model", vector_figures(volume->V_model)},
           {"as_stated", vector_figures(volume->difference.as_stated)},
@@ -120,11 +129,14 @@ json volume_json(const calib::Result<direct::VolumeComparison>& volume) {
 }
 
 void print_measured_json(const MeasuredComparison& found, const MeasuredOptions& options) {
-  json object{{"measured", found.file.source.name},
-              {"sha256", found.file.source.sha256},
-              {"straightness", options.straightness},
-              {"tables", json::array()},
-              {"volume", volume_json(found.volume)}};
+  json object{
+      {"measured", found.file.source.name},
+      {"sha256", found.file.source.sha256},
+      {"straightness", options.straightness},
+      {"tool_mm",
+       {kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z()}},
+      {"tables", json::array()},
+      {"volume", volume_json(found.volume)}};
   for (const auto& table : found.tables) object["tables"].push_back(table_json(table));
   fmt::print("{}\n", object.dump(1));
 }
@@ -145,10 +157,12 @@ void print_row(const direct::TableComparison& table) {
   const std::string place =
       table.is_squareness ? "-" : fmt::format("{:.1f}", kMmPerM * table.largest_at_m);
   const std::string reversal =
-      table.reversal ? fmt::format("{:.2f}", kMicroUnits * table.reversal->mean) : "-";
-  fmt::print("  {:>8.2f}  {:>8.2f}  {:>8.2f}  {:>8}  {:<4}  {:>7.2f}  {:>7.2f}  {:>8}\n",
-             kMicroUnits * table.mae, kMicroUnits * table.rms, kMicroUnits * table.largest, place,
-             unit_of(table), table.rms_normalised, table.largest_normalised, reversal);
+      table.reversal ? fmt::format("{:.2f}", kUmPerM * table.reversal->mean) : "-";
+  const std::string revealed =
+      table.revealed > 0.0 ? fmt::format("{:.2f}", kUmPerM * table.revealed) : "-";
+  fmt::print("  {:>8.2f}  {:>8.2f}  {:>8.2f}  {:>8}  {:<4}  {:>7.2f}  {:>7.2f}  {:>8}  {:>8}\n",
+             kUmPerM * table.mae, kUmPerM * table.rms, kUmPerM * table.largest, place,
+             unit_of(table), table.rms_normalised, table.largest_normalised, revealed, reversal);
 }
 
 void print_remarks(const direct::TableComparison& table) {
@@ -158,8 +172,10 @@ void print_remarks(const direct::TableComparison& table) {
                        table.left_out));
   if (table.outside > 0 && !table.points.empty())
     remark(fmt::format("{} positions left out: outside the nodes of the model", table.outside));
+  if (!table.reversal && !table.is_squareness)
+    remark("one direction of travel only: the values contain half of the backlash");
   if (!table.reason.empty() && !table.points.empty()) remark(table.reason);
-  for (const auto& cause : table.causes) remark("fits " + cause);
+  for (const auto& cause : table.causes) remark(cause);
 }
 
 /// The conventions, each once.
@@ -169,13 +185,9 @@ void print_conventions(const MeasuredComparison& found) {
     if (table.points.empty()) continue;
     const std::string text = fmt::format(
         "{}{}", table.is_squareness ? "" : fmt::format("{}: ", table.name[2]), table.convention);
-    const auto at =
-        std::ranges::find(tables_of, text, [](const auto& entry) { return entry.first; });
-    if (at != tables_of.end()) {
-      at->second.push_back(table.name);
-    } else {
-      tables_of.emplace_back(text, std::vector<std::string>{table.name});
-    }
+    auto at = std::ranges::find(tables_of, text, [](const auto& entry) { return entry.first; });
+    if (at == tables_of.end()) at = tables_of.insert(tables_of.end(), {text, {}});
+    at->second.push_back(table.name);
   }
   for (const auto& [text, tables] : tables_of)
     fmt::print("{}  ({})\n", text, fmt::join(tables, ", "));
@@ -192,27 +204,36 @@ void print_volume(const calib::Result<direct::VolumeComparison>& volume) {
              fmt::join(volume->compared, ", "));
   if (!volume->not_measured.empty())
     fmt::print("left out of both: {} (not measured)\n", fmt::join(volume->not_measured, ", "));
+  for (const auto& [name, reason] : volume->left_out)
+    fmt::print("left out of both: {} ({})\n", name, reason);
   fmt::print("{:<32}  {:>8}  {:>8}  {:>8}\n", "", "mean", "rms", "largest");
   print_vectors("measured", volume->V_measured);
   print_vectors("model", volume->V_model);
   print_vectors("difference as stated", volume->difference.as_stated);
   print_vectors("difference without rigid motion", volume->difference.rigid_free);
   if (volume->u_rms_m)
-    fmt::print("{:<32}  {:>8}  {:>8.3f}\n", "standard uncertainty of it", "",
+    fmt::print("{:<32}  {:>8}  {:>8.3f}\n", "standard uncertainty, as stated", "",
                kUmPerM * *volume->u_rms_m);
 }
 
 void print_measured_text(const MeasuredComparison& found) {
-  fmt::print("measured minus model; |d|/u: relative to the standard uncertainty of both\n");
   fmt::print(
-      "{:<5}  {:<12}  {:>4}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:<4}  {:>7}  {:>7}  {:>8}\n",
+      "measured minus model; |d|/u: relative to the standard uncertainty of both; reveals: a\n"
+      "larger difference contradicts at every position\n");
+  fmt::print(
+      "{:<5}  {:<12}  {:>4}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:<4}  {:>7}  {:>7}  {:>8}  "
+      "{:>8}\n",
       "table", "verdict", "runs", "points", "mae", "rms", "largest", "at mm", "unit", "|d|/u",
-      "largest", "backlash");
+      "largest", "reveals", "backlash");
   for (const auto& table : found.tables) print_row(table);
   fmt::print("\n");
   for (const auto& table : found.tables) print_remarks(table);
 
   print_conventions(found);
+  fmt::print(
+      "tool offset of the model: ({:.1f}, {:.1f}, {:.1f}) mm; the point of the device must be\n"
+      "there: with one tool offset, some rotations are part of the translations there\n",
+      kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z());
   const bool no_line = std::ranges::all_of(
       found.file.errors, [](const auto& error) { return !error.line_m.has_value(); });
   if (no_line)
@@ -248,10 +269,10 @@ CLI::Option* add_measured_options(CLI::App& command, MeasuredOptions& options) {
 }
 
 Result<int> compare_with_measured(const calib::VolumetricModel& model,
-                                  const MeasuredOptions& options, bool as_json) {
+                                  const MeasuredOptions& options, bool json) {
   const auto found = compared(model, options);
   if (!found) return tl::make_unexpected(found.error());
-  as_json ? print_measured_json(*found, options) : print_measured_text(*found);
+  json ? print_measured_json(*found, options) : print_measured_text(*found);
 
   if (any_with(*found, direct::Finding::Contradicts)) return exit_code(ErrorCode::Refused);
   const bool none =

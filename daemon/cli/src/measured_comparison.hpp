@@ -13,7 +13,6 @@ struct MeasuredOptions {
   std::string file;  ///< measured.csv; empty: not wanted
   std::string straightness = "end-points";
   double u_um = 0.0, u_urad = 0.0, u_ppm = 0.0;  ///< of the device, k = 1
-  double false_alarm = 0.05;
 };
 
 /// Adds --measured and its options; returns --measured.

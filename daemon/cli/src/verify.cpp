@@ -259,6 +259,17 @@ int run_several(const VerifyArguments& arguments) {
   return points->cut_short ? report(*points->cut_short) : code;
 }
 
+/// The given option that has no effect with several models; empty: none. With --live, -o is the folder
+/// of the collected points.
+std::string only_for_one_model(const VerifyArguments& arguments) {
+  if (arguments.models.size() < 2) return {};
+  if (!arguments.out.empty() && !arguments.live) return "-o (report.html, grid.csv)";
+  if (!arguments.origin.empty()) return "--origin-mm";
+  if (!arguments.grid.empty()) return "--grid-mm";
+  if (!arguments.planes.empty()) return "--planes-mm";
+  return arguments.least_distance_mm ? "--least-distance-mm" : "";
+}
+
 void add_options(CLI::App& command, VerifyArguments& arguments) {
   command
       .add_option("MODEL", arguments.models,
@@ -311,7 +322,7 @@ void add_options(CLI::App& command, VerifyArguments& arguments) {
   command.add_option(
       "-o,--out", arguments.out,
       "folder for report.html and grid.csv, and for verification.csv with the points of\n"
-      "--recording or --live; created if needed");
+      "--recording or --live; created if needed. Several models: only verification.csv, of --live");
 }
 
 }  // namespace
@@ -335,8 +346,9 @@ void add_verify(CLI::App& parent, int& exit) {
     else if (arguments->live && arguments->out.empty())
       exit =
           report({ErrorCode::Usage, "verify --live: -o is required: the points are saved there"});
-    else if (arguments->models.size() > 1 && !arguments->points.empty() && !arguments->out.empty())
-      exit = report({ErrorCode::Usage, "verify: -o writes the report of one model; give one"});
+    else if (const std::string wrong = only_for_one_model(*arguments); !wrong.empty())
+      exit =
+          report({ErrorCode::Usage, fmt::format("verify: {} is for one model; give one", wrong)});
     else
       exit = arguments->models.size() > 1 ? run_several(*arguments) : run(*arguments);
   });

@@ -94,6 +94,16 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
     if (!tool_m) return tl::make_unexpected(tool_m.error());
     models.push_back({name, std::move(*document), *tool_m});
   }
+
+  constexpr double kSameTool_m = 1e-6;
+  for (const NamedModel& model : models) {
+    if ((model.tool_m - models.front().tool_m).norm() > kSameTool_m)
+      return fail(
+          ErrorCode::Usage,
+          fmt::format("{} and {} have different tool offsets, the points were measured with "
+                      "one: give it with --tool",
+                      models.front().name, model.name));
+  }
   return models;
 }
 

@@ -48,7 +48,7 @@ class MeasuredRows {
     MeasuredError& error = error_named(name);
     const calib::direct::Reading reading = reading_of(row, motion);
     check_repeated(row, name, reading);
-    if (motion && table_.has(kLine)) take_line(row, *motion, error);
+    if (table_.has(kLine)) take_line(row, motion, error);
     error.readings.push_back(reading);
   }
 
@@ -95,20 +95,25 @@ class MeasuredRows {
                                    name, reading.run, at->second));
   }
 
-  void take_line(std::size_t row, calib::ErrorMotion motion, MeasuredError& error) {
+  void take_line(std::size_t row, const std::optional<calib::ErrorMotion>& motion,
+                 MeasuredError& error) {
     constexpr double kSameLine_m = 1e-3;
     calib::Vector3 line_m = calib::Vector3::Zero();
     int given = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       const double at_mm = table_.at(row, kLine + a);
-      if (a == calib::index(motion.axis) || std::isnan(at_mm)) continue;
+      if ((motion && a == calib::index(motion->axis)) || std::isnan(at_mm)) continue;
       line_m(static_cast<Eigen::Index>(a)) = at_mm / kMmPerM;
       ++given;
     }
 
-    if (given == 1)
-      return fault(row, "x_mm", "one axis of the measured line is empty: needs both or none");
-    const std::optional<calib::Vector3> line = given == 2 ? std::optional(line_m) : std::nullopt;
+    const int wanted = motion ? 2 : 3;
+    if (given != 0 && given != wanted)
+      return fault(row, "x_mm",
+                   motion ? "one axis of the measured line is empty: needs both or none"
+                          : "the point where the lines of a squareness meet needs x, y and z");
+    const std::optional<calib::Vector3> line =
+        given == wanted ? std::optional(line_m) : std::nullopt;
     if (error.readings.empty()) error.line_m = line;
     const bool same = line.has_value() == error.line_m.has_value() &&
                       (!line || (*line - *error.line_m).norm() < kSameLine_m);

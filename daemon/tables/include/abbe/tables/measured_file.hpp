@@ -16,7 +16,7 @@ namespace abbe::daemon {
 /// - an error motion has no position or no direction (squareness needs neither),
 /// - it repeats the run, direction and position of an earlier row of the same error,
 /// - x, y, z are given in part, or differ from those of other rows of the same error; the column of
-///   the moving axis has no effect and may be empty.
+///   the moving axis has no effect and may be empty; a squareness needs all three or none.
 struct MeasuredFile {
   InputFile source;
   std::vector<calib::direct::MeasuredError> errors;

@@ -177,7 +177,8 @@ TEST_F(DirectComparison, NamesTheReversedSignOfASquareness) {
 TEST_F(DirectComparison, RefersSquarenessToTheCommonLines) {
   const Vector3 first = end_m(machine(), false);
   Vector3 at = 0.5 * first, last = end_m(machine(), true);
-  auto straightness = measured_table(machine(), "EYX", {.noise = 0.0, .offset = 0.0, .slope = 0.0});
+  auto straightness =
+      measured_table(machine(), "EYX", {.runs = 1, .noise = 0.0, .offset = 0.0, .slope = 0.0});
   std::erase_if(straightness.readings, [](const Reading& r) { return r.position_m > 0.01; });
   const double of_all =
       tests::direct::slope_on_line(machine(), {Motion::Y, Axis::X}, at, first.x(), last.x());
@@ -185,7 +186,7 @@ TEST_F(DirectComparison, RefersSquarenessToTheCommonLines) {
   const double of_half =
       tests::direct::slope_on_line(machine(), {Motion::Y, Axis::X}, at, first.x(), last.x());
   const auto squareness = tests::direct::measured_squareness(machine(), "EC0Y", at, first, last);
-  const auto tables = *compare(std::vector{squareness, straightness}, model());
+  const auto tables = compare(std::vector{squareness, straightness}, model()).value();
   EXPECT_LT(tables[0].largest, 2e-6);
   EXPECT_GT(std::abs(of_half - of_all), 20e-6) << "the test shows nothing";
 }

@@ -50,7 +50,7 @@ class SimulatedTable {
     table.runs = runs.values.size();
     const Eigen::VectorXd offset = Eigen::VectorXd::Constant(P.rows(), model_value);
     add_points(table, runs, P * runs.mean() + offset, P * model + offset,
-               {covariance_of_runs(runs, found, P), Eigen::MatrixXd::Zero(P.rows(), P.rows()),
+               {covariance_of_runs(runs, kEXX, found, P), Eigen::MatrixXd::Zero(P.rows(), P.rows()),
                 u_model_ * u_model_ * P * P.transpose()},
                uncertainty_known(kEXX, found, {}));
     judge(table, limits_of(0.05 / static_cast<double>(kTables * kPositions), found.dof));

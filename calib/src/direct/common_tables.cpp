@@ -141,7 +141,7 @@ class CommonTables {
                                                           const Eigen::MatrixXd& W) {
     const Scatter scatter = scatter_of(u.runs, u.motion);
     const double t = scatter.dof > 0 ? student_over_normal(static_cast<double>(scatter.dof)) : 1.0;
-    return t * t * covariance_of_runs(u.runs, scatter, W);
+    return t * t * covariance_of_runs(u.runs, u.motion, scatter, W);
   }
 
   void add_table(TableValues& raw, const UsedError& u) const {

@@ -109,7 +109,7 @@ Result<Reduced> compare_motion(const MeasuredError& error, ErrorMotion motion,
   out.table.dof = out.scatter.dof;
   add_points(
       out.table, out.runs, P * out.measured, B * model.U(),
-      {covariance_of_runs(out.runs, out.scatter, P),
+      {covariance_of_runs(out.runs, motion, out.scatter, P),
        covariance_of_device(motion, P, p, options.device), B * model.covariance() * B.transpose()},
       uncertainty_known(motion, out.scatter, options.device));
   return out;
@@ -158,7 +158,7 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
   out.scatter = scatter_of(*runs, std::nullopt);
   out.table.dof = out.scatter.dof;
   add_points(out.table, *runs, out.measured, row * model.U(),
-             {covariance_of_runs(*runs, out.scatter, one),
+             {covariance_of_runs(*runs, std::nullopt, out.scatter, one),
               options.device.u_rad * options.device.u_rad * one,
               row * model.covariance() * row.transpose()},
              uncertainty_known(std::nullopt, out.scatter, options.device));

@@ -55,11 +55,12 @@ Scatter scatter_of(const Runs& runs, const std::optional<ErrorMotion>& motion) {
   return {squares / all, std::max(n - 1, dof)};
 }
 
-Eigen::MatrixXd covariance_of_runs(const Runs& runs, const Scatter& scatter,
-                                   const Eigen::MatrixXd& P) {
+Eigen::MatrixXd covariance_of_runs(const Runs& runs, const std::optional<ErrorMotion>& motion,
+                                   const Scatter& scatter, const Eigen::MatrixXd& P) {
   const double n = static_cast<double>(runs.values.size());
   const Eigen::MatrixXd pooled = scatter.variance / n * P * P.transpose();
-  const Eigen::VectorXd own = runs.covariance_of_mean(P).diagonal();
+  const Eigen::VectorXd own =
+      runs.covariance_of_mean(P * residual_operator(runs, motion)).diagonal();
   Eigen::VectorXd factor = Eigen::VectorXd::Ones(pooled.rows());
   for (Eigen::Index i = 0; i < factor.size(); ++i) {
     if (own(i) > pooled(i, i) && pooled(i, i) > 0.0) {

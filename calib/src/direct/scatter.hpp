@@ -16,8 +16,9 @@ struct Scatter {
 [[nodiscard]] Scatter scatter_of(const Runs&, const std::optional<ErrorMotion>&);
 
 /// Covariance of P mean() from the pooled scatter, enlarged at positions with more scatter.
-[[nodiscard]] Eigen::MatrixXd covariance_of_runs(const Runs&, const Scatter&,
-                                                 const Eigen::MatrixXd& P);
+/// The offset of a run, of a straightness also its slope, is not scatter.
+[[nodiscard]] Eigen::MatrixXd covariance_of_runs(const Runs&, const std::optional<ErrorMotion>&,
+                                                 const Scatter&, const Eigen::MatrixXd& P);
 
 /// Whether the uncertainty of the measured values is known: from the scatter, or stated as
 /// DeviceUncertainty::u_m or u_rad. An uncertainty of the scale alone is not enough.

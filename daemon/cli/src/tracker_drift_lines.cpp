@@ -14,16 +14,15 @@ nlohmann::json array_um(const calib::Vector3& v_m) {
 }  // namespace
 
 std::string tracker_drift_text(const TrackerDriftFigures& drift) {
-  const calib::Vector3 value_um = kUmPerM * drift.largest_m, u_um = kUmPerM * drift.u_largest_m;
+  const calib::Vector3 value_um = kUmPerM * drift.largest_m;
   return fmt::format(
-      "drift       of the tracker: largest {:.3f}, {:.3f}, {:.3f} um in X, Y, Z, standard "
-      "uncertainty {:.3f}, {:.3f}, {:.3f} um; {} visits of nests\n",
-      value_um.x(), value_um.y(), value_um.z(), u_um.x(), u_um.y(), u_um.z(), drift.visits);
+      "drift       of the tracker: largest {:.1f}, {:.1f}, {:.1f} um in X, Y, Z; {} visits of "
+      "nests\n",
+      value_um.x(), value_um.y(), value_um.z(), drift.visits);
 }
 
 nlohmann::json tracker_drift_json(const TrackerDriftFigures& drift) {
   return {{"largest_um", array_um(drift.largest_m)},
-          {"u_um", array_um(drift.u_largest_m)},
           {"nest_repeatability_um", drift.u_repeatability_m * kUmPerM},
           {"visits", drift.visits}};
 }

@@ -209,7 +209,6 @@ std::optional<TrackerDriftFigures> read_tracker_drift(ModelReader& in) {
   const ModelJson& entry = in.root().at(path);
   return TrackerDriftFigures{
       .largest_m = read_vector_um(in, entry, path, "largest_um"),
-      .u_largest_m = read_vector_um(in, entry, path, "u_um"),
       .u_repeatability_m = in.number_of(entry, path, "nest_repeatability_um", kMicroUnit),
       .visits = in.count_of(entry, path, "visits")};
 }

@@ -163,10 +163,9 @@ std::string vector_um(const calib::Vector3& v_m) {
 
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
   out.key("tracker_drift");
-  out.raw(fmt::format(
-      "{{\"largest_um\": {}, \"u_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
-      vector_um(drift.largest_m), vector_um(drift.u_largest_m),
-      to_decimal(drift.u_repeatability_m, kMicroUnit), drift.visits));
+  out.raw(fmt::format("{{\"largest_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
+                      vector_um(drift.largest_m), to_decimal(drift.u_repeatability_m, kMicroUnit),
+                      drift.visits));
 }
 
 void write_artefact(JsonText& out, const calib::Expansion& artefact) {

@@ -37,9 +37,7 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
 }
 
 TrackerDriftFigures drift_figures(const calib::otf::TrackerDrift& drift) {
-  const calib::otf::DriftPoint largest = drift.largest();
-  return {.largest_m = largest.value_m,
-          .u_largest_m = largest.u_m,
+  return {.largest_m = drift.largest().value_m,
           .u_repeatability_m = drift.u_repeatability_m,
           .visits = drift.visits};
 }

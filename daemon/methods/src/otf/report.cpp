@@ -103,15 +103,15 @@ void add_tracker_drift(HtmlReport& page, const std::optional<TrackerDriftFigures
   page.heading("Drift of the tracker");
   page.paragraph(fmt::format(
       "From {} visits of reference nests and the run itself, estimated together with the tables "
-      "and "
-      "removed. Largest value since the first visit, at the centre of the path; repeatability of a "
+      "and removed. Largest value since the first visit, at the centre of the path; repeatability "
+      "of a "
       "visit {:.1f} um.",
       drift->visits, drift->u_repeatability_m * kUmPerM));
   std::vector<std::vector<std::string>> rows;
   for (Eigen::Index k = 0; k < 3; ++k)
-    rows.push_back({std::string(1, "XYZ"[k]), fmt::format("{:.3f}", drift->largest_m(k) * kUmPerM),
-                    fmt::format("{:.3f}", drift->u_largest_m(k) * kUmPerM)});
-  page.table({"", "um", "u, um"}, rows);
+    rows.push_back(
+        {std::string(1, "XYZ"[k]), fmt::format("{:.1f}", drift->largest_m(k) * kUmPerM)});
+  page.table({"", "um"}, rows);
 }
 
 }  // namespace

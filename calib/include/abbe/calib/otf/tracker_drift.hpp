@@ -45,7 +45,9 @@ struct DriftObservations {
 struct DriftPoint {
   double time_s = 0.0;                ///< tracker clock
   Vector3 value_m = Vector3::Zero();  ///< apparent motion of the centre of the path, machine axes
-  Vector3 u_m = Vector3::Zero();      ///< standard uncertainty
+  /// Standard uncertainty for a course that is as smooth as the prior; a real course between two
+  /// visits may be off by more (nests.md), so results do not state it.
+  Vector3 u_m = Vector3::Zero();
 };
 
 /// The estimated drift.

@@ -44,7 +44,6 @@ struct ModelStatistics {
 /// Drift of the tracker estimated with reference nests (calib/otf/tracker_drift.hpp).
 struct TrackerDriftFigures {
   calib::Vector3 largest_m = calib::Vector3::Zero();  ///< machine axes, at the centre of the path
-  calib::Vector3 u_largest_m = calib::Vector3::Zero();
   double u_repeatability_m = 0.0;  ///< of a visit of a nest, as used
   std::size_t visits = 0;
   friend bool operator==(const TrackerDriftFigures&, const TrackerDriftFigures&) = default;

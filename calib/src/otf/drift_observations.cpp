@@ -18,29 +18,42 @@ std::vector<std::size_t> visits_by_nest(const NestVisits& nests) {
   return count;
 }
 
+/// Mean of the first visit.
 Vector3 position_of(const NestVisits& nests, std::size_t nest) {
   return std::find_if(nests.found.begin(), nests.found.end(),
                       [&](const NestVisit& v) { return v.nest == nest; })
       ->mean_tracker_m;
 }
 
-/// BadInput if the target is in a nest while it is on the path.
+/// BadInput if a leg of the path passes through the radius of the nest at `p_tracker_m`.
+Result<void> check_apart_from_legs(const Observations& o, const Nest& nest,
+                                   const Vector3& p_tracker_m) {
+  const Vector3 q = o.alignment.T_machine_tracker * p_tracker_m - o.target_offset_m;
+  for (std::size_t leg = 0; leg + 1 < o.vertices_m.size(); ++leg) {
+    const Vector3 c = closest_on_leg(o.vertices_m[leg], o.vertices_m[leg + 1], q).closest_m;
+    if ((q - c).norm() <= nest.radius_m) {
+      return failure(
+          ErrorCode::BadInput,
+          message("reference nest ", nest.name, " is ", 1e3 * (q - c).norm(), " mm from leg ", leg,
+                  " of the path, its radius is ", 1e3 * nest.radius_m,
+                  " mm: use a smaller radius, or place the nest elsewhere"));
+    }
+  }
+  return {};
+}
+
+/// BadInput if the target is in a nest while it is on the path: around the configured position,
+/// where samples are taken for a visit, and around that of the first visit.
 Result<void> check_apart(const Observations& o, const NestVisits& nests,
                          const std::vector<std::size_t>& visits, const NestOptions& options) {
-  for (std::size_t n = 0; n < visits.size(); ++n) {
-    if (visits[n] == 0) {
-      continue;
+  for (std::size_t n = 0; n < options.nests.size(); ++n) {
+    const Nest& nest = options.nests[n];
+    Result<void> apart = check_apart_from_legs(o, nest, nest.position_tracker_m);
+    if (apart && visits[n] > 0) {
+      apart = check_apart_from_legs(o, nest, position_of(nests, n));
     }
-    const Vector3 q = o.alignment.T_machine_tracker * position_of(nests, n) - o.target_offset_m;
-    for (std::size_t leg = 0; leg + 1 < o.vertices_m.size(); ++leg) {
-      const Vector3 c = closest_on_leg(o.vertices_m[leg], o.vertices_m[leg + 1], q).closest_m;
-      if ((q - c).norm() <= options.nests[n].radius_m) {
-        return failure(ErrorCode::BadInput,
-                       message("reference nest ", nests.names[n], " is ", 1e3 * (q - c).norm(),
-                               " mm from leg ", leg, " of the path, its radius is ",
-                               1e3 * options.nests[n].radius_m,
-                               " mm: use a smaller radius, or place the nest elsewhere"));
-      }
+    if (!apart) {
+      return apart;
     }
   }
   return {};
@@ -120,13 +133,16 @@ Result<Observations> with_nest_visits(Observations o, const AlignedBlocks& run,
                                       const NestOptions& options) {
   const NestVisits& nests = run.nests;
   o.notes.insert(o.notes.end(), nests.notes.begin(), nests.notes.end());
-  if (nests.found.empty()) {
+  if (options.nests.empty()) {
     return o;
   }
 
   const std::vector<std::size_t> visits = visits_by_nest(nests);
   if (Result<void> apart = check_apart(o, nests, visits, options); !apart) {
     return tl::unexpected(apart.error());
+  }
+  if (nests.found.empty()) {
+    return o;
   }
   if (*std::max_element(visits.begin(), visits.end()) < 2) {
     o.notes.emplace_back(

@@ -19,16 +19,16 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-constexpr unsigned kRuns = 5;
+constexpr unsigned kNestRuns = 5;
 const Vector3 kDrift_m(16e-6, -16e-6, 16e-6);
 
 double mean_error_of_runs_m(NestRunOptions wanted) {
   double sum_m = 0.0;
-  for (wanted.seed = 1; wanted.seed <= kRuns; ++wanted.seed) {
+  for (wanted.seed = 1; wanted.seed <= kNestRuns; ++wanted.seed) {
     const MadeRun run = make_nest_run(wanted);
-    sum_m += mean_error_m(run, identify_nest_run(run)->solution.model);
+    sum_m += nest_error_m(run, identify_nest_run(run)->solution.model);
   }
-  return sum_m / kRuns;
+  return sum_m / kNestRuns;
 }
 
 double error_without_drift_m() {
@@ -36,7 +36,7 @@ double error_without_drift_m() {
   return error_m;
 }
 
-Verdict verdict_on(const MadeRun& run) {
+Verdict verdict_on_nest_run(const MadeRun& run) {
   const Identification id = *identify_nest_run(run);
   return *judge(id.observations, id.solution, nullptr, {}, run.options);
 }
@@ -49,7 +49,7 @@ TEST(Nests, DriftRaisesTheErrorByLessThanAFifth) {
 TEST(Nests, DriftWithoutNestsSpoilsTheModelAndIsNamed) {
   const NestRunOptions wanted{.drift_m = kDrift_m, .visits = false};
   EXPECT_GT(mean_error_of_runs_m(wanted), 2.0 * error_without_drift_m());
-  const Verdict verdict = verdict_on(make_nest_run(wanted));
+  const Verdict verdict = verdict_on_nest_run(make_nest_run(wanted));
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("drifts")));
 }
 
@@ -109,7 +109,7 @@ TEST(Nests, ARotationIsEstimatedFromThreeNestsThatAreNotOnALine) {
       make_nest_run({.drift_m = kDrift_m, .rotation_rad = Vector3(5e-6, -5e-6, 5e-6)});
   const Identification id = *identify_nest_run(run);
   EXPECT_TRUE(id.observations.drift->rotates);
-  EXPECT_LE(mean_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
+  EXPECT_LE(nest_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
 }
 
 TEST(Nests, OnALineTheyShowNoRotation) {
@@ -118,7 +118,7 @@ TEST(Nests, OnALineTheyShowNoRotation) {
                      .nests_m = {{-0.7, -0.45, -0.5}, {0.0, -0.45, -0.5}, {0.7, -0.45, -0.5}}});
   const Identification id = *identify_nest_run(run);
   EXPECT_FALSE(id.observations.drift->rotates);
-  EXPECT_LE(mean_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
+  EXPECT_LE(nest_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
 }
 
 TEST(Nests, ABumpedNestIsNamedAndDoesNotSpoilTheModel) {
@@ -126,10 +126,10 @@ TEST(Nests, ABumpedNestIsNamedAndDoesNotSpoilTheModel) {
                                        return nest == 1 && visit >= 3 ? Vector3(80e-6, 0.0, 60e-6)
                                                                       : Vector3(Vector3::Zero());
                                      }});
-  const Verdict verdict = verdict_on(run);
+  const Verdict verdict = verdict_on_nest_run(run);
   EXPECT_THAT(verdict.notes, Contains(AllOf(HasSubstr("nest B was found"), HasSubstr("moved"))));
   const Identification id = *identify_nest_run(run);
-  EXPECT_LE(mean_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
+  EXPECT_LE(nest_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
 }
 
 TEST(Nests, AVisitThatIsWrongIsNamedAndNotUsed) {
@@ -141,15 +141,15 @@ TEST(Nests, AVisitThatIsWrongIsNamedAndNotUsed) {
   EXPECT_THAT(id.solution.drift->notes,
               Contains(AllOf(HasSubstr("nest C was found"), HasSubstr("not used"))));
   EXPECT_EQ(id.solution.drift->visits + 1, id.observations.drift->visits.size());
-  EXPECT_LE(mean_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
+  EXPECT_LE(nest_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
 }
 
 TEST(Nests, VisitsThatScatterMoreThanStatedCountLess) {
   const MadeRun run = make_nest_run({.drift_m = kDrift_m, .u_nest_m = 20e-6});
   const Identification id = *identify_nest_run(run);
   EXPECT_GT(id.solution.drift->u_repeatability_m, 8e-6);
-  EXPECT_THAT(verdict_on(run).notes, Contains(HasSubstr("scatter more than stated")));
-  EXPECT_LE(mean_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
+  EXPECT_THAT(verdict_on_nest_run(run).notes, Contains(HasSubstr("scatter more than stated")));
+  EXPECT_LE(nest_error_m(run, id.solution.model), 1.5 * error_without_drift_m());
 }
 
 TEST(Nests, OneVisitShowsNoDrift) {

@@ -55,7 +55,7 @@ const std::vector<NestCase>& cases() {
   return all;
 }
 
-double mean_error_m(const VolumetricModel& model) {
+double nest_error_m(const VolumetricModel& model) {
   const Machine machine = case_a_machine();
   const auto layout = *ParameterLayout::observable_with_one_target(machine.chain, machine.nodes);
   const Eigen::VectorXd truth = case_a_tables(TableColumn::Truth);
@@ -86,7 +86,7 @@ void case_a() {
     const std::clock_t start = std::clock();
     const auto found = identify(samples, case_a_machine(), case_a_path(), {}, options);
     const double took_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-    const double error_m = found ? mean_error_m(found->solution.model) : INFINITY;
+    const double error_m = found ? nest_error_m(found->solution.model) : INFINITY;
     clean_m = clean_m > 0.0 ? clean_m : error_m;
     std::printf("  %-28s mean error %.4f um, %.3f of the run without drift (%.1f s)\n", one.name,
                 1e6 * error_m, error_m / clean_m, took_s);

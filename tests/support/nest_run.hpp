@@ -142,7 +142,7 @@ inline calib::Result<calib::otf::Identification> identify_nest_run(const MadeRun
 }
 
 /// Mean error of a model on the grid of the nodes, rigid motion removed.
-inline double mean_error_m(const MadeRun& run, const calib::VolumetricModel& model) {
+inline double nest_error_m(const MadeRun& run, const calib::VolumetricModel& model) {
   std::vector<Vector3> points = calib::tensor_grid(run.machine.nodes);
   return calib::rigid_free(points, errors_left(run, model))->rigid_free.mean_m;
 }

@@ -70,22 +70,24 @@ TEST_F(DirectCauses, NamesReversedPositions) {
 
 TEST_F(DirectCauses, NamesPositionsFromTheOtherEnd) {
   const auto t = with("EZZ", [](Reading& r) { r.position_m = -0.4 - r.position_m; });
-  EXPECT_THAT(t.causes, ElementsAre(HasSubstr("counted from the other end: ")));
+  EXPECT_THAT(t.causes, ::testing::Contains(HasSubstr("counted from the other end: ")));
 }
 
-TEST_F(DirectCauses, NamesAnOffsetOfThePositions) {
+/// Two nodes are left in the common range, so that an offset with a slope would fit any values.
+TEST_F(DirectCauses, DoNotNameAnOffsetOfThePositionsThatFewNodesCannotShow) {
   const auto t = with("EXX", [](Reading& r) { r.position_m += 0.05; });
-  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("with -(49|50|51)[.0-9]* mm added to the .*")));
+  EXPECT_EQ(t.finding, Finding::Contradicts);
+  EXPECT_THAT(t.causes, ::testing::Not(::testing::Contains(HasSubstr("mm added to the"))));
 }
 
 TEST_F(DirectCauses, NamesAWrongUnit) {
   const auto t = with("EXX", [](Reading& r) { r.value *= 1e-3; });
-  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("with the values divided by 0.00(0[89]|10).*")));
+  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex(".*with the values divided by 0.00(0[89]|10).*")));
 }
 
 TEST_F(DirectCauses, NamesAScaleOfLengths) {
   const auto t = with("EXX", [](Reading& r) { r.value += 150e-6 * r.position_m; });
-  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex("after removal of 1(49|50|51)[.0-9]* um/m.*")));
+  EXPECT_THAT(t.causes, ElementsAre(MatchesRegex(".*after removal of 1(49|50|51)[.0-9]* um/m.*")));
 }
 
 /// A line 0.2 m beside the axis: EXX + EBX 0.2 m.

@@ -96,8 +96,9 @@ TEST(Nests, TheCourseOfTheDriftIsEstimated) {
   ASSERT_TRUE(id.solution.drift);
   const double first_s = id.observations.drift->visits.front().time_s;
   for (const DriftPoint& point : id.solution.drift->points) {
-    const Vector3 expected_m = run.T_machine_tracker.R *
-                               (drift_at(wanted, point.time_s, {}) - drift_at(wanted, first_s, {}));
+    const Vector3 expected_m =
+        run.T_machine_tracker.R * (drift_at(wanted, point.time_s, Vector3::Zero()) -
+                                   drift_at(wanted, first_s, Vector3::Zero()));
     for (Eigen::Index k = 0; k < 3; ++k) {
       EXPECT_NEAR(point.value_m(k), expected_m(k), 4e-6) << point.time_s;
     }

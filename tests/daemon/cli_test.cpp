@@ -129,7 +129,8 @@ TEST_F(Cli, WritesAReportThatNeedsNoNetwork) {
 TEST_F(Cli, WritesAReportWhoseFiguresHaveTheDataOfTheModel) {
   for (const std::string options : {"", "--tables cubic", "--backlash=forward-backward"}) {
     const fs::path out = folder_ / "figures";
-    ASSERT_EQ(identify(files_.path, files_.tracker, out, options).exit, 0) << options;
+    const int exit = identify(files_.path, files_.tracker, out, options).exit;
+    ASSERT_TRUE(exit == 0 || exit == 5) << options;  // a refused model has a report, too
     const std::string page = text_of(out / "report.html");
     EXPECT_TRUE(test::every_figure_has_data(page)) << options;
     EXPECT_EQ(test::maps_of(page).size(), 3u) << options;

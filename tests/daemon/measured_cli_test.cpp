@@ -115,13 +115,13 @@ TEST_F(MeasuredCli, PrintsTablesConventionsAndVolume) {
 TEST_F(MeasuredCli, NamesAReversedSign) {
   const auto ran = compare_changed([](MeasuredRow& r) { r.value = -r.value; });
   EXPECT_EQ(ran.exit, 5);
-  EXPECT_THAT(ran.out, HasSubstr("EXX: fits with the sign of the values reversed"));
+  EXPECT_THAT(ran.out, HasSubstr("with the sign of the values reversed"));
 }
 
 TEST_F(MeasuredCli, NamesReversedPositions) {
   const auto ran = compare_changed([](MeasuredRow& r) { r.position_mm = -r.position_mm; });
   EXPECT_EQ(ran.exit, 5);
-  EXPECT_THAT(ran.out, HasSubstr("EXX: fits with the sign of the positions reversed"));
+  EXPECT_THAT(ran.out, HasSubstr("with the sign of the positions reversed"));
 }
 
 TEST_F(MeasuredCli, NamesAnOffsetOfThePositions) {

@@ -82,18 +82,22 @@ std::vector<Vector3> starting_directions(const Matrix3& principal) {
 struct FoundCylinder {
   Frame frame;
   Iteration iteration;
-  double squares = 0.0;
+  double squares = 0.0, condition = 0.0;  ///< at the end of the iteration
 
-  [[nodiscard]] bool is_cylinder() const { return iteration.converged && frame.radius > 0.0; }
+  [[nodiscard]] bool is_cylinder() const {
+    return iteration.converged && frame.radius > 0.0 && condition < kUndetermined;
+  }
 };
 
 FoundCylinder find_from(const Eigen::Matrix3Xd& p, const Vector3& direction) {
-  FoundCylinder found{start(p, direction), {}, 0.0};
+  FoundCylinder found{start(p, direction)};
   Frame& f = found.frame;
   found.iteration =
       minimise([&] { return linearised(p, f); },
                [&](const Eigen::Matrix<double, 5, 1>& change) { return move(f, change); });
-  found.squares = linearised(p, f).r.squaredNorm();
+  const Linearised<5> at = linearised(p, f);
+  found.squares = at.r.squaredNorm();
+  found.condition = cofactor<5>(at.J).condition;
   return found;
 }
 

@@ -83,8 +83,11 @@ TEST(PlanObservableWithBacklash, RefusesWhatTheAdjustmentWouldRefuse) {
 /// X moves forward only. The adjustment accepts it: the differences of X have their prior.
 TEST(PlanObservableWithBacklash, AcceptsTablesThatThePathShowsInOneDirectionOnly) {
   const Machine machine = coarse_machine("[w X' b Y Z (C1) t]");
-  Path path;
-  for (const double x_m : machine.nodes[0].nodes_m) {
+  const std::vector<double>& nodes_m = machine.nodes[0].nodes_m;
+  const Vector3 first = case_a_path().vertices_m.front();
+  Path path{{{nodes_m.front(), first.y(), first.z()}}};  // X has moved before the first plane
+  for (const double node_m : nodes_m) {
+    const double x_m = std::max(node_m, nodes_m.front() + 0.05);
     for (const Vector3& q : case_a_path().vertices_m) {
       path.vertices_m.emplace_back(x_m, q.y(), q.z());
     }

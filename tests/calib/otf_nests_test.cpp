@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-constexpr unsigned kNestRuns = 5;
+constexpr unsigned kNestRuns = 3;
 const Vector3 kDrift_m(16e-6, -16e-6, 16e-6);
 
 double mean_error_of_runs_m(NestRunOptions wanted) {

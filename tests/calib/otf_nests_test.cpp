@@ -164,11 +164,12 @@ TEST(Nests, OneVisitShowsNoDrift) {
 TEST(Nests, AtAWrongPositionAreNamed) {
   MadeRun run = make_nest_run({.drift_m = kDrift_m});
   for (Nest& nest : run.options.nests.nests) {
-    nest.position_tracker_m += Vector3(0.1, 0.0, 0.0);
+    nest.position_tracker_m += Vector3(0.0, 0.0, 2.0);
   }
-  const Identification id = *identify_nest_run(run);
-  EXPECT_FALSE(id.solution.drift);
-  EXPECT_THAT(id.observations.notes, Contains(HasSubstr("nest A was never measured")));
+  const auto id = identify_nest_run(run);
+  ASSERT_TRUE(id) << id.error().text;
+  EXPECT_FALSE(id->solution.drift);
+  EXPECT_THAT(id->observations.notes, Contains(HasSubstr("nest A was never measured")));
 }
 
 TEST(Nests, ThatTheMachineDrivesThroughAreRefused) {

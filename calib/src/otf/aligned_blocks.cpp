@@ -1,6 +1,7 @@
 #include "abbe/calib/otf/aligned_blocks.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 #include "abbe/calib/otf/observe.hpp"
@@ -156,19 +157,27 @@ Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples
   if (!nests) {
     return tl::unexpected(nests.error());
   }
+  const auto with_notes = [&](Error error) {
+    for (const std::string& note : nests->notes) {
+      error.text += "; " + note;
+    }
+    return error;
+  };
   if (nests->samples.empty()) {
-    return Screening(samples, machine, path, noise, options).blocks().map([&](AlignedBlocks run) {
-      return with_nests(std::move(run), *std::move(nests));
-    });
+    return Screening(samples, machine, path, noise, options)
+        .blocks()
+        .map([&](AlignedBlocks run) { return with_nests(std::move(run), *std::move(nests)); })
+        .map_error(with_notes);
   }
 
   KeptSamples without(samples.begin(), samples.end());
   for (const std::size_t i : nests->samples) {
     without[i].valid = false;
   }
-  return Screening(without, machine, path, noise, options).blocks().map([&](AlignedBlocks run) {
-    return with_nests(std::move(run), *std::move(nests));
-  });
+  return Screening(without, machine, path, noise, options)
+      .blocks()
+      .map([&](AlignedBlocks run) { return with_nests(std::move(run), *std::move(nests)); })
+      .map_error(with_notes);
 }
 
 }  // namespace abbe::calib::otf

@@ -111,7 +111,7 @@ TEST_F(DirectCauses, NamesNothingForAnotherMachine) {
   EXPECT_THAT(t.causes, IsEmpty());
 }
 
-/// Measured where the program is told the line: rotations times levers are part of the model's
+/// Measured on a stated line: rotations times levers are part of the model's
 /// value.
 TEST_F(DirectCauses, AKnownLineNeedsNoCause) {
   const Vector3 line(0.0, 0.1, -0.3), t = run_.machine.target_offset_m;

@@ -165,7 +165,7 @@ Result<Reduced> compare_squareness(const MeasuredError& error, const VolumetricM
   return out;
 }
 
-/// Causes of a squareness: only its sign can be told from one value.
+/// Causes of a squareness: one value can only show its sign.
 void add_squareness_cause(Reduced& r) {
   const PointDifference& point = r.table.points.front();
   const double reversed = std::abs(2.0 * r.change - point.measured - point.model);

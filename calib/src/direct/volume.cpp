@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "direct/common_tables.hpp"
+#include "direct/common_nodes.hpp"
 #include "direct/scatter.hpp"
 
 namespace abbe::calib::direct {

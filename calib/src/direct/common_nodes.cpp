@@ -1,4 +1,4 @@
-#include "direct/common_tables.hpp"
+#include "direct/common_nodes.hpp"
 
 #include <algorithm>
 

@@ -7,70 +7,14 @@
 
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/environment_use.hpp"
+#include "session_drive.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 using namespace std::chrono_literals;
 using protocol::HostTime;
-using protocol::SampleFlag;
-using protocol::Snapshot;
-
-constexpr auto kPeriod = 2ms;       // 500 points per second
-constexpr double kStep_m = 100e-6;  // 50 mm/s
-
-/// Drives a machine point by point and shows every snapshot to a session.
-class Drive {
- public:
-  explicit Drive(CalibrationSession& session) : session_(session) {}
-
-  void stand(AxisPosition q, std::chrono::nanoseconds how_long) {
-    q_ = q;
-    speed_m_per_s_ = 0.0;
-    for (auto t = 0ns; t < how_long; t += kPeriod) show();
-  }
-  void move(AxisPosition to) {
-    const AxisPosition from = q_;
-    const double way = std::hypot(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-    const int steps = static_cast<int>(std::ceil(way / kStep_m));
-    speed_m_per_s_ = kStep_m / std::chrono::duration<double>(kPeriod).count();
-    for (int i = 1; i <= steps; ++i) {
-      for (std::size_t a = 0; a < 3; ++a) q_[a] = from[a] + (to[a] - from[a]) * i / steps;
-      show();
-    }
-  }
-  void pause(std::chrono::nanoseconds how_long) { now_ += how_long; }
-  void jump(AxisPosition to) { q_ = to; }  ///< without a snapshot on the way
-  /// Offset of the tracker's clock from host time; 500 s at first.
-  void set_device_clock(std::chrono::nanoseconds ahead) { device_ahead_ = ahead; }
-  void lose_axes() { axes_known_ = false; }
-  void set_environment(const protocol::EnvironmentSample& e) { environment_ = e; }
-  [[nodiscard]] HostTime now() const { return now_; }
-
- private:
-  void show() {
-    Snapshot s;
-    s.head.time = now_;
-    s.axis_count = axes_known_ ? 3 : 0;
-    for (std::size_t a = 0; a < 3; ++a) s.position[a] = q_[a];
-    s.velocity[0] = speed_m_per_s_;
-    s.has_tracker_point = true;
-    s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch() + device_ahead_};
-    s.tracker_point.p_tracker_m = q_;
-    s.has_environment = environment_.has_value();
-    if (environment_) s.environment = *environment_;
-    session_.take(s);
-    now_ += kPeriod;
-  }
-
-  CalibrationSession& session_;
-  AxisPosition q_{};
-  double speed_m_per_s_ = 0.0;
-  HostTime now_{10s};
-  std::chrono::nanoseconds device_ahead_ = 500s;
-  bool axes_known_ = true;
-  std::optional<protocol::EnvironmentSample> environment_;
-};
+using Drive = test::SessionDrive;
 
 const std::vector<AxisPosition> kPath{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0.1, 0.1, 0.1}};
 
@@ -440,7 +384,7 @@ TEST(CalibrationSession, RefusesWhenTheMachineStopsForGood) {
   drive.move({0.05, 0, 0});
   for (int i = 0; i < 60; ++i) {  // a point now and then: the tracker continues
     drive.pause(20s);
-    drive.stand({0.05, 0, 0}, kPeriod);
+    drive.stand({0.05, 0, 0}, Drive::kPeriod);
   }
   EXPECT_EQ(session.status().state, SessionState::Refused);
   EXPECT_NE(session.status().reason.find("stood still"), std::string::npos)

@@ -5,10 +5,10 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "abbe/model/model_document.hpp"
 #include "abbe_command.hpp"
+#include "model_eval_output.hpp"
 #include "synthetic_otf_run.hpp"
 
 namespace abbe::daemon {
@@ -79,12 +79,9 @@ TEST_F(CliBacklash, IsInSummaryVerdictAndFiles) {
   EXPECT_EQ(document->backlash.size(), 14u);
 }
 
-/// Column `column` of the only point of eval.csv.
+/// Of the last point.
 double value_of(const test::Ran& ran, std::size_t column) {
-  std::istringstream row(ran.out.substr(ran.out.rfind('\n', ran.out.size() - 2) + 1));
-  std::string cell;
-  for (std::size_t i = 0; i <= column; ++i) std::getline(row, cell, ',');
-  return std::stod(cell);
+  return test::rows_of(ran.out).back().at(column);
 }
 
 TEST_F(CliBacklash, IsInVOfADirection) {

@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "abbe_command.hpp"
+#include "model_eval_output.hpp"
 #include "report_page.hpp"
 #include "synthetic_otf_run.hpp"
 #include "warm_scales.hpp"
@@ -26,6 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Ran;
+using test::rows_of;
 using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -59,20 +60,6 @@ class Cli : public ::testing::Test {
   static inline test::OtfFiles files_;
   static inline Ran identified_;
 };
-
-/// Columns of the rows of `model eval`, without comment and header.
-std::vector<std::vector<double>> rows_of(const std::string& csv) {
-  std::vector<std::vector<double>> rows;
-  std::istringstream lines(csv);
-  for (std::string line; std::getline(lines, line);) {
-    if (line.empty() || line[0] == '#' || line[0] == 'x') continue;
-    std::vector<double> row;
-    std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
-    rows.push_back(row);
-  }
-  return rows;
-}
 
 TEST_F(Cli, IdentifiesTheTruthOfASimulatedMachine) {
   ASSERT_EQ(identified_.exit, 0) << identified_.err;

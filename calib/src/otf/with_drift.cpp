@@ -52,14 +52,12 @@ Vector3 centre_tracker_m(const Observations& o) {
 }
 
 std::vector<DriftPoint> drift_points(const Observations& o, const DriftBasis& basis,
-                                     const Eigen::VectorXd& c, const Eigen::MatrixXd& covariance) {
+                                     const Eigen::VectorXd& c) {
   const Vector3 centre_m = centre_tracker_m(o);
   const Matrix3& R = o.alignment.T_machine_tracker.R;
   std::vector<DriftPoint> points;
   for (const double time_s : o.drift->knots_s) {
-    const Eigen::MatrixXd H = R * basis.dp_dc(time_s, centre_m);
-    const Matrix3 cov = H * covariance * H.transpose();
-    points.push_back({time_s, H * c, cov.diagonal().cwiseMax(0.0).cwiseSqrt()});
+    points.push_back({time_s, R * basis.dp_dc(time_s, centre_m) * c});
   }
   return points;
 }
@@ -86,14 +84,12 @@ Observations without_run_effects(Observations o, const Solution& solution) {
   return solution.drift ? without_drift(std::move(o), *solution.drift) : o;
 }
 
-DriftPoint TrackerDrift::largest() const {
-  DriftPoint most;
+Vector3 TrackerDrift::largest_m() const {
+  Vector3 most = Vector3::Zero();
   for (const DriftPoint& point : points) {
     for (Eigen::Index k = 0; k < 3; ++k) {
-      if (std::abs(point.value_m(k)) > std::abs(most.value_m(k))) {
-        most.value_m(k) = point.value_m(k);
-        most.u_m(k) = point.u_m(k);
-        most.time_s = point.time_s;
+      if (std::abs(point.value_m(k)) > std::abs(most(k))) {
+        most(k) = point.value_m(k);
       }
     }
   }
@@ -127,9 +123,7 @@ WithDrift with_drift(const Observations& o, const WhitenedRows& rows, const Adju
     factor = std::max(1.0, variance(with.residual_m));
   }
 
-  const Eigen::Index m = with.drift.coefficients.size();
-  with.drift.points =
-      drift_points(o, basis, with.drift.coefficients, estimate.covariance.bottomRightCorner(m, m));
+  with.drift.points = drift_points(o, basis, with.drift.coefficients);
   with.drift.visits = estimate.visits;
   with.drift.u_repeatability_m = estimate.u_repeatability_m;
   with.drift.notes = std::move(estimate.notes);

@@ -37,7 +37,7 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
 }
 
 TrackerDriftFigures drift_figures(const calib::otf::TrackerDrift& drift) {
-  return {.largest_m = drift.largest().value_m,
+  return {.largest_m = drift.largest_m(),
           .u_repeatability_m = drift.u_repeatability_m,
           .visits = drift.visits};
 }

@@ -45,9 +45,6 @@ struct DriftObservations {
 struct DriftPoint {
   double time_s = 0.0;                ///< tracker clock
   Vector3 value_m = Vector3::Zero();  ///< apparent motion of the centre of the path, machine axes
-  /// Standard uncertainty for a course that is as smooth as the prior; a real course between two
-  /// visits may be off by more (nests.md), so results do not state it.
-  Vector3 u_m = Vector3::Zero();
 };
 
 /// The estimated drift.
@@ -59,8 +56,8 @@ struct TrackerDrift {
   double u_repeatability_m = 0.0;
   std::vector<std::string> notes{};  ///< for the verdict
 
-  /// For each machine axis the point with the largest absolute value.
-  [[nodiscard]] DriftPoint largest() const;
+  /// For each machine axis the value with the largest absolute value.
+  [[nodiscard]] Vector3 largest_m() const;
 };
 
 }  // namespace abbe::calib::otf

@@ -185,8 +185,9 @@ TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
   }
   for (const auto& part : summary["parts"]) {
     EXPECT_GE(part["u_without_um"].get<double>(), summary["u_um"].get<double>());
-    if (part["method"] == "otf")
+    if (part["method"] == "otf") {
       EXPECT_GT(part["u_alone_um"].get<double>(), summary["u_um"].get<double>());
+    }
   }
   for (const auto& table : summary["tables"])
     for (const auto& u_of_run : table["u_of_runs"])

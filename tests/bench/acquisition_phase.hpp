@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 
 #include "hung_hub.hpp"
@@ -42,14 +43,16 @@ struct AcquisitionPhase {
   }
 };
 
-/// By the name of the stream, which is that of its thread.
+/// By the name of the stream; its thread is "abbe-" and this name.
 using AcquisitionPhases = std::map<std::string, AcquisitionPhase>;
 
 /// Fields of /proc/PID/task/TID/schedstat: time on a processor, time spent runnable but waiting for
 /// one (both in ns), number of times scheduled [Linux, Documentation/scheduler/sched-stats.rst].
 inline void read_scheduling(pid_t process, const std::string& thread, AcquisitionPhase& phase) {
-  std::ifstream in{"/proc/" + std::to_string(process) + "/task/" +
-                   std::to_string(test::thread_of(process, thread)) + "/schedstat"};
+  const pid_t id = test::thread_of(process, thread);
+  if (id == 0) throw std::runtime_error("abbed has no thread " + thread);
+  std::ifstream in{"/proc/" + std::to_string(process) + "/task/" + std::to_string(id) +
+                   "/schedstat"};
   std::uint64_t on_processor_ns = 0, delay_ns = 0, scheduled = 0;
   if (!(in >> on_processor_ns >> delay_ns >> scheduled)) return;
   phase.delay_ns = delay_ns;
@@ -58,7 +61,7 @@ inline void read_scheduling(pid_t process, const std::string& thread, Acquisitio
 
 /// Since the start of abbed. `status`: its reply to a status request; `process`: its id.
 inline AcquisitionPhases acquisition_until_now(const nlohmann::json& status, pid_t process) {
-  constexpr std::size_t kLongestName = 15;  // of a thread
+  constexpr std::size_t kLongestName = 15;  // of a thread, in Linux
   AcquisitionPhases all;
   for (const auto& stream : status["streams"]) {
     const auto counts = stream.value("latency_counts", nlohmann::json::array());
@@ -68,7 +71,7 @@ inline AcquisitionPhases acquisition_until_now(const nlohmann::json& status, pid
     for (const auto& bucket : counts)
       phase.receive[bucket[0].get<double>()] = bucket[1].get<std::uint64_t>();
     phase.lost = stream["gaps"].get<std::uint64_t>() + stream["dropped"].get<std::uint64_t>();
-    read_scheduling(process, name.substr(0, kLongestName), phase);
+    read_scheduling(process, ("abbe-" + name).substr(0, kLongestName), phase);
   }
 
   return all;

@@ -13,6 +13,14 @@ template <class... Pieces>
   return out.str();
 }
 
+/// A number with two significant digits, for values that only show a size.
+[[nodiscard]] inline std::string two_digits(double value) {
+  std::ostringstream out;
+  out.precision(2);
+  out << value;
+  return out.str();
+}
+
 /// Text of a vector in metres, such as "(20, -15, -120) mm".
 template <class Vector>
 [[nodiscard]] std::string mm_text(const Vector& v_m) {

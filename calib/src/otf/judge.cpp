@@ -50,14 +50,14 @@ void note_what_u_leaves_out(Verdict& verdict, const Observations& o) {
   if (!(o.u_scale > 0.0)) {
     verdict.notes.push_back(
         message("not in the uncertainty: the scale of the tracker's ranges; 1 um/m would be ",
-                lever_m, " um rms"));
+                two_digits(lever_m), " um rms"));
   }
 
   if (*std::max_element(o.u_axis_scale.begin(), o.u_axis_scale.end()) <= 0.0) {
     verdict.notes.push_back(
         message("not in the uncertainty: the temperature of the machine's scales; 1 K of steel "
                 "would be ",
-                1e6 * kSteel_per_K * lever_m, " um rms"));
+                two_digits(1e6 * kSteel_per_K * lever_m), " um rms"));
   }
 }
 

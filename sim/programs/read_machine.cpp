@@ -6,6 +6,7 @@
 
 #include "read_counter_card.hpp"
 #include "read_measuring_machine.hpp"
+#include "read_tracker.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -93,6 +94,7 @@ void read_machine_tables(TomlSection root, SetupDraft& draft) {
   tracker.number("sigma_angle_urad", simulation.tracker->model.sigma_angle_rad, kMicro,
                  kNotNegativeNumber);
   tracker.port("port", simulation.tracker_port);
+  read_nests(tracker, simulation);
   TomlSection encoder = root.child("encoder");
   encoder.port("peer_port", simulation.bus->port);
   encoder.port("local_port", simulation.bus->peer_port);

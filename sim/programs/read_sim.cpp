@@ -9,15 +9,10 @@
 #include "read_faults.hpp"
 #include "read_measuring_machine.hpp"
 #include "read_touching.hpp"
+#include "read_tracker.hpp"
 
 namespace abbe::sim {
 namespace {
-
-void read_duration(TomlSection& section, std::string_view key, std::chrono::nanoseconds& value,
-                   double scale) {
-  double seconds = 0.0;
-  if (section.number(key, seconds, scale, kNotNegativeNumber)) value = seconds_to_ns(seconds);
-}
 
 void read_truth(TomlSection section, const std::string& file, SetupDraft& draft) {
   std::string shape = "linear";
@@ -48,34 +43,8 @@ void read_path(TomlSection section, const std::string& file, SetupDraft& draft) 
   section.number("acceleration_mm_per_s2", simulation.path.acceleration_m_per_s2, kMilli,
                  kPositiveNumber);
   section.number("dwell_s", simulation.path.dwell_s, 1.0, kNotNegativeNumber);
-  read_duration(section, "standstill_s", simulation.standstill, 1.0);
+  section.duration("standstill_s", simulation.standstill);
   section.flag("start_when_streaming", simulation.start_when_streaming);
-  section.refuse_unknown_keys();
-}
-
-void read_tracker(TomlSection section, SimulationSetup& simulation) {
-  TrackerOptions& tracker = *simulation.tracker;
-  TrackerModel& model = tracker.model;
-  section.port("port", simulation.tracker_port);
-  section.vector("position_mm", model.position_m, kMilli);
-  section.vector("rotation_rad", model.rotation_rad);
-  section.number("sigma_range_um", model.sigma_range_m, kMicro, kNotNegativeNumber);
-  section.number("sigma_angle_urad", model.sigma_angle_rad, kMicro, kNotNegativeNumber);
-  section.number("max_radial_speed_mm_per_s", model.max_radial_speed_m_per_s, kMilli,
-                 kPositiveNumber);
-  section.number("max_lateral_speed_mm_per_s", model.max_lateral_speed_m_per_s, kMilli,
-                 kPositiveNumber);
-  section.number("clock_offset_s", model.clock_offset_s, 1.0, {0.0, 2e9});
-  section.number("clock_drift_ppm", model.clock_drift_ppm, 1.0, {-1000.0, 1000.0});
-  read_duration(section, "delay_ms", tracker.delay, kMilli);
-  read_duration(section, "warm_up_s", tracker.warm_up, 1.0);
-  read_duration(section, "command_latency_ms", tracker.command_latency, kMilli);
-  read_duration(section, "initialize_s", tracker.initialize_time, 1.0);
-  read_duration(section, "fetch_beam_s", tracker.fetch_beam, 1.0);
-  section.number("air_temperature_C", tracker.air_temperature_C);
-  section.number("air_pressure_mbar", tracker.air_pressure_mbar);
-  section.number("air_humidity_percent", tracker.air_humidity_percent);
-  section.number("air_drift_K_per_hour", tracker.air_drift_K_per_hour);
   section.refuse_unknown_keys();
 }
 
@@ -108,7 +77,7 @@ void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
   read_truth(sim.child("truth"), file, draft);
   read_thermal(sim.child("thermal"), simulation.truth.thermal);
   read_path(sim.child("path"), file, draft);
-  read_tracker(sim.child("tracker"), simulation);
+  read_sim_tracker(sim.child("tracker"), draft);
   TomlSection encoder = sim.child("encoder");
   encoder.port("port", simulation.bus->port);
   encoder.port("peer_port", simulation.bus->peer_port);

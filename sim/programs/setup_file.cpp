@@ -115,6 +115,18 @@ void share_seed_and_speed(SetupDraft& draft) {
     card.seed = static_cast<std::uint64_t>(draft.seed);
 }
 
+/// The tracker visits the nests, if there are any, while the machine waits.
+void make_nest_visits(SetupDraft& draft) {
+  SimulationSetup& simulation = draft.setup.simulation;
+  TrackerModel& tracker = simulation.tracker->model;
+  const auto seed = static_cast<std::uint64_t>(draft.seed);
+  tracker.drift = draft.drift_is_random_walk ? TrackerDrift::random_walk(draft.drift_at_end_m, seed)
+                                             : TrackerDrift::linear(draft.drift_at_end_m);
+  tracker.nests.seed = seed;
+  if (!draft.nest_visits) tracker.nests.nests.clear();
+  simulation.path.wait_s = tracker.nests.round_s();
+}
+
 }  // namespace
 
 Result<LoadedSetup> load_setup(const SetupChoices& choices) {
@@ -136,6 +148,7 @@ Result<LoadedSetup> load_setup(const SetupChoices& choices) {
   }
 
   share_seed_and_speed(draft);
+  make_nest_visits(draft);
   return draft.setup;
 }
 

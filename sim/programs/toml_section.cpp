@@ -8,6 +8,7 @@
 
 #include "abbe/protocol/table/faults.hpp"
 #include "abbe/protocol/toml_nesting.hpp"
+#include "abbe/sim/sim_clock.hpp"
 #include "files.hpp"
 
 namespace abbe::sim {
@@ -125,6 +126,13 @@ bool TomlSection::flag(std::string_view key, bool& value) {
     return false;
   }
   value = node->as_boolean()->get();
+  return true;
+}
+
+bool TomlSection::duration(std::string_view key, std::chrono::nanoseconds& value, double scale) {
+  double seconds = 0.0;
+  if (!number(key, seconds, scale, kNotNegativeNumber)) return false;
+  value = seconds_to_ns(seconds);
   return true;
 }
 

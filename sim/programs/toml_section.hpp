@@ -5,6 +5,7 @@
 
 #include <toml++/toml.h>
 #include <Eigen/Core>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -58,6 +59,8 @@ class TomlSection {
   bool port(std::string_view key, std::uint16_t& value);
   bool text(std::string_view key, std::string& value);
   bool flag(std::string_view key, bool& value);
+  /// Not negative; `scale`: of the file's unit, in s.
+  bool duration(std::string_view key, std::chrono::nanoseconds& value, double scale = 1.0);
   bool vector(std::string_view key, Eigen::Vector3d& value, double scale = 1.0);
 
   void fault(std::string_view key, std::string_view what);

@@ -14,40 +14,68 @@ std::array<int, 3> direction_after(std::array<int, 3> before, const Eigen::Vecto
   return before;
 }
 
-}  // namespace
-
-Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
+Result<void> check_plan(const PathPlan& plan) {
   if (plan.vertices.empty()) return bad_input("path: no vertex");
   if (!(plan.acceleration_m_per_s2 > 0.0)) return bad_input("path: acceleration must be positive");
   if (!(plan.dwell_s >= 0.0)) return bad_input("path: dwell must not be negative");
-  PathMotion motion;
-  motion.first_m_ = motion.last_m_ = plan.vertices.front().q_m;
-  motion.acceleration_m_per_s2_ = plan.acceleration_m_per_s2;
-  std::array<int, 3> direction{};
+  if (!(plan.wait_s >= 0.0)) return bad_input("path: a wait must not be negative");
+  return {};
+}
 
-  for (std::size_t i = 1; i < plan.vertices.size(); ++i) {
-    const PathVertex& to = plan.vertices[i];
-    const double feed = to.feed_m_per_s > 0.0 ? to.feed_m_per_s : plan.feed_m_per_s;
-    if (!(feed > 0.0)) return bad_input("path: feed must be positive");
-    const Eigen::Vector3d chord = to.q_m - motion.last_m_;
-    if (chord.norm() == 0.0) continue;
-    Leg leg;
-    leg.from_m = motion.last_m_;
-    leg.length_m = chord.norm();
-    leg.unit = chord / leg.length_m;
-    // A leg too short to reach the feed decelerates from its middle on.
-    leg.speed_m_per_s = std::min(feed, std::sqrt(leg.length_m * plan.acceleration_m_per_s2));
-    leg.ramp_s = leg.speed_m_per_s / plan.acceleration_m_per_s2;
-    leg.cruise_s = leg.length_m / leg.speed_m_per_s - leg.ramp_s;
-    leg.begin_s = motion.end_s_ + plan.dwell_s;
-    leg.direction_before = direction;
-    leg.direction = direction = direction_after(direction, leg.unit);
-    motion.end_s_ = leg.begin_s + 2.0 * leg.ramp_s + leg.cruise_s;
-    motion.last_m_ = to.q_m;
-    motion.legs_.push_back(leg);
+/// The vertices without those at which the machine already is.
+std::vector<PathVertex> vertices_reached(const PathPlan& plan) {
+  std::vector<PathVertex> reached{plan.vertices.front()};
+  for (const PathVertex& vertex : plan.vertices)
+    if ((vertex.q_m - reached.back().q_m).norm() > 0.0) reached.push_back(vertex);
+  return reached;
+}
+
+}  // namespace
+
+Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
+  if (const auto valid = check_plan(plan); !valid) return tl::unexpected(valid.error());
+  const std::vector<PathVertex> vertices = vertices_reached(plan);
+  if (plan.wait_s > 0.0 && vertices.size() < 3)
+    return bad_input("path: no inner vertex at which the machine can wait");
+
+  PathMotion motion;
+  motion.first_m_ = motion.last_m_ = vertices.front().q_m;
+  motion.acceleration_m_per_s2_ = plan.acceleration_m_per_s2;
+  double next_wait_s = 0.0;
+
+  for (std::size_t i = 1; i < vertices.size(); ++i) {
+    const double feed_m_per_s =
+        vertices[i].feed_m_per_s > 0.0 ? vertices[i].feed_m_per_s : plan.feed_m_per_s;
+    if (!(feed_m_per_s > 0.0)) return bad_input("path: feed must be positive");
+    double begin_s = motion.end_s_ + plan.dwell_s;
+    const bool last = i + 1 == vertices.size();
+    if (plan.wait_s > 0.0 && i > 1 && (last || begin_s >= next_wait_s)) {
+      motion.waits_s_.push_back(begin_s);
+      begin_s += plan.wait_s;
+      next_wait_s = begin_s + plan.wait_every_s;
+    }
+    motion.add_leg(vertices[i], feed_m_per_s, begin_s);
   }
 
   return motion;
+}
+
+void PathMotion::add_leg(const PathVertex& to, double feed_m_per_s, double begin_s) {
+  Leg leg;
+  leg.from_m = last_m_;
+  const Eigen::Vector3d chord = to.q_m - leg.from_m;
+  leg.length_m = chord.norm();
+  leg.unit = chord / leg.length_m;
+  // A leg too short to reach the feed decelerates from its middle on.
+  leg.speed_m_per_s = std::min(feed_m_per_s, std::sqrt(leg.length_m * acceleration_m_per_s2_));
+  leg.ramp_s = leg.speed_m_per_s / acceleration_m_per_s2_;
+  leg.cruise_s = leg.length_m / leg.speed_m_per_s - leg.ramp_s;
+  leg.begin_s = begin_s;
+  leg.direction_before = legs_.empty() ? std::array<int, 3>{} : legs_.back().direction;
+  leg.direction = direction_after(leg.direction_before, leg.unit);
+  end_s_ = leg.begin_s + 2.0 * leg.ramp_s + leg.cruise_s;
+  last_m_ = to.q_m;
+  legs_.push_back(leg);
 }
 
 double PathMotion::leg_end_s(std::size_t i) const {

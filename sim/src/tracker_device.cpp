@@ -196,17 +196,19 @@ void TrackerDevice::finish_boot(HostTime at) {
 // ------------------------------------------------------------------------------------------
 // results
 
-emscon::MultiPoint TrackerDevice::point_at(DeviceTime t) {
+std::optional<emscon::MultiPoint> TrackerDevice::point_at(DeviceTime t) {
   const HostTime at = host_time(options_.model, power_on_, t);
   const auto index = static_cast<std::uint64_t>((t - grid_->first) / grid_->separation);
   noise_next_ = std::max(noise_next_, noise_base_ + index + 1);
   const TrackerView view = observe(options_.model, machine_, at, noise_base_ + index);
+  if (!view.has_target) return std::nullopt;
   Eigen::Vector3d p = length_per_metre(units_.length) * view.p_tracker_m;
   // Only the translation of a transformation is simulated: enough to detect a transformation that
   // was left switched on.
   if (settings_.apply_transformation) p += Eigen::Vector3d::Map(transformation_.translation.data());
   if (coordinates_ == emscon::CoordinateSystem::LeftHandedX) p.x() = -p.x();
-  return {status_of(view.speed, at), emscon::TrackerClockReading::from(t), {p.x(), p.y(), p.z()}};
+  return emscon::MultiPoint{
+      status_of(view.speed, at), emscon::TrackerClockReading::from(t), {p.x(), p.y(), p.z()}};
 }
 
 emscon::PointStatus TrackerDevice::status_of(BeamSpeed speed, HostTime at) const {
@@ -223,7 +225,9 @@ void TrackerDevice::emit_burst(HostTime at) {
        stream_->next_point += stream_->separation) {
     const HostTime measured = host_time(options_.model, power_on_, stream_->next_point);
     if (beam_broken_.holds(measured)) continue;
-    points.push_back(point_at(stream_->next_point));
+    const auto point = point_at(stream_->next_point);
+    if (!point) continue;
+    points.push_back(*point);
     --stream_->points_left;
   }
 
@@ -262,13 +266,19 @@ void TrackerDevice::emit_single(HostTime at) {
   const auto n =
       static_cast<std::uint64_t>(std::max<std::int32_t>(stationary_.measurement_time_ms, 1));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::uint64_t measured = 0;
 
   for (std::uint64_t i = 0; i < n; ++i) {
     const HostTime t = at - std::chrono::milliseconds{n - i};
-    sum += observe(options_.model, machine_, t, noise_next_++).p_tracker_m;
+    const TrackerView view = observe(options_.model, machine_, t, noise_next_++);
+    sum += view.p_tracker_m;
+    if (view.has_target) ++measured;
   }
 
-  const Eigen::Vector3d mean = length_per_metre(units_.length) / static_cast<double>(n) * sum;
+  if (measured == 0)
+    return send(emscon::ErrorResponse{emscon::Command::StartMeasurement, emscon::Status::Unknown});
+  const Eigen::Vector3d mean =
+      length_per_metre(units_.length) / static_cast<double>(measured) * sum;
   emscon::SingleResult result;
   result.value = {mean.x(), mean.y(), mean.z()};
   result.environment = environment(at);

@@ -48,10 +48,20 @@ Eigen::Matrix3d R_machine_tracker(const TrackerModel& model) {
 
 TrackerView observe(const TrackerModel& model, const VirtualMachine& machine, HostTime at,
                     std::uint64_t index) {
+  const double elapsed_s = machine.elapsed_s(at);
+  const Beam beam = beam_at(model.nests, machine.path().waits_s(), elapsed_s);
+  if (beam.target == BeamTarget::None) return {.has_target = false};
+  const Eigen::Vector3d drift_m = model.drift.at(elapsed_s / machine.path().duration_s());
+  if (beam.target == BeamTarget::Nest) {
+    const Eigen::Vector3d p = nest_position_m(model.nests, beam, elapsed_s) + drift_m;
+    return {.p_tracker_m = with_noise(model, p, index)};
+  }
+
   const Eigen::Matrix3d R_tracker_machine = R_machine_tracker(model).transpose();
   const Eigen::Vector3d p = R_tracker_machine * (machine.target_m(at) - model.position_m);
   const Eigen::Vector3d velocity = R_tracker_machine * machine.motion(at).velocity_m_per_s;
-  return {with_noise(model, p, index), judged(model, p, velocity)};
+  return {.p_tracker_m = with_noise(model, p + drift_m, index),
+          .speed = judged(model, p, velocity)};
 }
 
 DeviceTime device_time(const TrackerModel& model, HostTime power_on, HostTime at) {

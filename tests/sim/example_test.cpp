@@ -57,7 +57,8 @@ class SimExample : public testing::Test {
 
   /// The keys that the reader knows in `table` ("sim.path"), from its message for an unknown key.
   [[nodiscard]] std::set<std::string> known_keys(const std::string& table) const {
-    const bool array = table == "sim.environment" || table == "sim.fault";
+    const bool array =
+        table == "sim.environment" || table == "sim.fault" || table == "sim.tracker.nest";
     const std::string output =
         faults((array ? "[[" + table + "]]" : "[" + table + "]") + "\nxxxxxxxxxxxx = 1\n");
     const std::regex list{table + "\\.xxxxxxxxxxxx: unknown key; the keys of this table are (.*)"};

@@ -19,6 +19,8 @@ enum class NoiseStream : std::uint64_t {
   Backlash,
   Probe,
   Artefact,
+  Nest,
+  Drift,
   Encoder = 1000,
   CounterCard = 2000,
 };

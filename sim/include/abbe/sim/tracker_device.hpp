@@ -112,7 +112,7 @@ class TrackerDevice {
   void check_weather(HostTime at);
   void finish_boot(HostTime at);
   void return_beam();
-  [[nodiscard]] emscon::MultiPoint point_at(DeviceTime t);
+  [[nodiscard]] std::optional<emscon::MultiPoint> point_at(DeviceTime t);
   [[nodiscard]] emscon::PointStatus status_of(BeamSpeed speed, HostTime at) const;
   [[nodiscard]] emscon::Environment environment(HostTime at) const;
   [[nodiscard]] double air_temperature_C(HostTime at) const;

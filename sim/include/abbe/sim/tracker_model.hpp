@@ -8,13 +8,16 @@
 ///
 /// P is the position of the tracker, R its rotation; r, az, el are range, azimuth and elevation of
 /// the target. Standard deviations of the noise: sigma_r of r, sigma_a of el, sigma_a / cos el of
-/// az. Across the beam the noise is therefore sigma_a r in both directions.
+/// az. Across the beam the noise is therefore sigma_a r in both directions. Drift of the tracker is
+/// added to p_tracker of every target; it depends on the time since the start of the motion.
 
 #include <Eigen/Core>
 #include <chrono>
 #include <cstdint>
 
 #include "abbe/protocol/time.hpp"
+#include "abbe/sim/reference_nests.hpp"
+#include "abbe/sim/tracker_drift.hpp"
 #include "abbe/sim/virtual_machine.hpp"
 
 namespace abbe::sim {
@@ -30,19 +33,22 @@ struct TrackerModel {
   double max_lateral_speed_m_per_s = 4.0;
   double clock_offset_s = 12345.0;  ///< reading of the tracker's clock at power-on
   double clock_drift_ppm = 15.0;    ///< rate error of the tracker's clock; positive: too fast
+  TrackerDrift drift{};
+  NestVisits nests{};  ///< visited while the machine waits
   std::uint64_t seed = 1;
 };
 
 enum class BeamSpeed { Allowed, Warning, Exceeded };
 
 struct TrackerView {
+  bool has_target = true;  ///< false: the beam moves, nothing is measured
   Eigen::Vector3d p_tracker_m = Eigen::Vector3d::Zero();
   BeamSpeed speed = BeamSpeed::Allowed;
 };
 
 [[nodiscard]] Eigen::Matrix3d R_machine_tracker(const TrackerModel& model);
 
-/// The measured position of the target at time `at`; `index` selects the random numbers of the
+/// The measured position of the target at time `at`, that of the machine or of a nest; `index` selects the random numbers of the
 /// noise.
 [[nodiscard]] TrackerView observe(const TrackerModel& model, const VirtualMachine& machine,
                                   HostTime at, std::uint64_t index);

@@ -44,16 +44,17 @@ class VirtualMachine {
     return position_m(truth_, m.q_m, {m.direction, truth_.thermal.heat_after(elapsed_s(at))});
   }
 
+  /// Time since the start of the motion; -1 before start().
+  [[nodiscard]] double elapsed_s(HostTime at) const {
+    const auto start = started();
+    return start ? ns_to_seconds(at - *start) : -1.0;
+  }
+
   [[nodiscard]] const TruthMachine& truth() const { return truth_; }
   [[nodiscard]] const PathMotion& path() const { return path_; }
 
  private:
   static constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
-
-  [[nodiscard]] double elapsed_s(HostTime at) const {
-    const auto start = started();
-    return start ? ns_to_seconds(at - *start) : -1.0;
-  }
 
   TruthMachine truth_;
   PathMotion path_;

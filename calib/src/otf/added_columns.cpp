@@ -24,6 +24,22 @@ void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> 
   }
 }
 
+void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> row,
+                       double residual_m, std::span<const SparseRows::Entry> values) {
+  const double weight = 1.0 / (o.sigma_m * o.sigma_m);
+  for (const SparseRows::Entry& c : values) {
+    const auto i = static_cast<Eigen::Index>(c.column);
+    const double weighted = weight * c.value;
+    for (const SparseRows::Entry& other : values) {
+      CWC_(static_cast<Eigen::Index>(other.column), i) += weighted * other.value;
+    }
+    for (const SparseRows::Entry& e : row) {
+      CWA_(i, static_cast<Eigen::Index>(e.column)) += weighted * e.value;
+    }
+    CWr_(i) += weighted * residual_m;
+  }
+}
+
 AddedColumns& AddedColumns::operator+=(const AddedColumns& other) {
   CWC_ += other.CWC_;
   CWA_ += other.CWA_;

@@ -18,6 +18,9 @@ class AddedColumns {
   /// `values`: one value per added column in this row.
   void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
            std::span<const double> values);
+  /// The same for a row in which few columns have a value: entries with the index of the column.
+  void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
+           std::span<const SparseRows::Entry> values);
   AddedColumns& operator+=(const AddedColumns&);
   AddedColumns& operator-=(const AddedColumns&);
 

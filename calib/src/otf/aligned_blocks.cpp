@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "abbe/calib/otf/observe.hpp"
+#include "message.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/off_line_samples.hpp"
 #include "otf/unreachable_samples.hpp"
@@ -142,6 +143,18 @@ class Screening {
   SetAside found_;
 };
 
+std::string taken_out_text(const NestVisits& nests) {
+  std::string names;
+  for (std::size_t n = 0; n < nests.names.size(); ++n) {
+    const auto visits = std::count_if(nests.found.begin(), nests.found.end(),
+                                      [&](const NestVisit& v) { return v.nest == n; });
+    if (visits > 0) {
+      names += (names.empty() ? "" : ", ") + message(nests.names[n], " (", visits, ")");
+    }
+  }
+  return "visits of reference nests are not part of the run: " + names;
+}
+
 AlignedBlocks with_nests(AlignedBlocks run, NestVisits nests) {
   run.series.lost_samples -= nests.samples.size();
   run.nests = std::move(nests);
@@ -158,6 +171,9 @@ Result<AlignedBlocks> aligned_blocks(std::span<const TrackerObservation> samples
     return tl::unexpected(nests.error());
   }
   const auto with_notes = [&](Error error) {
+    if (!nests->found.empty()) {
+      error.text += "; " + taken_out_text(*nests);
+    }
     for (const std::string& note : nests->notes) {
       error.text += "; " + note;
     }

@@ -54,15 +54,15 @@ Eigen::MatrixXd DriftBasis::dp_dc(double time_s, const Vector3& p_tracker_m) con
   return H;
 }
 
-void DriftBasis::dp_dc_along(const Vector3& direction_tracker, double time_s,
-                             const Vector3& p_tracker_m, std::span<double> out) const {
-  std::fill(out.begin(), out.end(), 0.0);
+void DriftBasis::append_along(const Vector3& direction_tracker, double time_s,
+                              const Vector3& p_tracker_m, std::size_t first,
+                              std::vector<SparseRows::Entry>& out) const {
   const Vector3 moment = p_tracker_m.cross(direction_tracker) / d_.length_m;
   for (const auto& share : shares(time_s)) {
     for (std::size_t k = 0; share && k < modes_; ++k) {
       const double part = k < 3 ? direction_tracker(static_cast<Eigen::Index>(k))
                                 : moment(static_cast<Eigen::Index>(k - 3));
-      out[share->first + k] = share->weight * part;
+      out.push_back({first + share->first + k, share->weight * part});
     }
   }
 }
@@ -85,22 +85,7 @@ Eigen::MatrixXd DriftBasis::root_of_prior() const {
     }
   }
 
-  const Eigen::MatrixXd L = K.llt().matrixL();
-  const auto m = static_cast<Eigen::Index>(modes_);
-  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n * m, n * m);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      root.block(i * m, j * m, m, m).diagonal().setConstant(L(i, j));
-    }
-  }
-  return root;
-}
-
-void drow_ddrift(const Observations& o, const DriftBasis& basis, const Observation& row,
-                 std::span<double> out) {
-  const RigidTransform& T = o.alignment.T_machine_tracker;
-  const Vector3 p_tracker_m = T.R.transpose() * (row.axis_position_m + o.target_offset_m - T.t_m);
-  basis.dp_dc_along(T.R.transpose() * row.direction, o.drift->block_s[row.block], p_tracker_m, out);
+  return K.llt().matrixL();
 }
 
 }  // namespace abbe::calib::otf

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "abbe/calib/otf/observe.hpp"
 
@@ -23,10 +24,12 @@ class DriftBasis {
   /// Derivative of the measured position with respect to the coefficients, 3 x size(), for a point
   /// at p in the tracker frame.
   [[nodiscard]] Eigen::MatrixXd dp_dc(double time_s, const Vector3& p_tracker_m) const;
-  /// The same along a direction of the tracker frame, written to `out`.
-  void dp_dc_along(const Vector3& direction_tracker, double time_s, const Vector3& p_tracker_m,
-                   std::span<double> out) const;
-  /// Lower triangular root of the covariance of the coefficients for the amplitude 1.
+  /// The same along a direction of the tracker frame: appends the coefficients that have one, at
+  /// most 2 modes(), to `out`. `first`: column of the first coefficient.
+  void append_along(const Vector3& direction_tracker, double time_s, const Vector3& p_tracker_m,
+                    std::size_t first, std::vector<SparseRows::Entry>& out) const;
+  /// Lower triangular root of the covariance of one mode at the knots for the amplitude 1. All modes
+  /// have the same, and are independent.
   [[nodiscard]] Eigen::MatrixXd root_of_prior() const;
 
  private:
@@ -40,9 +43,5 @@ class DriftBasis {
   const DriftObservations& d_;
   std::size_t modes_;
 };
-
-/// Derivative of y of the row with respect to the coefficients of Observations::drift.
-void drow_ddrift(const Observations&, const DriftBasis&, const Observation& row,
-                 std::span<double> out);
 
 }  // namespace abbe::calib::otf

@@ -7,18 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "otf/nest_information.hpp"
+#include "otf/drift_likelihood.hpp"
 
 namespace abbe::calib::otf {
-
-/// S d = g of the rows; d: range offset (only if it has a prior), then the coefficients.
-struct DriftEquations {
-  Eigen::MatrixXd S{};
-  Eigen::VectorXd g{};
-  double u_range_offset_m = 0.0;  ///< 0: the range offset is not an unknown
-
-  [[nodiscard]] Eigen::Index offsets() const { return u_range_offset_m > 0.0 ? 1 : 0; }
-};
 
 struct DriftEstimate {
   Eigen::VectorXd d;
@@ -27,6 +18,8 @@ struct DriftEstimate {
   std::size_t visits = 0;            ///< of positions that were visited at least twice
   std::vector<std::string> notes{};  ///< nests that moved, visits not used
 };
-[[nodiscard]] DriftEstimate estimate_drift(const DriftObservations&, const DriftEquations&);
+/// NotConverged if `stopped` returns true.
+[[nodiscard]] Result<DriftEstimate> estimate_drift(const DriftObservations&, const DriftEquations&,
+                                                   const Stopped& stopped);
 
 }  // namespace abbe::calib::otf

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "abbe/calib/otf/polyline.hpp"
@@ -25,38 +26,44 @@ Vector3 position_of(const NestVisits& nests, std::size_t nest) {
       ->mean_tracker_m;
 }
 
-/// BadInput if a leg of the path passes through the radius of the nest at `p_tracker_m`.
-Result<void> check_apart_from_legs(const Observations& o, const Nest& nest,
-                                   const Vector3& p_tracker_m) {
+/// Distance of a point in the tracker frame to the path; `leg`: the closest one.
+double distance_to_legs_m(const Observations& o, const Vector3& p_tracker_m, std::size_t& leg) {
   const Vector3 q = o.alignment.T_machine_tracker * p_tracker_m - o.target_offset_m;
-  for (std::size_t leg = 0; leg + 1 < o.vertices_m.size(); ++leg) {
-    const Vector3 c = closest_on_leg(o.vertices_m[leg], o.vertices_m[leg + 1], q).closest_m;
-    if ((q - c).norm() <= nest.radius_m) {
-      return failure(
-          ErrorCode::BadInput,
-          message("reference nest ", nest.name, " is ", 1e3 * (q - c).norm(), " mm from leg ", leg,
-                  " of the path, its radius is ", 1e3 * nest.radius_m,
-                  " mm: use a smaller radius, or place the nest elsewhere"));
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < o.vertices_m.size(); ++i) {
+    const Vector3 c = closest_on_leg(o.vertices_m[i], o.vertices_m[i + 1], q).closest_m;
+    if ((q - c).norm() < least_m) {
+      least_m = (q - c).norm();
+      leg = i;
     }
   }
-  return {};
+  return least_m;
 }
 
-/// BadInput if the target is in a nest while it is on the path: around the configured position,
-/// where samples are taken for a visit, and around that of the first visit.
-Result<void> check_apart(const Observations& o, const NestVisits& nests,
-                         const std::vector<std::size_t>& visits, const NestOptions& options) {
-  for (std::size_t n = 0; n < options.nests.size(); ++n) {
-    const Nest& nest = options.nests[n];
-    Result<void> apart = check_apart_from_legs(o, nest, nest.position_tracker_m);
-    if (apart && visits[n] > 0) {
-      apart = check_apart_from_legs(o, nest, position_of(nests, n));
-    }
-    if (!apart) {
-      return apart;
+/// The visits without those on the path: a nest can not be where the target of the machine passes,
+/// so the machine stood there. Adds a note for each nest.
+std::vector<NestVisit> visits_apart(const Observations& o, const NestVisits& nests,
+                                    std::vector<std::string>& notes) {
+  constexpr double kOnPath_m = 3e-3;  // as Options::max_alignment_distance_m
+  std::vector<NestVisit> apart;
+  std::vector<std::size_t> on_path(nests.names.size(), 0), leg(nests.names.size(), 0);
+  for (const NestVisit& visit : nests.found) {
+    if (distance_to_legs_m(o, visit.mean_tracker_m, leg[visit.nest]) <= kOnPath_m) {
+      ++on_path[visit.nest];
+    } else {
+      apart.push_back(visit);
     }
   }
-  return {};
+
+  for (std::size_t n = 0; n < on_path.size(); ++n) {
+    if (on_path[n] > 0) {
+      notes.push_back(message("reference nest ", nests.names[n], " is on leg ", leg[n],
+                              " of the path: ", on_path[n],
+                              on_path[n] == 1 ? " visit is" : " visits are",
+                              " the machine itself and not used; check position_mm"));
+    }
+  }
+  return apart;
 }
 
 /// True if three nests with at least two visits are not on a line.
@@ -104,17 +111,16 @@ void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t c
   d.knots_s.push_back(end_s);
 }
 
-DriftObservations drift_of(const AlignedBlocks& run, const std::vector<std::size_t>& visits,
-                           const NestOptions& options) {
+DriftObservations drift_of(const BlockSeries& series, const NestVisits& nests,
+                           const std::vector<std::size_t>& visits, const NestOptions& options) {
   constexpr std::size_t kFewestKnots = 32, kMostKnots = 64;
-  const NestVisits& nests = run.nests;
   DriftObservations d{.visits = nests.found,
                       .names = nests.names,
                       .u_repeatability_m = options.u_repeatability_m,
                       .rotates = determine_rotation(nests, visits),
                       .length_m = 0.0};
   double end_s = nests.found.back().time_s;
-  for (const Block& block : run.series.blocks) {
+  for (const Block& block : series.blocks) {
     d.block_s.push_back(block.time_s);
     end_s = std::max(end_s, block.last_s);
   }
@@ -123,27 +129,21 @@ DriftObservations drift_of(const AlignedBlocks& run, const std::vector<std::size
   }
 
   const std::size_t most = *std::max_element(visits.begin(), visits.end());
-  set_knots(d, run.series.first_time_s, end_s, std::clamp(2 * most, kFewestKnots, kMostKnots));
+  set_knots(d, series.first_time_s, end_s, std::clamp(2 * most, kFewestKnots, kMostKnots));
   return d;
 }
 
 }  // namespace
 
-Result<Observations> with_nest_visits(Observations o, const AlignedBlocks& run,
-                                      const NestOptions& options) {
-  const NestVisits& nests = run.nests;
-  o.notes.insert(o.notes.end(), nests.notes.begin(), nests.notes.end());
-  if (options.nests.empty()) {
+Observations with_nest_visits(Observations o, const AlignedBlocks& run,
+                              const NestOptions& options) {
+  o.notes.insert(o.notes.end(), run.nests.notes.begin(), run.nests.notes.end());
+  const NestVisits nests{.found = visits_apart(o, run.nests, o.notes), .names = run.nests.names};
+  if (nests.found.empty()) {
     return o;
   }
 
   const std::vector<std::size_t> visits = visits_by_nest(nests);
-  if (Result<void> apart = check_apart(o, nests, visits, options); !apart) {
-    return tl::unexpected(apart.error());
-  }
-  if (nests.found.empty()) {
-    return o;
-  }
   if (*std::max_element(visits.begin(), visits.end()) < 2) {
     o.notes.emplace_back(
         "no reference nest was visited twice: the drift of the tracker is not estimated");
@@ -156,7 +156,7 @@ Result<Observations> with_nest_visits(Observations o, const AlignedBlocks& run,
           message("reference nest ", nests.names[n], " was visited once only: it shows no drift"));
     }
   }
-  o.drift = drift_of(run, visits, options);
+  o.drift = drift_of(run.series, nests, visits, options);
   return o;
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "abbe/calib/otf/judge.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
+#include "otf/drift_held_out.hpp"
 #include "otf/held_out_rows.hpp"
 #include "otf/run_unknowns.hpp"
 
@@ -36,9 +38,13 @@ struct RunByFold {
   const Observations& o;
   std::vector<RowInformation> parts;
   std::optional<Observations> with_linear;  ///< absent if the tables of `o` are linear
+  std::optional<DriftHeldOut> drift{};      ///< if a drift was removed from `o`
 
-  RunByFold(const Observations& run, std::size_t folds)
+  RunByFold(const Observations& run, std::size_t folds, const Solution* solution)
       : o(run), parts(information_by_fold(run, folds)) {
+    if (solution != nullptr && solution->drift && run.drift) {
+      drift.emplace(run, *solution->drift);
+    }
     if (!has_linear_tables(run.basis)) {
       with_linear = with_linear_tables(run);
     }
@@ -48,9 +54,41 @@ struct RunByFold {
 
 struct HeldOutFold {
   Eigen::VectorXd U;
+  Eigen::VectorXd change_of_drift{};  ///< coefficients; empty without a drift
   /// for each run the held-out rows: U was not fitted to them
   std::vector<std::vector<std::size_t>> rows;
 };
+
+struct FittedFold {
+  Eigen::VectorXd U;
+  Eigen::VectorXd change_of_drift{};
+};
+
+/// `first`: the first run; only a single run has a drift. `training`: information of the rows for
+/// which `take` returns true.
+Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Information& training,
+                            std::size_t unknowns,
+                            const std::function<bool(const Observation&)>& take,
+                            const Options& options) {
+  const estimation::Datum gauge = gauge_of_runs(first.o.basis, unknowns);
+  if (!first.drift) {
+    return gauge.estimate(training, {.weight = options.gauge_weight}).map([](Eigen::VectorXd U) {
+      return FittedFold{std::move(U)};
+    });
+  }
+
+  const Result<Adjustment> a = gauge.solve(training, {.weight = options.gauge_weight});
+  if (!a) {
+    return tl::unexpected(a.error());
+  }
+  FittedFold fitted{a->U};
+  Result<Eigen::VectorXd> change = first.drift->correct(fitted.U, *a, take, options.stopped);
+  if (!change) {
+    return tl::unexpected(change.error());
+  }
+  fitted.change_of_drift = *std::move(change);
+  return fitted;
+}
 
 /// Fits U without the legs of a fold. A leg that has the only observations of a node of a table in
 /// its run remains in the fit. If U is not determined even with these legs, the result has no
@@ -76,22 +114,22 @@ Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fol
   }
 
   const Observations& any = runs.front().o;
-  Result<Eigen::VectorXd> U = gauge_of_runs(any.basis, unknowns.size())
-                                  .estimate(with_backlash_prior(std::move(training), any),
-                                            {.weight = options.gauge_weight});
-  if (!U && U.error().code == ErrorCode::RankDeficient) {
+  Result<FittedFold> fitted = fit_fold(
+      runs.front(), with_backlash_prior(std::move(training), any), unknowns.size(),
+      [&](const Observation& r) { return r.leg % folds != fold || needed[0][r.leg]; }, options);
+  if (!fitted && fitted.error().code == ErrorCode::RankDeficient) {
     return HeldOutFold{};
   }
-
-  if (!U) {
-    return failure(U.error().code, message("held-out test without fold ", fold, " of ", folds, ": ",
-                                           U.error().text));
+  if (!fitted) {
+    return failure(fitted.error().code, message("held-out test without fold ", fold, " of ", folds,
+                                                ": ", fitted.error().text));
   }
 
   // The model is the mean of both directions of travel: it does not predict backlash.
   const auto model = static_cast<Eigen::Index>(any.layout().model_size());
-  U->segment(model, static_cast<Eigen::Index>(any.basis.size()) - model).setZero();
-  HeldOutFold held{*std::move(U), std::vector<std::vector<std::size_t>>(runs.size())};
+  fitted->U.segment(model, static_cast<Eigen::Index>(any.basis.size()) - model).setZero();
+  HeldOutFold held{std::move(fitted->U), std::move(fitted->change_of_drift),
+                   std::vector<std::vector<std::size_t>>(runs.size())};
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const std::vector<Observation>& rows = runs[k].o.rows;
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -113,7 +151,7 @@ Result<HeldOutFigures> held_out(const Observations& o, const VolumetricModel* ac
 
 Result<HeldOutFigures> held_out(std::span<const Observations> observed,
                                 const VolumetricModel* active, const Options& options,
-                                const HeldOutRow& row) {
+                                const HeldOutRow& row, std::span<const Solution> solutions) {
   const std::size_t folds = options.held_out_folds;
   std::vector<RunByFold> runs;
   std::size_t all_rows = 0;
@@ -124,7 +162,7 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
                      message("held-out test: ", legs, " legs in ", folds,
                              " folds, needs at least 2 folds and one leg per fold"));
     }
-    runs.emplace_back(o, folds);
+    runs.emplace_back(o, folds, solutions.size() == 1 ? &solutions.front() : nullptr);
     all_rows += o.rows.size();
   }
 
@@ -148,8 +186,10 @@ Result<HeldOutFigures> held_out(std::span<const Observations> observed,
         }
       };
       sums.add(
-          o, fit->rows[k], [&](std::size_t i) { return predicted_by_fit(o, i, U); }, active,
-          of_run);
+          o, fit->rows[k], [&](std::size_t i) { return predicted_by_fit(o, i, U); }, active, of_run,
+          [&](std::size_t i) {
+            return runs[k].drift ? runs[k].drift->effect_m(i, fit->change_of_drift) : 0.0;
+          });
     }
     if (options.progress) {
       options.progress(Stage::Judge, static_cast<double>(f + 1) / static_cast<double>(folds));

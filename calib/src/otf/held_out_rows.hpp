@@ -113,17 +113,21 @@ struct HeldOutSums {
 
   /// `predicted_m(row)`: the prediction of the candidate, which was not fitted to `rows`.
   /// `left(row, none_m, candidate_m)` gets what remains of the residuals of each row.
-  template <class Prediction, class Left>
-  void add(const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
-           const VolumetricModel* other_model, Left left) {
+  /// `effect_m(row)`: effect of the run on y of the row that no model predicts.
+  template <class Prediction, class Left, class Effect = double (*)(std::size_t)>
+  void add(
+      const Observations& o, std::span<const std::size_t> rows, Prediction predicted_m,
+      const VolumetricModel* other_model, Left left,
+      Effect effect_m = [](std::size_t) { return 0.0; }) {
     // A best-fit rigid motion fits as few rows as it has unknowns exactly.
     if (rows.size() <= kRigidUnknowns) {
       return;
     }
-    const std::vector<double> none_m = add_without_rigid(
-        none, o, rows, residuals_of_rows(o, rows, [](std::size_t) { return 0.0; }));
+    const std::vector<double> none_m =
+        add_without_rigid(none, o, rows, residuals_of_rows(o, rows, effect_m));
+    const auto with_effect_m = [&](std::size_t row) { return predicted_m(row) + effect_m(row); };
     const std::vector<double> candidate_m =
-        add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, predicted_m));
+        add_without_rigid(candidate, o, rows, residuals_of_rows(o, rows, with_effect_m));
     for (std::size_t i = 0; i < rows.size(); ++i) {
       left(rows[i], none_m[i], candidate_m[i]);
     }
@@ -133,9 +137,9 @@ struct HeldOutSums {
     }
     const std::vector<std::size_t> both = rows_inside(o, rows, other_model->validity());
     if (both.size() > kRigidUnknowns) {
-      add_without_rigid(candidate_beside_other, o, both, residuals_of_rows(o, both, predicted_m));
+      add_without_rigid(candidate_beside_other, o, both, residuals_of_rows(o, both, with_effect_m));
       add_without_rigid(other, o, both, residuals_of_rows(o, both, [&](std::size_t row) {
-                          return predicted_by_model(o, row, *other_model);
+                          return predicted_by_model(o, row, *other_model) + effect_m(row);
                         }));
     }
   }

@@ -133,7 +133,7 @@ Result<Verdict> judge(std::span<const Observations> measured, std::span<const So
     others.push_back(*std::move(of_run));
   }
 
-  const Result<HeldOutFigures> figures = held_out(runs, active, options, row);
+  const Result<HeldOutFigures> figures = held_out(runs, active, options, row, solutions);
   if (!figures) {
     return tl::unexpected(figures.error());
   }

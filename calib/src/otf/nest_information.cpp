@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "elementary.hpp"
 
@@ -18,14 +19,28 @@ std::size_t places(const std::vector<std::size_t>& place) {
   return place.empty() ? 0 : *std::max_element(place.begin(), place.end()) + 1;
 }
 
+/// First column with a value, and number of columns to the last one.
+std::pair<Eigen::Index, Eigen::Index> columns_with_values(const Eigen::MatrixXd& H) {
+  Eigen::Index first = 0, end = H.cols();
+  while (first < end && H.col(first).isZero(0.0)) {
+    ++first;
+  }
+  while (end > first && H.col(end - 1).isZero(0.0)) {
+    --end;
+  }
+  return {first, end - first};
+}
+
 }  // namespace
 
 NestRows::NestRows(const DriftObservations& d, const DriftBasis& basis) : size_(basis.size()) {
-  std::map<std::size_t, Vector3> first;
+  std::map<std::size_t, Vector3> first_visit;
   for (const NestVisit& visit : d.visits) {
-    const Vector3 origin = first.emplace(visit.nest, visit.mean_tracker_m).first->second;
-    rows_.push_back({basis.dp_dc(visit.time_s, visit.mean_tracker_m), visit.mean_tracker_m - origin,
-                     visit.cov_tracker_m2});
+    const Vector3 origin = first_visit.emplace(visit.nest, visit.mean_tracker_m).first->second;
+    const Eigen::MatrixXd H = basis.dp_dc(visit.time_s, visit.mean_tracker_m);
+    const auto [first, count] = columns_with_values(H);
+    rows_.push_back(
+        {first, H.middleCols(first, count), visit.mean_tracker_m - origin, visit.cov_tracker_m2});
   }
 }
 
@@ -48,9 +63,10 @@ NestInformation NestRows::information(const std::vector<std::size_t>& place, dou
         const Eigen::MatrixXd wH = w * row.H;
         W += w;
         Wz += w * row.z_m;
-        WH += wH;
-        all.N += row.H.transpose() * wH;
-        all.Nc += wH.transpose() * row.z_m;
+        const Eigen::Index begin = row.first_column, count = row.H.cols();
+        WH.middleCols(begin, count) += wH;
+        all.N.block(begin, begin, count, count) += row.H.transpose() * wH;
+        all.Nc.segment(begin, count) += wH.transpose() * row.z_m;
         all.constant += row.z_m.dot(w * row.z_m) - natural_logarithm(w.determinant());
       }
     }
@@ -67,7 +83,7 @@ NestInformation NestRows::information(const std::vector<std::size_t>& place, dou
 std::vector<Vector3> NestRows::measured_m(const Eigen::VectorXd& c) const {
   std::vector<Vector3> all;
   for (const Row& row : rows_) {
-    all.emplace_back(row.z_m - row.H * c);
+    all.emplace_back(row.z_m - row.H * c.segment(row.first_column, row.H.cols()));
   }
   return all;
 }

@@ -37,7 +37,9 @@ class NestRows {
                                               const Eigen::VectorXd& c) const;
 
  private:
+  /// H: without the columns of knots that are not beside the visit.
   struct Row {
+    Eigen::Index first_column = 0;
     Eigen::MatrixXd H;
     Vector3 z_m;  ///< relative to the first visit of the nest
     Matrix3 cov_m2;

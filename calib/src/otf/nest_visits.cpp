@@ -3,21 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 #include "message.hpp"
+#include "otf/nest_stands.hpp"
 
 namespace abbe::calib::otf {
 namespace {
 
-constexpr double kLongestPause_s = 2.0, kLeastVisit_s = 0.5;
-
-/// Valid samples within the radius of a nest: indices in the stream.
-struct NearNest {
-  std::size_t nest = 0;
-  std::vector<std::size_t> samples;
-};
+constexpr double kLeastVisit_s = 0.5;
 
 Result<void> check_nest(const Nest& nest) {
   if (nest.name.empty()) {
@@ -68,66 +62,6 @@ Result<void> check_nests(const NestOptions& options) {
   return {};
 }
 
-/// Groups of samples near one nest. A sample elsewhere or a long pause ends a group.
-std::vector<NearNest> groups_near(std::span<const TrackerObservation> samples,
-                                  const std::vector<Nest>& nests) {
-  std::vector<NearNest> groups;
-  bool open = false;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (!samples[i].valid) {
-      continue;
-    }
-    const auto nest = nest_at(samples[i].p_tracker_m, nests);
-    if (!nest) {
-      open = false;
-      continue;
-    }
-
-    const bool goes_on =
-        open && groups.back().nest == *nest &&
-        samples[i].time_s - samples[groups.back().samples.back()].time_s <= kLongestPause_s;
-    if (!goes_on) {
-      groups.push_back({*nest, {}});
-    }
-    groups.back().samples.push_back(i);
-    open = true;
-  }
-  return groups;
-}
-
-Vector3 median_position(std::span<const TrackerObservation> samples,
-                        const std::vector<std::size_t>& of) {
-  Vector3 median;
-  std::vector<double> values(of.size());
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    std::transform(of.begin(), of.end(), values.begin(),
-                   [&](std::size_t i) { return samples[i].p_tracker_m(k); });
-    const auto middle = values.begin() + std::ssize(values) / 2;
-    std::nth_element(values.begin(), middle, values.end());
-    median(k) = *middle;
-  }
-  return median;
-}
-
-Matrix3 noise_of_sample(const Vector3& p_m, const Noise& noise) {
-  const double range_m = p_m.norm();
-  const Vector3 beam = p_m / range_m;
-  const Matrix3 along = beam * beam.transpose();
-  const double across_m = noise.sigma_angle_rad * range_m;
-  return noise.sigma_range_m * noise.sigma_range_m * along +
-         across_m * across_m * (Matrix3::Identity() - along);
-}
-
-Vector3 mean_position(std::span<const TrackerObservation> samples,
-                      std::span<const std::size_t> of) {
-  const Vector3& first = samples[of.front()].p_tracker_m;
-  Vector3 sum = Vector3::Zero();
-  for (const std::size_t i : of) {
-    sum += samples[i].p_tracker_m - first;
-  }
-  return first + sum / static_cast<double>(of.size());
-}
-
 /// Sum of the variances of the coordinates of means over `count` consecutive samples.
 double variance_of_means(std::span<const TrackerObservation> samples,
                          std::span<const std::size_t> of, std::size_t count) {
@@ -163,19 +97,6 @@ NestVisit visit_of(std::span<const TrackerObservation> samples, const NearNest& 
   return visit;
 }
 
-/// The samples of a group at which the target stands; empty if it passes.
-std::vector<std::size_t> standing_samples(std::span<const TrackerObservation> samples,
-                                          const NearNest& group, const Noise& noise) {
-  constexpr double kStand_m = 50e-6, kSigmas = 6.0;
-  const Vector3 at = median_position(samples, group.samples);
-  const double limit_m =
-      std::max(kStand_m, kSigmas * std::sqrt(noise_of_sample(at, noise).trace()));
-  std::vector<std::size_t> standing;
-  std::copy_if(group.samples.begin(), group.samples.end(), std::back_inserter(standing),
-               [&](std::size_t i) { return (samples[i].p_tracker_m - at).norm() <= limit_m; });
-  return 2 * standing.size() >= group.samples.size() ? standing : std::vector<std::size_t>{};
-}
-
 bool is_long_enough(std::span<const TrackerObservation> samples,
                     const std::vector<std::size_t>& standing) {
   constexpr std::size_t kFewest = 4;
@@ -188,6 +109,13 @@ std::string too_short_text(const Nest& nest, std::size_t times) {
                  " shorter than ", kLeastVisit_s, " s or with fewer than 4 samples not used");
 }
 
+std::string machine_text(const Nest& nest, std::size_t times) {
+  return message("reference nest ", nest.name, ": the target of the machine stood within ",
+                 1e3 * nest.radius_m, " mm of ", mm_text(nest.position_tracker_m), " ", times,
+                 times == 1 ? " time" : " times",
+                 ", which is not a visit; check position_mm, or use a smaller radius");
+}
+
 std::string never_text(const Nest& nest) {
   return message("reference nest ", nest.name, " was never measured: no target stood within ",
                  1e3 * nest.radius_m, " mm of ", mm_text(nest.position_tracker_m),
@@ -195,28 +123,23 @@ std::string never_text(const Nest& nest) {
 }
 
 void add_notes(NestVisits& visits, const std::vector<Nest>& nests,
-               const std::vector<std::size_t>& too_short) {
+               const std::vector<std::size_t>& too_short,
+               const std::vector<std::size_t>& of_machine) {
   for (std::size_t n = 0; n < nests.size(); ++n) {
     const bool seen = std::any_of(visits.found.begin(), visits.found.end(),
                                   [&](const NestVisit& v) { return v.nest == n; });
+    if (of_machine[n] > 0) {
+      visits.notes.push_back(machine_text(nests[n], of_machine[n]));
+    }
     if (too_short[n] > 0) {
       visits.notes.push_back(too_short_text(nests[n], too_short[n]));
-    } else if (!seen) {
+    } else if (!seen && of_machine[n] == 0) {
       visits.notes.push_back(never_text(nests[n]));
     }
   }
 }
 
 }  // namespace
-
-std::optional<std::size_t> nest_at(const Vector3& p_tracker_m, const std::vector<Nest>& nests) {
-  for (std::size_t n = 0; n < nests.size(); ++n) {
-    if ((p_tracker_m - nests[n].position_tracker_m).norm() <= nests[n].radius_m) {
-      return n;
-    }
-  }
-  return std::nullopt;
-}
 
 Result<NestVisits> find_nest_visits(std::span<const TrackerObservation> samples,
                                     const NestOptions& options, const Noise& noise) {
@@ -228,25 +151,27 @@ Result<NestVisits> find_nest_visits(std::span<const TrackerObservation> samples,
     return tl::unexpected(valid.error());
   }
 
-  std::vector<std::size_t> too_short(options.nests.size(), 0);
+  std::vector<std::size_t> too_short(options.nests.size(), 0), of_machine = too_short;
   for (const Nest& nest : options.nests) {
     visits.names.push_back(nest.name);
   }
 
-  for (const NearNest& group : groups_near(samples, options.nests)) {
-    const std::vector<std::size_t> standing = standing_samples(samples, group, noise);
-    if (standing.empty()) {
+  const std::vector<Stand> stands = stands_near(samples, options.nests, noise);
+  for (const Stand& stand : stands) {
+    if (is_of_machine(stand, stands)) {
+      ++of_machine[stand.group.nest];
       continue;
     }
-    visits.samples.insert(visits.samples.end(), group.samples.begin(), group.samples.end());
-    if (is_long_enough(samples, standing)) {
-      visits.found.push_back(visit_of(samples, group, standing, noise));
+    visits.samples.insert(visits.samples.end(), stand.group.samples.begin(),
+                          stand.group.samples.end());
+    if (is_long_enough(samples, stand.samples)) {
+      visits.found.push_back(visit_of(samples, stand.group, stand.samples, noise));
     } else {
-      ++too_short[group.nest];
+      ++too_short[stand.group.nest];
     }
   }
 
-  add_notes(visits, options.nests, too_short);
+  add_notes(visits, options.nests, too_short, of_machine);
   return visits;
 }
 

@@ -311,7 +311,7 @@ Result<Observations> observe_with_nests(const AlignedBlocks& run, const Machine&
                                         const Path& path, const Noise& noise,
                                         const Options& options) {
   return observe_aligned(run.series, run.alignment, machine, path, noise, options)
-      .and_then([&](Observations o) { return with_nest_visits(std::move(o), run, options.nests); });
+      .map([&](Observations o) { return with_nest_visits(std::move(o), run, options.nests); });
 }
 
 Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,

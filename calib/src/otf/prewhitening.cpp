@@ -126,7 +126,11 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
   std::optional<WithDrift> drift;
 
   if (o.drift) {
-    drift = with_drift(o, rows, *a, w.residual_m, factor);
+    Result<WithDrift> with = with_drift(o, rows, *a, w.residual_m, factor, options.stopped);
+    if (!with) {
+      return tl::unexpected(with.error());
+    }
+    drift = *std::move(with);
     w.U = std::move(drift->U);
     w.residual_m = std::move(drift->residual_m);
     w.variance_factor = factor(w.residual_m);

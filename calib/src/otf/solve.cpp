@@ -152,10 +152,16 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   std::optional<WithDrift> drift;
 
   if (o.drift) {
-    drift = with_drift(o, as_observed, *a, residuals.after_m, [&](std::span<const double> r_m) {
+    const auto variance = [&](std::span<const double> r_m) {
       return variance_factor(residual_noise(o, r_m, figures.degrees_of_freedom),
                              figures.degrees_of_freedom);
-    });
+    };
+    Result<WithDrift> with =
+        with_drift(o, as_observed, *a, residuals.after_m, variance, options.stopped);
+    if (!with) {
+      return tl::unexpected(with.error());
+    }
+    drift = *std::move(with);
     offset = drift->offset;
     a->U = std::move(drift->U);
     residuals.after_m = std::move(drift->residual_m);

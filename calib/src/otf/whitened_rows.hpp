@@ -37,10 +37,15 @@ class WhitenedRows {
       return of_row(i);
     }
     double sum = 0.0;
-    for (std::size_t k = first_term_[i]; k < first_term_[i + 1]; ++k) {
-      sum += terms_[k].factor * of_row(terms_[k].row);
+    for (const Term& term : terms(i)) {
+      sum += term.factor * of_row(term.row);
     }
     return sum;
+  }
+  /// False if the rows are as they are: then they have no terms.
+  [[nodiscard]] bool are_sums() const { return !white_; }
+  [[nodiscard]] std::span<const Term> terms(std::size_t i) const {
+    return std::span(terms_).subspan(first_term_[i], first_term_[i + 1] - first_term_[i]);
   }
   [[nodiscard]] std::vector<double> values(std::span<const double> of_rows) const;
 

@@ -4,42 +4,12 @@
 #include <cmath>
 #include <utility>
 
-#include "otf/added_columns.hpp"
+#include "otf/drift_columns.hpp"
 #include "otf/drift_estimate.hpp"
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
 namespace {
-
-/// Values of the added columns in all rows of the observations: one column per row.
-Eigen::MatrixXd added_values(const Observations& o, const DriftBasis& basis, Eigen::Index offsets) {
-  const auto size = static_cast<Eigen::Index>(basis.size());
-  Eigen::MatrixXd values(offsets + size, std::ssize(o.rows));
-  for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    double* const column = values.col(static_cast<Eigen::Index>(i)).data();
-    if (offsets > 0) {
-      *column = drow_drange_offset(o, o.rows[i]);
-    }
-    drow_ddrift(o, basis, o.rows[i], std::span(column + offsets, basis.size()));
-  }
-  return values;
-}
-
-AddedColumns sums_of(const Observations& o, const WhitenedRows& rows, const Eigen::MatrixXd& values,
-                     std::span<const double> residual_m) {
-  AddedColumns sums(static_cast<std::size_t>(values.rows()), o.unknowns());
-  Eigen::VectorXd whitened(values.rows());
-  for (std::size_t i = 0; i < o.rows.size(); ++i) {
-    for (Eigen::Index k = 0; k < values.rows(); ++k) {
-      whitened(k) =
-          rows.value(i, [&](std::size_t row) { return values(k, static_cast<Eigen::Index>(row)); });
-    }
-    const double r_m = rows.value(i, [&](std::size_t row) { return residual_m[row]; });
-    sums.add(o.rows[i], rows.row(i), r_m,
-             std::span(whitened.data(), static_cast<std::size_t>(whitened.size())));
-  }
-  return sums;
-}
 
 /// Mean of the measured positions, tracker frame.
 Vector3 centre_tracker_m(const Observations& o) {
@@ -62,21 +32,27 @@ std::vector<DriftPoint> drift_points(const Observations& o, const DriftBasis& ba
   return points;
 }
 
-Observations without_coefficients(Observations o, const Eigen::VectorXd& c) {
-  const DriftBasis basis(*o.drift);
-  std::vector<double> values(basis.size());
-  const Eigen::Map<const Eigen::VectorXd> of_row(values.data(), std::ssize(values));
-  for (Observation& row : o.rows) {
-    drow_ddrift(o, basis, row, values);
-    row.y_m -= of_row.dot(c);
+/// y - A U - C d of every row.
+std::vector<double> residuals_with_drift_m(const Observations& o, const DriftColumns& columns,
+                                           const Eigen::VectorXd& U, const Eigen::VectorXd& d) {
+  std::vector<double> r = residuals_m(o, U);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    r[i] -= columns.effect_m(o.rows[i], d);
   }
-  return o;
+  return r;
 }
 
 }  // namespace
 
 Observations without_drift(Observations o, const TrackerDrift& drift) {
-  return o.drift ? without_coefficients(std::move(o), drift.coefficients) : o;
+  if (!o.drift) {
+    return o;
+  }
+  const DriftColumns columns(o);
+  for (Observation& row : o.rows) {
+    row.y_m -= columns.effect_m(row, drift.coefficients);
+  }
+  return o;
 }
 
 Observations without_run_effects(Observations o, const Solution& solution) {
@@ -96,15 +72,14 @@ Vector3 TrackerDrift::largest_m() const {
   return most;
 }
 
-WithDrift with_drift(const Observations& o, const WhitenedRows& rows, const Adjustment& a,
-                     std::span<const double> residual_m,
-                     const std::function<double(std::span<const double>)>& variance) {
+Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, const Adjustment& a,
+                             std::span<const double> residual_m, const RowVariance& variance,
+                             const Stopped& stopped) {
   constexpr int kRounds = 3;
-  const DriftBasis basis(*o.drift);
   DriftEquations equations{.u_range_offset_m = o.u_range_offset_m};
   const Eigen::Index offsets = equations.offsets();
-  const Eigen::MatrixXd values = added_values(o, basis, offsets);
-  const AddedColumns::Reduced reduced = sums_of(o, rows, values, residual_m).reduced(a.cofactor_Q);
+  const DriftColumns columns(o, static_cast<std::size_t>(offsets));
+  const AddedColumns::Reduced reduced = columns.sums(rows, residual_m).reduced(a.cofactor_Q);
 
   WithDrift with;
   DriftEstimate estimate;
@@ -112,18 +87,21 @@ WithDrift with_drift(const Observations& o, const WhitenedRows& rows, const Adju
   for (int round = 0; round < kRounds; ++round) {
     equations.S = reduced.S / factor;
     equations.g = reduced.g / factor;
-    estimate = estimate_drift(*o.drift, equations);
-    with.U = a.U - reduced.dU_dd * estimate.d;
-    if (offsets > 0) {
-      with.offset = {estimate.d(0), std::sqrt(std::max(0.0, estimate.covariance(0, 0)))};
+    Result<DriftEstimate> found = estimate_drift(*o.drift, equations, stopped);
+    if (!found) {
+      return tl::unexpected(found.error());
     }
-    with.drift.coefficients = estimate.d.tail(estimate.d.size() - offsets);
-    with.residual_m = residuals_m(
-        without_drift(without_range_offset(o, with.offset.value_m), with.drift), with.U);
+    estimate = *std::move(found);
+    with.U = a.U - reduced.dU_dd * estimate.d;
+    with.residual_m = residuals_with_drift_m(o, columns, with.U, estimate.d);
     factor = std::max(1.0, variance(with.residual_m));
   }
 
-  with.drift.points = drift_points(o, basis, with.drift.coefficients);
+  if (offsets > 0) {
+    with.offset = {estimate.d(0), std::sqrt(std::max(0.0, estimate.covariance(0, 0)))};
+  }
+  with.drift.coefficients = estimate.d.tail(estimate.d.size() - offsets);
+  with.drift.points = drift_points(o, columns.basis(), with.drift.coefficients);
   with.drift.visits = estimate.visits;
   with.drift.u_repeatability_m = estimate.u_repeatability_m;
   with.drift.notes = std::move(estimate.notes);

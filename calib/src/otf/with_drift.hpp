@@ -18,14 +18,14 @@ struct WithDrift {
   Eigen::MatrixXd added_covariance;  ///< what drift and range offset add to that of U
   std::vector<double> residual_m;    ///< of the rows without drift and range offset
 };
+/// Variance of the rows relative to the stated one, from residuals of the observations' own rows.
+using RowVariance = std::function<double(std::span<const double> residual_m)>;
 /// For observations with a drift. `a`: adjustment of `rows`, `residual_m`: y - A U of the
-/// observations' own rows, `variance`: of the rows relative to the stated one, from residuals of
-/// the observations' own rows. The drift is first estimated with the stated variance, and then with
-/// that of the residuals without it.
-[[nodiscard]] WithDrift with_drift(
-    const Observations&, const WhitenedRows& rows, const Adjustment& a,
-    std::span<const double> residual_m,
-    const std::function<double(std::span<const double> residual_m)>& variance);
+/// observations' own rows. The drift is first estimated with the stated variance, and then with
+/// that of the residuals without it. NotConverged if `stopped` returns true.
+[[nodiscard]] Result<WithDrift> with_drift(const Observations&, const WhitenedRows& rows,
+                                           const Adjustment& a, std::span<const double> residual_m,
+                                           const RowVariance& variance, const Stopped& stopped);
 
 /// The observations without a drift.
 [[nodiscard]] Observations without_drift(Observations, const TrackerDrift&);

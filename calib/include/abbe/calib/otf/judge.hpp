@@ -36,10 +36,12 @@ using HeldOutRow = std::function<void(std::size_t run, std::size_t row, double n
                                               const Options& = {});
 
 /// The same for the joint adjustment of several runs (targets.hpp). The folds are those of each
-/// run.
+/// run. `solutions`: of the runs, if the observations are those of without_run_effects(); the drift
+/// of the tracker in a single run is then estimated again without the held-out legs.
 [[nodiscard]] Result<HeldOutFigures> held_out(std::span<const Observations>,
                                               const VolumetricModel* active, const Options& = {},
-                                              const HeldOutRow& row = {});
+                                              const HeldOutRow& row = {},
+                                              std::span<const Solution> solutions = {});
 
 /// Runs held_out(), decide() and alternatives(). The model is also refused if an alternative
 /// changes it by more than its uncertainty, or if the uncertainty is more than half the correction.

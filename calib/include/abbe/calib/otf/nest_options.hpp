@@ -13,8 +13,8 @@ namespace abbe::calib::otf {
 struct Nest {
   std::string name;
   Vector3 position_tracker_m = Vector3::Zero();  ///< approximate, tracker frame
-  /// A target that stands closer to this position is in the nest. No leg of the path may be so
-  /// close.
+  /// A target that stands closer to this position is in the nest, unless it is that of the machine
+  /// (nest_visits.hpp).
   double radius_m = 10e-3;
 };
 

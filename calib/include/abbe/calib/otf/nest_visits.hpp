@@ -2,7 +2,10 @@
 /// Visits of reference nests in the stream of the tracker. Valid samples that follow one another
 /// within the radius of a nest, with pauses of at most 2 s, are a visit if the target stands in at
 /// least half of them for at least 0.5 s: within 50 um, or six standard deviations of a sample, of
-/// their median. Other samples within the radius belong to a target that passes.
+/// their median. Other samples within the radius belong to a target that passes. So do those that
+/// follow on the sample before them, or are followed by the one behind them, without a gap of more
+/// than four sample periods, and all samples within 1 mm of such a place: the target of the machine
+/// that stands at a vertex near the nest.
 
 #include <cstddef>
 #include <optional>
@@ -29,7 +32,8 @@ struct NestVisits {
   std::vector<NestVisit> found;        ///< in the order of time
   std::vector<std::string> names{};    ///< of the nests
   std::vector<std::size_t> samples{};  ///< indices of all samples that belong to visits
-  std::vector<std::string> notes{};    ///< for the verdict: nests never or too shortly seen
+  std::vector<std::string> notes{};    ///< for the verdict: nests never or too shortly seen, or
+                                       ///< near which the machine stood
 };
 
 /// Index of the nest within whose radius a point is.

@@ -11,6 +11,7 @@
 
 #include "abbe/calib/otf/judge.hpp"
 #include "nest_run.hpp"
+#include "standstill_run.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -252,6 +253,26 @@ TEST(Nests, NearThePathAreUsed) {
   const auto id = identify_nest_run(run);
   ASSERT_TRUE(id) << id.error().text;
   EXPECT_EQ(id->solution.model.U(), with_drift_and_nests().id.solution.model.U());
+}
+
+/// A run in standstill mode of about 300 s.
+NestResult standstills(const NestRunOptions& wanted) {
+  MadeRun run = make_standstill_run(
+      {.made = {.error_scale_m = 10e-6, .rate_hz = 100.0}, .positions = 80, .dwell_s = 1.0});
+  run.samples = with_drift_and_visits(run.samples, wanted, run.noise, run.T_machine_tracker);
+  run.options.nests = nest_options(wanted, run.T_machine_tracker);
+  Identification id = *identify_nest_run(run);
+  return {std::move(run), std::move(id)};
+}
+
+TEST(Nests, InStandstillModeTheyShowTheDrift) {
+  const NestRunOptions none{.visits = false}, drift{.drift_m = 3.0 * kDrift_m, .visits = false};
+  const NestRunOptions nests = two_nests({.drift_m = 3.0 * kDrift_m, .every_s = 40.0});
+  const NestResult with_nests = standstills(nests);
+  ASSERT_TRUE(with_nests.id.solution.drift);
+  EXPECT_GE(with_nests.drift().visits, 8u);
+  EXPECT_LE(with_nests.error_m(), 1.3 * standstills(none).error_m());
+  EXPECT_GE(standstills(drift).error_m(), 1.5 * with_nests.error_m());
 }
 
 TEST(Nests, HeldOutLegsDoNotTakePartInTheDrift) {

@@ -111,34 +111,48 @@ void set_knots(DriftObservations& d, double begin_s, double end_s, std::size_t c
   d.knots_s.push_back(end_s);
 }
 
-DriftObservations drift_of(const BlockSeries& series, const NestVisits& nests,
+DriftObservations drift_of(const RunTimes& times, const NestVisits& nests,
                            const std::vector<std::size_t>& visits, const NestOptions& options) {
   constexpr std::size_t kFewestKnots = 32, kMostKnots = 64;
-  DriftObservations d{.visits = nests.found,
+  DriftObservations d{.block_s = times.of_block_s,
+                      .visits = nests.found,
                       .names = nests.names,
                       .u_repeatability_m = options.u_repeatability_m,
                       .rotates = determine_rotation(nests, visits),
                       .length_m = 0.0};
-  double end_s = nests.found.back().time_s;
-  for (const Block& block : series.blocks) {
-    d.block_s.push_back(block.time_s);
-    end_s = std::max(end_s, block.last_s);
-  }
   for (const NestVisit& visit : nests.found) {
     d.length_m += visit.mean_tracker_m.norm() / static_cast<double>(nests.found.size());
   }
 
   const std::size_t most = *std::max_element(visits.begin(), visits.end());
-  set_knots(d, series.first_time_s, end_s, std::clamp(2 * most, kFewestKnots, kMostKnots));
+  const double end_s = std::max(times.end_s, nests.found.back().time_s);
+  set_knots(d, times.begin_s, end_s, std::clamp(2 * most, kFewestKnots, kMostKnots));
   return d;
 }
 
 }  // namespace
 
-Observations with_nest_visits(Observations o, const AlignedBlocks& run,
+RunTimes times_of(const BlockSeries& series) {
+  RunTimes times{.begin_s = series.first_time_s, .end_s = series.first_time_s};
+  for (const Block& block : series.blocks) {
+    times.of_block_s.push_back(block.time_s);
+    times.end_s = std::max(times.end_s, block.last_s);
+  }
+  return times;
+}
+
+RunTimes times_of(const Standstills& all) {
+  RunTimes times{.begin_s = all.found.front().begin_s, .end_s = all.found.back().end_s};
+  for (const Standstill& s : all.found) {
+    times.of_block_s.push_back(s.middle_s());
+  }
+  return times;
+}
+
+Observations with_nest_visits(Observations o, const NestVisits& all, const RunTimes& times,
                               const NestOptions& options) {
-  o.notes.insert(o.notes.end(), run.nests.notes.begin(), run.nests.notes.end());
-  const NestVisits nests{.found = visits_apart(o, run.nests, o.notes), .names = run.nests.names};
+  o.notes.insert(o.notes.end(), all.notes.begin(), all.notes.end());
+  const NestVisits nests{.found = visits_apart(o, all, o.notes), .names = all.names};
   if (nests.found.empty()) {
     return o;
   }
@@ -156,7 +170,7 @@ Observations with_nest_visits(Observations o, const AlignedBlocks& run,
           message("reference nest ", nests.names[n], " was visited once only: it shows no drift"));
     }
   }
-  o.drift = drift_of(run.series, nests, visits, options);
+  o.drift = drift_of(times, nests, visits, options);
   return o;
 }
 

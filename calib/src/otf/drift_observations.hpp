@@ -1,16 +1,28 @@
 #pragma once
 /// Observations of a run with its visits of reference nests.
 
-#include "abbe/calib/otf/aligned_blocks.hpp"
+#include <vector>
+
+#include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/observe.hpp"
+#include "abbe/calib/otf/standstill.hpp"
 
 namespace abbe::calib::otf {
+
+/// Times of the tracker's clock.
+struct RunTimes {
+  double begin_s = 0.0, end_s = 0.0;
+  std::vector<double> of_block_s{};  ///< by Observation::block
+};
+[[nodiscard]] RunTimes times_of(const BlockSeries&);
+[[nodiscard]] RunTimes times_of(const Standstills&);
 
 /// Adds Observations::drift if a nest was visited at least twice, and notes. The rotation of the
 /// tracker is estimated, too, if three such nests are not on a line: the height of their triangle
 /// is more than a tenth of its longest side. There are two knots for each visit of the nest with
 /// the most visits, 32 to 64 in all. A visit within 3 mm of the path is not used: the machine stood
 /// there.
-[[nodiscard]] Observations with_nest_visits(Observations, const AlignedBlocks&, const NestOptions&);
+[[nodiscard]] Observations with_nest_visits(Observations, const NestVisits&, const RunTimes&,
+                                            const NestOptions&);
 
 }  // namespace abbe::calib::otf

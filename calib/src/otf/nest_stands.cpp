@@ -78,9 +78,13 @@ class TargetOnMachine {
     std::vector<double> steps_s, speeds_m_per_s;
     for (std::size_t i = 1; i < samples.size(); ++i) {
       const double step_s = samples[i].time_s - samples[i - 1].time_s;
+      if (!(step_s > 0.0) || !std::isfinite(step_s)) {
+        continue;
+      }
       steps_s.push_back(step_s);
-      if (samples[i].valid && samples[i - 1].valid && step_s > 0.0) {
-        speeds_m_per_s.push_back(distance_m(i - 1, i) / step_s);
+      const double speed_m_per_s = distance_m(i - 1, i) / step_s;
+      if (samples[i].valid && samples[i - 1].valid && std::isfinite(speed_m_per_s)) {
+        speeds_m_per_s.push_back(speed_m_per_s);
       }
     }
     if (!speeds_m_per_s.empty()) {

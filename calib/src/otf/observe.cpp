@@ -311,7 +311,9 @@ Result<Observations> observe_with_nests(const AlignedBlocks& run, const Machine&
                                         const Path& path, const Noise& noise,
                                         const Options& options) {
   return observe_aligned(run.series, run.alignment, machine, path, noise, options)
-      .map([&](Observations o) { return with_nest_visits(std::move(o), run, options.nests); });
+      .map([&](Observations o) {
+        return with_nest_visits(std::move(o), run.nests, times_of(run.series), options.nests);
+      });
 }
 
 Result<Observations> observe_blocks(const BlockSeries& series, const Machine& machine,

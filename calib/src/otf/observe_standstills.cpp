@@ -8,6 +8,7 @@
 #include "check_stopped.hpp"
 #include "median.hpp"
 #include "message.hpp"
+#include "otf/drift_observations.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -146,12 +147,24 @@ Result<Observations> observe_standstills(std::span<const TrackerObservation> sam
                                          const Machine& machine, const Path& path,
                                          const Noise& noise, const Options& options) {
   report_observe(options, 0.0);
-  const Result<Standstills> all = find_standstills(samples, options.standstill);
+  const Result<NestVisits> nests = find_nest_visits(samples, options.nests, noise);
+  if (!nests) {
+    return tl::unexpected(nests.error());
+  }
+  std::vector<TrackerObservation> of_machine(samples.begin(), samples.end());
+  for (const std::size_t i : nests->samples) {
+    of_machine[i].valid = false;
+  }
+
+  Result<Standstills> all = find_standstills(of_machine, options.standstill);
   if (!all) {
     return tl::unexpected(all.error());
   }
+  all->lost_samples -= nests->samples.size();
   report_observe(options, 0.5);
-  return observe_standstills(*all, machine, path, noise, options);
+  return observe_standstills(*all, machine, path, noise, options).map([&](Observations o) {
+    return with_nest_visits(std::move(o), *nests, times_of(*all), options.nests);
+  });
 }
 
 Result<Observations> observe_standstills(const Standstills& all, const Machine& machine,

@@ -1,5 +1,6 @@
 #include "abbe/calib/estimation/datum.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -126,6 +127,47 @@ TEST(Datum, RefusesMoreUndeterminedCombinationsThanConditions) {
   const auto s = mean_is_zero().solve(data);
   ASSERT_FALSE(s);
   EXPECT_EQ(s.error().code, ErrorCode::RankDeficient);
+}
+
+/// Points 0 to 3 are levelled, and their common height is the datum; the difference of points 4 and
+/// 5 is measured, their height is not.
+TEST(Datum, NamesOnlyUnknownsThatNeitherDataNorConditionsDetermine) {
+  const Levelling net;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(6, 6);
+  A.topLeftCorner(5, 4) = net.A;
+  A.row(5) << 0, 0, 0, 0, 1, -1;
+  Information data(6);
+  data.add_rows(A, Eigen::VectorXd::Zero(6));
+  Eigen::RowVectorXd mean_height(6);
+  mean_height << 1, 1, 1, 1, 0, 0;
+  for (const bool with_covariance : {true, false}) {
+    const Datum datum{Eigen::MatrixXd(mean_height)};
+    const std::string text =
+        with_covariance ? datum.solve(data).error().text : datum.estimate(data).error().text;
+    EXPECT_THAT(text, testing::HasSubstr("combinations of unknown 4, unknown 5"));
+    EXPECT_THAT(text, testing::Not(testing::HasSubstr("unknown 3")));
+  }
+}
+
+/// Columns 1 and 2 of three are the same except for 1e-7: rounding does not make them equal, a
+/// measurement of them would.
+TEST(Datum, CountsWeakCombinationsAsZeroBelowAStatedThreshold) {
+  Eigen::MatrixXd A = Eigen::MatrixXd::Random(20, 3);
+  A.col(2) = A.col(1) + 1e-7 * A.col(2).eval();
+  Information data(3);
+  data.add_rows(A, Eigen::VectorXd::Ones(20));
+  const Datum no_conditions(Eigen::MatrixXd(0, 3));
+  EXPECT_TRUE(no_conditions.solve(data));
+  for (const bool with_covariance : {true, false}) {
+    const DatumOptions options{.zero = 1e-6};
+    const std::string text = with_covariance ? no_conditions.solve(data, options).error().text
+                                             : no_conditions.estimate(data, options).error().text;
+    EXPECT_THAT(text, testing::HasSubstr("rank 2"));
+    EXPECT_THAT(text, testing::HasSubstr("unknown 1"));
+    EXPECT_THAT(text, testing::HasSubstr("unknown 2"));
+    EXPECT_THAT(text, testing::Not(testing::AnyOf(testing::HasSubstr("unknown 0"),
+                                                  testing::HasSubstr("gauge"))));
+  }
 }
 
 /// A condition that the data determine already does not fix the common height.

@@ -13,7 +13,8 @@
 namespace abbe::calib::estimation {
 namespace {
 
-/// Names of the unknowns with the largest share in the directions that the data do not determine.
+/// Names of the unknowns with the largest share in the directions that are not determined. A share is
+/// the square of an entry of a unit vector; those of unknowns that are determined are rounding.
 std::string largest_shares(const Eigen::VectorXd& shares, const DatumOptions& options) {
   std::vector<std::size_t> order(static_cast<std::size_t>(shares.size()));
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -22,9 +23,10 @@ std::string largest_shares(const Eigen::VectorXd& shares, const DatumOptions& op
   });
 
   constexpr std::size_t kMostNamed = 6;
+  constexpr double kRoundingShare = 1e-8;
   std::string list;
   for (std::size_t i = 0; i < std::min(kMostNamed, order.size()); ++i) {
-    if (shares(static_cast<Eigen::Index>(order[i])) > 0) {
+    if (shares(static_cast<Eigen::Index>(order[i])) > kRoundingShare) {
       list += list.empty() ? "" : ", ";
       list += options.label ? options.label(order[i]) : message("unknown ", order[i]);
     }
@@ -82,16 +84,29 @@ Result<void> check_solvable(const Information& data, const DatumOptions& options
   return check_every_unknown(data, options);
 }
 
-Result<void> check_rank(const Information& data, std::size_t rank, Eigen::Index conditions,
+/// The rows of the data and the conditions K for the unknowns divided by `scale`.
+Information bordered_rows(const Information& data, const Eigen::MatrixXd& K,
+                          const Eigen::VectorXd& scale, double weight) {
+  Information bordered(data.unknowns());
+  bordered.add_rows(data.R() * scale.asDiagonal(), data.z());
+  bordered.add_rows(scaled_conditions(K, scale, weight), Eigen::VectorXd::Zero(K.rows()));
+  return bordered;
+}
+
+/// The unknowns that neither data of this rank nor the conditions determine.
+Result<void> check_rank(const Information& data, std::size_t rank, const Eigen::MatrixXd& K,
                         const DatumOptions& options) {
-  const std::size_t fixed = static_cast<std::size_t>(conditions);
-  if (rank + fixed >= data.unknowns()) {
+  const std::size_t with_conditions = rank + static_cast<std::size_t>(K.rows());
+  if (with_conditions >= data.unknowns()) {
     return {};
   }
-  return failure(ErrorCode::RankDeficient,
-                 message("adjustment: rank ", rank, " from ", data.rows(), " observations, needs ",
-                         data.unknowns() - fixed, "; not determined: combinations of ",
-                         largest_shares(null_space(data).share, options)));
+  const Information bordered = bordered_rows(data, K, column_scale(data), options.weight);
+  return failure(
+      ErrorCode::RankDeficient,
+      message("adjustment: rank ", rank, " from ", data.rows(), " observations, needs ",
+              data.unknowns() - static_cast<std::size_t>(K.rows()),
+              "; not determined: combinations of ",
+              largest_shares(null_space_of_rank(bordered, with_conditions).share, options)));
 }
 
 /// Triangular factor T of [R; sqrt(mu) K] (datum.hpp), for the unknowns divided by `scale`.
@@ -102,21 +117,23 @@ struct BorderedTriangle {
 };
 
 Result<BorderedTriangle> bordered_triangle(const Information& data, const Eigen::MatrixXd& K,
-                                           double weight) {
+                                           const DatumOptions& options) {
   const Eigen::VectorXd scale = column_scale(data);
-  Information bordered(data.unknowns());
-  bordered.add_rows(data.R() * scale.asDiagonal(), data.z());
-  bordered.add_rows(scaled_conditions(K, scale, weight), Eigen::VectorXd::Zero(K.rows()));
+  const Information bordered = bordered_rows(data, K, scale, options.weight);
 
   // A combination of unknowns that neither data nor conditions determine has a diagonal element of
   // T that consists of rounding errors only.
   constexpr double kZero = 1e-11;
   BorderedTriangle result{scale, bordered.R(), bordered.z()};
   if (!(result.T.diagonal().minCoeff() > kZero)) {
+    const std::size_t rank = std::min(pivoted_rank(bordered, kZero), data.unknowns() - 1);
     return failure(
         ErrorCode::RankDeficient,
-        message("adjustment: the conditions of the gauge do not fix all combinations of ",
-                data.unknowns(), " unknowns that the data leave undetermined"));
+        message("adjustment: ",
+                K.rows() == 0 ? "the data do not determine"
+                              : "neither the data nor the conditions of the gauge determine",
+                " combinations of ",
+                largest_shares(null_space_of_rank(bordered, rank).share, options)));
   }
   return result;
 }
@@ -128,12 +145,12 @@ Result<DatumSolution> Datum::solve(const Information& data, const DatumOptions& 
     return tl::unexpected(valid.error());
   }
 
-  const Spectrum of_data = spectrum(data);
-  if (Result<void> valid = check_rank(data, of_data.rank, K_.rows(), options); !valid) {
+  const Spectrum of_data = spectrum(data, options.zero);
+  if (Result<void> valid = check_rank(data, of_data.rank, K_, options); !valid) {
     return tl::unexpected(valid.error());
   }
 
-  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options.weight);
+  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options);
   if (!bordered) {
     return tl::unexpected(bordered.error());
   }
@@ -170,11 +187,12 @@ Result<Eigen::VectorXd> Datum::estimate(const Information& data,
     return tl::unexpected(valid.error());
   }
 
-  if (Result<void> valid = check_rank(data, pivoted_rank(data), K_.rows(), options); !valid) {
+  const std::size_t rank = pivoted_rank(data, options.zero);
+  if (Result<void> valid = check_rank(data, rank, K_, options); !valid) {
     return tl::unexpected(valid.error());
   }
 
-  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options.weight);
+  const Result<BorderedTriangle> bordered = bordered_triangle(data, K_, options);
   if (!bordered) {
     return tl::unexpected(bordered.error());
   }

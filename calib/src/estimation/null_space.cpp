@@ -4,6 +4,7 @@
 #include <Eigen/Householder>
 #include <Eigen/QR>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -57,9 +58,14 @@ Eigen::VectorXd singular_values_of(const Eigen::MatrixXd& A) {
   return eigen.eigenvalues().tail(n).reverse().cwiseMax(0.0);
 }
 
-Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(const Information& data) {
+/// Singular values that count as zero, relative to the largest.
+double zero_of(const Information& data, double zero) {
+  return std::max(rounding_of(data), zero);
+}
+
+Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(const Information& data, double zero = 0.0) {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled_R(data));
-  qr.setThreshold(rounding_of(data));
+  qr.setThreshold(zero_of(data, zero));
   return qr;
 }
 
@@ -74,7 +80,7 @@ Eigen::VectorXd column_scale(const Information& data) {
   return scale;
 }
 
-Spectrum spectrum(const Information& data) {
+Spectrum spectrum(const Information& data, double zero) {
   Spectrum s;
   s.singular_values = singular_values_of(scaled_R(data));
   const Eigen::Index n = s.singular_values.size();
@@ -82,7 +88,7 @@ Spectrum spectrum(const Information& data) {
     return s;
   }
 
-  s.threshold = rounding_of(data) * s.singular_values(0);
+  s.threshold = zero_of(data, zero) * s.singular_values(0);
   while (static_cast<Eigen::Index>(s.rank) < n &&
          s.singular_values(static_cast<Eigen::Index>(s.rank)) > s.threshold) {
     ++s.rank;
@@ -95,15 +101,19 @@ Spectrum spectrum(const Information& data) {
   return s;
 }
 
-std::size_t pivoted_rank(const Information& data) {
-  return static_cast<std::size_t>(pivoted(data).rank());
+std::size_t pivoted_rank(const Information& data, double zero) {
+  return static_cast<std::size_t>(pivoted(data, zero).rank());
 }
 
 NullSpace null_space(const Information& data) {
+  return null_space_of_rank(data, pivoted_rank(data));
+}
+
+NullSpace null_space_of_rank(const Information& data, std::size_t of_rank) {
   // R P = Q [R11 R12; 0 0], P: permutation, Q: orthogonal. The columns of P [-R11^-1 R12; I] span
   // the null space of R.
   const auto qr = pivoted(data);
-  const Eigen::Index n = qr.cols(), rank = qr.rank();
+  const Eigen::Index n = qr.cols(), rank = static_cast<Eigen::Index>(of_rank);
   if (rank == n) {
     return {.rank = static_cast<std::size_t>(rank),
             .basis = Eigen::MatrixXd(n, 0),

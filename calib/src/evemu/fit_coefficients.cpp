@@ -74,8 +74,9 @@ Result<Fit> fit_ols(const FitProblem& problem) {
       times_noise_root(o, problem.X), Eigen::VectorXd::Zero(problem.y.size()));
   const estimation::Datum without_conditions(Eigen::MatrixXd(0, problem.X.cols()));
   const Result<estimation::DatumSolution> adjusted = without_conditions.solve(
-      data, {.noise = &noise,
-             .label = [&](std::size_t j) { return problem.design.equivalent().names()[j]; }});
+      data, {.noise = &noise, .zero = kUndetermined, .label = [&](std::size_t j) {
+               return problem.design.equivalent().names()[j];
+             }});
 
   if (!adjusted) {
     return failure(adjusted.error().code, "least squares: " + adjusted.error().text);

@@ -35,6 +35,11 @@ struct Fit {
   int iterations = 0;
 };
 
+/// Singular values of the design with columns of unit length, relative to the largest, are about
+/// 1e-7 for rotations that the positions do not show (not 0, because readings of Ball1 differ by
+/// nanometres), and 1e-4 and more for determined coefficients.
+inline constexpr double kUndetermined = 1e-6;
+
 /// whitened() rows without those of Ball1, whose error is zero by definition.
 [[nodiscard]] Eigen::MatrixXd white_rows(const Observations&, const Eigen::MatrixXd& rows);
 

@@ -154,14 +154,10 @@ Statistics statistics_of(const FitProblem& problem, const Fit& fit, const Eigen:
   s.balls = o.rows.size();
   s.observations = 3 * (o.rows.size() - s.positions);
   s.unknowns = problem.design.size();
-  const Eigen::VectorXd sv =
-      estimation::spectrum(estimation::information_of(problem.X, problem.y)).singular_values;
-
-  // Singular values relative to the largest are about 1e-7 for the unobservable rotations (not 0,
-  // because readings of Ball1 differ by nanometres), and 1e-4 and more for determined coefficients.
-  constexpr double kZero = 1e-6;
-  s.rank = static_cast<std::size_t>((sv.array() > kZero * sv(0)).count());
-  s.condition = sv(0) / sv(static_cast<Eigen::Index>(s.rank) - 1);
+  const estimation::Spectrum design =
+      estimation::spectrum(estimation::information_of(problem.X, problem.y), kUndetermined);
+  s.rank = design.rank;
+  s.condition = design.condition;
   s.effective_parameters = fit.effective_parameters;
   s.degrees_of_freedom =
       static_cast<double>(s.observations) - fit.effective_parameters - fit.pose_parameters;

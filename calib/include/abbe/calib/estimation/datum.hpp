@@ -44,6 +44,10 @@ struct DatumOptions {
   /// Information whose R is R_n with A^T W^2 C W^2 A = R_n^T R_n (A: design, W: weights, C:
   /// covariance of the observations); null: the weights W are 1/sigma
   const Information* noise = nullptr;
+  /// Singular values of the column-scaled data below this fraction of the largest count as zero, if
+  /// it exceeds rounding (Spectrum::threshold): for data whose columns are known with less than
+  /// machine precision
+  double zero = 0.0;
   /// name of an unknown in messages
   std::function<std::string(std::size_t)> label;
 };
@@ -57,7 +61,8 @@ class Datum {
   [[nodiscard]] const Eigen::MatrixXd& conditions() const { return K_; }
 
   /// RankDeficient if an unknown has no observation, or if the data leave more combinations
-  /// undetermined than there are conditions; the text names unknowns that are not determined.
+  /// undetermined than there are conditions; the text names unknowns that are not determined, and
+  /// no others.
   [[nodiscard]] Result<DatumSolution> solve(const Information&, const DatumOptions& = {}) const;
   /// The U of solve() without covariance, in less time: the rank is judged by column pivoting
   /// instead of singular values.

@@ -16,17 +16,18 @@ struct Spectrum {
   /// Smaller singular values count as zero. Rounding changes a singular value by at most
   ///     n sqrt(rows) eps times the largest singular value,
   /// n: number of columns, eps: machine precision. Each of the n columns of unit length has an
-  /// error of sqrt(rows n) eps, because rounding errors have random signs.
+  /// error of sqrt(rows n) eps, because rounding errors have random signs. The argument
+  /// `zero` replaces the factor of the largest singular value if it is larger.
   double threshold = 0.0;
   /// largest singular value divided by the smallest one above the threshold; 0 for rank 0
   double condition = 0.0;
 };
-[[nodiscard]] Spectrum spectrum(const Information&);
+[[nodiscard]] Spectrum spectrum(const Information&, double zero = 0.0);
 
 /// Rank of the column-scaled R from a QR decomposition with column pivoting, with the threshold of
 /// Spectrum. The diagonal of the triangular factor shows the rank, except for specially constructed
 /// matrices ([Golub 2013] section 5.4). Takes less time than singular values.
-[[nodiscard]] std::size_t pivoted_rank(const Information&);
+[[nodiscard]] std::size_t pivoted_rank(const Information&, double zero = 0.0);
 
 /// Combinations of the unknowns that the data do not determine.
 struct NullSpace {
@@ -36,5 +37,8 @@ struct NullSpace {
   Eigen::VectorXd share;
 };
 [[nodiscard]] NullSpace null_space(const Information&);
+/// The same for a rank that is already known, at most unknowns(): the unknowns() - rank combinations
+/// that are determined worst.
+[[nodiscard]] NullSpace null_space_of_rank(const Information&, std::size_t rank);
 
 }  // namespace abbe::calib::estimation

@@ -12,6 +12,7 @@
 #include "message.hpp"
 #include "otf/drift_held_out.hpp"
 #include "otf/held_out_rows.hpp"
+#include "otf/priors.hpp"
 #include "otf/run_unknowns.hpp"
 
 namespace abbe::calib::otf {
@@ -115,7 +116,7 @@ Result<HeldOutFold> hold_out(const std::vector<RunByFold>& runs, std::size_t fol
 
   const Observations& any = runs.front().o;
   Result<FittedFold> fitted = fit_fold(
-      runs.front(), with_backlash_prior(std::move(training), any), unknowns.size(),
+      runs.front(), with_priors(std::move(training), any), unknowns.size(),
       [&](const Observation& r) { return r.leg % folds != fold || needed[0][r.leg]; }, options);
   if (!fitted && fitted.error().code == ErrorCode::RankDeficient) {
     return HeldOutFold{};

@@ -24,6 +24,29 @@ Options after_linearisation(Options options) {
   return options;
 }
 
+/// solve(), with the prior for smooth tables that these rows permit, if there is one.
+Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const Options& options) {
+  constexpr int kMostRounds = 4;  // the variance factor depends little on the prior
+  Result<Solution> solution = solve(o, rows, options);
+  for (int round = 0; o.smoothness && solution && round < kMostRounds; ++round) {
+    Smoothness next = smoothness_for(rows.data, o.basis, *options.smoothness,
+                                     solution->statistics.variance_factor);
+    const bool same = is_same(next, *o.smoothness);
+    o.smoothness = std::move(next);
+    if (same) {
+      solution->smoothness = o.smoothness;
+      break;
+    }
+    solution = solve(o, rows, options);
+  }
+
+  if (o.smoothness && solution) {
+    const std::vector<std::string> notes = notes_on(*o.smoothness);
+    o.notes.insert(o.notes.end(), notes.begin(), notes.end());
+  }
+  return solution;
+}
+
 Result<Identification> joint(Observations of_alignment, const BlockSeries& series,
                              const Noise& noise, const Options& options, AlongRows* along) {
   Result<JointObservations> at_solution =
@@ -33,7 +56,8 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
   }
 
   Result<Solution> solution =
-      solve(at_solution->observations, at_solution->information, after_linearisation(options))
+      solve_smooth(at_solution->observations, at_solution->information,
+                   after_linearisation(options))
           .and_then([&](Solution of_rows) {
             return prewhitened(std::move(of_rows), at_solution->observations, options);
           });
@@ -47,11 +71,20 @@ Result<Identification> joint(Observations of_alignment, const BlockSeries& serie
 }
 
 Result<Identification> two_step(Observations observations, const Options& options) {
-  Result<Solution> solution = solve(observations, options);
+  Result<Solution> solution =
+      observations.smoothness ? solve_smooth(observations, information_of(observations), options)
+                              : solve(observations, options);
   if (!solution) {
     return tl::unexpected(solution.error());
   }
   return Identification{std::move(observations), *std::move(solution)};
+}
+
+Observations with_smoothness(Observations o, const Options& options) {
+  if (options.smoothness) {
+    o.smoothness = first_smoothness(*options.smoothness);
+  }
+  return o;
 }
 
 /// Adds the legs that were not used because of backlash: the rest may be insufficient without them.
@@ -75,6 +108,7 @@ Result<Identification> estimated(Observations across, const BlockSeries& series,
 
 Result<Identification> identify_observed(Observations observations, const BlockSeries& series,
                                          const Noise& noise, const Options& options) {
+  observations = with_smoothness(std::move(observations), options);
   const auto name_unused = naming_unused(observations);
   if (options.encoders != nullptr) {
     return identify_synchronised(observations, series, noise, options,
@@ -94,7 +128,7 @@ Result<Identification> identify(std::span<const TrackerObservation> samples, con
   if (options.mode == Mode::Standstill) {
     return observe(samples, machine, path, noise, options).and_then([&](Observations o) {
       const auto name_unused = naming_unused(o);
-      return two_step(std::move(o), options).map_error(name_unused);
+      return two_step(with_smoothness(std::move(o), options), options).map_error(name_unused);
     });
   }
 

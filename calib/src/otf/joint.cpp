@@ -9,6 +9,7 @@
 #include "message.hpp"
 #include "otf/change_in_u.hpp"
 #include "otf/gauge_of.hpp"
+#include "otf/priors.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -129,7 +130,7 @@ Result<JointObservations> linearise_at_solution(Observations o, const BlockSerie
 
     RowInformation information = information_of(rows);
     const Result<Eigen::VectorXd> U = gauge_of(rows).estimate(
-        with_backlash_prior(information.data, rows),
+        with_priors(information.data, rows),
         {.weight = options.gauge_weight, .label = [&](std::size_t i) { return rows.label(i); }});
     if (!U) {
       return tl::unexpected(U.error());

@@ -101,6 +101,7 @@ struct Whitened {
   Eigen::MatrixXd covariance;
   std::vector<double> residual_m;  ///< of the observations' own rows
   double variance_factor = 1.0;
+  std::optional<OffsetInModel> offset_in_model{};
 };
 
 Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filter,
@@ -140,6 +141,7 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
     w.residual_m = std::move(with.residual_m);
     w.variance_factor = factor(w.residual_m);
     of_offset = std::move(with.root_of_covariance);
+    w.offset_in_model = std::move(with.in_model);
   }
 
   w.covariance = w.variance_factor * a->covariance;
@@ -149,6 +151,14 @@ Result<Whitened> adjust_whitened(const Observations& o, const NoiseFilter& filte
   }
   add_scale_effects(w.covariance, o, rows, a->cofactor_Q);
   return w;
+}
+
+/// The observations for an adjustment of prewhitened rows whose variance factor is `factor`.
+Observations with_variance_factor(Observations o, double factor) {
+  if (o.smoothness) {
+    o.smoothness->variance_factor = factor;
+  }
+  return o;
 }
 
 }  // namespace
@@ -166,13 +176,14 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
     return s;
   }
 
-  const Result<Whitened> of_first = adjust_whitened(o, first, options);
+  const Result<Whitened> of_first = adjust_whitened(with_variance_factor(o, 1.0), first, options);
   if (!of_first) {
     return tl::unexpected(of_first.error());
   }
 
   const NoiseFilter filter = noise_filter(o, of_first->residual_m);
-  Result<Whitened> w = adjust_whitened(o, filter, options);
+  Result<Whitened> w =
+      adjust_whitened(with_variance_factor(o, of_first->variance_factor), filter, options);
   if (!w) {
     return tl::unexpected(w.error());
   }
@@ -188,6 +199,7 @@ Result<Solution> prewhitened(Solution s, const Observations& o, const Options& o
   s.backlash = backlash_of(o, w->U, w->covariance);
   s.clock = w->U.tail(static_cast<Eigen::Index>(o.clock_unknowns));
   s.covariance_with_rigid = std::move(w->covariance);
+  s.offset_in_model = std::move(w->offset_in_model);
   s.statistics.variance_factor = w->variance_factor;
   s.statistics.noise_correlation = {filter.of_direction[0].lag_1(), filter.of_direction[1].lag_1()};
   return s;

@@ -4,6 +4,7 @@
 #include "abbe/calib/estimation/sparse_information.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "otf/gauge_of.hpp"
+#include "otf/priors.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -51,15 +52,24 @@ estimation::Datum gauge_of(const Observations& o) {
   return estimation::Datum(gauge_conditions(Gauge::G1, o.basis, o.unknowns()));
 }
 
+std::size_t determined_by(const estimation::Information& data, const Eigen::MatrixXd& Q) {
+  const Eigen::MatrixXd R = data.R();
+  return static_cast<std::size_t>(std::lround((R * Q).cwiseProduct(R).sum()));
+}
+
 Result<Adjustment> adjust(const RowInformation& rows, const Observations& o, double gauge_weight) {
   std::optional<estimation::Information> noise;
   if (rows.noise) {
-    noise = with_backlash_prior(*rows.noise, o);
+    noise = with_priors(*rows.noise, o);
   }
-  return gauge_of(o).solve(with_backlash_prior(rows.data, o),
-                           {.weight = gauge_weight,
-                            .noise = noise ? &*noise : nullptr,
-                            .label = [&](std::size_t i) { return o.label(i); }});
+  Result<Adjustment> a = gauge_of(o).solve(with_priors(rows.data, o),
+                                           {.weight = gauge_weight,
+                                            .noise = noise ? &*noise : nullptr,
+                                            .label = [&](std::size_t i) { return o.label(i); }});
+  if (a && o.smoothness) {
+    a->rank = determined_by(rows.data, a->cofactor_Q);
+  }
+  return a;
 }
 
 }  // namespace abbe::calib::otf

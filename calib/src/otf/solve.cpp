@@ -149,6 +149,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
   Statistics figures = statistics(o, *a, residuals);
   RangeOffset offset;
   Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
+  std::optional<OffsetInModel> offset_in_model;
   std::optional<WithDrift> drift;
 
   if (o.drift) {
@@ -171,6 +172,7 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
         with_range_offset(o, as_observed, *a, residuals.after_m, figures.variance_factor);
     offset = with.offset;
     root_of_offset = std::move(with.root_of_covariance);
+    offset_in_model = std::move(with.in_model);
     a->U = std::move(with.U);
     residuals.after_m = std::move(with.residual_m);
     figures = statistics(o, *a, residuals);
@@ -203,7 +205,9 @@ Result<Solution> solve(const Observations& o, const RowInformation& rows, const 
       .residuals = std::move(residuals),
       .range_offset = offset,
       .backlash = backlash_of(o, a->U, a->covariance),
-      .drift = drift ? std::optional(std::move(drift->drift)) : std::nullopt};
+      .drift = drift ? std::optional(std::move(drift->drift)) : std::nullopt,
+      .smoothness = o.smoothness,
+      .offset_in_model = std::move(offset_in_model)};
 }
 
 }  // namespace abbe::calib::otf

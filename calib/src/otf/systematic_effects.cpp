@@ -45,7 +45,14 @@ WithRangeOffset with_range_offset(const Observations& o, const WhitenedRows& row
       sums.estimate_with_prior(a.cofactor_Q, o.u_range_offset_m, factor);
   const RangeOffset offset{e.d(0), e.u(0)};
   const Eigen::VectorXd U = a.U - e.dU;
-  return {offset, U, e.root_cov_dU, residuals_m(without_range_offset(o, offset.value_m), U)};
+  const OffsetInModel in_model{
+      .dU_dd =
+          sums.reduced(a.cofactor_Q).dU_dd.col(0).head(static_cast<Eigen::Index>(o.basis.size())),
+      .value_m = offset.value_m,
+      .u_m = offset.u_m,
+      .u_prior_m = o.u_range_offset_m};
+  return {offset, U, e.root_cov_dU, residuals_m(without_range_offset(o, offset.value_m), U),
+          in_model};
 }
 
 void add_scale_effects(Eigen::MatrixXd& covariance, const Observations& o, const WhitenedRows& rows,

@@ -17,6 +17,7 @@ struct WithRangeOffset {
   Eigen::VectorXd U;
   Eigen::MatrixXd root_of_covariance;  ///< what the offset adds to that of U: root root^T
   std::vector<double> residual_m;      ///< of the rows without the offset
+  OffsetInModel in_model;
 };
 /// `a`: adjustment of `rows`, `residual_m`: y - A U of the observations' own rows, `factor`:
 /// variance of the rows relative to the stated one.

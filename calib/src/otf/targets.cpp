@@ -11,6 +11,7 @@
 #include "otf/added_columns.hpp"
 #include "otf/change_in_u.hpp"
 #include "otf/observe_aligned.hpp"
+#include "otf/priors.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"
 #include "otf/run_unknowns.hpp"
@@ -94,6 +95,9 @@ Result<ObservedRuns> observe_runs(std::span<const TargetRun> runs, const Machine
       return error_of_run(k, o.error());
     }
     all.observations.push_back(with_basis(*o, *basis));
+    if (options.smoothness) {
+      all.observations.back().smoothness = first_smoothness(*options.smoothness);
+    }
   }
   return all;
 }
@@ -106,13 +110,18 @@ std::size_t rows_of_runs(std::span<const Observations> runs) {
   return rows;
 }
 
-estimation::Information information_of_runs(std::span<const Observations> runs) {
+/// Of all rows, without priors.
+estimation::Information rows_information(std::span<const Observations> runs) {
   const RunUnknowns unknowns(runs);
   estimation::Information all(unknowns.size());
   for (std::size_t k = 0; k < runs.size(); ++k) {
     all.add(information_of(runs[k]).data, unknowns.of_run(k));
   }
-  return with_backlash_prior(std::move(all), runs.front());
+  return all;
+}
+
+estimation::Information information_of_runs(std::span<const Observations> runs) {
+  return with_priors(rows_information(runs), runs.front());
 }
 
 estimation::DatumOptions datum_options(std::span<const Observations> runs, const Options& options) {
@@ -305,6 +314,31 @@ Result<VolumetricModel> model_of_runs(std::span<const Observations> runs, const 
   });
 }
 
+Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options& options) {
+  const estimation::Information rows = rows_information(runs);
+  Result<Adjustment> a = gauge_of_runs(runs.front().basis, rows.unknowns())
+                             .solve(with_priors(rows, runs.front()), datum_options(runs, options));
+  if (a && runs.front().smoothness) {
+    a->rank = determined_by(rows, a->cofactor_Q);
+  }
+  return a;
+}
+
+/// The prior for smooth tables that the rows of all runs permit; `first`: with the first prior.
+void choose_smoothness(std::vector<Observations>& runs, const Adjustment& first,
+                       const SmoothnessOptions& options) {
+  const std::vector<Residuals> residuals = residuals_of_runs(runs, first.U);
+  const std::vector<Statistics> of_runs = statistics_of_runs(runs, first, residuals);
+  const double factor = statistics_of_all(of_runs, first, RunUnknowns(runs).size()).variance_factor;
+  const Smoothness chosen =
+      smoothness_for(rows_information(runs), runs.front().basis, options, factor);
+  for (Observations& o : runs) {
+    o.smoothness = chosen;
+  }
+  const std::vector<std::string> notes = notes_on(chosen);
+  runs.front().notes.insert(runs.front().notes.end(), notes.begin(), notes.end());
+}
+
 Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adjustments,
                                          const Options& options) {
   const RunUnknowns unknowns(runs);
@@ -314,8 +348,11 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                            " observations for ", unknowns.size(), " unknowns"));
   }
 
-  Result<Adjustment> a = gauge_of_runs(runs.front().basis, unknowns.size())
-                             .solve(information_of_runs(runs), datum_options(runs, options));
+  Result<Adjustment> a = adjust_runs(runs, options);
+  if (a && runs.front().smoothness) {
+    choose_smoothness(runs, *a, *options.smoothness);
+    a = adjust_runs(runs, options);
+  }
   if (!a) {
     return tl::unexpected(a.error());
   }
@@ -361,7 +398,8 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                .statistics = of_runs[k],
                                .residuals = std::move(residuals[k]),
                                .range_offset = offset,
-                               .backlash = backlash_of(runs[k], a->U, a->covariance)});
+                               .backlash = backlash_of(runs[k], a->U, a->covariance),
+                               .smoothness = runs[k].smoothness});
   }
   found.observations = std::move(runs);
   return found;

@@ -67,7 +67,8 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
           s.blocks,
           s.blocks_used,
           candidate.solution.range_offset,
-          candidate.solution.synchronisation};
+          candidate.solution.synchronisation,
+          candidate.solution.smoothness};
 }
 
 namespace {
@@ -124,6 +125,8 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   apply(arguments, files->config);
+  if (const auto valid = apply_smoothness(arguments.smoothness, files->config); !valid)
+    return tl::make_unexpected(valid.error());
   if (const auto valid =
           check_scales("identify otf", "a path", files->config, arguments.scales_corrected);
       !valid)
@@ -217,6 +220,15 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"held_out_rms_before_um", outcome.verdict.held_out.no_compensation_rms_m * kUmPerM},
       {"held_out_rms_after_um", outcome.verdict.held_out.candidate_rms_m * kUmPerM},
       {"gate", verdict_json(outcome.verdict)}};
+  if (const auto& prior = outcome.smoothness)
+    object["smoothness"] = {
+        {"estimated", prior->estimated},
+        {"bend_um",
+         {prior->bend_m[0] * kUmPerM, prior->bend_m[1] * kUmPerM, prior->bend_m[2] * kUmPerM}},
+        {"chi2", prior->chi2},
+        {"expected_chi2", prior->expected_chi2},
+        {"bends", prior->rows},
+        {"left_out", prior->left_out()}};
   if (!outcome.document.backlash.empty())
     object["backlash"] = backlash_json(outcome.document.backlash);
   if (outcome.document.tracker_drift)
@@ -245,6 +257,10 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
   if (outcome.range_offset.u_m > 0.0)
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
+  if (const auto& prior = outcome.smoothness)
+    fmt::print("smoothness  prior {}{}: chi-square {:.1f}, expected {:.1f}; left out: {}\n",
+               otf::size_text(*prior), prior->estimated ? " (estimated)" : "", prior->chi2,
+               prior->expected_chi2, prior->left_out());
   print_backlash(outcome.document.backlash);
   if (outcome.document.tracker_drift)
     fmt::print("{}", tracker_drift_text(*outcome.document.tracker_drift));
@@ -368,6 +384,13 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                  "difference between both directions of travel at every node. The tables are the\n"
                  "mean of both directions; default: [otf] backlash, or none")
       ->check(CLI::IsMember({"none", "per-table", "forward-backward"}));
+  command->add_option(
+      "--smoothness", arguments->smoothness,
+      "prior for smooth tables: none; estimated (its size from the data); or UM or X,Y,Z: "
+      "standard\n"
+      "deviation, in um, of the bend of a table over three nodes 50 mm apart (second difference;\n"
+      "twice as many urad for angles). Tables rougher than the prior are named and computed\n"
+      "without it; default: that of [otf], or none");
   command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")

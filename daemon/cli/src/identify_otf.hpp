@@ -21,6 +21,7 @@ struct IdentifyOtfArguments {
   std::size_t block_samples = 0;         // 0: blocks by travel
   std::optional<double> u_scale_ppm;     // without a value: that of the configured tracker
   std::string backlash;                  // empty: that of [otf]
+  std::string smoothness;                // empty: that of [otf]
   double encoder_u_time_us = 20.0;       // standard uncertainty of the time of a scale reading
   bool scales_corrected = false, accept_path_orientation = false;
   bool json = false;
@@ -36,6 +37,7 @@ struct OtfOutcome {
   std::size_t blocks = 0, blocks_used = 0;
   calib::otf::RangeOffset range_offset;
   std::optional<calib::otf::Synchronisation> synchronisation{};
+  std::optional<calib::otf::Smoothness> smoothness{};
 };
 
 /// Words of the progress bar.
@@ -47,7 +49,10 @@ struct OtfOutcome {
 /// --u-scale-ppm, or that of the configured tracker; 0 without both.
 [[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
 
-/// The options of the command replace those of the configuration.
+/// Sets the prior for smooth tables as --smoothness (`text`) states: none, estimated, UM or
+/// UM_X,UM_Y,UM_Z. Error Usage for another text.
+[[nodiscard]] Result<void> apply_smoothness(const std::string& text, Config& config);
+/// The options of the command replace those of the configuration; --smoothness apart.
 void apply(const IdentifyOtfArguments& arguments, Config& config);
 
 /// Makes the checks of the path that the daemon makes before the machine drives. The message for a
@@ -69,6 +74,12 @@ struct OtfFromFiles {
 [[nodiscard]] Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
                                                   const std::optional<ModelDocument>& active,
                                                   ProgressBar& bar);
+
+/// Identifies the last complete run of --recording with the configuration --machine. The recorded
+/// configuration states how the run was acquired, and its reflector and tracker position, unless
+/// the arguments state others.
+[[nodiscard]] Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments,
+                                                     ProgressBar& bar);
 
 /// Identifies the last complete run of --recording.
 [[nodiscard]] Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,

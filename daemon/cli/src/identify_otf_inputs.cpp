@@ -1,11 +1,13 @@
 // What the options of `abbe identify otf` change in the configuration, and the checks of the path.
 #include <fmt/format.h>
 
+#include "abbe/base/units.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/tables/travel_faults.hpp"
 #include "identify_otf.hpp"
 #include "target_offset.hpp"
+#include "vector_option.hpp"
 
 namespace abbe::daemon {
 
@@ -34,6 +36,33 @@ void apply(const IdentifyOtfArguments& arguments, Config& config) {
   if (const auto& t = arguments.target_offset_m) set_target(config.machine, *t);
   if (const auto& p = arguments.tracker_position_m)
     config.machine.tracker_position_m = {p->x(), p->y(), p->z()};
+}
+
+Result<void> apply_smoothness(const std::string& text, Config& config) {
+  auto& smoothness = config.otf.smoothness;
+  if (text.empty()) return {};
+  smoothness.reset();
+  if (text == "none") return {};
+  if (text == "estimated") {
+    smoothness = otf::SmoothnessOptions{.estimated = true};
+    return {};
+  }
+
+  const bool is_one = text.find(',') == std::string::npos;
+  const auto size_mm = parse_mm("--smoothness", is_one ? fmt::format("{0},{0},{0}", text) : text);
+  const calib::Vector3 bend_m =
+      size_mm ? calib::Vector3(*size_mm * kMmPerM / kUmPerM) : calib::Vector3::Zero();
+  bool valid = bend_m.maxCoeff() > 0.0;
+  for (const double value_m : bend_m)
+    valid = valid && (value_m == 0.0 || otf::is_bend_size(value_m));
+  if (!valid)
+    return fail(ErrorCode::Usage,
+                fmt::format("--smoothness \"{}\": must be none, estimated, or the standard "
+                            "deviation of the bend over nodes 50 mm apart in um, 0.01 to 1000: one "
+                            "number, or X,Y,Z with 0 for no prior",
+                            text));
+  smoothness = otf::SmoothnessOptions{.bend_m = {bend_m[0], bend_m[1], bend_m[2]}};
+  return {};
 }
 
 Result<void> check_path(const std::string& file, const PathFile& path, const Config& config) {

@@ -112,6 +112,8 @@ Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
   auto all = read_runs(arguments, bar);
   if (!all) return tl::make_unexpected(all.error());
   apply(arguments, all->config);
+  if (const auto valid = apply_smoothness(arguments.smoothness, all->config); !valid)
+    return tl::make_unexpected(valid.error());
   if (const auto valid = check_runs(arguments, *all); !valid)
     return tl::make_unexpected(valid.error());
   const auto machine = otf_machine(all->config.machine);

@@ -29,6 +29,10 @@ void read_drift(Section& root, Config& out) {
     section.fault("continuous",
                   "needs backlash = \"none\" in [otf]: half the backlash is in the uncertainty of "
                   "every run, and an update would take it for noise that averages out");
+  if (drift.continuous && out.otf.smoothness)
+    section.fault("continuous",
+                  "needs smoothness = \"none\" in [otf]: every run would contain the prior, and an "
+                  "update would count it once for each of them");
   if (drift.hold && !drift.test) section.fault("hold", "needs test = true");
 
   Section tables = section.child("tables");

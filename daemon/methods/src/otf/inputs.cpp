@@ -103,6 +103,7 @@ calib::otf::Options otf_options(std::span<const calib::otf::TrackerObservation> 
   options.estimator = config.otf.estimator;
   options.backlash = config.otf.backlash;
   options.nests = config.otf.nests;
+  options.smoothness = config.otf.smoothness;
   options.block_samples = calib::otf::suitable_block_samples(points);
   options.held_out_folds =
       static_cast<std::size_t>(std::lround(1.0 / config.gate.holdout_fraction));

@@ -18,6 +18,7 @@
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/path_frame.hpp"
+#include "abbe/calib/otf/smoothness.hpp"
 #include "abbe/calib/otf/tracker_drift.hpp"
 #include "abbe/calib/otf/travel.hpp"
 
@@ -79,7 +80,9 @@ struct Observations {
   std::vector<std::size_t> beam_returned{};  ///< see BlockSeries
   SetAside set_aside{};
   std::optional<DriftObservations> drift{};  ///< if nests were visited repeatedly
-  std::vector<std::string> notes{};          ///< for the verdict
+  /// The prior with which every adjustment of these rows is made.
+  std::optional<Smoothness> smoothness{};
+  std::vector<std::string> notes{};  ///< for the verdict
 
   [[nodiscard]] const ParameterLayout& layout() const { return basis.layout(); }
   /// Index in U of the first of the six rigid unknowns T, r, which follow the parameters of the

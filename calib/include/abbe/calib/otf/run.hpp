@@ -20,6 +20,7 @@
 #include "abbe/calib/kinematic_chain.hpp"
 #include "abbe/calib/otf/encoder_log.hpp"
 #include "abbe/calib/otf/nest_options.hpp"
+#include "abbe/calib/otf/smoothness_options.hpp"
 #include "abbe/calib/otf/standstill_options.hpp"
 
 namespace abbe::calib::otf {
@@ -167,6 +168,8 @@ struct Options {
   /// Reference nests that the tracker visits between the legs, for Mode::OnTheFly: the drift of the
   /// tracker is then estimated (tracker_drift.hpp).
   NestOptions nests{};
+  /// Prior for smooth tables (smoothness.hpp), for every mode and estimator. Absent: no prior.
+  std::optional<SmoothnessOptions> smoothness{};
   Progress progress;  ///< may be empty
   Stopped stopped;    ///< may be empty: the computation is never stopped
 };

@@ -63,7 +63,8 @@ struct RowInformation {
 [[nodiscard]] RowInformation information_of(
     const Observations&, const std::function<bool(const Observation&)>& take = {});
 
-/// Parameters U in gauge G1, with their covariance caused by the noise of the rows.
+/// Parameters U in gauge G1, with their covariance caused by the noise of the rows. With
+/// Observations::smoothness `rank` is that of Statistics.
 using Adjustment = estimation::DatumSolution;
 /// RankDeficient if the rank defect of the data is larger than the number of gauge conditions. The
 /// text names parameters that are not determined.
@@ -87,6 +88,8 @@ struct Statistics {
   std::size_t samples = 0, lost_samples = 0, blocks = 0, blocks_used = 0;
   std::size_t observations = 0;  ///< rows
   std::size_t unknowns = 0;      ///< columns
+  /// With a prior for smooth tables: the number of combinations of the unknowns that the data
+  /// determine, trace(Q A^T W^2 A), rounded.
   std::size_t rank = 0;
   std::size_t gauge_conditions = 0;
   std::size_t degrees_of_freedom = 0;  ///< observations - rank
@@ -115,6 +118,16 @@ struct RangeOffset {
   double u_m = 0.0;
 };
 
+/// The range offset as it is in the covariance of the model, for a joint identification in which
+/// several runs have the same offset (joint/part.hpp). With the offset d the model of the run is
+///     U - dU_dd (d - value)
+struct OffsetInModel {
+  Eigen::VectorXd dU_dd;  ///< of the parameters of the basis, m/m or rad/m
+  double value_m = 0.0;   ///< estimate with the prior
+  double u_m = 0.0;
+  double u_prior_m = 0.0;
+};
+
 /// What the scale readings contributed (along_rows.hpp).
 struct Synchronisation {
   ClockMap clock;
@@ -141,6 +154,9 @@ struct Solution {
   std::optional<Synchronisation> synchronisation{};  ///< with scale readings
   std::vector<Backlash> backlash{};                  ///< with Options::backlash
   std::optional<TrackerDrift> drift{};               ///< with Options::nests
+  std::optional<Smoothness> smoothness{};            ///< with Options::smoothness
+  /// With Noise::u_range_offset_m; not with nests, where it is estimated beside the drift.
+  std::optional<OffsetInModel> offset_in_model{};
 };
 /// The observations that result without the estimated range offset and the drift of the tracker.
 [[nodiscard]] Observations without_run_effects(Observations, const Solution&);

@@ -178,6 +178,7 @@ struct OtfConfig {
   /// See calib::otf::Options.
   calib::estimation::TravelDependence backlash = calib::otf::Options{}.backlash;
   calib::otf::NestOptions nests{};  ///< [[tracker.nest]]
+  std::optional<calib::otf::SmoothnessOptions> smoothness{};
 };
 
 /// [drift]: comparison of the tables of a new run with those of the active model, and continuous

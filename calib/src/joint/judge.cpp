@@ -74,7 +74,10 @@ Result<std::optional<VolumetricModel>> model_without_fold(std::span<const Part> 
     Part& part = rest[folded.run.part];
     Result<Part> made =
         otf::solve(without_fold(folded, fold), quiet).and_then([&](const otf::Solution& s) {
-          return part_of_run(part.name, s.model, common, folded.run.effects);
+          // The offset of the ranges was removed from the observations.
+          CommonEffects effects = folded.run.effects;
+          effects.range_offset.reset();
+          return part_of_run(part.name, s.model, common, effects);
         });
     if (!made && made.error().code == ErrorCode::RankDeficient) {
       return std::nullopt;

@@ -16,17 +16,21 @@ namespace {
 
 /// Columns of the effects that a run shares with other parts, one standard uncertainty each.
 struct SharedColumns {
-  Eigen::MatrixXd G;
+  Eigen::MatrixXd G;              ///< effect of one standard uncertainty on the model
+  Eigen::MatrixXd in_covariance;  ///< what each of them adds to the covariance: column column^T
   std::vector<std::string> names;
   std::vector<double> u;
 };
 
 SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects& e) {
   const Eigen::MatrixX3d of_axis = axis_scale_columns(layout);
-  SharedColumns shared{Eigen::MatrixXd(of_axis.rows(), 4), {}, {}};
+  constexpr Eigen::Index kMost = 5;
+  SharedColumns shared{
+      Eigen::MatrixXd(of_axis.rows(), kMost), Eigen::MatrixXd(of_axis.rows(), kMost), {}, {}};
   Eigen::Index columns = 0;
-  const auto add = [&](double u, const Eigen::VectorXd& column, std::string name) {
+  const auto add = [&](double u, double u_left, const Eigen::VectorXd& column, std::string name) {
     if (u > 0.0 && column.squaredNorm() > 0.0) {
+      shared.in_covariance.col(columns) = u_left * column;
       shared.G.col(columns++) = u * column;
       shared.names.push_back(std::move(name));
       shared.u.push_back(u);
@@ -34,13 +38,51 @@ SharedColumns shared_columns(const ParameterLayout& layout, const CommonEffects&
   };
 
   // A relative error of the ranges enlarges the whole machine.
-  add(e.u_ranges, of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
+  add(e.u_ranges, e.u_ranges, of_axis.rowwise().sum(), "ranges of " + e.ranges_of);
   for (const Axis a : kAllAxes) {
-    add(e.u_axis_scale[index(a)], of_axis.col(static_cast<Eigen::Index>(index(a))),
-        message("scale of ", letter(a)));
+    const double u = e.u_axis_scale[index(a)];
+    add(u, u, of_axis.col(static_cast<Eigen::Index>(index(a))), message("scale of ", letter(a)));
+  }
+  if (e.range_offset) {
+    const otf::OffsetInModel& of_run = e.range_offset->of_run;
+    add(of_run.u_prior_m, of_run.u_m, of_run.dU_dd, "offset of the ranges " + e.range_offset->name);
   }
   shared.G.conservativeResize(Eigen::NoChange, columns);
+  shared.in_covariance.conservativeResize(Eigen::NoChange, columns);
   return shared;
+}
+
+/// What the data of the run, without the prior, state about its range offset d, in units of its
+/// prior. The estimate with the prior has the information 1/u^2 = s^2 + 1/u_prior^2 and the value
+///     d = s^2 d_data u^2
+void add_offset_of_data(estimation::Information& information, const otf::OffsetInModel& of_run,
+                        Eigen::Index column) {
+  constexpr double kNothing = 1e-9;  // rounding of 1 - u^2 / u_prior^2
+  const double u2 = of_run.u_m * of_run.u_m, prior2 = of_run.u_prior_m * of_run.u_prior_m,
+               s2 = 1.0 / u2 - 1.0 / prior2;
+  if (s2 * u2 > kNothing) {
+    const double s = std::sqrt(s2);
+    Eigen::MatrixXd row =
+        Eigen::MatrixXd::Zero(1, static_cast<Eigen::Index>(information.unknowns()));
+    row(0, column) = s * of_run.u_prior_m;
+    information.add_rows(row, Eigen::VectorXd::Constant(1, of_run.value_m / (u2 * s)));
+  }
+}
+
+Result<void> check_offset(const std::string& part, const CommonEffects& effects,
+                          const CommonTables& common) {
+  const auto& shared = effects.range_offset;
+  if (!shared) {
+    return {};
+  }
+  const otf::OffsetInModel& of_run = shared->of_run;
+  if (of_run.u_prior_m > 0.0 && of_run.u_m > 0.0 && of_run.dU_dd.squaredNorm() > 0.0 &&
+      of_run.dU_dd.size() == static_cast<Eigen::Index>(common.basis.size())) {
+    return {};
+  }
+  return failure(ErrorCode::NotApplicable,
+                 message("joint identification: ", part, " has no estimate of the range offset '",
+                         shared->name, "': it needs u_range_offset, and no nests"));
 }
 
 /// "has 4 nodes of X, not 5"; empty if nodes, reference and interpolation of the axis are the same.
@@ -136,7 +178,8 @@ Result<ScaledTriangle> triangle_without_effects(const std::string& part, const E
       ErrorCode::NotApplicable,
       message("joint identification: the covariance of ", part,
               " is not larger than the effects stated as common (", stated,
-              "): state the u_scale and u_axis_scale with which the run was identified"));
+              "): state the u_scale, u_axis_scale and range offset with which the run was "
+              "identified"));
 }
 
 /// W M with W^T W = C^-1.
@@ -151,12 +194,16 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
   if (Result<void> same = check_same_layout(name, model, common); !same) {
     return tl::unexpected(same.error());
   }
+  if (Result<void> valid = check_offset(name, effects, common); !valid) {
+    return tl::unexpected(valid.error());
+  }
 
   const Eigen::MatrixXd N = gauge_coordinates(common.basis).N;
   SharedColumns shared = shared_columns(common.basis.layout(), effects);
   const Eigen::MatrixXd G = N.transpose() * shared.G;
   const Result<ScaledTriangle> triangle =
-      triangle_without_effects(name, N.transpose() * model.covariance() * N, G, shared.names);
+      triangle_without_effects(name, N.transpose() * model.covariance() * N,
+                               N.transpose() * shared.in_covariance, shared.names);
   if (!triangle) {
     return tl::unexpected(triangle.error());
   }
@@ -172,8 +219,12 @@ Result<Part> part_of_run(std::string name, const VolumetricModel& model, const C
   Eigen::MatrixXd A(N.cols(), n + own + of_rotations->cols());
   A << N.transpose(), G.leftCols(own), N.transpose() * *of_rotations;
   estimation::Information information(static_cast<std::size_t>(A.cols()));
-  information.add_rows(whitened_by(*triangle, A),
-                       whitened_by(*triangle, N.transpose() * model.U()));
+  Eigen::VectorXd U = model.U();
+  if (effects.range_offset) {
+    U += effects.range_offset->of_run.dU_dd * effects.range_offset->of_run.value_m;
+    add_offset_of_data(information, effects.range_offset->of_run, n + own - 1);
+  }
+  information.add_rows(whitened_by(*triangle, A), whitened_by(*triangle, N.transpose() * U));
 
   std::vector<std::size_t> eliminated(left_out.size());
   std::iota(eliminated.begin(), eliminated.end(), static_cast<std::size_t>(n + own));

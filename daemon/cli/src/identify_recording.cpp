@@ -27,13 +27,78 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
               fmt::format("{}: contains no complete calibration: {}", file, why));
 }
 
+/// The last complete run along a path, as it was acquired.
+Result<OtfRun> last_run(const OpenedRecording& recording, const std::string& file,
+                        ProgressBar& bar) {
+  std::optional<OtfRun> last;
+  const auto replayed = replay(recording.reader, recording.config,
+                               {.progress = [&bar](double share) { bar.show("replaying", share); },
+                                .runs =
+                                    [&last](CalibrationRun run) {
+                                      if (auto* otf = std::get_if<OtfRun>(&run))
+                                        last = std::move(*otf);
+                                    }});
+  if (!replayed) return tl::make_unexpected(replayed.error());
+  if (last) return *std::move(last);
+  const auto& all = replayed->calibrations;
+  return fail(ErrorCode::DataInsufficient,
+              fmt::format("{}: contains no complete run along a path: {}", file,
+                          all.empty() ? "no calibration was requested" : all.back().ended.reason));
+}
+
+/// The configuration for the identification of a recorded run.
+Result<Config> config_for(const IdentifyOtfArguments& arguments, const Config& recorded) {
+  auto config = load_config(arguments.machine);
+  if (!config) return config;
+  if (config->machine.chain != recorded.machine.chain)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: was recorded on a machine with the chain {}, {} has {}",
+                            arguments.recording, recorded.machine.chain, arguments.machine,
+                            config->machine.chain));
+  if (recorded.machine.target_given) {
+    config->machine.target_offset_m = recorded.machine.target_offset_m;
+    config->machine.target_given = true;
+  }
+  if (recorded.machine.tracker_position_m)
+    config->machine.tracker_position_m = recorded.machine.tracker_position_m;
+  apply(arguments, *config);
+  if (const auto given = require_target(config->machine); !given)
+    return tl::make_unexpected(given.error());
+  return config;
+}
+
 }  // namespace
+
+Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, ProgressBar& bar) {
+  const auto recording = open_recording(arguments.recording);
+  if (!recording) return tl::make_unexpected(recording.error());
+  auto config = config_for(arguments, recording->config);
+  if (!config) return tl::make_unexpected(config.error());
+  auto run = last_run(*recording, arguments.recording, bar);
+  if (!run) return tl::make_unexpected(run.error());
+  if (arguments.u_scale_ppm) run->u_scale = u_scale_of(arguments, *config);
+
+  const IdentificationWatch watch{
+      .progress = [&bar](double share) { bar.show("identifying", share); }};
+  auto identified = identify_observations(*run, *config, nullptr, watch);
+  if (!identified) return tl::make_unexpected(identified.error());
+  judge_recording(recording->reader, identified->verdict);
+  return OtfFromFiles{*std::move(config),
+                      {recording->source},
+                      identified->noise,
+                      run->mode,
+                      std::move(identified->found),
+                      std::move(identified->verdict),
+                      std::move(identified->residuals)};
+}
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
                                   const std::optional<ModelDocument>& active, ProgressBar& bar) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
   apply(arguments, recording->config);
+  if (const auto valid = apply_smoothness(arguments.smoothness, recording->config); !valid)
+    return tl::make_unexpected(valid.error());
   if (const auto given = require_target(recording->config.machine); !given)
     return tl::make_unexpected(given.error());
   const auto other = comparison_model(active, recording->config);

@@ -46,6 +46,7 @@ IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFi
   run.path = files.path;
   run.tracker = files.tracker;
   run.encoder = files.encoder;
+  run.recording = files.recording;
   run.estimator = all.estimator;
   run.u_scale_ppm = all.u_scale_ppm;
   run.scales_corrected = all.scales_corrected;
@@ -55,9 +56,24 @@ IdentifyOtfArguments arguments_of(const IdentifyJointArguments& all, const RunFi
   return run;
 }
 
+/// The offset of the ranges that the run shares with others.
+Result<std::optional<calib::joint::SharedRangeOffset>> shared_offset(
+    const RunFiles& files, const calib::otf::Solution& solution) {
+  if (files.range_offset.empty()) return std::nullopt;
+  if (!solution.offset_in_model)
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: range_offset = \"{}\" needs [tracker] u_range_offset_um > 0, and a "
+                    "run without reference nests: otherwise the offset is not estimated",
+                    files.name, files.range_offset));
+  return calib::joint::SharedRangeOffset{files.range_offset, *solution.offset_in_model};
+}
+
 Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& files,
                      JointInput& input, ProgressBar& bar) {
-  auto run = identify_files(arguments_of(arguments, files), std::nullopt, bar);
+  const IdentifyOtfArguments of_run = arguments_of(arguments, files);
+  auto run = files.recording.empty() ? identify_files(of_run, std::nullopt, bar)
+                                     : identify_recorded(of_run, bar);
   if (!run) return tl::make_unexpected(in_part(files.name, run.error()));
   const auto& solution = run->found.solution;
   if (!input.common) {
@@ -66,26 +82,30 @@ Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& fi
     input.common = std::move(*common);
   }
 
+  const auto offset = shared_offset(files, solution);
+  if (!offset) return tl::make_unexpected(offset.error());
   const calib::joint::CommonEffects effects{.u_ranges = run->noise.u_scale,
                                             .ranges_of = files.instrument,
-                                            .u_axis_scale = run->noise.u_axis_scale};
+                                            .u_axis_scale = run->noise.u_axis_scale,
+                                            .range_offset = *offset};
   auto part = calib::joint::part_of_run(files.name, solution.model, *input.common, effects);
   if (!part) return tl::make_unexpected(error_of(part.error()));
 
   // Of its variance, less than three quarters are determined by the data.
   constexpr double kHalf = 0.5;
-  if (solution.range_offset.u_m > kHalf * run->noise.u_range_offset_m)
+  if (!*offset && solution.range_offset.u_m > kHalf * run->noise.u_range_offset_m)
     run->verdict.notes.emplace_back(
         "the offset of the ranges is known from its stated uncertainty only; it counts as "
-        "independent between runs: state a smaller u_range_offset_um, or use a longer path");
+        "independent between runs: state a smaller u_range_offset_um, use a longer path, or, "
+        "for runs with the same tracker, reflector and home position, range_offset in parts.toml");
 
   input.observations.push_back(
       calib::otf::without_run_effects(std::move(run->found.observations), solution));
   input.runs.push_back({input.parts.size(), &input.observations.back(), effects});
   input.parts.push_back(std::move(*part));
-  input.facts.push_back({files.name, "otf", file_names({files.path, files.tracker, files.encoder}),
-                         solution.statistics.observations, solution.model,
-                         std::move(run->verdict)});
+  input.facts.push_back(
+      {files.name, "otf", file_names({files.path, files.tracker, files.encoder, files.recording}),
+       solution.statistics.observations, solution.model, std::move(run->verdict)});
   add_sources(input, run->sources);
 
   return {};
@@ -148,6 +168,12 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, Pro
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: otf.backlash: must be \"none\" for identify joint: half the "
                             "backlash is in the uncertainty of every run and does not average out",
+                            arguments.machine));
+  if (config->otf.smoothness)
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: otf.smoothness: must be \"none\" for identify joint: every run "
+                            "would contain the prior, and all together would count it once for "
+                            "each of them",
                             arguments.machine));
   const auto hash = sha256_hex_of_file(arguments.machine);
   if (!hash) return tl::make_unexpected(hash.error());

@@ -29,12 +29,17 @@ void read_vector(Section& part, std::string_view key, std::optional<calib::Vecto
 RunFiles read_run(Section& part, std::size_t number, const std::filesystem::path& folder) {
   RunFiles run{.name = fmt::format("run {}", number)};
   part.get("name", run.name);
-  read_file_name(part, "path", run.path, folder, Need::Required);
-  read_file_name(part, "tracker", run.tracker, folder, Need::Required);
+  read_file_name(part, "recording", run.recording, folder);
+  const Need files = run.recording.empty() ? Need::Required : Need::Optional;
+  read_file_name(part, "path", run.path, folder, files);
+  read_file_name(part, "tracker", run.tracker, folder, files);
   read_file_name(part, "encoder", run.encoder, folder);
+  if (!run.recording.empty() && !(run.path + run.tracker + run.encoder).empty())
+    part.fault("recording", "must not be given beside path, tracker or encoder: it contains them");
   read_vector(part, "target_offset_mm", run.target_offset_m);
   read_vector(part, "tracker_position_mm", run.tracker_position_m);
   part.get("instrument", run.instrument);
+  part.get("range_offset", run.range_offset);
   part.close();
   return run;
 }

@@ -30,9 +30,9 @@ double overall(calib::otf::Stage stage, double fraction) {
 
 }  // namespace
 
-Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
-                                  const calib::VolumetricModel* active,
-                                  const IdentificationWatch& watch) {
+Result<IdentifiedRun> identify_observations(const OtfRun& run, const Config& config,
+                                            const calib::VolumetricModel* active,
+                                            const IdentificationWatch& watch) {
   const auto machine = otf_machine(config.machine);
   if (!machine) return tl::unexpected(machine.error());
   const auto points = otf_observations(run.points);
@@ -61,8 +61,16 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
   if (run.unmeasured_air) verdict->notes.push_back(*run.unmeasured_air);
 
-  return OtfCandidate{std::move(found->solution), std::move(*verdict), run.mode,
-                      std::move(residuals)};
+  return IdentifiedRun{noise, *std::move(found), std::move(*verdict), std::move(residuals)};
+}
+
+Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
+                                  const calib::VolumetricModel* active,
+                                  const IdentificationWatch& watch) {
+  auto identified = identify_observations(run, config, active, watch);
+  if (!identified) return tl::unexpected(identified.error());
+  return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
+                      run.mode, std::move(identified->residuals)};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

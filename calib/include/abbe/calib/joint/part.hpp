@@ -19,12 +19,14 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/estimation/table_basis.hpp"
 #include "abbe/calib/evemu/observe.hpp"
+#include "abbe/calib/otf/solve.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 
 namespace abbe::calib::joint {
@@ -61,6 +63,15 @@ struct Part {
   std::function<std::vector<Mistake>()> mistakes{};
 };
 
+/// The range offset of a run, where several runs have the same one: the same tracker with the same
+/// reflector, and no new home position or initialisation between them. Each run estimated it with
+/// its prior. The part then states what its data alone know about the offset, and the prior is
+/// counted once for all runs.
+struct SharedRangeOffset {
+  std::string name;             ///< runs with the same name have the same offset
+  otf::OffsetInModel of_run{};  ///< Solution::offset_in_model
+};
+
 /// Standard uncertainties of errors that parts have in common. An error that is not stated here
 /// counts as independent between the parts: if it is not, the joint uncertainty of n parts is too
 /// small by up to sqrt(n).
@@ -72,6 +83,7 @@ struct CommonEffects {
   /// Relative, of the length of the scales of X, Y, Z (otf::Noise::u_axis_scale): the same in all
   /// parts.
   std::array<double, 3> u_axis_scale{};
+  std::optional<SharedRangeOffset> range_offset{};  ///< nullopt: its own in every run
 };
 
 /// The part of an on-the-fly run: its model with its covariance, which contains all effects of the

@@ -15,15 +15,18 @@ namespace abbe::daemon {
 
 /// [[run]]: a drive along a path, measured by a laser tracker.
 struct RunFiles {
-  std::string name;  ///< default: "run 1", "run 2", ...
-  std::string path, tracker;
-  std::string encoder;  ///< empty: no scale readings
+  std::string name;           ///< default: "run 1", "run 2", ...
+  std::string path, tracker;  ///< both, or
+  std::string recording;      ///< instead of them: file of the daemon with a run along a path
+  std::string encoder;        ///< empty: no scale readings
   /// Tool reference point to reflector; nullopt: [target] offset_mm of the machine.
   std::optional<calib::Vector3> target_offset_m{};
   /// Place of the tracker in machine coordinates, to 0.5 m; nullopt: that of the configuration.
   std::optional<calib::Vector3> tracker_position_m{};
   /// Runs with the same instrument have the same error of the scale of its ranges.
   std::string instrument = "tracker";
+  /// Runs with the same text have the same offset of the ranges; empty: its own.
+  std::string range_offset{};
 };
 
 /// [[array]]: touches of a ball array, or errors at its balls.

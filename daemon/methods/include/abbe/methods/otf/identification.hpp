@@ -13,8 +13,8 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/calib/gate.hpp"
+#include "abbe/calib/otf/identify.hpp"
 #include "abbe/calib/otf/placed_residuals.hpp"
-#include "abbe/calib/otf/solve.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/methods/identification_watch.hpp"
 #include "abbe/methods/otf/acquisition.hpp"
@@ -43,6 +43,18 @@ struct OtfCandidate {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   std::vector<RunResiduals> residuals{};  ///< one element, or one per run of several targets
 };
+
+/// What identify_run() computed, with the observations.
+struct IdentifiedRun {
+  calib::otf::Noise noise;
+  calib::otf::Identification found;
+  calib::Verdict verdict;
+  std::vector<RunResiduals> residuals;
+};
+/// As identify_run(), for a caller that needs the observations.
+[[nodiscard]] Result<IdentifiedRun> identify_observations(const OtfRun& run, const Config& config,
+                                                          const calib::VolumetricModel* active,
+                                                          const IdentificationWatch& watch = {});
 
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there
 /// is none. An Error DataInsufficient names what is missing if the run does not determine the

@@ -1,0 +1,146 @@
+/// Runs of one tracker with one offset of its ranges (joint/part.hpp, SharedRangeOffset).
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "joint_parts.hpp"
+
+namespace {
+namespace joint = abbe::calib::joint;
+namespace otf = abbe::calib::otf;
+using abbe::calib::VolumetricModel;
+using abbe::tests::otf::MadeRun;
+using abbe::tests::otf::make_run;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kUOffset_m = 50e-6;
+
+/// A run whose ranges are all too long by `offset_m`, with the prior kUOffset_m.
+MadeRun run_with_offset(double offset_m, unsigned noise_seed) {
+  MadeRun run =
+      make_run({.seed = 3, .noise_seed = noise_seed, .error_scale_m = 10e-6, .in_gauge = true});
+  for (otf::TrackerObservation& sample : run.samples) {
+    sample.p_tracker_m *= 1.0 + offset_m / sample.p_tracker_m.norm();
+  }
+  run.noise.u_range_offset_m = kUOffset_m;
+  return run;
+}
+
+otf::Solution solution_of(const MadeRun& run) {
+  return otf::identify(run.samples, run.machine, run.path, run.noise, run.options)->solution;
+}
+
+joint::Part part_of(const std::string& name, const otf::Solution& solution,
+                    const joint::CommonTables& common, const std::string& offset) {
+  joint::CommonEffects effects;
+  if (!offset.empty()) {
+    effects.range_offset = joint::SharedRangeOffset{offset, *solution.offset_in_model};
+  }
+  return *joint::part_of_run(name, solution.model, common, effects);
+}
+
+/// Largest difference of two covariances in units of the standard uncertainties of the first.
+double difference_in_u(const VolumetricModel& a, const VolumetricModel& b) {
+  const Eigen::VectorXd u = a.covariance().diagonal().cwiseSqrt().cwiseMax(1e-12).cwiseInverse();
+  return (u.asDiagonal() * (a.covariance() - b.covariance()) * u.asDiagonal())
+      .cwiseAbs()
+      .maxCoeff();
+}
+
+TEST(SharedRangeOffset, OfOneRunAloneIsItsOwn) {
+  const otf::Solution run = solution_of(run_with_offset(30e-6, 1));
+  const joint::CommonTables common = *joint::tables_of(run.model);
+  const std::vector with{part_of("run", run, common, "home 1")},
+      without{part_of("run", run, common, "")};
+  const auto shared = joint::joint_model(with, common), own = joint::joint_model(without, common);
+  ASSERT_TRUE(shared) << shared.error().text;
+  ASSERT_TRUE(own) << own.error().text;
+  EXPECT_LT(difference_in_u(own->model, shared->model), 1e-6);
+  const Eigen::VectorXd u = own->model.covariance().diagonal().cwiseSqrt();
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    EXPECT_NEAR(shared->model.U()(i), own->model.U()(i), 1e-6 * u(i) + 1e-15);
+  }
+  ASSERT_EQ(shared->effects.size(), 1u);
+  EXPECT_EQ(shared->effects[0].name, "offset of the ranges home 1");
+  EXPECT_NEAR(shared->effects[0].value * kUOffset_m, run.range_offset.value_m, 1e-10);
+  EXPECT_NEAR(shared->effects[0].u * kUOffset_m, run.range_offset.u_m, 1e-10);
+}
+
+/// Two runs know the common offset better than one: by 1 / sqrt(2) where the prior does not count.
+TEST(SharedRangeOffset, OfTwoRunsIsKnownFromBothAndThePriorCountsOnce) {
+  constexpr double kOffset_m = 30e-6;
+  const otf::Solution one = solution_of(run_with_offset(kOffset_m, 1)),
+                      two = solution_of(run_with_offset(kOffset_m, 2));
+  const joint::CommonTables common = *joint::tables_of(one.model);
+  const std::vector parts{part_of("run 1", one, common, "home 1"),
+                          part_of("run 2", two, common, "home 1")};
+  const auto result = joint::identify(parts, common);
+  ASSERT_TRUE(result) << result.error().text;
+  ASSERT_THAT(result->contradictions, IsEmpty());
+  const joint::EffectEstimate& offset = result->joint->effects.front();
+  const auto of_data = [](const otf::Solution& s) {
+    return 1.0 / std::pow(s.range_offset.u_m, 2) - 1.0 / std::pow(kUOffset_m, 2);
+  };
+  // The tables of both are the same: together they know the offset at least as well as both alone.
+  const double least = of_data(one) + of_data(two) + 1.0 / std::pow(kUOffset_m, 2);
+  EXPECT_GE(1.0 / std::pow(offset.u * kUOffset_m, 2), least * (1.0 - 1e-6));
+  EXPECT_NEAR(offset.value * kUOffset_m, kOffset_m, 4.0 * offset.u * kUOffset_m);
+}
+
+/// Runs of another home position have another offset: named as the same, they contradict.
+TEST(SharedRangeOffset, ThatIsNotSharedIsAContradiction) {
+  const otf::Solution one = solution_of(run_with_offset(60e-6, 1)),
+                      two = solution_of(run_with_offset(-60e-6, 2));
+  const joint::CommonTables common = *joint::tables_of(one.model);
+  const auto contradictions = [&](const std::string& first, const std::string& second) {
+    const std::vector parts{part_of("run 1", one, common, first),
+                            part_of("run 2", two, common, second)};
+    return joint::identify(parts, common)->contradictions;
+  };
+  EXPECT_THAT(contradictions("home 1", "home 1"), testing::SizeIs(1));
+  EXPECT_THAT(contradictions("home 1", "home 2"), IsEmpty());
+}
+
+/// Four pairs of runs with a common offset: 31 combinations each, the mean scatters by 0.13.
+TEST(SharedRangeOffset, UncertaintyIsHonest) {
+  double normalised = 0.0;
+  constexpr unsigned kPairs = 4;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (unsigned pair = 0; pair < kPairs; ++pair) {
+    const double offset_m = kUOffset_m * normal(random);
+    const MadeRun first = run_with_offset(offset_m, 10 + 2 * pair);
+    const otf::Solution one = solution_of(first),
+                        two = solution_of(run_with_offset(offset_m, 11 + 2 * pair));
+    const joint::CommonTables common = *joint::tables_of(one.model);
+    const std::vector parts{part_of("run 1", one, common, "home 1"),
+                            part_of("run 2", two, common, "home 1")};
+    const auto joint = joint::joint_model(parts, common);
+    ASSERT_TRUE(joint) << joint.error().text;
+    const Eigen::VectorXd error = joint->model.U() - first.truth;
+    const Eigen::MatrixXd C = joint->model.covariance();
+    const auto inverse = C.completeOrthogonalDecomposition();
+    normalised += error.dot(inverse.solve(error)) / static_cast<double>(inverse.rank()) / kPairs;
+  }
+  RecordProperty("mean_squared_normalised_error", std::to_string(normalised));
+  EXPECT_NEAR(normalised, 1.0, 0.3);
+}
+
+TEST(SharedRangeOffset, NeedsAnEstimateOfTheRun) {
+  const MadeRun run = make_run({.seed = 3});
+  const otf::Solution solution = solution_of(run);
+  EXPECT_FALSE(solution.offset_in_model);
+  const joint::CommonTables common = *joint::tables_of(solution.model);
+  const auto part = joint::part_of_run("run", solution.model, common,
+                                       {.range_offset = joint::SharedRangeOffset{"home 1", {}}});
+  ASSERT_FALSE(part);
+  EXPECT_THAT(part.error().text, HasSubstr("run has no estimate of the range offset 'home 1'"));
+}
+
+}  // namespace

@@ -8,6 +8,7 @@
 #include "message.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/off_line_samples.hpp"
+#include "otf/off_time_samples.hpp"
 #include "otf/unreachable_samples.hpp"
 
 namespace abbe::calib::otf {
@@ -82,15 +83,17 @@ class Screening {
 
   Result<AlignedBlocks> without_off_line(AlignedBlocks run) {
     const KeptSamples reachable = aside_.empty() ? KeptSamples{} : without_aside(samples_, aside_);
+    const std::span<const TrackerObservation> kept =
+        aside_.empty() ? samples_ : std::span<const TrackerObservation>(reachable);
     const OffLine off =
-        off_line_samples(aside_.empty() ? samples_ : std::span<const TrackerObservation>(reachable),
-                         run.series, run.alignment, machine_.target_offset_m, path_, noise_);
+        off_line_samples(kept, run.series, run.alignment, machine_.target_offset_m, path_, noise_);
+    const std::vector<std::size_t> off_samples = with_off_time(off.samples, kept, run);
 
-    found_.off_line = off.samples.size();
+    found_.off_line = off_samples.size();
     found_.noisy_blocks = off.blocks.size();
-    if (!off.samples.empty()) {
+    if (!off_samples.empty()) {
       aside_.resize(samples_.size(), false);
-      for (const std::size_t i : off.samples) {
+      for (const std::size_t i : off_samples) {
         aside_[i] = true;
       }
       Result<AlignedBlocks> again = aligned_without_aside();
@@ -110,6 +113,20 @@ class Screening {
         samples_.begin(), samples_.end(), [](const TrackerObservation& s) { return s.valid; }));
     run.series.set_aside = found_;
     return run;
+  }
+
+  /// Adds the samples that are wrong along the travel, if that component is used.
+  [[nodiscard]] std::vector<std::size_t> with_off_time(std::vector<std::size_t> off,
+                                                       std::span<const TrackerObservation> samples,
+                                                       const AlignedBlocks& run) const {
+    if (options_.encoders != nullptr) {
+      const std::vector<std::size_t> more =
+          off_time_samples(samples, run.series, run.alignment, path_, noise_);
+      off.insert(off.end(), more.begin(), more.end());
+      std::sort(off.begin(), off.end());
+      off.erase(std::unique(off.begin(), off.end()), off.end());
+    }
+    return off;
   }
 
   Result<AlignedBlocks> aligned_without_aside() {

@@ -114,6 +114,11 @@ void AlongRows::correct_clock(const Eigen::VectorXd& by) {
   }
 }
 
+void AlongRows::leave_out(std::span<const std::size_t> blocks) {
+  left_out_.insert(left_out_.end(), blocks.begin(), blocks.end());
+  std::sort(left_out_.begin(), left_out_.end());
+}
+
 Observations AlongRows::added_to(const Observations& across, const BlockSeries& series,
                                  const Noise& noise) const {
   const auto lines = lines_of_blocks(lines_, series, clock_);
@@ -126,7 +131,8 @@ Observations AlongRows::added_to(const Observations& across, const BlockSeries& 
   for (std::size_t i = 0; i < across.rows.size(); i += 2) {
     append_copies(o, across, i, i + 2);
     const Observation &row = across.rows[i], &other = across.rows[i + 1];
-    if (!constant.holds(row.block)) {
+    if (!constant.holds(row.block) ||
+        std::binary_search(left_out_.begin(), left_out_.end(), row.block)) {
       continue;
     }
 

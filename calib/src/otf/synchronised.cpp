@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "median.hpp"
 #include "message.hpp"
 #include "otf/clock_match.hpp"
+#include "otf/reading_jumps.hpp"
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
@@ -63,6 +65,57 @@ Result<Identification> without_along(const std::string& why,
   return id;
 }
 
+/// Blocks whose row along the travel is off by seven standard deviations, while those of most blocks
+/// beside them are not: what is wrong for longer is a fault of the readings and no outlier. Empty if
+/// more than 5 % of the rows are off.
+std::vector<std::size_t> blocks_off(const Identification& id) {
+  constexpr double kOff = 7.0, kMostShare = 0.05;
+  constexpr std::size_t kLongest = 3;
+  const Observations& o = id.observations;
+  std::vector<std::size_t> blocks;
+  std::vector<double> times;  // standard deviations
+  for (std::size_t i = 0; i < o.rows.size(); ++i) {
+    if (is_along(o.rows[i])) {
+      blocks.push_back(o.rows[i].block);
+      times.push_back(std::abs(id.solution.residuals.after_m[i]) / o.rows[i].sigma_m);
+    }
+  }
+  std::vector<double> sorted = times;
+  const double limit = kOff * std::max(1.0, kMadToSigma * median(sorted));
+
+  std::vector<std::size_t> off;
+  for (std::size_t begin = 0, end = 0; begin < times.size(); begin = end + 1) {
+    for (end = begin; end < times.size() && times[end] > limit; ++end) {
+    }
+    if (end - begin <= kLongest) {
+      off.insert(off.end(), blocks.begin() + static_cast<std::ptrdiff_t>(begin),
+                 blocks.begin() + static_cast<std::ptrdiff_t>(end));
+    }
+  }
+  const bool few =
+      static_cast<double>(off.size()) <= kMostShare * static_cast<double>(times.size());
+  return few ? off : std::vector<std::size_t>{};
+}
+
+void add_notes(Observations& o, const AlongRows& along, std::size_t jumps, std::size_t readings) {
+  if (jumps > 0) {
+    o.notes.push_back(message("scale readings: ", jumps, " of ", readings,
+                              " jump away from their neighbours and back, and were not used; check "
+                              "scales, cables and the recording"));
+  }
+  if (!along.left_out().empty()) {
+    o.notes.push_back(
+        message("scale readings: ", along.left_out().size(),
+                " blocks do not fit along the travel (seven standard deviations), and "
+                "this component of them was not used"));
+  }
+  if (along.sigma_factor() > 1.0) {
+    o.notes.push_back(message("scale readings: their residuals along the path are ",
+                              along.sigma_factor(),
+                              " times as large as stated; they were used with this uncertainty"));
+  }
+}
+
 Synchronisation synchronisation_of(const Identification& id, const AlongRows& along,
                                    const NoiseOfRows& noise) {
   const double factor2 = along.sigma_factor() * along.sigma_factor();
@@ -105,12 +158,14 @@ Result<Identification> identify_synchronised(
   if (!(series.period_s > 0.0)) {
     return failure(ErrorCode::BadInput, "scale readings: the blocks of the tracker have no times");
   }
-  const Result<ClockMap> clock = match_clocks(*options.encoders, across, series);
+  const WithoutJumps kept = without_jumps(*options.encoders);
+  const EncoderLog& log = kept.log ? *kept.log : *options.encoders;
+  const Result<ClockMap> clock = match_clocks(log, across, series);
   if (!clock) {
     return tl::unexpected(clock.error());
   }
 
-  AlongRows along(*options.encoders, *clock);
+  AlongRows along(log, *clock);
   constexpr std::size_t kFewestRows = 30;  // fewer do not show their own noise
   const Observations first = along.added_to(across, series, noise);
   const std::size_t rows = first.rows.size() - across.rows.size();
@@ -131,16 +186,17 @@ Result<Identification> identify_synchronised(
       return id;
     }
 
+    if (const std::vector<std::size_t> off = blocks_off(*id); !off.empty() && round < kRounds) {
+      along.leave_out(off);
+      continue;
+    }
+
     const NoiseOfRows noise_of = noise_along(*id);
     const double excess = noise_of.noise.sigma0 * noise_of.noise.sigma0 / variance_across(*id);
     const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / noise_of.degrees_of_freedom);
     if (excess <= unsuspicious || round == kRounds) {
       id->solution.synchronisation = synchronisation_of(*id, along, noise_of);
-      if (along.sigma_factor() > 1.0) {
-        id->observations.notes.push_back(
-            message("scale readings: their residuals along the path are ", along.sigma_factor(),
-                    " times as large as stated; they were used with this uncertainty"));
-      }
+      add_notes(id->observations, along, kept.jumps, options.encoders->readings.size());
       return id;
     }
 

@@ -24,8 +24,13 @@
 /// differences of successive samples have more than three times max(1, f) sigma, this factor
 /// increases the uncertainty of its mean (Block::noise_factor).
 ///
-/// Not found: a fault longer than about two blocks that begins and ends within reach, and errors
-/// along the direction of travel.
+/// With Options::encoders also samples off the line along the travel: the distance along the leg of
+/// a sample is compared with a line of repeated medians through those of the 14 samples around it
+/// against time, with the same limit. Blocks whose speed differs from that of their leg by more than
+/// 2 % are not looked at.
+///
+/// Not found: a fault longer than about two blocks that begins and ends within reach; without
+/// encoders, errors along the direction of travel.
 
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/blocks.hpp"

@@ -9,6 +9,10 @@
 /// is that of a2 and a3, along a1. Corrections of offset and drift of the clocks are two more
 /// unknowns, with the columns v and v (t - reference), unless the clocks are known.
 ///
+/// Readings that jump away from their neighbours and back are not used, and rows of up to three
+/// blocks beside each other that are off by seven standard deviations are left out: both are named
+/// in the notes.
+///
 /// q is that of a straight line through the readings of the time of the block: so the average of
 /// the readings is compared with the average of the samples.
 
@@ -70,12 +74,16 @@ class AlongRows {
   /// Factor of the standard uncertainties of the rows.
   [[nodiscard]] double sigma_factor() const { return sigma_factor_; }
   void multiply_sigma(double factor) { sigma_factor_ *= factor; }
+  /// These blocks have no row from now on.
+  void leave_out(std::span<const std::size_t> blocks);
+  [[nodiscard]] const std::vector<std::size_t>& left_out() const { return left_out_; }
 
  private:
   const EncoderLog* log_;
   EncoderLines lines_;
   ClockMap clock_;
   double sigma_factor_ = 1.0;
+  std::vector<std::size_t> left_out_;  ///< blocks, ascending
 };
 
 }  // namespace abbe::calib::otf

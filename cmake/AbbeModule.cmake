@@ -100,6 +100,15 @@ function(abbe_unity_build target)
   endif()
 endfunction()
 
+# Compiles the source files whose path matches `pattern` as one in a unity build. The groups of a
+# target do not depend on the number of its files: a new file changes its own group only.
+function(abbe_unity_group target group pattern)
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "${pattern}")
+  set_source_files_properties(${sources} PROPERTIES UNITY_GROUP ${group})
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+endfunction()
+
 function(abbe_module name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/*.cpp)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/include/*.hpp)

@@ -145,13 +145,7 @@ Result<VolumetricModel> VolumetricModel::from_vector(const ParameterLayout& layo
     }
   }
 
-  const bool cubic = interpolation == estimation::Interpolation::NaturalCubic;
-  if (!cubic && interpolation != estimation::Interpolation::Linear) {
-    return failure(ErrorCode::BadInput,
-                   message("model: the tables are ", estimation::name(interpolation), ", must be ",
-                           kLinearBasis, " or ", kCubicBasis));
-  }
-
+  const bool cubic = interpolation != estimation::Interpolation::Linear;
   Result<estimation::TableBasis> basis =
       estimation::TableBasis::of(layout, estimation::TableOptions::all_axes(interpolation));
   if (!basis) {

@@ -110,13 +110,14 @@ std::string_view name(Interpolation kind) {
     case Interpolation::NaturalCubic:
       return kCubicBasis;
     case Interpolation::NotAKnotCubic:
-      return "not-a-knot-cubic";
+      return kNotAKnotCubicBasis;
   }
   return kLinearBasis;
 }
 
 std::optional<Interpolation> table_interpolation(std::string_view text) {
-  for (const Interpolation kind : {Interpolation::Linear, Interpolation::NaturalCubic}) {
+  for (const Interpolation kind :
+       {Interpolation::Linear, Interpolation::NaturalCubic, Interpolation::NotAKnotCubic}) {
     if (text == name(kind)) {
       return kind;
     }

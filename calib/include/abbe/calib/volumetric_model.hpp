@@ -13,8 +13,8 @@
 /// Functions without this direction give the mean of both directions; the covariance contains half
 /// the difference, not its uncertainty. error_at() with all directions unknown contains both.
 ///
-/// A model has one of two forms: tables with nodes (rigid-body model; linear or natural cubic
-/// between the nodes), or polynomials without tables (equivalent model of a ball array). Gate,
+/// A model has one of two forms: tables with nodes (rigid-body model; linear or cubic between the
+/// nodes, with natural or not-a-knot ends), or polynomials without tables (equivalent model of a ball array). Gate,
 /// grid, comparison and export treat all forms alike: nodes() and linear_between_nodes() describe
 /// them. Values and uncertainties refer to the
 /// gauge of the model; compare two models with rigid_free_difference().
@@ -77,7 +77,7 @@ struct ModelDescription {
   /// If set, `parameters` are the coefficients of the scaled design [m]; nodes and basis are
   /// ignored.
   std::optional<PolynomialForm> polynomials{};
-  /// of the tables of all axes, between `nodes`: Linear or NaturalCubic
+  /// of the tables of all axes, between `nodes`
   estimation::Interpolation interpolation = estimation::Interpolation::Linear;
   /// Tables only. `covariance` contains half the differences (TravelDifferences).
   std::optional<TravelDifferences> travel{};
@@ -96,7 +96,7 @@ class VolumetricModel {
   /// wrong size); the text names the first wrong parameter.
   [[nodiscard]] static Result<VolumetricModel> from_description(ModelDescription);
   /// `U`: the model_size() parameters of the layout; `covariance`: their covariance;
-  /// `interpolation`: of all tables, Linear or NaturalCubic, else BadInput.
+  /// `interpolation`: of all tables.
   [[nodiscard]] static Result<VolumetricModel> from_vector(
       const ParameterLayout&, Gauge, std::span<const Vector3> tool_offsets_m,
       const Eigen::VectorXd& U, const Eigen::MatrixXd& covariance, ValidityVolume,

@@ -29,8 +29,7 @@ namespace abbe::calib::estimation {
 enum class Interpolation { Linear, NaturalCubic, NotAKnotCubic };
 /// "linear", "cubic" (natural), "not-a-knot-cubic".
 [[nodiscard]] std::string_view name(Interpolation);
-/// The interpolation of the tables of a model by its name, "linear" or "cubic"; nullopt for any
-/// other text.
+/// The interpolation of the tables of a model by its name(); nullopt for any other text.
 [[nodiscard]] std::optional<Interpolation> table_interpolation(std::string_view name);
 
 /// Weights of the nodes at one position. Points into the AxisInterpolation that returned it and

@@ -30,7 +30,7 @@ struct Machine {
   MachineNodes nodes;  ///< axis ranges, nodes, references
   /// vector from the tool reference point to the reflector centre in this run
   Vector3 target_offset_m = Vector3::Zero();
-  /// Interpolation of the tables that are identified, Linear or NaturalCubic. A cubic reproduces
+  /// Interpolation of the tables that are identified. A cubic reproduces
   /// smooth errors with a fraction of the error of linear tables, but needs a path that determines
   /// every node well.
   estimation::Interpolation interpolation = estimation::Interpolation::Linear;

@@ -1,0 +1,201 @@
+#include "abbe/calib/mfb/identify.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "message.hpp"
+#include "mfb/likely_cause.hpp"
+#include "mfb/set_aside_touches.hpp"
+
+namespace abbe::calib::mfb {
+namespace {
+
+/// Observations and solution of the touches that are not set aside.
+struct Adjusted {
+  Observations observations;
+  Solution solution;
+  std::vector<ResidualsOfFeature> residuals;
+};
+
+Result<Adjusted> adjusted(const Bar& bar, const Plan& plan, std::span<const PassTouches> touches,
+                          const MfbMachine& machine, const Options& options) {
+  return observe(bar, plan, touches, machine, options.limits).and_then([&](Observations o) {
+    return solve(o, options.solve).map([&](Solution solution) {
+      std::vector<ResidualsOfFeature> residuals = feature_residuals(o, touches, solution.U);
+      return Adjusted{std::move(o), std::move(solution), std::move(residuals)};
+    });
+  });
+}
+
+/// The touches of a pass that may be set aside.
+std::size_t most_of_pass(const PassTouches& touches, const SetAsideOptions& options) {
+  return static_cast<std::size_t>(
+      std::ceil(options.most_of_pass * static_cast<double>(touches.size())));
+}
+
+struct Outliers {
+  std::vector<SetAsideTouch> set_aside;
+  std::vector<std::string> notes;
+};
+
+/// Sets touches aside one after another and adjusts again after each.
+Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
+                                  std::vector<PassTouches>& touches, const MfbMachine& machine,
+                                  const Options& options, Outliers& outliers) {
+  std::vector<std::string> left;
+  std::vector<std::size_t> of_pass(touches.size(), 0);
+  while (const std::optional<Suspects> found =
+             suspects(at.observations, at.residuals, options.outliers, left)) {
+    const std::size_t m = found->measurement;
+    if (of_pass[m] >= most_of_pass(touches[m], options.outliers)) {
+      left.push_back(name_in_plan(plan, m, found->touches.front()));
+      continue;
+    }
+
+    const std::size_t worst =
+        found->touches.front().feature == Feature::Plane
+            ? farthest_suspect(at.observations, at.solution.poses, at.residuals, *found)
+            : worst_suspect(at.observations, touches, *found, options);
+    ++of_pass[m];
+    set_aside(touches[m], found->touches[worst]);
+    outliers.set_aside.push_back(
+        {m, plan.measurements[m].name, found->touches[worst], found->off_m[worst]});
+    Result<Adjusted> next = adjusted(bar, plan, touches, machine, options);
+    if (!next) {
+      return next;
+    }
+    at = *std::move(next);
+  }
+  for (const std::string& feature : left) {
+    outliers.notes.push_back(
+        message(feature,
+                ": the touches do not fit together, and too many are wrong or missing to "
+                "find out which: touch it again"));
+  }
+  return at;
+}
+
+/// Box of the readings of all touches, inside the nodes.
+Result<ValidityVolume> touched_box(const Observations& o) {
+  Vector3 low = Vector3::Constant(1e9), high = -low;
+  for (const PassObservation& pass : o.passes) {
+    for (const Vector3& q : pass.reading_m) {
+      low = low.cwiseMin(q);
+      high = high.cwiseMax(q);
+    }
+  }
+  for (const Axis a : kAllAxes) {
+    const auto k = static_cast<Eigen::Index>(index(a));
+    const std::vector<double>& nodes_m = o.basis.layout().nodes()[index(a)].nodes_m;
+    low(k) = std::max(low(k), nodes_m.front());
+    high(k) = std::min(high(k), nodes_m.back());
+  }
+  std::vector<Vector3> corners;
+  for (int corner = 0; corner < 8; ++corner) {
+    corners.emplace_back((corner & 1) != 0 ? high.x() : low.x(),
+                         (corner & 2) != 0 ? high.y() : low.y(),
+                         (corner & 4) != 0 ? high.z() : low.z());
+  }
+  return ValidityVolume::hull_of(corners);
+}
+
+std::vector<Vector3> tools_of(const Plan& plan) {
+  std::vector<Vector3> tools_m;
+  for (const Measurement& m : plan.measurements) {
+    if (std::find(tools_m.begin(), tools_m.end(), m.tool_offset_m) == tools_m.end()) {
+      tools_m.push_back(m.tool_offset_m);
+    }
+  }
+  return tools_m;
+}
+
+Result<VolumetricModel> model_of(const Observations& o, const Solution& solution) {
+  return touched_box(o).and_then([&](ValidityVolume volume) {
+    return VolumetricModel::from_vector(o.basis, Gauge::G1, tools_of(o.plan), solution.U,
+                                        solution.covariance, std::move(volume));
+  });
+}
+
+/// The sequence is no adjustment: its residuals contain what it leaves out, not only faults.
+LikelyCause cause_of_sequence(const Statistics& s) {
+  if (!(s.chi2_per_dof > s.chi2_per_dof_limit)) {
+    return {};
+  }
+  return {Cause::Unknown,
+          message("chi-square per degree of freedom is ", s.chi2_per_dof, ", at most ",
+                  s.chi2_per_dof_limit,
+                  ": the sequence loses the slope of EAX and the places of the rods; the joint "
+                  "estimator tells faults of the measurement from that"),
+          s.chi2_per_dof};
+}
+
+std::vector<TouchResidual> residuals_of_touches(const std::vector<ResidualsOfFeature>& features,
+                                                const std::vector<SetAsideTouch>& set_aside) {
+  std::vector<TouchResidual> all;
+  for (const ResidualsOfFeature& f : features) {
+    for (std::size_t i = 0; i < f.k.size(); ++i) {
+      Target target = f.feature;
+      target.k = f.k[i];
+      all.push_back({f.measurement, target, f.residual_m[i], false});
+    }
+  }
+  for (const SetAsideTouch& touch : set_aside) {
+    all.push_back({touch.measurement, touch.target, touch.residual_m, true});
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string_view name(Cause cause) {
+  switch (cause) {
+    case Cause::None:
+      return "none";
+    case Cause::Drift:
+      return "drift";
+    case Cause::Hole:
+      return "hole";
+    case Cause::Measurement:
+      return "measurement";
+    case Cause::Unknown:
+      break;
+  }
+  return "unknown";
+}
+
+Result<Identification> identify(const Bar& bar, const Plan& plan,
+                                std::span<const PassTouches> given, const MfbMachine& machine,
+                                const Options& options) {
+  std::vector<PassTouches> touches(given.begin(), given.end());
+  Outliers outliers;
+  Result<Adjusted> at =
+      adjusted(bar, plan, touches, machine, options).and_then([&](Adjusted first) {
+        return options.outliers.enabled ? without_outliers(std::move(first), bar, plan, touches,
+                                                           machine, options, outliers)
+                                        : Result<Adjusted>(std::move(first));
+      });
+  if (!at) {
+    return tl::unexpected(at.error());
+  }
+
+  Result<VolumetricModel> model = model_of(at->observations, at->solution);
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+  LikelyCause cause = options.solve.estimator == Estimator::Joint
+                          ? likely_cause(at->observations, at->solution, options.solve)
+                          : cause_of_sequence(at->solution.statistics);
+  std::vector<std::string> notes = at->observations.notes;
+  notes.insert(notes.end(), outliers.notes.begin(), outliers.notes.end());
+  auto touch_residuals = residuals_of_touches(at->residuals, outliers.set_aside);
+  return Identification{std::move(at->observations),
+                        std::move(at->solution),
+                        *std::move(model),
+                        std::move(outliers.set_aside),
+                        std::move(touch_residuals),
+                        std::hypot(plan.noise.probe_m, plan.noise.machine_m),
+                        std::move(cause),
+                        std::move(notes)};
+}
+
+}  // namespace abbe::calib::mfb

@@ -1,0 +1,62 @@
+#pragma once
+/// The whitened rows of one position [A | L | y] and their elimination: with the priors of the
+/// nuisances c as further rows, an orthogonal Q gives
+///     Q^T [A L y] = [G R z]      c = R^-1 (z - G x), x: shared unknowns
+///                   [E 0 e]      what the position states about x
+
+#include <Eigen/Cholesky>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "abbe/calib/estimation/information.hpp"
+#include "mfb/pass_rows.hpp"
+
+namespace abbe::calib::mfb {
+
+/// Root L of the covariance C_O = L L^T of the points of a pass, by its set of touches. Equal sets
+/// have one root.
+using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
+class RootsOfNoise {
+ public:
+  explicit RootsOfNoise(const TouchNoise&);
+  /// DegenerateGeometry if the covariance is not positive definite.
+  [[nodiscard]] Result<std::shared_ptr<const RootOfNoise>> of(const PassObservation&);
+
+ private:
+  double variance_m2_ = 0.0;
+  std::map<std::vector<std::size_t>, std::shared_ptr<const RootOfNoise>> known_;
+};
+
+struct PositionSystem {
+  std::vector<std::size_t> passes;  ///< in Observations::passes; their rows follow each other
+  std::vector<std::shared_ptr<const RootOfNoise>> root;  ///< of each pass
+  NuisanceLayout layout;
+  Eigen::Index rows_of_pass = 0;
+  RowMajorRows A;     ///< whitened, data only
+  Eigen::MatrixXd L;  ///< whitened, data only
+  Eigen::VectorXd y;  ///< whitened
+  Eigen::MatrixXd R;  ///< upper triangle
+  Eigen::MatrixXd G;
+  Eigen::VectorXd z;
+  Eigen::MatrixXd E;
+  Eigen::VectorXd e;
+
+  /// The nuisances for given shared unknowns.
+  [[nodiscard]] Eigen::VectorXd nuisances(const Eigen::VectorXd& x) const;
+};
+
+/// RankDeficient if the rows do not determine the nuisances.
+[[nodiscard]] Result<PositionSystem> position_system(const Observations&, std::size_t position,
+                                                     const std::vector<NominalTouch>&,
+                                                     const SharedUnknowns&, RootsOfNoise&,
+                                                     const NuisanceOptions&);
+
+/// E^T Q_E^T W as a matrix of the data: shared unknowns x data rows, W: whitening. With the
+/// covariance C of the shared unknowns, C times it is the derivative of x by delta.
+[[nodiscard]] Eigen::MatrixXd gain_rows(const PositionSystem&);
+
+/// The priors of the shared unknowns.
+void add_shared_priors(estimation::Information&, const SharedUnknowns&);
+
+}  // namespace abbe::calib::mfb

@@ -103,14 +103,20 @@ TEST(CubicModel, ComesBackFromItsDescriptionBitForBit) {
   EXPECT_EQ(again->error_at(q, kCubicTool).cov_V_m2, model.error_at(q, kCubicTool).cov_V_m2);
 }
 
-TEST(CubicModel, WithAnotherCubicIsRefused) {
-  const VolumetricModel model = random_cubic();
-  ModelDescription d = model.description();
+TEST(CubicModel, KeepsNotAKnotEnds) {
+  const VolumetricModel natural = random_cubic();
+  ModelDescription d = natural.description();
   d.interpolation = Interpolation::NotAKnotCubic;
-  const auto refused = VolumetricModel::from_description(d);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
-  EXPECT_THAT(refused.error().text, HasSubstr("not-a-knot-cubic, must be linear or cubic"));
+  const auto model = VolumetricModel::from_description(d);
+  ASSERT_TRUE(model) << model.error().text;
+  EXPECT_EQ(model->interpolation(), Interpolation::NotAKnotCubic);
+  EXPECT_EQ(model->description().interpolation, Interpolation::NotAKnotCubic);
+
+  const Vector3 between = natural.tables()->layout().nodes()[0].nodes_m.front() * Vector3::Ones() +
+                          Vector3::Constant(0.01);
+  const Vector3 V_m = model->error_at(between, kCubicTool).V_m;
+  EXPECT_LT((V_m - model->V_at(between, kCubicTool)).norm(), 1e-15);
+  EXPECT_GT((V_m - natural.V_at(between, kCubicTool)).norm(), 1e-9);
 }
 
 /// An error of one node between two zeros: a cubic is largest beside the nodes, and steepest at the

@@ -1,0 +1,152 @@
+/// The judgement of an identification with a Multi-Feature Bar, on a simulated machine.
+
+#include "abbe/calib/mfb/judge.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <set>
+#include <string>
+
+#include "mfb_simulation.hpp"
+
+namespace {
+using namespace abbe::calib;
+using namespace abbe::calib::mfb;
+using namespace abbe::tests::mfb;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Identification identified(unsigned seed, const Plan& plan = paper_plan(),
+                          const ProbingOptions& options = {}) {
+  std::mt19937_64 random(seed);
+  const SimulatedMachine machine(random);
+  const ProbedBar probed = probe(machine, plan, random, options);
+  auto found = identify(probed.bar, plan, probed.touches, paper_machine());
+  EXPECT_TRUE(found) << found.error().text;
+  return *std::move(found);
+}
+
+const Identification& usual_identification() {
+  static const Identification found = identified(5);
+  return found;
+}
+
+HeldOutFigures figures_of(const Identification& found, const VolumetricModel* active = nullptr) {
+  return held_out(found.observations, found.solution, active).value();
+}
+
+VolumetricModel with_tables(const Identification& found, const Eigen::VectorXd& U) {
+  return VolumetricModel::from_vector(found.observations.basis, Gauge::G1,
+                                      found.model.tool_offsets_m(), U, found.solution.covariance,
+                                      found.model.validity())
+      .value();
+}
+
+/// The plan without all measurements except those of these names.
+Plan with_measurements(const Plan& plan, const std::set<std::string>& names) {
+  Plan out = plan;
+  std::erase_if(out.measurements, [&](const Measurement& m) { return !names.contains(m.name); });
+  return out;
+}
+
+TEST(MfbJudge, AcceptsAModelOfAnUndisturbedMeasurement) {
+  const auto verdict = judge(usual_identification(), nullptr);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
+  EXPECT_GT(verdict->held_out.no_compensation, 10 * verdict->held_out.candidate);
+}
+
+// A left-out point differs from its prediction by its own noise and by that of the prediction,
+// which is at most ten times as large for a single point, and about as large in the mean.
+TEST(MfbJudge, LeavesOutPointsThatTheOthersPredict) {
+  const HeldOutFigures figures = figures_of(usual_identification());
+  const std::size_t all = 3 * 12 * usual_identification().observations.passes.size();
+  EXPECT_EQ(figures.observations + figures.not_held_out, all);
+  EXPECT_LT(figures.not_held_out, all / 10);
+  EXPECT_GT(figures.candidate, 1.0);
+  EXPECT_LT(figures.candidate, 3.0);
+}
+
+TEST(MfbJudge, LeavesOutPointsOfTheShortestPlan) {
+  const Plan shortest = with_measurements(paper_plan(), {"X1", "X2", "X3", "Y1", "Y2", "Y3+", "Z1+",
+                                                         "Z1-", "Z2+", "DXY1", "DXZ1", "DYZ1"});
+  const auto verdict = judge(identified(6, shortest), nullptr);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
+  EXPECT_GT(verdict->held_out.observations, 300u);
+}
+
+// The left-out point must not be known to the prediction: an error of a point shows in full.
+TEST(MfbJudge, SeesTheWholeErrorOfAPoint) {
+  constexpr double kError_m = 30e-6;
+  Identification wrong = usual_identification();
+  wrong.observations.passes[0].delta_m(3 * 5) += kError_m;  // x of hole 6 of X1
+  const HeldOutFigures before = figures_of(usual_identification()), after = figures_of(wrong);
+  const auto squares = [](const HeldOutFigures& f) {
+    return f.candidate_rms_m * f.candidate_rms_m * static_cast<double>(f.observations);
+  };
+  EXPECT_GT(squares(after) - squares(before), 0.9 * kError_m * kError_m);
+}
+
+TEST(MfbJudge, ComparesWithTheActiveModelAtTheSamePoints) {
+  const Identification& found = usual_identification();
+  const VolumetricModel nothing =
+      with_tables(found, Eigen::VectorXd::Zero(found.solution.U.size()));
+  const HeldOutFigures of_nothing = figures_of(found, &nothing);
+  ASSERT_TRUE(of_nothing.active);
+  EXPECT_GT(of_nothing.observations_beside_active, 100u);
+
+  // A model without errors leaves what no compensation leaves, apart from the passes that reach
+  // beyond its validity volume.
+  EXPECT_NEAR(*of_nothing.active, of_nothing.no_compensation, 0.5 * of_nothing.no_compensation);
+  EXPECT_LT(*of_nothing.candidate_beside_active, 0.1 * *of_nothing.active);
+
+  const HeldOutFigures of_itself = figures_of(found, &found.model);
+  EXPECT_LT(*of_itself.active, *of_itself.candidate_beside_active) << "it was fitted to the points";
+}
+
+TEST(MfbJudge, KeepsAnActiveModelThatIsAsGood) {
+  const Identification& found = usual_identification();
+  const auto verdict = judge(found, &found.model);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_THAT(verdict->causes, ElementsAre("held-out"));
+}
+
+TEST(MfbJudge, RefusesWhatTheStatedNoiseDoesNotExplain) {
+  ProbingOptions options;
+  options.noise = 2.0;
+  const Identification found = identified(7, paper_plan(), options);
+  const auto verdict = judge(found, nullptr);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_FALSE(verdict->accepted);
+  EXPECT_THAT(verdict->reasons.front(), HasSubstr("chi-square per degree of freedom is"));
+  EXPECT_EQ(verdict->causes.size(), verdict->reasons.size());
+}
+
+TEST(MfbJudge, NotesTouchesThatWereSetAside) {
+  Identification found = usual_identification();
+  found.set_aside.push_back({0, "X1", {Feature::Hole, 4, Side::Left, 2}, 52e-6});
+  const auto verdict = judge(found, nullptr);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_THAT(verdict->notes,
+              Contains(HasSubstr("X1: hole 5, k = 2 is set aside: it is 52 um off its feature")));
+}
+
+TEST(MfbJudge, StatesThatTheSequenceIsNotFittedAgain) {
+  std::mt19937_64 random(8);
+  const SimulatedMachine machine(random);
+  const Plan plan = paper_plan();
+  const ProbedBar probed = probe(machine, plan, random, {});
+  Options options;
+  options.solve.estimator = Estimator::Sequential;
+  const auto found = identify(probed.bar, plan, probed.touches, paper_machine(), options);
+  ASSERT_TRUE(found) << found.error().text;
+  const auto verdict = judge(*found, nullptr, {.solve = options.solve});
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_THAT(verdict->notes, Contains(HasSubstr("is not fitted again")));
+  EXPECT_GT(verdict->held_out.no_compensation, 2 * verdict->held_out.candidate);
+}
+
+}  // namespace

@@ -1,0 +1,255 @@
+#pragma once
+/// A machine with 21 known errors that probes a Multi-Feature Bar, for tests: exact transforms of
+/// [Viprey 2016] eq. 8 with exact rotations, written independently of the error model of calib. The
+/// errors are smooth functions in gauge G1.
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <random>
+
+#include "abbe/calib/mfb/points_of_interest.hpp"
+#include "mfb_identification.hpp"
+
+namespace abbe::tests::mfb {
+
+using calib::Matrix3;
+
+/// A polynomial and a wave over the travel, 0 at its begin.
+struct SmoothError {
+  std::array<double, 4> polynomial{};
+  double amplitude = 0.0, phase = 0.0, period_m = 0.6;
+  bool level_ends = false;  ///< straightness: 0 at both ends
+
+  static constexpr double kTravel_m = 0.55;
+  [[nodiscard]] double raw(double x_m) const {
+    const double u = x_m / kTravel_m;
+    return u * (polynomial[0] + u * (polynomial[1] + u * polynomial[2])) +
+           amplitude * std::sin(2.0 * std::numbers::pi * x_m / period_m + phase);
+  }
+  [[nodiscard]] double at(double x_m) const {
+    const double rise = level_ends ? raw(kTravel_m) - raw(0.0) : 0.0;
+    return raw(x_m) - raw(0.0) - rise * x_m / kTravel_m;
+  }
+};
+
+struct SimulatedMachine {
+  /// translations x y z [m], then rotations x y z [rad] of X, Y, Z
+  std::array<std::array<SmoothError, 6>, 3> error;
+  double EA0Z = 0.0, EB0Z = 0.0, EC0Y = 0.0;
+
+  explicit SimulatedMachine(std::mt19937_64& random, double scale = 1.0) {
+    std::normal_distribution<double> normal;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t k = 0; k < 6; ++k) {
+        SmoothError& e = error[axis][k];
+        const bool straightness = k < 3 && k != axis;
+        const double size = scale * (k < 3 ? (straightness ? 2e-6 : 10e-6) : 20e-6);
+        for (double& c : e.polynomial) {
+          c = size * normal(random);
+        }
+        e.amplitude = 0.15 * size * normal(random);
+        e.phase = normal(random);
+        e.period_m = 0.5 + 0.1 * std::abs(normal(random));
+        e.level_ends = straightness;
+      }
+    }
+    EA0Z = scale * 30e-6 * normal(random);
+    EB0Z = scale * 30e-6 * normal(random);
+    EC0Y = scale * 30e-6 * normal(random);
+  }
+
+  static Vector3 turned(const Vector3& rotation_rad, const Vector3& v) {
+    const double angle = rotation_rad.norm();
+    return angle > 0.0 ? Vector3(Eigen::AngleAxisd(angle, rotation_rad / angle) * v) : v;
+  }
+  [[nodiscard]] Vector3 moved(std::size_t axis, double q_m, const Vector3& v) const {
+    const auto at = [&](std::size_t k) { return error[axis][k].at(q_m); };
+    return turned({at(3), at(4), at(5)}, v) + Vector3(at(0), at(1), at(2));
+  }
+  /// Eq. 8: where the centre of the tip stands.
+  [[nodiscard]] Vector3 tip_m(const Vector3& q_m, const Vector3& tool_m) const {
+    Vector3 v = moved(2, q_m.z(), tool_m) + Vector3(0, 0, q_m.z());
+    v = turned({EA0Z, EB0Z, 0.0}, v);
+    v = moved(1, q_m.y(), v) + Vector3(0, q_m.y(), 0);
+    v = turned({0.0, 0.0, EC0Y}, v);
+    return moved(0, q_m.x(), v) + Vector3(q_m.x(), 0, 0);
+  }
+  [[nodiscard]] Vector3 reading_m(const Vector3& p_m, const Vector3& tool_m) const {
+    Vector3 q = p_m - tool_m;
+    for (int i = 0; i < 3; ++i) {  // each step divides the error by 10,000
+      q -= tip_m(q, tool_m) - p_m;
+    }
+    return q;
+  }
+
+  /// The parameters that an identification should find.
+  [[nodiscard]] Eigen::VectorXd truth(const calib::ParameterLayout& layout) const {
+    Eigen::VectorXd U(static_cast<Eigen::Index>(layout.model_size()));
+    for (const calib::Table& table : layout.tables()) {
+      const auto axis = index(table.motion.axis);
+      const auto k = static_cast<std::size_t>(table.motion.motion);
+      auto i = static_cast<Eigen::Index>(table.offset);
+      for (const double x_m : layout.nodes()[axis].nodes_m) {
+        U(i++) = error[axis][k].at(x_m);
+      }
+    }
+    U.tail<3>() << EA0Z, EB0Z, EC0Y;
+    return U;
+  }
+};
+
+/// What happens during the measurements.
+struct ProbingOptions {
+  double noise = 1.0;        ///< factor of the noise of the plan
+  double calibration = 1.0;  ///< factor of the errors of the calibration of the bar
+  double drift_m = 0.0;      ///< of each pass, in a random direction
+  double form_m = 0.0;       ///< form errors of the features, the same in all passes
+  double origin_m = 0.5e-3, axes_rad = 0.5e-3;     ///< pose beside the plan
+  std::optional<calib::mfb::Expansion> expansion;  ///< as the bar states it
+  double warmer_K = 0.0;                           ///< the bar above 20 degC, as measured
+  double alpha_error_per_K = 0.0;
+  std::optional<calib::mfb::Sag> sag;
+};
+
+struct ProbedBar {
+  calib::mfb::Bar bar;
+  std::vector<calib::mfb::PassTouches> touches;
+};
+
+/// The bar as it is: holes and rods are not where the pattern has them.
+struct TrueBar {
+  calib::mfb::TouchPattern pattern;
+  std::vector<Vector3> hole_m, rod_m;
+  std::vector<double> form_m;  ///< of each touch along its normal
+
+  TrueBar(std::mt19937_64& random, double form) : pattern(paper_pattern()) {
+    std::normal_distribution<double> normal;
+    const auto off = [&] {
+      return Vector3(20e-6 * Vector3(normal(random), normal(random), normal(random)));
+    };
+    for (std::size_t i = 0; i < pattern.holes(); ++i) {
+      hole_m.push_back(off());
+    }
+    for (std::size_t j = 0; j < pattern.rod_x_m.size(); ++j) {
+      rod_m.push_back(off());
+    }
+    for (std::size_t k = 0; k < pattern.count(); ++k) {
+      form_m.push_back(form * normal(random));
+    }
+  }
+  /// Centres of the tip in bar axes, in the fixed order.
+  [[nodiscard]] std::vector<Vector3> tips_m(double tip_radius_m) const {
+    std::vector<Vector3> tips;
+    for (const auto& touch : calib::mfb::nominal_touches(pattern, tip_radius_m)) {
+      const bool hole = touch.target.feature == calib::mfb::Feature::Hole;
+      Vector3 off = hole ? hole_m[touch.target.index] : rod_m[touch.target.index];
+      if (touch.target.feature == calib::mfb::Feature::Plane) {
+        off.x() = off.z() = 0.0;
+      }
+      tips.emplace_back(touch.tip_m + off + form_m[tips.size()] * touch.outward);
+    }
+    return tips;
+  }
+};
+
+/// The points of one pass by feature.
+inline calib::mfb::BarTouches by_feature(const std::vector<calib::mfb::NominalTouch>& nominal,
+                                         const std::vector<Vector3>& points_m) {
+  calib::mfb::BarTouches touches;
+  for (std::size_t k = 0; k < nominal.size(); ++k) {
+    const calib::mfb::Target& t = nominal[k].target;
+    if (t.feature == calib::mfb::Feature::Hole) {
+      touches.holes_m.resize(t.index + 1);
+      touches.holes_m.back().push_back(points_m[k]);
+    } else if (t.feature == calib::mfb::Feature::Rod) {
+      touches.rods_m.resize(t.index + 1);
+      touches.rods_m.back().push_back(points_m[k]);
+    } else {
+      touches.planes_m.resize(t.index + 1);
+      touches.planes_m.back()[static_cast<std::size_t>(t.side)].push_back(points_m[k]);
+    }
+  }
+  return touches;
+}
+
+inline ProbedBar probe(const SimulatedMachine& machine, const calib::mfb::Plan& plan,
+                       std::mt19937_64& random, const ProbingOptions& options = {}) {
+  using namespace calib::mfb;
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Vector3(normal(random), normal(random), normal(random)); };
+  const TrueBar bar(random, options.form_m);
+  const auto nominal = nominal_touches(bar.pattern, plan.tip_radius_m);
+  const std::vector<Vector3> tips_m = bar.tips_m(plan.tip_radius_m);
+  const auto shape = points_of_interest(by_feature(nominal, tips_m), Matrix3::Identity());
+
+  ProbedBar probed{bar_with(shape->O_bar_m), {}};
+  probed.bar.expansion = options.expansion;
+  probed.bar.sag = options.sag;
+  const Eigen::VectorXd u_m = probed.bar.covariance_m2.diagonal().cwiseSqrt();
+  for (std::size_t i = 0; i < probed.bar.O_m.size(); ++i) {
+    const Vector3 error = u_m.segment<3>(3 * static_cast<Eigen::Index>(i)).cwiseProduct(vector());
+    probed.bar.O_m[i] += options.calibration * error;
+  }
+  const std::vector<std::size_t> order = probing_order(nominal);
+  std::map<std::string, std::pair<Vector3, Vector3>> beside;
+  std::map<std::string, Vector3> drift;
+  for (const Measurement& m : plan.measurements) {
+    if (beside.count(m.position) == 0) {
+      beside[m.position] = {options.origin_m * vector(), options.axes_rad * vector()};
+    }
+    const auto& [origin, turn] = beside[m.position];
+    const bool backward = m.direction == PassDirection::Backward;
+    const std::string key =
+        m.position + std::to_string(m.tool_offset_m.x()) + std::to_string(m.tool_offset_m.y());
+    if (!backward) {
+      drift[key] = options.drift_m * vector().normalized();
+    }
+    const double alpha_per_K = options.expansion ? options.expansion->alpha_per_K : 0.0;
+    const double longer = 1.0 + options.warmer_K * (alpha_per_K + options.alpha_error_per_K);
+    PassTouches touches;
+    for (std::size_t row = 0; row < order.size(); ++row) {
+      const std::size_t k = backward ? order[order.size() - 1 - row] : order[row];
+      Vector3 in_bar = longer * tips_m[k];
+      if (options.sag) {
+        in_bar += sag_m(*options.sag, tips_m[k].x(), m.axes().transpose() * plan.gravity);
+      }
+      in_bar = SimulatedMachine::turned(turn, in_bar);
+      const Vector3 p_m = m.origin_m + origin + m.axes() * in_bar;
+      Vector3 reading_m = machine.reading_m(p_m, m.tool_offset_m);
+      reading_m += options.noise * plan.noise.machine_m * vector();
+      reading_m +=
+          options.noise * plan.noise.probe_m * normal(random) * (m.axes() * nominal[k].outward);
+      const double time = static_cast<double>(row) / static_cast<double>(order.size() - 1);
+      reading_m += (backward ? 1.0 + time : time) * drift[key];
+      touches.push_back({nominal[k].target, reading_m, false});
+    }
+    probed.touches.push_back(std::move(touches));
+  }
+  return probed;
+}
+
+/// Every measurement forward, then backward.
+inline calib::mfb::Plan with_pairs(const calib::mfb::Plan& plan) {
+  calib::mfb::Plan pairs = plan;
+  pairs.measurements.clear();
+  for (calib::mfb::Measurement m : plan.measurements) {
+    pairs.measurements.push_back(m);
+    m.name += " back";
+    m.direction = calib::mfb::PassDirection::Backward;
+    pairs.measurements.push_back(m);
+  }
+  return pairs;
+}
+
+/// The plan of the paper with a tip of 1.5 mm radius.
+inline calib::mfb::Plan paper_plan() {
+  calib::mfb::Plan plan = plan_of(reference("identification_reference.json").at("cases").at(1));
+  plan.tip_radius_m = 1.5e-3;
+  return plan;
+}
+
+}  // namespace abbe::tests::mfb

@@ -42,6 +42,17 @@ TEST(CubicModelDocument, ReadsBackToTheSameModel) {
   EXPECT_EQ(to_json(*read), text);
 }
 
+TEST(CubicModelDocument, TellsTheEndConditionsApart) {
+  const auto written = document_of(Interpolation::NotAKnotCubic);
+  const auto text = to_json(written);
+  EXPECT_THAT(text, HasSubstr("\"kind\": \"not-a-knot-cubic\""));
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().details.front();
+  EXPECT_EQ(read->model.interpolation(), Interpolation::NotAKnotCubic);
+  EXPECT_EQ(to_json(*read), text);
+  EXPECT_NE(model_hash(written), model_hash(document_of(Interpolation::NaturalCubic)));
+}
+
 TEST(CubicModelDocument, HasAnotherHashThanLinearTables) {
   EXPECT_NE(model_hash(document_of(Interpolation::NaturalCubic)),
             model_hash(document_of(Interpolation::Linear)));
@@ -55,8 +66,9 @@ TEST(CubicModelDocument, IsRefusedWithAKindThatThisVersionDoesNotKnow) {
   const auto read = parse_model(text, "model.json");
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().details,
-              ElementsAre(HasSubstr("basis.kind: is \"quintic\", must be \"linear\", \"cubic\" or "
-                                    "\"legendre\"; another kind needs a newer abbe")));
+              ElementsAre(HasSubstr(
+                  "basis.kind: is \"quintic\", must be \"linear\", \"cubic\", "
+                  "\"not-a-knot-cubic\" or \"legendre\"; another kind needs a newer abbe")));
   const auto changed = replaced_once(to_json(document_of(Interpolation::NaturalCubic)),
                                      "\"kind\": \"cubic\"", "\"kind\": \"linear\"");
   EXPECT_FALSE(parse_model(changed, "model.json"));  // the hash does not fit

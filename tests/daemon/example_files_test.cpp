@@ -9,6 +9,7 @@
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe/tables/measured_file.hpp"
+#include "abbe/tables/mfb_files.hpp"
 #include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
@@ -61,6 +62,17 @@ TEST_F(ExampleFiles, OfABallArrayAreAccepted) {
   EXPECT_EQ(test::faults_text(read_errors_csv(printed("errors.csv"))), "");
 }
 
+TEST_F(ExampleFiles, OfAMultiFeatureBarAreAccepted) {
+  const auto bar = read_bar_toml(printed("bar.toml"));
+  ASSERT_TRUE(bar) << test::faults_text(bar);
+  const auto plan = read_bar_plan_toml(printed("plan.toml"), bar->bar);
+  ASSERT_TRUE(plan) << test::faults_text(plan);
+  calib::MachineNodes nodes;
+  for (auto& axis : nodes) axis.nodes_m = {0.0, 0.05, 0.5, 0.55};
+  EXPECT_EQ(
+      test::faults_text(read_bar_points_csv(printed("barpoints.csv"), bar->bar, *plan, nodes)), "");
+}
+
 TEST_F(ExampleFiles, OfAJointIdentificationAreAccepted) {
   EXPECT_EQ(test::faults_text(read_parts_toml(printed("parts.toml"))), "");
 }
@@ -81,9 +93,10 @@ TEST_F(ExampleFiles, OfTheSimulatorAreAccepted) {
 TEST_F(ExampleFiles, AreListed) {
   const auto ran = abbe("example");
   EXPECT_EQ(ran.exit, 0) << ran.err;
-  for (const char* name : {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv",
-                           "tracker.csv", "encoder.csv", "touches.csv", "parts.toml", "errors.csv",
-                           "points.csv", "verification.csv", "truth.csv"})
+  for (const char* name :
+       {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
+        "encoder.csv", "touches.csv", "bar.toml", "plan.toml", "barpoints.csv", "parts.toml",
+        "errors.csv", "points.csv", "verification.csv", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)

@@ -17,6 +17,7 @@
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe/tables/measured_file.hpp"
+#include "abbe/tables/mfb_files.hpp"
 #include "abbe/tables/parts_file.hpp"
 #include "abbe_command.hpp"
 #include "faults_text.hpp"
@@ -81,11 +82,36 @@ std::string faults_of_config(const fs::path& file) {
   return test::faults_text(parse_config(test::text_of(file), file));
 }
 
+/// Writes the example of a file of the page beside `file`.
+fs::path example_beside(const fs::path& file, const std::string& name) {
+  const fs::path written = file.parent_path() / ("page_" + name);
+  test::write_text(written, sections_of_page().at(name).examples.at(0));
+  return written;
+}
+
+Result<BarPlanFile> read_plan_for_bar_of_page(const fs::path& file) {
+  const auto bar = read_bar_toml(example_beside(file, "bar.toml"));
+  if (!bar) return tl::make_unexpected(bar.error());
+  return read_bar_plan_toml(file, bar->bar);
+}
+
+/// Touches of the bar and the plan of the page.
+Result<BarPointsFile> read_touches_of_page(const fs::path& file) {
+  const auto bar = read_bar_toml(example_beside(file, "bar.toml"));
+  if (!bar) return tl::make_unexpected(bar.error());
+  const auto plan = read_plan_for_bar_of_page(example_beside(file, "plan.toml"));
+  if (!plan) return tl::make_unexpected(plan.error());
+  calib::MachineNodes nodes;
+  for (auto& axis : nodes) axis.nodes_m = {0.0, 0.05, 0.55};
+  return read_bar_points_csv(file, bar->bar, *plan, nodes);
+}
+
 const std::map<std::string, FileReader> kTableReaders{
     {"path.csv", reader(read_path_csv)},
     {"tracker.csv", reader([](const fs::path& file) { return read_tracker_csv(file); })},
     {"encoder.csv", reader([](const fs::path& file) { return read_encoder_csv(file); })},
     {"touches.csv", reader(read_touches_csv)},
+    {"barpoints.csv", reader(read_touches_of_page)},
     {"errors.csv", reader(read_errors_csv)},
     {"points.csv", reader(read_points_csv)},
     {"verification.csv", reader(read_verification_csv)},
@@ -97,6 +123,8 @@ std::map<std::string, FileReader> all_readers() {
   readers["abbed.toml"] = readers["machine.toml"] = faults_of_config;
   readers["calibrator.toml"] = reader(read_calibrator_toml);
   readers["parts.toml"] = reader(read_parts_toml);
+  readers["bar.toml"] = reader(read_bar_toml);
+  readers["plan.toml"] = reader(read_plan_for_bar_of_page);
   readers["folds.txt"] = [](const fs::path& file) {
     return calib::sparse::parse_folds(test::text_of(file)) ? "" : "no folds";
   };

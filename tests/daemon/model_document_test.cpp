@@ -257,6 +257,42 @@ TEST(ModelDocument, IsNamedWhereBacklashIsUnreadable) {
   }
 }
 
+ModelDocument document_of_a_bar() {
+  auto document = synthetic_document(4);
+  document.method = "mfb";
+  document.bar = BarFigures{
+      .passes = {{"X1", 1.02}, {"X1 \"back\"", 0.97}},
+      .drift = {{"X1", "X1 \"back\"", {1e-6, -2e-7, 0.0}, {1e-7, 1e-7, 2e-7}}},
+      .set_aside = {{"X1", "plane", "L", 3, 0, 48.5e-6}, {"X1", "hole", "", 5, 7, -31e-6}}};
+  return document;
+}
+
+TEST(ModelDocument, ReadsBackWithTheFiguresOfABar) {
+  const auto written = document_of_a_bar();
+  const auto read = parse_model(to_json(written), "model.json");
+  ASSERT_TRUE(read) << read.error().details.front();
+  EXPECT_EQ(read->bar, written.bar);
+  EXPECT_EQ(to_json(*read), to_json(written));
+  auto without = written;
+  without.bar.reset();
+  EXPECT_EQ(model_hash(written), model_hash(without));
+  EXPECT_FALSE(parse_model(to_json(without), "model.json")->bar);
+}
+
+TEST(ModelDocument, IsNamedWhereTheFiguresOfABarAreUnreadable) {
+  const auto text = to_json(document_of_a_bar());
+  const auto fault = [&](const std::string& what, const std::string& with) {
+    const auto read = parse_model(replaced(text, what, with), "model.json");
+    return read ? std::string{} : read.error().details.front();
+  };
+  EXPECT_THAT(fault("\"k\": 7", "\"k\": -7"),
+              HasSubstr("statistics.set_aside.k: must be a whole number"));
+  EXPECT_THAT(fault("\"feature\": \"hole\"", "\"feature\": 1"),
+              HasSubstr("statistics.set_aside.feature: must be a string"));
+  EXPECT_THAT(fault("[1, -0.2, 0]", "[1, -0.2]"),
+              HasSubstr("statistics.drift_um_per_pass.value: must be [x, y, z]"));
+}
+
 TEST(ModelDocument, GivesBacklashToSpreadsheets) {
   const auto document = document_with_backlash();
   const auto csv = to_tables_csv(document.model, document.backlash);

@@ -11,9 +11,11 @@ namespace abbe::daemon {
 
 void add_identify_otf(CLI::App& parent, int& exit);
 void add_identify_evemu(CLI::App& parent, int& exit);
+void add_identify_mfb(CLI::App& parent, int& exit);
 void add_identify_joint(CLI::App& parent, int& exit);
 void add_identify_artefact(CLI::App& parent, int& exit);
 void add_plan_otf(CLI::App& parent, int& exit);
+void add_plan_mfb(CLI::App& parent, int& exit);
 void add_calibrate_otf(CLI::App& parent, int& exit);
 void add_calibrate_evemu(CLI::App& parent, int& exit);
 void add_reference(CLI::App& parent, int& exit);

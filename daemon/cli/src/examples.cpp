@@ -46,6 +46,8 @@ constexpr std::array kExamples{
             "--machine machine.toml --path path.csv --tracker tracker.csv -o result"},
     Example{"identify evemu",
             "--machine machine.toml --touches touches.csv --calibrator calibrator.toml -o result"},
+    Example{"identify mfb",
+            "--machine machine.toml --bar bar.toml --plan plan.toml --points points.csv -o result"},
     Example{"identify joint", "--machine machine.toml --parts parts.toml -o result"},
     Example{"identify artefact",
             "--touches touches.csv --name array-1 --tip-radius-mm 2.5 -o calibrator.toml"},

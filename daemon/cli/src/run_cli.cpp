@@ -77,6 +77,7 @@ void add_commands(CLI::App& app, int& exit) {
   auto* plan = app.add_subcommand("plan", "Plan a calibration before the machine moves");
   plan->require_subcommand(1);
   add_plan_otf(*plan, exit);
+  add_plan_mfb(*plan, exit);
   add_reference(app, exit);
   add_machine(app, exit);
   add_tracker(app, exit);
@@ -86,6 +87,7 @@ void add_commands(CLI::App& app, int& exit) {
   identify->require_subcommand(1);
   add_identify_otf(*identify, exit);
   add_identify_evemu(*identify, exit);
+  add_identify_mfb(*identify, exit);
   add_identify_joint(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);

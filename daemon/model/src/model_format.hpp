@@ -17,7 +17,7 @@ inline constexpr int kMm = 3;
 inline constexpr int kMicroUnit = 6;          // um, urad
 inline constexpr int kMicroUnitSquared = 12;  // their products
 
-/// `basis.kind` of model.json: "linear" or "cubic" for tables, else kLegendre.
+/// `basis.kind` of model.json: for tables the name of their interpolation, else kLegendre.
 [[nodiscard]] inline std::string_view basis_kind(const calib::VolumetricModel& model) {
   const auto interpolation = model.interpolation();
   return interpolation ? calib::estimation::name(*interpolation) : kLegendre;

@@ -43,10 +43,11 @@ class ModelReader {
     fault(path.empty() ? key : path + "." + key, "missing");
     return nullptr;
   }
-  std::string text(const std::string& key) {
-    const ModelJson* value = find(root_, "", key);
+  std::string text(const std::string& key) { return text_of(root_, "", key); }
+  std::string text_of(const ModelJson& in, const std::string& path, const std::string& key) {
+    const ModelJson* value = find(in, path, key);
     if (value == nullptr) return {};
-    if (!value->is_string()) fault(key, "must be a string");
+    if (!value->is_string()) fault(path.empty() ? key : path + "." + key, "must be a string");
     return value->is_string() ? value->get<std::string>() : std::string{};
   }
   double number(const ModelJson& value, const std::string& path, int shift) {
@@ -86,6 +87,14 @@ class ModelReader {
     if (value.is_array())
       for (const auto& element : value) result.push_back(number(element, path, shift));
     return result;
+  }
+  calib::Vector3 vector_um(const ModelJson& in, const std::string& path, const std::string& key) {
+    const ModelJson* value = find(in, path, key);
+    if (value == nullptr) return calib::Vector3::Zero();
+    const auto v = numbers(*value, path + "." + key, kMicroUnit);
+    if (v.size() == 3) return {v[0], v[1], v[2]};
+    fault(path + "." + key, "must be [x, y, z]");
+    return calib::Vector3::Zero();
   }
   std::vector<calib::Vector3> vectors(const ModelJson* value, const std::string& path) {
     std::vector<calib::Vector3> result;

@@ -9,6 +9,7 @@
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
 #include "model_reader.hpp"
+#include "read_bar_figures.hpp"
 #include "read_travel.hpp"
 
 namespace abbe::daemon {
@@ -48,9 +49,12 @@ void read_basis(ModelReader& in, calib::ModelDescription& out) {
                                  ? calib::estimation::table_interpolation(kind->get<std::string>())
                                  : std::nullopt;
   if (kind != nullptr && !interpolation)
-    in.fault("basis.kind",
-             fmt::format("is {}, must be \"{}\", \"{}\" or \"{}\"; another kind needs a newer abbe",
-                         kind->dump(), calib::kLinearBasis, calib::kCubicBasis, kLegendre));
+    in.fault(
+        "basis.kind",
+        fmt::format("is {}, must be \"{}\", \"{}\", \"{}\" or \"{}\"; another kind needs a newer "
+                    "abbe",
+                    kind->dump(), calib::kLinearBasis, calib::kCubicBasis,
+                    calib::kNotAKnotCubicBasis, kLegendre));
   out.interpolation = interpolation.value_or(out.interpolation);
   const ModelJson* axes = in.find(*basis, "basis", "axes");
   if (axes == nullptr) return;
@@ -192,23 +196,13 @@ std::string read_optional(ModelReader& in, const std::string& key) {
   return in.root().is_object() && in.root().contains(key) ? in.text(key) : std::string{};
 }
 
-calib::Vector3 read_vector_um(ModelReader& in, const ModelJson& entry, const std::string& path,
-                              const std::string& key) {
-  const ModelJson* value = in.find(entry, path, key);
-  const auto v = value != nullptr ? in.numbers(*value, path + "." + key, kMicroUnit)
-                                  : std::vector<double>{0.0, 0.0, 0.0};
-  if (v.size() == 3) return {v[0], v[1], v[2]};
-  in.fault(path + "." + key, "must be [x, y, z]");
-  return calib::Vector3::Zero();
-}
-
 /// Absent in models without reference nests.
 std::optional<TrackerDriftFigures> read_tracker_drift(ModelReader& in) {
   const std::string path = "tracker_drift";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
   const ModelJson& entry = in.root().at(path);
   return TrackerDriftFigures{
-      .largest_m = read_vector_um(in, entry, path, "largest_um"),
+      .largest_m = in.vector_um(entry, path, "largest_um"),
       .u_repeatability_m = in.number_of(entry, path, "nest_repeatability_um", kMicroUnit),
       .visits = in.count_of(entry, path, "visits")};
 }
@@ -250,15 +244,16 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto artefact = read_artefact(in);
   const auto backlash = read_backlash(in);
   const auto tracker_drift = read_tracker_drift(in);
+  const auto bar = read_bar_figures(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{std::move(*model), method,        estimator,  machine,
-                         machine_hash,      *created,      statistics, inputs,
-                         artefact,          recording_gap, mode,       backlash,
-                         tracker_drift};
+  ModelDocument document{
+      std::move(*model), method, estimator, machine,       machine_hash, *created,
+      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
+      tracker_drift,     bar};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

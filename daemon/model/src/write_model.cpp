@@ -145,20 +145,54 @@ std::string residuals(const ResidualFigures& figures) {
                      to_decimal(figures.max_abs_m, kMicroUnit));
 }
 
-void write_statistics(JsonText& out, const ModelStatistics& s) {
+std::string vector_um(const calib::Vector3& v_m) {
+  return numbers({v_m.data(), 3}, kMicroUnit);
+}
+
+/// A JSON array with one element per line.
+template <class Elements, class Text>
+std::string array_of(const Elements& elements, Text text) {
+  std::string all = "[";
+  for (const auto& element : elements)
+    all += fmt::format("{}\n      {}", all.size() > 1 ? "," : "", text(element));
+  return all + "]";
+}
+
+/// The members of "statistics" that only models of method mfb have.
+std::string bar_figures(const BarFigures& bar) {
+  const auto passes = array_of(bar.passes, [](const BarFigures::Pass& pass) {
+    return fmt::format("{{\"name\": {}, \"chi2_per_dof\": {}}}", JsonText::quoted(pass.measurement),
+                       to_decimal(pass.chi2_per_dof, 0));
+  });
+  const auto drift = array_of(bar.drift, [](const BarFigures::Drift& d) {
+    return fmt::format("{{\"forward\": {}, \"backward\": {}, \"value\": {}, \"u\": {}}}",
+                       JsonText::quoted(d.forward), JsonText::quoted(d.backward),
+                       vector_um(d.rate_m), vector_um(d.u_rate_m));
+  });
+  const auto set_aside = array_of(bar.set_aside, [](const BarFigures::SetAside& t) {
+    return fmt::format(
+        "{{\"measurement\": {}, \"feature\": {}, \"index\": {}, \"side\": {}, \"k\": {}, "
+        "\"residual_um\": {}}}",
+        JsonText::quoted(t.measurement), JsonText::quoted(t.feature), t.index,
+        JsonText::quoted(t.side), t.k, to_decimal(t.residual_m, kMicroUnit));
+  });
+  return fmt::format(
+      ",\n    \"measurements\": {},\n    \"drift_um_per_pass\": {},\n    \"set_aside\": {}", passes,
+      drift, set_aside);
+}
+
+void write_statistics(JsonText& out, const ModelStatistics& s,
+                      const std::optional<BarFigures>& bar) {
   out.key("statistics");
   out.raw(fmt::format(
       "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": "
       "{},\n"
       "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
-      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}}}",
+      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
       to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.variance_factor, 0),
-      residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason)));
-}
-
-std::string vector_um(const calib::Vector3& v_m) {
-  return numbers({v_m.data(), 3}, kMicroUnit);
+      residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason),
+      bar ? bar_figures(*bar) : ""));
 }
 
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
@@ -216,7 +250,7 @@ std::string to_json(const ModelDocument& document) {
     write_polynomials(out, *polynomials);
   else
     write_axes(out, model);
-  write_statistics(out, document.statistics);
+  write_statistics(out, document.statistics, document.bar);
   if (document.tracker_drift) write_tracker_drift(out, *document.tracker_drift);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);

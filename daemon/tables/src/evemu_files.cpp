@@ -13,6 +13,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/section.hpp"
+#include "expansivity.hpp"
 #include "whole_number.hpp"
 
 namespace abbe::daemon {
@@ -73,17 +74,6 @@ void read_blocks(Section& root, calib::evemu::Calibrator& out,
 
   std::sort(out.blocks.begin(), out.blocks.end(),
             [](const auto& a, const auto& b) { return a.number < b.number; });
-}
-
-void read_expansivity(Section& head, std::optional<calib::evemu::Calibrator::Expansivity>& out) {
-  calib::evemu::Calibrator::Expansivity given;
-  const bool alpha = head.get("alpha_um_per_m_K", given.alpha_per_K, kMicro, {-50.0, 50.0});
-  const bool u_alpha = head.get("u_alpha_um_per_m_K", given.u_alpha_per_K, kMicro, {0.0, 50.0});
-  if (alpha && u_alpha) out = given;
-  if (alpha && !head.has("u_alpha_um_per_m_K"))
-    head.fault("alpha_um_per_m_K", "also needs u_alpha_um_per_m_K");
-  if (u_alpha && !head.has("alpha_um_per_m_K"))
-    head.fault("u_alpha_um_per_m_K", "also needs alpha_um_per_m_K");
 }
 
 calib::evemu::Calibrator read_calibrator(Section& root,

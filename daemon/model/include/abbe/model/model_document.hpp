@@ -44,9 +44,35 @@ struct ModelStatistics {
 /// Drift of the tracker estimated with reference nests (calib/otf/tracker_drift.hpp).
 struct TrackerDriftFigures {
   calib::Vector3 largest_m = calib::Vector3::Zero();  ///< machine axes, at the centre of the path
-  double u_repeatability_m = 0.0;  ///< of a visit of a nest, as used
+  double u_repeatability_m = 0.0;                     ///< of a visit of a nest, as used
   std::size_t visits = 0;
   friend bool operator==(const TrackerDriftFigures&, const TrackerDriftFigures&) = default;
+};
+
+/// What an identification with a Multi-Feature Bar found besides the errors, in the terms of its
+/// files: features from 1, touches of a feature from 0.
+struct BarFigures {
+  struct Pass {
+    std::string measurement;
+    double chi2_per_dof = 0.0;
+    friend bool operator==(const Pass&, const Pass&) = default;
+  };
+  /// Drift of the machine during one pass, machine axes, from a pair of passes.
+  struct Drift {
+    std::string forward, backward;  ///< names of the measurements
+    calib::Vector3 rate_m = calib::Vector3::Zero(), u_rate_m = calib::Vector3::Zero();
+    friend bool operator==(const Drift&, const Drift&) = default;
+  };
+  struct SetAside {
+    std::string measurement, feature, side;  ///< side: empty for holes and rods
+    std::size_t index = 0, k = 0;
+    double residual_m = 0.0;  ///< from the other touches of the feature, along the normal
+    friend bool operator==(const SetAside&, const SetAside&) = default;
+  };
+  std::vector<Pass> passes;
+  std::vector<Drift> drift;
+  std::vector<SetAside> set_aside;
+  friend bool operator==(const BarFigures&, const BarFigures&) = default;
 };
 
 /// A model and its origin.
@@ -75,6 +101,8 @@ struct ModelDocument {
   std::vector<calib::otf::Backlash> backlash{};
   /// Of method otf with reference nests. Not in the hash, as other statistics.
   std::optional<TrackerDriftFigures> tracker_drift{};
+  /// Of method mfb. Not in the hash, as other statistics.
+  std::optional<BarFigures> bar{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);

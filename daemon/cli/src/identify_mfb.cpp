@@ -1,0 +1,214 @@
+// `abbe identify mfb`: the 21 errors of three linear axes from a Multi-Feature Bar.
+#include <fmt/format.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <CLI/Validators.hpp>
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/methods/mfb/document.hpp"
+#include "abbe/methods/mfb/identification.hpp"
+#include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/methods/mfb/report.hpp"
+#include "abbe/model/model_document.hpp"
+#include "abbe/tables/mfb_files.hpp"
+#include "commands.hpp"
+#include "identified_model.hpp"
+#include "mfb_summary.hpp"
+#include "scales_corrected.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+
+namespace mfb = calib::mfb;
+
+namespace {
+
+struct IdentifyMfbArguments {
+  std::string machine, bar, plan, points, keep, out;
+  std::string estimator{mfb::name(mfb::Estimator::Joint)};
+  std::size_t trials = 0;  // 0: no Monte Carlo
+  std::uint64_t seed = mfb::MonteCarloOptions{}.seed;
+  bool scales_corrected = false, json = false;
+};
+
+struct MfbInput {
+  Config config;
+  MfbTask task;
+  std::vector<InputFile> sources;
+  std::vector<std::string> notes{};
+};
+
+/// The machine as it was configured, for the readings of the file `points`.
+Result<Config> read_config(const IdentifyMfbArguments& arguments) {
+  auto config = load_config(arguments.machine);
+  if (!config) return config;
+  if (const auto valid =
+          check_scales("identify mfb", "points", *config, arguments.scales_corrected);
+      !valid)
+    return tl::make_unexpected(valid.error());
+  if (const auto valid = check_bar_machine(arguments.machine, config->machine); !valid)
+    return tl::make_unexpected(valid.error());
+  return config;
+}
+
+mfb::Options options_of(const IdentifyMfbArguments& arguments) {
+  mfb::Options options;
+  options.solve.estimator =
+      mfb::estimator_named(arguments.estimator).value_or(options.solve.estimator);
+  return options;
+}
+
+void add_notes(MfbInput& input, const BarPointsFile& points) {
+  if (input.config.machine.interpolation == calib::estimation::Interpolation::Linear)
+    input.notes.emplace_back(
+        "the tables are linear between their nodes: for smooth errors set [model] basis = "
+        "\"cubic\"");
+  const auto pairs = mfb::pairs_of(input.task.plan.measurements);
+  if (std::ranges::none_of(pairs, [](const auto& forward) { return forward.has_value(); }))
+    input.notes.emplace_back(
+        "no pass was measured backward as well: a drift during the passes looks like an error of "
+        "the machine");
+  for (const std::string& name : points.against_pass)
+    input.notes.push_back(fmt::format(
+        "{}: the rows of its touches run against its pass: they must be in the order of probing",
+        name));
+}
+
+Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
+  auto config = read_config(arguments);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto hash = sha256_hex_of_file(arguments.machine);
+  if (!hash) return tl::make_unexpected(hash.error());
+  const auto machine = mfb_machine(config->machine);
+  if (!machine) return tl::make_unexpected(machine.error());
+  auto bar = read_bar_toml(arguments.bar);
+  if (!bar) return tl::make_unexpected(bar.error());
+  auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
+  if (!plan) return tl::make_unexpected(plan.error());
+  auto points = read_bar_points_csv(arguments.points, bar->bar, *plan, machine->nodes);
+  if (!points) return tl::make_unexpected(points.error());
+
+  MfbInput input{std::move(*config),
+                 {.bar = std::move(bar->bar),
+                  .plan = std::move(plan->plan),
+                  .passes = std::move(points->passes),
+                  .options = options_of(arguments)},
+                 {{std::filesystem::path(arguments.machine).filename().string(), *hash},
+                  bar->source,
+                  plan->source,
+                  points->source}};
+  if (arguments.trials > 0)
+    input.task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
+  add_notes(input, *points);
+  return input;
+}
+
+/// Errors of an identification name measurement and feature; the file of the touches is put before.
+Error in_points(const IdentifyMfbArguments& arguments, Error error) {
+  error.text = fmt::format("{}: {}", arguments.points, error.text);
+  return error;
+}
+
+Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const MfbInput& input) {
+  const auto active = active_model(arguments.keep);
+  if (!active) return tl::make_unexpected(active.error());
+  const auto other = comparison_model(*active, input.config);
+  ProgressBar bar;
+  auto candidate =
+      identify_with_bar(input.task, input.config, other.model,
+                        [&bar](std::string_view step, double share) { bar.show(step, share); });
+  bar.clear();
+  if (!candidate) return tl::make_unexpected(in_points(arguments, candidate.error()));
+  other.add_note(candidate->verdict);
+  auto& notes = candidate->verdict.notes;
+  notes.insert(notes.end(), input.notes.begin(), input.notes.end());
+  return candidate;
+}
+
+int run(const IdentifyMfbArguments& arguments) {
+  const auto input = read_input(arguments);
+  if (!input) return report(input.error());
+  const auto candidate = identified(arguments, *input);
+  if (!candidate) return report(candidate.error());
+
+  const auto now =
+      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  const auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
+                                     input->sources, now);
+  if (const auto written = write_results(arguments.out, document,
+                                         {{"tables.csv", to_tables_csv(document.model)},
+                                          {"report.html", mfb_report(document, *candidate)}});
+      !written)
+    return report(written.error());
+  if (const auto kept = keep(arguments.keep, document, candidate->verdict, "abbe identify mfb");
+      !kept)
+    return report(kept.error());
+
+  if (arguments.json)
+    fmt::print("{}\n", mfb_json(document, *candidate, arguments.out).dump(1));
+  else
+    print_mfb_summary(document, *candidate, arguments.out);
+  return exit_code(candidate->verdict);
+}
+
+void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
+  command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml")
+      ->required();
+  command.add_option("--bar", arguments.bar, "bar.toml: the calibrated bar")->required();
+  command
+      .add_option("--plan", arguments.plan,
+                  "plan.toml: where the bar stood, with which tool it was probed, noise")
+      ->required();
+  command
+      .add_option("--points", arguments.points,
+                  "touches: measurement,feature,index,side,k,x_mm,y_mm,z_mm; scale readings.\n"
+                  "`abbe example bar.toml`, plan.toml and barpoints.csv print commented examples")
+      ->required();
+  command
+      .add_option("--estimator", arguments.estimator,
+                  "joint: one weighted least-squares adjustment of all touches; sequential: as\n"
+                  "published, angles, then translations, then squareness; without the roll slope\n"
+                  "of X")
+      ->check(CLI::IsMember({"joint", "sequential"}))
+      ->capture_default_str();
+  auto* trials = command
+                     .add_option("--monte-carlo", arguments.trials,
+                                 "check the uncertainties with this number of trials")
+                     ->check(CLI::Range(2, 1000000));
+  command.add_option("--seed", arguments.seed, "of the Monte Carlo trials")
+      ->needs(trials)
+      ->capture_default_str();
+  add_scales_corrected(command, arguments.scales_corrected);
+  command.add_option("--keep", arguments.keep,
+                     "also add the model to this store, and compare it with its active model");
+  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
+  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
+      ->required();
+}
+
+}  // namespace
+
+void add_identify_mfb(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<IdentifyMfbArguments>();
+  auto* command = parent.add_subcommand(
+      "mfb",
+      "Identify all 21 errors of three linear axes from a Multi-Feature Bar probed in several\n"
+      "positions. Writes model.json, tables.csv and report.html to OUT and prints how well the\n"
+      "model predicts measurements that were not used in the fit. Exit code 5 if the gate would\n"
+      "refuse the model; the files are written in any case.");
+  add_options(*command, *arguments);
+  command->callback([arguments, &exit] { exit = run(*arguments); });
+}
+
+}  // namespace abbe::daemon

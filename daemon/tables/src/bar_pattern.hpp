@@ -1,0 +1,15 @@
+#pragma once
+/// [pattern] of bar.toml.
+
+#include "abbe/base/faults.hpp"
+#include "abbe/calib/mfb/bar.hpp"
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+
+/// Reads and checks [pattern]. `faults`: the list to which `root` adds. Returns true if the places
+/// of the holes are valid.
+[[nodiscard]] bool read_bar_pattern(Section& root, calib::mfb::TouchPattern& out,
+                                    const Faults& faults);
+
+}  // namespace abbe::daemon

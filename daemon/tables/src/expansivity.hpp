@@ -1,0 +1,24 @@
+#pragma once
+/// Thermal expansion of an artefact in its file: alpha_um_per_m_K and u_alpha_um_per_m_K, both or
+/// neither.
+
+#include <optional>
+
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+
+/// `Expansivity` has alpha_per_K and u_alpha_per_K. Adds a fault if one of the keys is missing.
+template <class Expansivity>
+void read_expansivity(Section& head, std::optional<Expansivity>& out) {
+  Expansivity given;
+  const bool alpha = head.get("alpha_um_per_m_K", given.alpha_per_K, kMicro, {-50.0, 50.0});
+  const bool u_alpha = head.get("u_alpha_um_per_m_K", given.u_alpha_per_K, kMicro, {0.0, 50.0});
+  if (alpha && u_alpha) out = given;
+  if (alpha && !head.has("u_alpha_um_per_m_K"))
+    head.fault("alpha_um_per_m_K", "also needs u_alpha_um_per_m_K");
+  if (u_alpha && !head.has("alpha_um_per_m_K"))
+    head.fault("u_alpha_um_per_m_K", "also needs alpha_um_per_m_K");
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,48 @@
+#pragma once
+/// What the readers of TOML files have in common.
+
+#include <toml++/toml.h>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+#include "abbe/calib/geometry.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+
+struct TomlFile {
+  InputFile source;
+  toml::table table;
+};
+
+/// Io if the file cannot be read, BadInput if it is not TOML.
+[[nodiscard]] inline Result<TomlFile> parse_toml_file(const std::filesystem::path& file,
+                                                      const TomlBounds& bounds = {}) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  auto table = parse_toml(*text, file.string(), bounds);
+  if (!table) return tl::make_unexpected(table.error());
+  return TomlFile{{file.filename().string(), sha256_hex(*text)}, std::move(*table)};
+}
+
+/// Reads three numbers.
+inline bool get_vector(Section& section, std::string_view key, calib::Vector3& out, Unit unit,
+                       Need need = Need::Optional) {
+  std::vector<double> given;
+  if (!section.get(key, given, unit, need)) return false;
+  if (given.size() == 3) {
+    out = {given[0], given[1], given[2]};
+    return true;
+  }
+  section.fault(key, "must be three numbers, x, y, z");
+  return false;
+}
+
+}  // namespace abbe::daemon

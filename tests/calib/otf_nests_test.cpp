@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "abbe/calib/otf/judge.hpp"
 #include "nest_run.hpp"
@@ -122,6 +124,22 @@ TEST(Nests, TheCourseOfTheDriftIsEstimated) {
       EXPECT_NEAR(point.value_m(k), expected_m(k), 4e-6) << point.time_s;
     }
   }
+}
+
+/// A random walk is far from the prior: the amplitude becomes large, and with it the covariance.
+TEST(Nests, ADriftThatIsNotSmoothStillGivesAModel) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> step(0.0, 1.0 / std::sqrt(1000.0));
+  std::vector<double> walk{0.0};
+  while (walk.size() < 2000) {
+    walk.push_back(walk.back() + step(random));
+  }
+  const MadeRun run = make_nest_run({.drift_m = kDrift_m, .course = [&](double time_s) {
+                                       return walk[static_cast<std::size_t>(time_s)];
+                                     }});
+  const auto id = identify_nest_run(run);
+  ASSERT_TRUE(id) << id.error().text;
+  EXPECT_TRUE(id->solution.drift);
 }
 
 TEST(Nests, ARotationIsEstimatedFromThreeNestsThatAreNotOnALine) {

@@ -20,6 +20,8 @@ struct NestRunOptions {
   Vector3 drift_m = Vector3::Zero();       ///< at the end of the run, tracker frame
   Vector3 rotation_rad = Vector3::Zero();  ///< the same, about the tracker
   double time_constant_s = 600.0;          ///< of its exponential course
+  /// Share of the drift by time, instead of the exponential course.
+  std::function<double(double time_s)> course{};
   bool visits = true;
   double every_s = 180.0;
   double stay_s = 4.0;     ///< at each nest
@@ -33,9 +35,13 @@ struct NestRunOptions {
 /// What the drift adds to the measured position of a point.
 inline Vector3 drift_at(const NestRunOptions& wanted, double time_s, const Vector3& p_tracker_m) {
   constexpr double kRun_s = 1000.0;
+  const Vector3 at_end_m = wanted.drift_m + wanted.rotation_rad.cross(p_tracker_m);
+  if (wanted.course) {
+    return wanted.course(time_s) * at_end_m;
+  }
   const double share = (1.0 - std::exp(-time_s / wanted.time_constant_s)) /
                        (1.0 - std::exp(-kRun_s / wanted.time_constant_s));
-  return share * (wanted.drift_m + wanted.rotation_rad.cross(p_tracker_m));
+  return share * at_end_m;
 }
 
 /// The visits of nests in a stream.

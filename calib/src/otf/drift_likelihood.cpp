@@ -144,9 +144,9 @@ Eigen::VectorXd DriftLikelihood::unknowns(const LikelihoodGrid& grid, const Drif
 Eigen::MatrixXd DriftLikelihood::covariance(const LikelihoodGrid& grid,
                                             const DriftCell& cell) const {
   const Factors f = factors(grid.equations[cell.equations], cell.amplitude_m);
-  const Eigen::MatrixXd scaled =
-      f.scale.asDiagonal() * f.llt.solve(Eigen::MatrixXd(f.scale.asDiagonal()));
-  return root_times(root_times(scaled).transpose());
+  const Eigen::MatrixXd scaled_root = root_times(f.scale.asDiagonal());
+  const Eigen::MatrixXd half = f.llt.matrixL().solve(Eigen::MatrixXd(scaled_root.transpose()));
+  return half.transpose() * half;
 }
 
 }  // namespace abbe::calib::otf

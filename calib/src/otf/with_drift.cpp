@@ -105,7 +105,8 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
   with.drift.visits = estimate.visits;
   with.drift.u_repeatability_m = estimate.u_repeatability_m;
   with.drift.notes = std::move(estimate.notes);
-  with.added_covariance = reduced.dU_dd * estimate.covariance * reduced.dU_dd.transpose();
+  const Eigen::MatrixXd added = reduced.dU_dd * estimate.covariance * reduced.dU_dd.transpose();
+  with.added_covariance = 0.5 * (added + added.transpose());  // symmetric in spite of rounding
   return with;
 }
 

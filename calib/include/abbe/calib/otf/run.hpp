@@ -165,7 +165,7 @@ struct Options {
   /// component along the direction of travel (along_rows.hpp). Null: it is not used. Must outlive
   /// the computation.
   const EncoderLog* encoders = nullptr;
-  /// Reference nests that the tracker visits between the legs, for Mode::OnTheFly: the drift of the
+  /// Reference nests that the tracker visits between the legs: the drift of the
   /// tracker is then estimated (tracker_drift.hpp).
   NestOptions nests{};
   /// Prior for smooth tables (smoothness.hpp), for every mode and estimator. Absent: no prior.

@@ -64,7 +64,7 @@ TEST(EvemuOls, NoiseIsUnbiased) {
   std::normal_distribution<double> normal;
   constexpr int kDraws = 200;
   double mean = 0.0;
-  for (int draw = 0; draw < kDraws; ++draw) {
+  for (int k = 0; k < kDraws; ++k) {
     Eigen::VectorXd n(L.cols());
     for (double& value : n) {
       value = normal(random);

@@ -128,7 +128,7 @@ TEST(SmoothnessPrior, ReducesTheErrorAndItsUncertaintyAlike) {
     ASSERT_TRUE(without && with);
     without_m2 += mean_square_m2(run, without->solution.model);
     with_m2 += mean_square_m2(run, with->solution.model);
-    normalised += normalised_square(run, with->solution.model) / kMachines;
+    normalised += normalised_error_square(run, with->solution.model) / kMachines;
     EXPECT_EQ(with->solution.smoothness->left_out(), 0u);
     EXPECT_LT(with->solution.statistics.rank, without->solution.statistics.rank);
   }
@@ -142,7 +142,7 @@ TEST(SmoothnessPrior, KeepsItsSizeWhenTheNoiseIsLargerThanStated) {
   const auto found = identified_with(run, stated(1e-6));
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_NEAR(found->solution.smoothness->variance_factor, 9.0, 1.0);
-  EXPECT_NEAR(normalised_square(run, found->solution.model), 1.0, 0.25);
+  EXPECT_NEAR(normalised_error_square(run, found->solution.model), 1.0, 0.25);
 }
 
 TEST(SmoothnessPrior, HasTheMostLikelySizeIfItIsEstimated) {
@@ -186,7 +186,7 @@ TEST(SmoothnessPrior, IsNotUsedForTablesThatAreRougher) {
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_GE(found->solution.smoothness->left_out(), 8u);
   EXPECT_THAT(found->observations.notes, Contains(HasSubstr("rougher than the prior")));
-  EXPECT_LT(normalised_square(run, found->solution.model), 1.3);
+  EXPECT_LT(normalised_error_square(run, found->solution.model), 1.3);
 }
 
 TEST(SmoothnessPrior, IsPartOfTheHeldOutTest) {

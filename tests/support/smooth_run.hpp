@@ -69,7 +69,7 @@ inline MadeRun smooth_run(const SmoothRunOptions& wanted) {
 }
 
 /// Squared error of the parameters in the metric of their covariance, per determined combination.
-inline double normalised_square(const MadeRun& run, const calib::VolumetricModel& model) {
+inline double normalised_error_square(const MadeRun& run, const calib::VolumetricModel& model) {
   const Eigen::VectorXd error = model.U() - run.truth;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(model.covariance());
   const double least = 1e-9 * of.eigenvalues().maxCoeff();

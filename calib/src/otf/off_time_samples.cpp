@@ -11,7 +11,7 @@ namespace abbe::calib::otf {
 namespace {
 
 /// Second differences with half weight, y_i - (y_i-1 + y_i+1) / 2, of white noise have this variance.
-constexpr double kOfSecondDifference = 1.5;
+constexpr double kVarianceOffNeighbours = 1.5;
 
 /// One valid sample of a block or of the blocks beside it.
 struct AlongSample {
@@ -121,16 +121,16 @@ class OffTimeSearch {
         of_blocks.push_back(median(off));
       }
     }
-    return std::max(1.0, kMadToSigma * median(of_blocks) / std::sqrt(kOfSecondDifference));
+    return std::max(1.0, kMadToSigma * median(of_blocks) / std::sqrt(kVarianceOffNeighbours));
   }
 
   void compare(std::size_t k, double scale, std::vector<std::size_t>& off) const {
-    constexpr double kSuspicious = 5.0;
+    constexpr double kOffTime = 5.0;
     const Block& block = series_.blocks[k];
     const std::vector<AlongSample> all = samples_of(k, kBeside);
     for (std::size_t i = 1; i + 1 < all.size(); ++i) {
       const bool own = all[i].index >= block.begin_sample && all[i].index < block.end_sample;
-      if (own && off_neighbours(all, i) > kSuspicious * std::sqrt(kOfSecondDifference) * scale &&
+      if (own && off_neighbours(all, i) > kOffTime * std::sqrt(kVarianceOffNeighbours) * scale &&
           is_off_line(all, i, scale)) {
         off.push_back(all[i].index);
       }

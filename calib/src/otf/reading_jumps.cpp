@@ -49,10 +49,10 @@ double scale_around_m(const std::vector<double>& off_m, std::size_t i) {
 /// Standard deviation of the distance of a reading from the line because of its time and those of
 /// its neighbours.
 double scale_of_times_m(const EncoderLog& log, Eigen::Index axis, std::size_t i) {
-  constexpr double kOfSecondDifference = 1.2247448713915890;  // sqrt(1.5)
+  constexpr double kRootOfVariance = 1.2247448713915890;  // sqrt(1.5)
   const EncoderReading &before = log.readings[i - 1], &after = log.readings[i + 1];
   const double v_m_s = (after.q_m(axis) - before.q_m(axis)) / (after.time_s - before.time_s);
-  return kOfSecondDifference * std::abs(v_m_s) * log.sigma_time_s;
+  return kRootOfVariance * std::abs(v_m_s) * log.sigma_time_s;
 }
 
 void mark_jumps(const EncoderLog& log, Eigen::Index axis, std::vector<bool>& jumps) {

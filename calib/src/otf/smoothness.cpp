@@ -16,7 +16,7 @@ namespace abbe::calib::otf {
 namespace {
 
 /// Probability that a bend or table is left out although all errors are as smooth as stated.
-constexpr double kFalseAlarm = 1e-3;
+constexpr double kSmoothFalseAlarm = 1e-3;
 
 /// Rows of the bends of each table that have the prior.
 std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
@@ -98,9 +98,9 @@ void leave_out_all(Smoothness& s, const AboutBends& about,
 /// there is nothing to add.
 bool leave_out_next(Smoothness& s, const AboutBends& about, const BendPosterior& p) {
   const auto tables = rows_of_tables(about, s);
-  const double per_bend = kFalseAlarm / static_cast<double>(about.bends.size()),
+  const double per_bend = kSmoothFalseAlarm / static_cast<double>(about.bends.size()),
                per_table =
-                   kFalseAlarm / static_cast<double>(std::max<std::size_t>(1, tables.size()));
+                   kSmoothFalseAlarm / static_cast<double>(std::max<std::size_t>(1, tables.size()));
   std::vector<Eigen::Index> all;
   for (const std::vector<Eigen::Index>& rows : tables) {
     all.insert(all.end(), rows.begin(), rows.end());
@@ -122,7 +122,7 @@ bool leave_out_next(Smoothness& s, const AboutBends& about, const BendPosterior&
       added = true;
     }
   }
-  if (!added && is_rough(p, all, kFalseAlarm)) {
+  if (!added && is_rough(p, all, kSmoothFalseAlarm)) {
     leave_out_all(s, about, tables);
     return true;
   }

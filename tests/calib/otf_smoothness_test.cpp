@@ -13,6 +13,7 @@
 #include "abbe/calib/otf/identify.hpp"
 #include "otf/table_bends.hpp"
 #include "smooth_run.hpp"
+#include "standstill_run.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -199,6 +200,17 @@ TEST(SmoothnessPrior, IsPartOfTheHeldOutTest) {
   EXPECT_THAT(verdict->reasons, testing::IsEmpty());
   EXPECT_THAT(verdict->notes, Contains(HasSubstr("a prior for smooth tables was used")));
   EXPECT_LT(verdict->held_out.candidate, 1.2);
+}
+
+TEST(SmoothnessPrior, IsUsedForStandstills) {
+  MadeRun run = make_standstill_run();
+  const auto without = identified_with(run, {});
+  const auto with = identified_with(run, SmoothnessOptions{.estimated = true});
+  ASSERT_TRUE(without && with) << with.error().text;
+  ASSERT_TRUE(with->solution.smoothness);
+  EXPECT_GT(with->solution.smoothness->rows, 0u);
+  EXPECT_LT(with->solution.model.covariance().trace(),
+            without->solution.model.covariance().trace());
 }
 
 }  // namespace

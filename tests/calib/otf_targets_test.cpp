@@ -282,4 +282,25 @@ TEST(SeveralTargets, NameTheRunThatDoesNotFitItsPath) {
   EXPECT_THAT(found.error().text, HasSubstr("run 2: "));
 }
 
+/// Tables of 10 um at nodes 200 mm apart: their bends are 24 um, (200 / 50)^1.5 = 8 times the size.
+TEST(SeveralTargets, HaveOnePriorForSmoothTables) {
+  MadeTargets made = make_targets({});
+  const auto without = identified_targets(made);
+  made.options.smoothness = SmoothnessOptions{.estimated = true};
+  const auto with = identified_targets(made);
+  ASSERT_TRUE(without && with) << with.error().text;
+  ASSERT_TRUE(with->solutions.front().smoothness);
+  const Smoothness& prior = *with->solutions.front().smoothness;
+  EXPECT_NEAR(std::log(prior.bend_m[0] / 3e-6), 0.0, std::log(2.0));
+  EXPECT_EQ(prior.left_out(), 0u);
+  EXPECT_THAT(with->observations.front().notes,
+              testing::Contains(HasSubstr("a prior for smooth tables was used")));
+  const Eigen::VectorXd u = without->solutions.front().model.covariance().diagonal().cwiseSqrt();
+  const Eigen::VectorXd change =
+      with->solutions.front().model.U() - without->solutions.front().model.U();
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    EXPECT_LE(std::abs(change(i)), 3.0 * u(i) + 1e-15) << i;
+  }
+}
+
 }  // namespace

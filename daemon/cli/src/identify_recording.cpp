@@ -41,9 +41,10 @@ Result<OtfRun> last_run(const OpenedRecording& recording, const std::string& fil
   if (!replayed) return tl::make_unexpected(replayed.error());
   if (last) return *std::move(last);
   const auto& all = replayed->calibrations;
+  std::string why = all.empty() ? "no calibration was requested" : all.back().ended.reason;
+  if (why.empty()) why = "its calibrations are of another method";
   return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete run along a path: {}", file,
-                          all.empty() ? "no calibration was requested" : all.back().ended.reason));
+              fmt::format("{}: contains no complete run along a path: {}", file, why));
 }
 
 /// The configuration for the identification of a recorded run.

@@ -36,7 +36,9 @@ Result<PathMotion> PathMotion::plan(const PathPlan& plan) {
   if (const auto valid = check_plan(plan); !valid) return tl::unexpected(valid.error());
   const std::vector<PathVertex> vertices = vertices_reached(plan);
   if (plan.wait_s > 0.0 && vertices.size() < 3)
-    return bad_input("path: no inner vertex at which the machine can wait");
+    return bad_input(
+        "path: no inner vertex at which the machine can wait for the visits of reference nests; "
+        "give a path with three vertices or more, or [sim.tracker] nest_visits = false");
 
   PathMotion motion;
   motion.first_m_ = motion.last_m_ = vertices.front().q_m;

@@ -9,7 +9,7 @@
 namespace abbe::calib {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 // pi/2 and ln 2, each as a sum of parts. All parts but the last end in enough zero bits that their
 // product with an integer of up to 20 bits is exact.
@@ -69,7 +69,7 @@ SinCos of_reduced(double r, double rest) noexcept {
 
 SinCos sin_cos(double angle_rad) noexcept {
   constexpr double kLargest_rad = 1e6;
-  if (!(std::abs(angle_rad) <= kLargest_rad)) return {kNaN, kNaN};
+  if (!(std::abs(angle_rad) <= kLargest_rad)) return {kNotANumber, kNotANumber};
   const double quarters = std::floor(angle_rad * (2.0 / std::numbers::pi) + 0.5);
   const double first = angle_rad - quarters * kHalfPi_1;  // both exact
   const double second = quarters * kHalfPi_2;             // exact
@@ -104,7 +104,7 @@ double exponential(double x) noexcept {
 }
 
 double natural_logarithm(double x) noexcept {
-  if (!std::isnormal(x) || x < 0.0) return kNaN;
+  if (!std::isnormal(x) || x < 0.0) return kNotANumber;
   int twos = 0;
   double fraction = std::frexp(x, &twos);
 

@@ -81,10 +81,10 @@ std::vector<NestPlaces> other_places(const NestPlaces& place, std::size_t worst,
 /// The worst visit of each place with a suspicious residual.
 std::vector<std::size_t> suspicious_visits(const NestPlaces& place,
                                            const std::vector<double>& residuals) {
-  constexpr double kSuspicious = 4.0;
+  constexpr double kSuspiciousVisit = 4.0;
   std::vector<std::size_t> worst;
   for (std::size_t v = 0; v < place.size(); ++v) {
-    if (!(residuals[v] > kSuspicious)) {
+    if (!(residuals[v] > kSuspiciousVisit)) {
       continue;
     }
     const auto same = std::find_if(worst.begin(), worst.end(),

@@ -134,9 +134,9 @@ TEST(Nests, ADriftThatIsNotSmoothStillGivesAModel) {
   while (walk.size() < 2000) {
     walk.push_back(walk.back() + step(random));
   }
-  const MadeRun run = make_nest_run({.drift_m = kDrift_m, .course = [&](double time_s) {
-                                       return walk[static_cast<std::size_t>(time_s)];
-                                     }});
+  const MadeRun run = make_nest_run(two_nests({.drift_m = kDrift_m, .course = [&](double time_s) {
+                                                 return walk[static_cast<std::size_t>(time_s)];
+                                               }}));
   const auto id = identify_nest_run(run);
   ASSERT_TRUE(id) << id.error().text;
   EXPECT_TRUE(id->solution.drift);

@@ -200,6 +200,24 @@ TEST(MfbIdentify, KeepsGoodTouchesOfABarWithFormErrors) {
   EXPECT_TRUE(found->set_aside.empty());
 }
 
+TEST(MfbIdentify, DoesNotNeedASignature) {
+  // O_z of 12 holes follows from 11 rods: without the shifts the noise of a combination is 0.
+  const Probed p(47, {.signature = false});
+  const auto found = p.identified();
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(found->cause.cause, Cause::None) << found->cause.text;
+  EXPECT_NEAR(agreement(*found, p.machine).mean_square, 1.0, 0.4);
+  EXPECT_THAT(found->notes, testing::ElementsAre(HasSubstr("no signature")));
+}
+
+TEST(MfbIdentify, UsesTheDerivativesOfTheBarAsItIs) {
+  const Probed p(48, {.place_m = 0.15e-3});  // some features 0.4 mm beside the pattern
+  const auto found = p.identified();
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(found->cause.cause, Cause::None) << found->cause.text;
+  EXPECT_LT(found->solution.statistics.chi2_per_dof, 1.2);
+}
+
 TEST(MfbIdentify, UsesFeaturesWithMissingTouches) {
   Probed p = usual();
   std::erase_if(p.pass("Y2"), [](const Touch& t) {

@@ -98,13 +98,37 @@ TEST(MfbJudge, ComparesWithTheActiveModelAtTheSamePoints) {
   ASSERT_TRUE(of_nothing.active);
   EXPECT_GT(of_nothing.observations_beside_active, 100u);
 
-  // A model without errors leaves what no compensation leaves, apart from the passes that reach
-  // beyond its validity volume.
-  EXPECT_NEAR(*of_nothing.active, of_nothing.no_compensation, 0.5 * of_nothing.no_compensation);
+  // A model without errors leaves what no compensation leaves, apart from the points at the rim.
+  EXPECT_NEAR(*of_nothing.active, of_nothing.no_compensation, 0.1 * of_nothing.no_compensation);
   EXPECT_LT(*of_nothing.candidate_beside_active, 0.1 * *of_nothing.active);
 
   const HeldOutFigures of_itself = figures_of(found, &found.model);
   EXPECT_LT(*of_itself.active, *of_itself.candidate_beside_active) << "it was fitted to the points";
+}
+
+// Other passes of the plan have tools for which the active model has no values.
+TEST(MfbJudge, ComparesWithAnActiveModelOfOneTool) {
+  const Identification& found = usual_identification();
+  const std::vector<Vector3> one_tool{found.observations.plan.measurements.front().tool_offset_m};
+  const auto model =
+      VolumetricModel::from_vector(found.observations.basis, Gauge::G1, one_tool, found.solution.U,
+                                   found.solution.covariance, found.model.validity());
+  const HeldOutFigures figures = figures_of(found, &*model);
+  ASSERT_TRUE(figures.active);
+  EXPECT_LT(*figures.active, *figures.candidate_beside_active);
+  EXPECT_GT(figures.observations_beside_active, 3u * 12u * 5u) << "X1, X2, Y1, Y2, DXY1, DXY2";
+  EXPECT_LT(figures.observations_beside_active, figures.observations / 2);
+}
+
+TEST(MfbJudge, ComparesAlongAllAxesWithAnActiveModelOfTheSameVolume) {
+  const HeldOutFigures figures = figures_of(usual_identification(), &usual_identification().model);
+  EXPECT_GT(figures.observations_beside_active, figures.observations * 9 / 10);
+}
+
+TEST(MfbJudge, RefusesTooManyTouchesThatWereSetAside) {
+  Identification found = usual_identification();
+  found.set_aside.assign(60, {0, "X1", {Feature::Hole, 4, Side::Left, 2}, 52e-6});
+  EXPECT_THAT(judge(found, nullptr)->causes, ElementsAre("outliers"));
 }
 
 TEST(MfbJudge, KeepsAnActiveModelThatIsAsGood) {

@@ -12,9 +12,15 @@ namespace abbe::tests::mfb {
 /// Nominal bar with `holes` holes, 50 mm apart.
 inline calib::mfb::Bar bar_to_plan(std::size_t holes) {
   calib::mfb::TouchPattern pattern = paper_pattern();
-  pattern.hole_x_m.resize(holes);
   pattern.hole_y_m.resize(holes);
-  pattern.rod_x_m.resize(holes - 1);
+  pattern.hole_x_m.clear();
+  pattern.rod_x_m.clear();
+  for (std::size_t i = 0; i < holes; ++i) {
+    pattern.hole_x_m.push_back(0.05 * static_cast<double>(i));
+    if (i > 0) {
+      pattern.rod_x_m.push_back(pattern.hole_x_m.back() - 0.025);
+    }
+  }
   std::vector<Vector3> O_m;
   for (std::size_t i = 0; i < holes; ++i) {
     O_m.emplace_back(pattern.hole_x_m[i], pattern.hole_y_m[i], 0.0);

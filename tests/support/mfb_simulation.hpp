@@ -3,6 +3,7 @@
 /// [Viprey 2016] eq. 8 with exact rotations, written independently of the error model of calib. The
 /// errors are smooth functions in gauge G1.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -20,7 +21,7 @@ using calib::Matrix3;
 
 /// A polynomial and a wave over the travel, 0 at its begin.
 struct SmoothError {
-  std::array<double, 4> polynomial{};
+  std::array<double, 3> polynomial{};
   double amplitude = 0.0, phase = 0.0, period_m = 0.6;
   bool level_ends = false;  ///< straightness: 0 at both ends
 
@@ -113,6 +114,9 @@ struct ProbingOptions {
   double warmer_K = 0.0;                           ///< the bar above 20 degC, as measured
   double alpha_error_per_K = 0.0;
   std::optional<calib::mfb::Sag> sag;
+  calib::mfb::TouchPattern pattern = paper_pattern();  ///< of the bar
+  double place_m = 20e-6;  ///< of the features beside the pattern, in each direction
+  bool signature = true;   ///< two holes are shifted by 1 mm
 };
 
 struct ProbedBar {
@@ -126,10 +130,13 @@ struct TrueBar {
   std::vector<Vector3> hole_m, rod_m;
   std::vector<double> form_m;  ///< of each touch along its normal
 
-  TrueBar(std::mt19937_64& random, double form) : pattern(paper_pattern()) {
+  TrueBar(std::mt19937_64& random, const ProbingOptions& options) : pattern(options.pattern) {
+    if (!options.signature) {
+      pattern.hole_y_m.assign(pattern.holes(), 0.0);
+    }
     std::normal_distribution<double> normal;
     const auto off = [&] {
-      return Vector3(20e-6 * Vector3(normal(random), normal(random), normal(random)));
+      return Vector3(options.place_m * Vector3(normal(random), normal(random), normal(random)));
     };
     for (std::size_t i = 0; i < pattern.holes(); ++i) {
       hole_m.push_back(off());
@@ -138,7 +145,7 @@ struct TrueBar {
       rod_m.push_back(off());
     }
     for (std::size_t k = 0; k < pattern.count(); ++k) {
-      form_m.push_back(form * normal(random));
+      form_m.push_back(options.form_m * normal(random));
     }
   }
   /// Centres of the tip in bar axes, in the fixed order.
@@ -176,58 +183,104 @@ inline calib::mfb::BarTouches by_feature(const std::vector<calib::mfb::NominalTo
   return touches;
 }
 
+/// Where the bar stands in its position, relative to the plan.
+struct Clamping {
+  Vector3 moved_m, turned_rad;
+};
+
+/// Probes a bar with a machine.
+class Probing {
+ public:
+  Probing(const SimulatedMachine& machine, const calib::mfb::Plan& plan, std::mt19937_64& random,
+          const ProbingOptions& options)
+      : machine_(machine),
+        plan_(plan),
+        options_(options),
+        random_(random),
+        bar_(random, options),
+        nominal_(calib::mfb::nominal_touches(bar_.pattern, plan.tip_radius_m)),
+        tips_m_(bar_.tips_m(plan.tip_radius_m)) {}
+
+  /// The bar as its calibration states it.
+  calib::mfb::Bar calibrated() {
+    const auto shape = points_of_interest(by_feature(nominal_, tips_m_), Matrix3::Identity());
+    calib::mfb::Bar bar = bar_with(shape->O_bar_m);
+    bar.pattern = bar_.pattern;
+    bar.expansion = options_.expansion;
+    bar.sag = options_.sag;
+    const Eigen::VectorXd u_m = bar.covariance_m2.diagonal().cwiseSqrt();
+    for (std::size_t i = 0; i < bar.O_m.size(); ++i) {
+      const Vector3 u = u_m.segment<3>(3 * static_cast<Eigen::Index>(i));
+      bar.O_m[i] += options_.calibration * u.cwiseProduct(deviates());
+    }
+    return bar;
+  }
+
+  /// `before`: time since the begin of the drift, in passes.
+  calib::mfb::PassTouches pass(const calib::mfb::Measurement& m, const Clamping& clamping,
+                               const Vector3& drift_m, double before) {
+    const bool backward = m.direction == calib::mfb::PassDirection::Backward;
+    std::vector<std::size_t> order = calib::mfb::probing_order(nominal_);
+    if (backward) {
+      std::reverse(order.begin(), order.end());
+    }
+    calib::mfb::PassTouches touches;
+    for (const std::size_t k : order) {
+      const double time =
+          before + static_cast<double>(touches.size()) / static_cast<double>(order.size() - 1);
+      const Vector3 p_m = m.origin_m + clamping.moved_m + m.axes() * in_bar_m(k, m, clamping);
+      const Vector3 noise_m = plan_.noise.machine_m * deviates() + plan_.noise.probe_m *
+                                                                       normal_(random_) * m.axes() *
+                                                                       nominal_[k].outward;
+      touches.push_back(
+          {nominal_[k].target,
+           machine_.reading_m(p_m, m.tool_offset_m) + options_.noise * noise_m + time * drift_m,
+           false});
+    }
+    return touches;
+  }
+
+  Vector3 deviates() { return {normal_(random_), normal_(random_), normal_(random_)}; }
+
+ private:
+  Vector3 in_bar_m(std::size_t k, const calib::mfb::Measurement& m,
+                   const Clamping& clamping) const {
+    const double alpha_per_K = options_.expansion ? options_.expansion->alpha_per_K : 0.0;
+    Vector3 p_m =
+        (1.0 + options_.warmer_K * (alpha_per_K + options_.alpha_error_per_K)) * tips_m_[k];
+    if (options_.sag) {
+      p_m += sag_m(*options_.sag, tips_m_[k].x(), m.axes().transpose() * plan_.gravity);
+    }
+    return SimulatedMachine::turned(clamping.turned_rad, p_m);
+  }
+
+  const SimulatedMachine& machine_;
+  const calib::mfb::Plan& plan_;
+  ProbingOptions options_;
+  std::mt19937_64& random_;
+  std::normal_distribution<double> normal_;
+  TrueBar bar_;
+  std::vector<calib::mfb::NominalTouch> nominal_;
+  std::vector<Vector3> tips_m_;
+};
+
 inline ProbedBar probe(const SimulatedMachine& machine, const calib::mfb::Plan& plan,
                        std::mt19937_64& random, const ProbingOptions& options = {}) {
-  using namespace calib::mfb;
-  std::normal_distribution<double> normal;
-  const auto vector = [&] { return Vector3(normal(random), normal(random), normal(random)); };
-  const TrueBar bar(random, options.form_m);
-  const auto nominal = nominal_touches(bar.pattern, plan.tip_radius_m);
-  const std::vector<Vector3> tips_m = bar.tips_m(plan.tip_radius_m);
-  const auto shape = points_of_interest(by_feature(nominal, tips_m), Matrix3::Identity());
-
-  ProbedBar probed{bar_with(shape->O_bar_m), {}};
-  probed.bar.expansion = options.expansion;
-  probed.bar.sag = options.sag;
-  const Eigen::VectorXd u_m = probed.bar.covariance_m2.diagonal().cwiseSqrt();
-  for (std::size_t i = 0; i < probed.bar.O_m.size(); ++i) {
-    const Vector3 error = u_m.segment<3>(3 * static_cast<Eigen::Index>(i)).cwiseProduct(vector());
-    probed.bar.O_m[i] += options.calibration * error;
-  }
-  const std::vector<std::size_t> order = probing_order(nominal);
-  std::map<std::string, std::pair<Vector3, Vector3>> beside;
-  std::map<std::string, Vector3> drift;
-  for (const Measurement& m : plan.measurements) {
-    if (beside.count(m.position) == 0) {
-      beside[m.position] = {options.origin_m * vector(), options.axes_rad * vector()};
+  Probing probing(machine, plan, random, options);
+  ProbedBar probed{probing.calibrated(), {}};
+  std::map<std::string, Clamping> clampings;
+  const auto forward_of = calib::mfb::pairs_of(plan.measurements);
+  std::vector<Vector3> drift_m;
+  for (std::size_t i = 0; i < plan.measurements.size(); ++i) {
+    const calib::mfb::Measurement& m = plan.measurements[i];
+    if (clampings.count(m.position) == 0) {
+      clampings[m.position] = {options.origin_m * probing.deviates(),
+                               options.axes_rad * probing.deviates()};
     }
-    const auto& [origin, turn] = beside[m.position];
-    const bool backward = m.direction == PassDirection::Backward;
-    const std::string key =
-        m.position + std::to_string(m.tool_offset_m.x()) + std::to_string(m.tool_offset_m.y());
-    if (!backward) {
-      drift[key] = options.drift_m * vector().normalized();
-    }
-    const double alpha_per_K = options.expansion ? options.expansion->alpha_per_K : 0.0;
-    const double longer = 1.0 + options.warmer_K * (alpha_per_K + options.alpha_error_per_K);
-    PassTouches touches;
-    for (std::size_t row = 0; row < order.size(); ++row) {
-      const std::size_t k = backward ? order[order.size() - 1 - row] : order[row];
-      Vector3 in_bar = longer * tips_m[k];
-      if (options.sag) {
-        in_bar += sag_m(*options.sag, tips_m[k].x(), m.axes().transpose() * plan.gravity);
-      }
-      in_bar = SimulatedMachine::turned(turn, in_bar);
-      const Vector3 p_m = m.origin_m + origin + m.axes() * in_bar;
-      Vector3 reading_m = machine.reading_m(p_m, m.tool_offset_m);
-      reading_m += options.noise * plan.noise.machine_m * vector();
-      reading_m +=
-          options.noise * plan.noise.probe_m * normal(random) * (m.axes() * nominal[k].outward);
-      const double time = static_cast<double>(row) / static_cast<double>(order.size() - 1);
-      reading_m += (backward ? 1.0 + time : time) * drift[key];
-      touches.push_back({nominal[k].target, reading_m, false});
-    }
-    probed.touches.push_back(std::move(touches));
+    drift_m.push_back(forward_of[i] ? drift_m[*forward_of[i]]
+                                    : options.drift_m * probing.deviates().normalized());
+    probed.touches.push_back(
+        probing.pass(m, clampings[m.position], drift_m.back(), forward_of[i] ? 1.0 : 0.0));
   }
   return probed;
 }

@@ -35,19 +35,28 @@ std::size_t most_of_pass(const PassTouches& touches, const SetAsideOptions& opti
 
 struct Outliers {
   std::vector<SetAsideTouch> set_aside;
-  std::vector<std::string> notes;
+  std::vector<std::string> unresolved;
 };
+
+std::size_t most_of_all(std::span<const PassTouches> touches, const SetAsideOptions& options) {
+  std::size_t all = 0;
+  for (const PassTouches& pass : touches) {
+    all += pass.size();
+  }
+  return static_cast<std::size_t>(std::ceil(options.most_of_all * static_cast<double>(all)));
+}
 
 /// Sets touches aside one after another and adjusts again after each.
 Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
                                   std::vector<PassTouches>& touches, const MfbMachine& machine,
                                   const Options& options, Outliers& outliers) {
-  std::vector<std::string> left;
+  std::vector<std::string>& left = outliers.unresolved;
   std::vector<std::size_t> of_pass(touches.size(), 0);
   while (const std::optional<Suspects> found =
              suspects(at.observations, at.residuals, options.outliers, left)) {
     const std::size_t m = found->measurement;
-    if (of_pass[m] >= most_of_pass(touches[m], options.outliers)) {
+    if (of_pass[m] >= most_of_pass(touches[m], options.outliers) ||
+        outliers.set_aside.size() >= most_of_all(touches, options.outliers)) {
       left.push_back(name_in_plan(plan, m, found->touches.front()));
       continue;
     }
@@ -65,12 +74,6 @@ Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
       return next;
     }
     at = *std::move(next);
-  }
-  for (const std::string& feature : left) {
-    outliers.notes.push_back(
-        message(feature,
-                ": the touches do not fit together, and too many are wrong or missing to "
-                "find out which: touch it again"));
   }
   return at;
 }
@@ -186,12 +189,17 @@ Result<Identification> identify(const Bar& bar, const Plan& plan,
                           ? likely_cause(at->observations, at->solution, options.solve)
                           : cause_of_sequence(at->solution.statistics);
   std::vector<std::string> notes = at->observations.notes;
-  notes.insert(notes.end(), outliers.notes.begin(), outliers.notes.end());
+  for (const std::string& feature : outliers.unresolved) {
+    notes.push_back(message(feature,
+                            ": the touches do not fit together, and too many are wrong or "
+                            "missing to find out which: touch it again"));
+  }
   auto touch_residuals = residuals_of_touches(at->residuals, outliers.set_aside);
   return Identification{std::move(at->observations),
                         std::move(at->solution),
                         *std::move(model),
                         std::move(outliers.set_aside),
+                        std::move(outliers.unresolved),
                         std::move(touch_residuals),
                         std::hypot(plan.noise.probe_m, plan.noise.machine_m),
                         std::move(cause),

@@ -83,10 +83,8 @@ void set_statistics(Solution& solution, const JointSystem& system, const SharedE
 
 Result<JointSystem> joint_system(const Observations& o, const NuisanceOptions& options) {
   JointSystem system{nominal_touches(o.bar.pattern, o.plan.tip_radius_m), SharedUnknowns(o), {}};
-  RootsOfNoise roots(o.plan.noise);
   for (std::size_t i = 0; i < o.positions.size(); ++i) {
-    Result<PositionSystem> position =
-        position_system(o, i, system.touches, system.shared, roots, options);
+    Result<PositionSystem> position = position_system(o, i, system.shared, options);
     if (!position) {
       return tl::unexpected(position.error());
     }

@@ -35,12 +35,28 @@ void keep_better(LikelyCause& best, Cause cause, const Result<Statistics>& found
   }
 }
 
+/// Without all passes with the position and tool of a pass.
+Observations without_clamping(const Observations& all, std::size_t pass) {
+  const std::size_t position = all.passes[pass].position, tool = all.passes[pass].tool;
+  Observations rest = all;
+  for (std::size_t i = all.passes.size(); i-- > 0;) {
+    if (all.passes[i].position == position && all.passes[i].tool == tool) {
+      rest = without_pass(rest, i);
+    }
+  }
+  return rest;
+}
+
 void try_drift(LikelyCause& best, const Observations& o, const SolveOptions& options) {
   NuisanceOptions with_drift = nuisance_options(options);
   with_drift.u_rate_of_every_pass_m = kDriftSearched_m;
+  const bool all_pairs = std::all_of(o.passes.begin(), o.passes.end(),
+                                     [](const PassObservation& p) { return p.pair.has_value(); });
   keep_better(best, Cause::Drift, joint_statistics(o, with_drift),
-              "the bar or the machine drifts during the passes: measure each pass forward and "
-              "backward");
+              all_pairs ? "the drift is not linear within a pair of passes: wait until bar and "
+                          "machine have the same temperature"
+                        : "the bar or the machine drifts during the passes: measure each pass "
+                          "forward and backward");
 }
 
 void try_holes(LikelyCause& best, const Observations& o, const Solution& solution,
@@ -81,7 +97,7 @@ void try_measurements(LikelyCause& best, const Observations& o, const Solution& 
   for (const std::size_t pass : largest(chi2, kMostTried)) {
     const PassResiduals& residuals = solution.residuals[pass];
     keep_better(best, Cause::Measurement,
-                joint_statistics(without_pass(o, pass), nuisance_options(options)),
+                joint_statistics(without_clamping(o, pass), nuisance_options(options)),
                 message("measurement ", residuals.measurement,
                         " is left out: the bar moved in its clamping, the stylus changed, or "
                         "touches of one feature are wrong (the largest residual is at ",
@@ -107,8 +123,11 @@ LikelyCause likely_cause(const Observations& o, const Solution& solution,
   const double excess = s.all_chi2_per_dof - 1.0,
                left = std::max(0.0, best.chi2_per_dof_without - 1.0);
   constexpr double kMostLeft = 0.5;
-  const std::string numbers = message("chi-square per degree of freedom is ", s.chi2_per_dof,
-                                      ", at most ", s.chi2_per_dof_limit);
+  const bool of_all = s.all_chi2_per_dof > s.all_chi2_per_dof_limit;
+  const std::string numbers = message("chi-square per degree of freedom",
+                                      of_all ? " (with the calibration of the bar)" : "", " is ",
+                                      of_all ? s.all_chi2_per_dof : s.chi2_per_dof, ", at most ",
+                                      of_all ? s.all_chi2_per_dof_limit : s.chi2_per_dof_limit);
   if (best.cause == Cause::Unknown || left > kMostLeft * excess) {
     return {Cause::Unknown,
             numbers +

@@ -134,10 +134,12 @@ Result<void> place_touches(Observations& o, PassObservation& pass, NominalBar& n
   const BarPose& pose = o.positions[pass.position].pose;
   pass.dO_dtouch = *std::move(derivatives);
   pass.reading_m.clear();
+  pass.normal.clear();
   pass.time.resize(std::ssize(places));
   for (std::size_t i = 0; i < places.size(); ++i) {
     const NominalTouch& touch = nominal.touches()[places[i]];
     pass.reading_m.emplace_back(pose.origin_m + pose.axes * touch.tip_m - m.tool_offset_m);
+    pass.normal.push_back(touch.outward);
     pass.time(static_cast<Eigen::Index>(i)) = time[i] + (pass.second_of_pair ? 1.0 : 0.0);
     if (Result<void> inside = check_inside(pass.reading_m.back(), o.basis.layout().nodes());
         !inside) {
@@ -157,7 +159,7 @@ Eigen::VectorXd sag_of_points(const Observations& o, const PassObservation& pass
     for (std::size_t i = 0; i < pass.touched.size(); ++i) {
       const NominalTouch& touch = touches[pass.touched[i]];
       along_normal(static_cast<Eigen::Index>(i)) =
-          touch.outward.dot(sag_m(*o.bar.sag, touch.tip_m.x(), gravity));
+          pass.normal[i].dot(sag_m(*o.bar.sag, touch.tip_m.x(), gravity));
     }
   }
   return pass.dO_dtouch * along_normal;

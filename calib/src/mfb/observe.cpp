@@ -46,12 +46,17 @@ Result<void> check_calibrated_places(const ExtractedBar& bar, const Bar& calibra
   return {};
 }
 
-Result<void> check_orientation(const ExtractedBar& bar, const TouchPattern& pattern) {
-  if (!pattern.has_signature()) {
+/// The signature is the calibrated y of the holes, which contains the nominal shifts.
+Result<void> check_orientation(const ExtractedBar& bar, const Bar& calibrated) {
+  if (!calibrated.pattern.has_signature()) {
     return {};
   }
+  std::vector<double> signature_m;
+  for (const Vector3& O : calibrated.O_m) {
+    signature_m.push_back(O.y());
+  }
   const std::vector<Vector3> O_bar_m = in_bar_frame(bar);
-  const Result<OrientationFit> fit = orientation_of(O_bar_m, pattern.hole_y_m);
+  const Result<OrientationFit> fit = orientation_of(O_bar_m, signature_m);
   if (!fit) {
     return tl::unexpected(fit.error());
   }
@@ -60,7 +65,7 @@ Result<void> check_orientation(const ExtractedBar& bar, const TouchPattern& patt
   }
   return failure(ErrorCode::NotApplicable,
                  message("the bar lies ", name(fit->orientation), ": ", kMmPerM * fit->rms_m,
-                         " mm against ", kMmPerM * rms_to_signature(O_bar_m, pattern.hole_y_m),
+                         " mm against ", kMmPerM * rms_to_signature(O_bar_m, signature_m),
                          " mm as planned: turn it and measure again"));
 }
 
@@ -88,7 +93,7 @@ Result<ExtractedBar> checked_bar(const Observations& o, const PassObservation& p
       .and_then([&](ExtractedBar bar) -> Result<ExtractedBar> {
         Result<void> valid =
             check_features(bar.features, pattern, o.plan.tip_radius_m, bar.pose, limits)
-                .and_then([&] { return check_orientation(bar, pattern); })
+                .and_then([&] { return check_orientation(bar, o.bar); })
                 .and_then([&] { return check_beside_plan(bar.pose, planned, limits); })
                 .and_then([&] { return check_calibrated_places(bar, o.bar, limits); });
         if (!valid) {
@@ -100,6 +105,23 @@ Result<ExtractedBar> checked_bar(const Observations& o, const PassObservation& p
         error.text = message(o.plan.measurements[pass.measurement].name, ": ", error.text);
         return error;
       });
+}
+
+/// Derivatives and normals of the bar as it was touched: features may be 1 mm beside the pattern,
+/// and some combinations of O_i have a noise of a few nm.
+void set_derivatives_of_touches(const Observations& o, PassObservation& pass,
+                                const std::vector<Vector3>& tips_m) {
+  const BarPose& pose = o.positions[pass.position].pose;
+  std::vector<Vector3> in_bar_m;
+  for (const Vector3& tip_m : tips_m) {
+    in_bar_m.emplace_back(pose.axes.transpose() * (tip_m - pose.origin_m));
+  }
+  const Result<PointsOfInterest> points =
+      points_of_interest(bar_touches(o.bar.pattern, pass.touched, in_bar_m), Matrix3::Identity());
+  if (points) {  // else those of the nominal bar remain
+    pass.dO_dtouch = points->dO_dtouch;
+    pass.normal = points->normals;
+  }
 }
 
 void set_deviations(const Observations& o, PassObservation& pass, const std::vector<Vector3>& O_m,
@@ -133,6 +155,7 @@ Result<void> observe_pass(Observations& o, PassObservation& pass, const PassTouc
   if (Result<void> placed = place_touches(o, pass, nominal, sorted->place, sorted->time); !placed) {
     return placed;
   }
+  set_derivatives_of_touches(o, pass, sorted->tip_m);
   set_deviations(o, pass, found->O_m, nominal.touches());
   return {};
 }

@@ -60,8 +60,7 @@ RowMajorRows without_curvatures(const RowMajorRows& cells, const estimation::Tab
   return rows;
 }
 
-RowMajorRows model_rows(const Observations& o, const PassObservation& pass,
-                        const std::vector<NominalTouch>& touches) {
+RowMajorRows model_rows(const Observations& o, const PassObservation& pass) {
   const BarPose& pose = o.positions[pass.position].pose;
   const Vector3& tool_m = o.plan.measurements[pass.measurement].tool_offset_m;
   const auto tables = static_cast<Eigen::Index>(o.basis.layout().squareness_offset());
@@ -72,19 +71,18 @@ RowMajorRows model_rows(const Observations& o, const PassObservation& pass,
     estimation::ModelColumns columns(memory);
     estimation::append_cell_columns(o.basis, {.q_m = pass.reading_m[k], .tool_offset_m = tool_m},
                                     columns);
-    const Vector3 normal = pose.axes * touches[pass.touched[k]].outward;
+    const Vector3 normal = pose.axes * pass.normal[k];
     add_touch(cells, pass.dO_dtouch, static_cast<Eigen::Index>(k), normal, columns.span());
   }
   return without_curvatures(cells, o.basis);
 }
 
 /// Effect of a displacement of the touches by `weight` of each along the three bar axes: 3N x 3.
-Eigen::MatrixXd displaced(const PassObservation& pass, const std::vector<NominalTouch>& touches,
-                          const Eigen::VectorXd& weight) {
+Eigen::MatrixXd displaced(const PassObservation& pass, const Eigen::VectorXd& weight) {
   Eigen::MatrixXd along(std::ssize(pass.touched), 3);
   for (std::size_t k = 0; k < pass.touched.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
-    along.row(row) = weight(row) * touches[pass.touched[k]].outward.transpose();
+    along.row(row) = weight(row) * pass.normal[k].transpose();
   }
   return pass.dO_dtouch * along;
 }
@@ -134,9 +132,9 @@ NuisanceLayout nuisance_layout(const Observations& o, std::size_t position,
 }
 
 RowMajorRows shared_rows(const Observations& o, const PassObservation& pass,
-                         const std::vector<NominalTouch>& touches, const SharedUnknowns& shared) {
+                         const SharedUnknowns& shared) {
   RowMajorRows rows(pass.dO_dtouch.rows(), shared.size());
-  shared.reduce(model_rows(o, pass, touches), rows.leftCols(shared.parameters()));
+  shared.reduce(model_rows(o, pass), rows.leftCols(shared.parameters()));
   rows.middleCols(shared.bar_offset(), shared.bar_root().cols()) = shared.bar_root();
   if (shared.alphas() > 0) {
     const double warmer_K = pass.temperature_K - kReferenceTemperature_K;
@@ -149,8 +147,8 @@ RowMajorRows shared_rows(const Observations& o, const PassObservation& pass,
 }
 
 Eigen::MatrixXd nuisance_rows(const Observations& o, const PassObservation& pass,
-                              std::size_t number, const std::vector<NominalTouch>& touches,
-                              const NuisanceLayout& layout, const NuisanceOptions& options) {
+                              std::size_t number, const NuisanceLayout& layout,
+                              const NuisanceOptions& options) {
   Eigen::MatrixXd L = Eigen::MatrixXd::Zero(pass.dO_dtouch.rows(), layout.size);
   const Vector3 middle_m = 0.5 * o.bar.O_m.back();
   const double alpha_per_K = o.bar.expansion ? o.bar.expansion->alpha_per_K : 0.0;
@@ -173,12 +171,12 @@ Eigen::MatrixXd nuisance_rows(const Observations& o, const PassObservation& pass
 
   if (pass.pair && options.drift) {
     L.middleCols<3>(layout.pairs + 6 * static_cast<Eigen::Index>(*pass.pair)) =
-        displaced(pass, touches, pass.time);
+        displaced(pass, pass.time);
   }
   if (layout.temperature > layout.rates) {
     const Eigen::VectorXd from_middle = pass.time.array() - pass.time.mean();
     L.middleCols<3>(layout.rates + 3 * static_cast<Eigen::Index>(number)) =
-        displaced(pass, touches, from_middle);
+        displaced(pass, from_middle);
   }
   return L;
 }

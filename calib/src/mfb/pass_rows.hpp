@@ -37,10 +37,10 @@ struct NuisanceOptions {
 
 /// 3N rows by the free parameters, the bar and alpha.
 [[nodiscard]] RowMajorRows shared_rows(const Observations&, const PassObservation&,
-                                       const std::vector<NominalTouch>&, const SharedUnknowns&);
+                                       const SharedUnknowns&);
 /// 3N rows by the unknowns of the position. `number`: of the pass in its position.
 [[nodiscard]] Eigen::MatrixXd nuisance_rows(const Observations&, const PassObservation&,
-                                            std::size_t number, const std::vector<NominalTouch>&,
-                                            const NuisanceLayout&, const NuisanceOptions&);
+                                            std::size_t number, const NuisanceLayout&,
+                                            const NuisanceOptions&);
 
 }  // namespace abbe::calib::mfb

@@ -23,9 +23,11 @@ std::vector<StyliOfPosition> styli_choices(const PlanTask& task, std::size_t hol
   return choices;
 }
 
-/// Ends and middle of an interval; one value if it is short.
-std::vector<double> places_between(double min_m, double max_m) {
+/// Ends and middle of an interval without its margins; one value if it is short.
+std::vector<double> places_between(double min_m, double max_m, double margin_m) {
   constexpr double kShort_m = 10e-3;
+  min_m += margin_m;
+  max_m -= margin_m;
   if (max_m - min_m < kShort_m) {
     return {0.5 * (min_m + max_m)};
   }
@@ -84,8 +86,8 @@ class CandidateList {
     const auto u = (k + 1) % 3, v = (k + 2) % 3;
     Vector3 origin_m;
     origin_m(k) = start_m + task_.styli[styli.front()].tool_offset_m(k);
-    for (const double u_m : places_between(room.min_m(u), room.max_m(u))) {
-      for (const double v_m : places_between(room.min_m(v), room.max_m(v))) {
+    for (const double u_m : places_across(room, u)) {
+      for (const double v_m : places_across(room, v)) {
         origin_m(u) = u_m;
         origin_m(v) = v_m;
         if (const auto fitting_m = placer_.nearest(axes, styli, origin_m)) {
@@ -102,10 +104,17 @@ class CandidateList {
     const BarPlacer::Room room = placer_.room(axes, styli);
     const auto h = static_cast<Eigen::Index>(holes);
     Vector3 origin_m = 0.5 * (room.min_m + room.max_m);
-    for (const double at_m : places_between(room.min_m(h), room.max_m(h))) {
+    for (const double at_m : places_across(room, h)) {
       origin_m(h) = at_m;
       all_.push_back({label, {origin_m, axes}, styli});
     }
+  }
+
+  /// Across the bar all touches are within the travel.
+  [[nodiscard]] std::vector<double> places_across(const BarPlacer::Room& room,
+                                                  Eigen::Index k) const {
+    return places_between(room.min_m(k), room.max_m(k),
+                          placer_.overhang_m(static_cast<std::size_t>(k)));
   }
 
   const PlanTask& task_;

@@ -10,7 +10,8 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// How a bar is clamped on the table with both axes at zero, if it is in a position at these angles.
+/// How a bar is clamped on the table with both axes at zero if it is in a position at these
+/// angles.
 struct Clamping {
   Matrix3 axes;
   Vector3 middle_m;  ///< of the bar, from the centre
@@ -95,6 +96,26 @@ const Clamping* find_same(const std::vector<Clamping>& all, const Clamping& want
   return found == all.end() ? nullptr : &*found;
 }
 
+/// The clamping that gives most of the positions that are not done; null: all are done.
+const Clamping* most_useful(const std::vector<std::vector<Clamping>>& possible,
+                            const std::vector<bool>& done) {
+  const Clamping* best = nullptr;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < possible.size(); ++i) {
+    for (std::size_t c = 0; !done[i] && c < possible[i].size(); ++c) {
+      std::size_t count = 0;
+      for (std::size_t k = 0; k < possible.size(); ++k) {
+        count += !done[k] && find_same(possible[k], possible[i][c]) != nullptr ? 1 : 0;
+      }
+      if (count > most) {
+        most = count;
+        best = &possible[i][c];
+      }
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 std::vector<IndexedPosition> indexed_positions(const std::vector<PlannedPosition>& positions,
@@ -107,33 +128,17 @@ std::vector<IndexedPosition> indexed_positions(const std::vector<PlannedPosition
 
   std::vector<IndexedPosition> indexed(positions.size());
   std::vector<bool> done(positions.size(), false);
-  for (std::size_t clamping = 0; std::find(done.begin(), done.end(), false) != done.end();
-       ++clamping) {
-    const Clamping* best = nullptr;
-    std::size_t most = 0;
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-      for (std::size_t c = 0; !done[i] && c < possible[i].size(); ++c) {
-        std::size_t count = 0;
-        for (std::size_t k = 0; k < positions.size(); ++k) {
-          count += !done[k] && find_same(possible[k], possible[i][c]) != nullptr ? 1 : 0;
-        }
-        if (count > most) {
-          most = count;
-          best = &possible[i][c];
-        }
-      }
-    }
-    if (best == nullptr) {
-      break;
-    }
-    const Clamping chosen = *best;
+  std::size_t clamping = 0;
+  for (const Clamping* chosen = most_useful(possible, done); chosen != nullptr;
+       chosen = most_useful(possible, done)) {
     for (std::size_t k = 0; k < positions.size(); ++k) {
-      const Clamping* at = done[k] ? nullptr : find_same(possible[k], chosen);
+      const Clamping* at = done[k] ? nullptr : find_same(possible[k], *chosen);
       if (at != nullptr) {
         indexed[k] = {clamping, at->swivel_rad, at->turn_rad};
         done[k] = true;
       }
     }
+    ++clamping;
   }
   return indexed;
 }

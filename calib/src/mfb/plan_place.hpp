@@ -43,7 +43,7 @@ class BarPlacer {
   [[nodiscard]] ReadingRange readings(const Matrix3& axes,
                                       std::span<const std::size_t> styli) const;
   /// Places of O_1 between which all readings are possible, with all holes in the volume that a
-  /// stylus along the ram reaches (a stylus across it reaches further, beside the table); min > max:
+  /// stylus along the ram reaches (a stylus across it reaches places beside the table); min > max:
   /// none.
   struct Room {
     Vector3 min_m, max_m;

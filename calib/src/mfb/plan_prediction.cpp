@@ -96,9 +96,7 @@ Result<PositionInformation> PlanPredictor::position(std::span<const Measurement>
                                                 o->positions.size(), " positions"));
   }
 
-  RootsOfNoise roots(plan.noise);
-  return position_system(*o, 0, nominal_touches(parts_->bar.pattern, plan.tip_radius_m),
-                         parts_->shared, roots, nuisance_options(parts_->options))
+  return position_system(*o, 0, parts_->shared, nuisance_options(parts_->options))
       .map([&](PositionSystem system) {
         return PositionInformation{o->positions.front().name, std::move(system.E),
                                    static_cast<std::size_t>(system.y.size()),

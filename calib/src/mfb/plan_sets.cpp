@@ -214,7 +214,8 @@ class SetPlacer {
     return offset_m;
   }
 
-  /// The styli need more travel along the holes than there is, or the bar does not fit in its plane.
+  /// The styli need more travel along the holes than there is, or the bar is too long for its
+  /// plane.
   [[nodiscard]] tl::unexpected<Error> does_not_fit(const Entry& e, const std::string& label,
                                                    const Vector3& z,
                                                    const std::vector<std::size_t>& styli) const {

@@ -9,6 +9,32 @@
 namespace abbe::calib::mfb {
 namespace {
 
+/// Standard uncertainty of each coordinate of O_i for what the rows neglect: 1 to 10 nm of the
+/// exact transforms, and the derivatives of the nominal bar instead of the real one. Without it
+/// some combinations of O_i would have a noise far below that: the N values O_z depend on the
+/// heights of N - 1 rods, so that without the shifts of the signature their covariance is singular.
+constexpr double kNeglected_m = 3e-9;
+
+/// D D^T. A touch has an effect on few O_i.
+Eigen::MatrixXd times_own_transpose(const Eigen::MatrixXd& D) {
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(D.rows(), D.rows());
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index k = 0; k < D.cols(); ++k) {
+    rows.clear();
+    for (Eigen::Index i = 0; i < D.rows(); ++i) {
+      if (D(i, k) != 0.0) {
+        rows.push_back(i);
+      }
+    }
+    for (const Eigen::Index i : rows) {
+      for (const Eigen::Index j : rows) {
+        product(i, j) += D(i, k) * D(j, k);
+      }
+    }
+  }
+  return product;
+}
+
 Eigen::Index priors_of(const NuisanceLayout& layout) {
   return std::count_if(layout.u.begin(), layout.u.end(), [](double u) { return std::isfinite(u); });
 }
@@ -99,20 +125,17 @@ Result<void> eliminate_nuisances(PositionSystem& s, const std::string& position)
 
 }  // namespace
 
-RootsOfNoise::RootsOfNoise(const TouchNoise& noise)
-    : variance_m2_(noise.probe_m * noise.probe_m + noise.machine_m * noise.machine_m) {}
-
-Result<std::shared_ptr<const RootOfNoise>> RootsOfNoise::of(const PassObservation& pass) {
-  std::shared_ptr<const RootOfNoise>& known = known_[pass.touched];
-  if (!known) {
-    known = std::make_shared<RootOfNoise>(
-        Eigen::MatrixXd(variance_m2_ * pass.dO_dtouch * pass.dO_dtouch.transpose()));
-  }
-  if (known->info() != Eigen::Success) {
+Result<std::shared_ptr<const RootOfNoise>> root_of_noise(const TouchNoise& noise,
+                                                         const PassObservation& pass) {
+  const double variance_m2 = noise.probe_m * noise.probe_m + noise.machine_m * noise.machine_m;
+  Eigen::MatrixXd covariance_m2 = variance_m2 * times_own_transpose(pass.dO_dtouch);
+  covariance_m2.diagonal().array() += kNeglected_m * kNeglected_m;
+  auto root = std::make_shared<const RootOfNoise>(covariance_m2);
+  if (root->info() != Eigen::Success) {
     return failure(ErrorCode::DegenerateGeometry,
                    "bar: the touches do not determine all points of interest");
   }
-  return known;
+  return root;
 }
 
 Eigen::VectorXd PositionSystem::nuisances(const Eigen::VectorXd& x) const {
@@ -120,8 +143,7 @@ Eigen::VectorXd PositionSystem::nuisances(const Eigen::VectorXd& x) const {
 }
 
 Result<PositionSystem> position_system(const Observations& o, std::size_t position,
-                                       const std::vector<NominalTouch>& touches,
-                                       const SharedUnknowns& shared, RootsOfNoise& roots,
+                                       const SharedUnknowns& shared,
                                        const NuisanceOptions& options) {
   PositionSystem s;
   s.passes = passes_of(o, position);
@@ -134,13 +156,12 @@ Result<PositionSystem> position_system(const Observations& o, std::size_t positi
 
   for (std::size_t k = 0; k < s.passes.size(); ++k) {
     const PassObservation& pass = o.passes[s.passes[k]];
-    const auto root = roots.of(pass);
+    const auto root = root_of_noise(o.plan.noise, pass);
     if (!root) {
       return tl::unexpected(root.error());
     }
-    append_pass(s, s.rows_of_pass * static_cast<Eigen::Index>(k),
-                shared_rows(o, pass, touches, shared),
-                nuisance_rows(o, pass, k, touches, s.layout, options), pass.delta_m, **root);
+    append_pass(s, s.rows_of_pass * static_cast<Eigen::Index>(k), shared_rows(o, pass, shared),
+                nuisance_rows(o, pass, k, s.layout, options), pass.delta_m, **root);
     s.root.push_back(*root);
   }
   if (Result<void> done = eliminate_nuisances(s, o.positions[position].name); !done) {

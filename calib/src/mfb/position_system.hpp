@@ -5,7 +5,6 @@
 ///                   [E 0 e]      what the position states about x
 
 #include <Eigen/Cholesky>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -14,19 +13,11 @@
 
 namespace abbe::calib::mfb {
 
-/// Root L of the covariance C_O = L L^T of the points of a pass, by its set of touches. Equal sets
-/// have one root.
+/// Root L of the covariance C_O = L L^T of the points of a pass. DegenerateGeometry if the touches
+/// do not determine all points.
 using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
-class RootsOfNoise {
- public:
-  explicit RootsOfNoise(const TouchNoise&);
-  /// DegenerateGeometry if the covariance is not positive definite.
-  [[nodiscard]] Result<std::shared_ptr<const RootOfNoise>> of(const PassObservation&);
-
- private:
-  double variance_m2_ = 0.0;
-  std::map<std::vector<std::size_t>, std::shared_ptr<const RootOfNoise>> known_;
-};
+[[nodiscard]] Result<std::shared_ptr<const RootOfNoise>> root_of_noise(const TouchNoise&,
+                                                                       const PassObservation&);
 
 struct PositionSystem {
   std::vector<std::size_t> passes;  ///< in Observations::passes; their rows follow each other
@@ -48,9 +39,7 @@ struct PositionSystem {
 
 /// RankDeficient if the rows do not determine the nuisances.
 [[nodiscard]] Result<PositionSystem> position_system(const Observations&, std::size_t position,
-                                                     const std::vector<NominalTouch>&,
-                                                     const SharedUnknowns&, RootsOfNoise&,
-                                                     const NuisanceOptions&);
+                                                     const SharedUnknowns&, const NuisanceOptions&);
 
 /// E^T Q_E^T W as a matrix of the data: shared unknowns x data rows, W: whitening. With the
 /// covariance C of the shared unknowns, C times it is the derivative of x by delta.

@@ -21,8 +21,8 @@ struct NuisanceRow {
 
 void set_residuals(Solution&, const Observations&, const JointSystem&, const SharedEstimate&);
 /// Degrees of freedom of each pass: its rows less their diagonal elements of the hat matrix. Row i
-/// of the whitened [A L] has the element |row i of L R^-1|^2 + |row i of (A - L R^-1 G) X|^2, X X^T:
-/// covariance of the shared unknowns.
+/// of the whitened [A L] has the element |row i of L R^-1|^2 + |row i of (A - L R^-1 G) X|^2, X
+/// X^T: covariance of the shared unknowns.
 void set_degrees_of_freedom(Solution&, const JointSystem&, const SharedEstimate&);
 
 }  // namespace abbe::calib::mfb

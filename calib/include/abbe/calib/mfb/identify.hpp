@@ -24,6 +24,8 @@ struct SetAsideOptions {
   double limit = 5.0;
   /// More touches than this share of a pass are not single outliers: the rest is left in.
   double most_of_pass = 0.02;
+  /// The same for all passes together.
+  double most_of_all = 0.01;
 };
 
 struct Options {
@@ -66,6 +68,9 @@ struct Identification {
   /// of the touched readings inside the nodes: every error is determined at every node.
   VolumetricModel model;
   std::vector<SetAsideTouch> set_aside;
+  /// Features whose touches do not fit together, but too many are wrong or missing to find out
+  /// which: "X2: hole 3". Their touches are used.
+  std::vector<std::string> unresolved_features;
   std::vector<TouchResidual> touch_residuals;
   double u_touch_m = 0.0;  ///< standard uncertainty of a touch along the normal
   LikelyCause cause;

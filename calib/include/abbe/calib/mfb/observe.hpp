@@ -6,8 +6,8 @@
 ///     delta_i = R^T (O_i,read - J - p) - O_i(T) - sag
 ///             = -sum_k D_ik n_k . R^T V(q_k, t) + pose, tool, drift + corrections of O_i + noise
 /// D: derivative of O_i by a displacement of touch k along its normal n_k (points_of_interest.hpp)
-/// of the nominal bar, at the centres of the tip; V: error of the machine at the reading q_k of the
-/// touch. Rows are in bar axes. Units: m, rad.
+/// at the centres of the tip, of the bar as it was touched; V: error of the machine at the reading
+/// q_k of the touch. Rows are in bar axes. Units: m, rad.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -43,6 +43,7 @@ struct PassObservation {
   double temperature_K = kReferenceTemperature_K;
   std::vector<std::size_t> touched;  ///< place of each used touch in the fixed order
   std::vector<Vector3> reading_m;    ///< of each used touch, nominal, at the pose
+  std::vector<Vector3> normal;       ///< outward normal of each used touch, bar axes
   Eigen::VectorXd time;              ///< of each used touch; 1 per pass
   /// Derivatives of O_i in bar axes by a displacement of each used touch along its normal: 3N x
   /// used touches.

@@ -1,7 +1,8 @@
 #pragma once
 /// The set of positions with the smallest worst uncertainty (PlanPrediction::worst): beginning with
-/// a named set, positions are replaced by candidates (candidate_positions()) with the same number of
-/// measurements as long as the worst uncertainty falls. Deterministic. Units: m, rad, s.
+/// a named set, positions are replaced by candidates (candidate_positions()) with as many styli
+/// while the mean uncertainty falls and the worst one does not increase. Deterministic. Units: m,
+/// rad, s.
 
 #include <functional>
 

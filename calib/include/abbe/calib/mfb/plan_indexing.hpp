@@ -1,6 +1,6 @@
 #pragma once
-/// Positions of the bar that one clamping on a table with two rotary axes gives: a swivel axis A' or
-/// B', which carries a rotary axis C'. The pose of every position is estimated, so errors of the
+/// Positions of the bar that one clamping on a table with two rotary axes gives: a swivel axis A'
+/// or B', which carries a rotary axis C'. The pose of every position is estimated, so errors of the
 /// rotary axes have no effect on the result; only their repeatability within a pass counts.
 ///     R_bar = R_swivel(s) R_z(c) R_clamped,   p - centre = R_swivel(s) R_z(c) p_clamped
 /// Units: m, rad. Pure.
@@ -24,7 +24,7 @@ struct IndexedPosition {
 };
 
 /// One for each position. Few clampings: repeatedly the one that gives most of the positions that
-/// are left.
+/// are left. The range of the swivel axis must contain 0.
 [[nodiscard]] std::vector<IndexedPosition> indexed_positions(const std::vector<PlannedPosition>&,
                                                              const Bar&, const RotaryTable&);
 [[nodiscard]] std::size_t clampings_of(const std::vector<IndexedPosition>&);

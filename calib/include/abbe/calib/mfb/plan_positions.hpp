@@ -3,8 +3,8 @@
 /// [Viprey 2016], adapted to travel, styli and bar. Whether a set shows the 21 errors is the matter
 /// of plan_prediction.hpp. Collisions are not considered. Units: m, rad. Pure.
 ///
-/// Roles: a, b, c are the axes from workpiece to tool. A bar across an axis shows its angular errors
-/// by the distance between two positions for a and b, but by different tools only for c.
+/// Roles: a, b, c are the axes from workpiece to tool. Angular errors of a and b are shown by two
+/// positions that are apart across the bar, those of c by different tools only.
 
 #include <array>
 #include <optional>
@@ -20,8 +20,8 @@ struct Stylus {
   Vector3 tool_offset_m = Vector3::Zero();  ///< t: tool reference point to the centre of the tip
   Vector3 stem = -Vector3::UnitZ();         ///< unit vector from the shank to the tip
 };
-/// The stem of a stylus of a star: the direction across the ram (last axis of the chain), if the tip
-/// is at least 20 mm beside it, else along the ram.
+/// The stem of a stylus of a star: across the ram (last axis of the chain) if the tip is at least
+/// 20 mm beside it, else along the ram.
 [[nodiscard]] Stylus stylus_of(const Vector3& tool_offset_m, const KinematicChain&);
 
 /// For what is planned. A stylus enters the holes along its stem from the probing side of the bar,
@@ -81,13 +81,13 @@ struct PlannedSet {
 
 /// A set, scaled to the travel. An axis longer than the bar gets several bars that overlap; along a
 /// shorter one the bar is inclined. `centre_m`: where two rotary axes cross, for NamedSet::Indexed;
-/// default: middle_of_travel(). The errors of check(); NotApplicable if a bar does not fit, with the
-/// travel that is needed.
+/// default: middle_of_travel(). The errors of check(); NotApplicable if a bar does not fit: the text
+/// states the travel that is needed.
 [[nodiscard]] Result<PlannedSet> named_set(NamedSet, const PlanTask&,
                                            const std::optional<Vector3>& centre_m = {});
 
-/// More positions than any set has: bars along each axis, at least 3 x 3 places across it, each roll
-/// that the styli allow, one stylus or two of opposite stem, and both diagonals of each plane.
+/// More positions than any set has: bars along each axis at 3 x 3 places across it, each roll that
+/// the styli allow, one stylus or two of opposite stem, and both diagonals of each plane.
 [[nodiscard]] Result<std::vector<PlannedPosition>> candidate_positions(const PlanTask&);
 
 /// The measurements of all positions in this order: each stylus forward and, with

@@ -1,0 +1,324 @@
+#include "abbe/calib/mfb/bar_calibration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "abbe/calib/mfb/reversal.hpp"
+#include "message.hpp"
+#include "mfb/gauge_line.hpp"
+#include "mfb/outlying_features.hpp"
+#include "student_tail.hpp"
+#include "units.hpp"
+
+namespace abbe::calib::mfb {
+namespace {
+
+constexpr double kBeside_m = 1e-3;  // a gauge farther from the bar is beside it
+
+/// A measuring machine without limits of travel: only its readings are used.
+Result<MfbMachine> machine_without_limits() {
+  constexpr double kFar_m = 100.0;
+  Result<KinematicChain> chain = KinematicChain::parse("[w b X Y Z t]");
+  if (!chain) {
+    return tl::unexpected(chain.error());
+  }
+  MfbMachine machine{*chain, {}};
+  for (auto& axis : machine.nodes) {
+    axis.nodes_m = {-kFar_m, -0.5 * kFar_m, 0.5 * kFar_m, kFar_m};
+  }
+  return machine;
+}
+
+Result<AlongBar> along_bar(const Plan& plan) {
+  constexpr double kMostFromAxis_rad = 20e-3;
+  const Vector3 first = plan.measurements.front().bar_x.normalized();
+  AlongBar along;
+  first.cwiseAbs().maxCoeff(&along.axis);
+  along.sign = first(along.axis) < 0.0 ? -1.0 : 1.0;
+
+  for (const Measurement& m : plan.measurements) {
+    const Vector3 x = m.bar_x.normalized();
+    const double off = (x - along.sign * Vector3::Unit(along.axis)).norm();
+    if (off > kMostFromAxis_rad) {
+      return failure(ErrorCode::BadInput,
+                     message(m.name, ": bar_x is ", 1e3 * off, " mrad from ",
+                             along.sign < 0.0 ? "-" : "", "XYZ"[along.axis],
+                             ": for a calibration the bar lies along one axis in all passes"));
+    }
+  }
+  return along;
+}
+
+/// True for each reversed pass.
+Result<std::vector<bool>> reversed_passes(const Plan& plan) {
+  const Vector3 normal = plan.measurements.front().bar_z.normalized();
+  std::vector<bool> reversed;
+  std::set<std::string> positions;
+  for (const Measurement& m : plan.measurements) {
+    constexpr double kParallel = 0.999;
+    const double cosine = normal.dot(m.bar_z.normalized());
+    if (std::abs(cosine) < kParallel) {
+      return failure(ErrorCode::BadInput,
+                     message(m.name,
+                             ": bar_z is neither that of the first pass (normal) nor its "
+                             "opposite (reversed)"));
+    }
+    if (!positions.insert(m.position).second) {
+      return failure(ErrorCode::BadInput,
+                     message(m.name, ": position \"", m.position,
+                             "\" has two passes: clamp the bar again for every pass"));
+    }
+    reversed.push_back(cosine < 0.0);
+  }
+  return reversed;
+}
+
+/// Readings along the bar at its holes, and the place of its line: means over all passes.
+struct LineOfBar {
+  std::vector<double> along_m;
+  Vector3 middle_m = Vector3::Zero();  ///< centre of the tip, machine axes
+};
+
+LineOfBar line_of_bar(const Observations& o, const AlongBar& along) {
+  const std::size_t holes = o.bar.O_m.size();
+  const auto passes = static_cast<double>(o.passes.size());
+  LineOfBar line{std::vector<double>(holes, 0.0)};
+  for (const PassObservation& pass : o.passes) {
+    const BarPose& pose = o.positions[pass.position].pose;
+    const Measurement& m = o.plan.measurements[pass.measurement];
+    const std::vector<Vector3> O_m = O_at(o.bar, pass.temperature_K);
+    for (std::size_t i = 0; i < holes; ++i) {
+      const Vector3 off_m = pass.delta_m.segment<3>(3 * static_cast<Eigen::Index>(i));
+      const Vector3 place_m = pose.origin_m + pose.axes * (O_m[i] + off_m);
+      line.along_m[i] += along.of(Vector3(place_m - m.tool_offset_m)) / passes;
+    }
+    line.middle_m += (pose.origin_m + 0.5 * pose.axes * O_m.back()) / passes;
+  }
+  return line;
+}
+
+/// Deviations in the axes of a normal pass, at 20 degC.
+BarPass deviations_of(const Observations& o, const PassObservation& pass, bool reversed) {
+  const double alpha_per_K = o.bar.expansion ? o.bar.expansion->alpha_per_K : 0.0;
+  const double growth = 1.0 + alpha_per_K * (pass.temperature_K - kReferenceTemperature_K);
+  const Vector3 signs = reversed ? Vector3(1.0, -1.0, -1.0) : Vector3::Ones();
+  BarPass deviations_m;
+  for (std::size_t i = 0; i < o.bar.O_m.size(); ++i) {
+    const Vector3 delta_m = pass.delta_m.segment<3>(3 * static_cast<Eigen::Index>(i));
+    deviations_m.emplace_back(signs.cwiseProduct(delta_m / growth));
+  }
+  return deviations_m;
+}
+
+/// Relative standard uncertainty of the length of the bar by its temperature, which is common to
+/// all passes.
+double u_of_bar_temperature(const Observations& o) {
+  if (!o.bar.expansion) {
+    return 0.0;
+  }
+  double from_20_K = 0.0;
+  for (const PassObservation& pass : o.passes) {
+    from_20_K +=
+        (pass.temperature_K - kReferenceTemperature_K) / static_cast<double>(o.passes.size());
+  }
+  return std::hypot(o.bar.expansion->u_alpha_per_K * from_20_K,
+                    o.bar.expansion->alpha_per_K * o.plan.noise.u_temperature_K);
+}
+
+Result<double> u_rotation_rad(const StepGauge& gauge, const Vector3& beside_m) {
+  if (gauge.u_rotation_rad || beside_m.norm() <= kBeside_m) {
+    return gauge.u_rotation_rad.value_or(0.0);
+  }
+  return failure(
+      ErrorCode::NotApplicable,
+      message("step gauge: its line is ", kMmPerM * beside_m.norm(),
+              " mm beside that of the bar (bar axes: y ", kMmPerM * beside_m.y(), ", z ",
+              kMmPerM * beside_m.z(),
+              " mm): measure it on the line of the bar, or state u_rotation, the standard "
+              "uncertainty of the rotations of the machine"));
+}
+
+Result<void> check_origin(const StepGauge& gauge, const AlongBar& along) {
+  const double read_m = gauge.faces.front().readings_m.front() + gauge.tool_offset_m(along.axis);
+  const double off_m = read_m - gauge.origin_m(along.axis);
+  if (std::abs(off_m) <= kBeside_m) {
+    return {};
+  }
+  return failure(
+      ErrorCode::BadInput,
+      message("step gauge: reading and tool offset place the first face at ", kMmPerM * read_m,
+              " mm along the bar, its origin says ", kMmPerM * gauge.origin_m(along.axis),
+              " mm: the origin is the centre of "
+              "the tip, reading plus tool offset"));
+}
+
+/// The covariances of x of the points, apart from that of the repeats.
+struct PositioningCovariances {
+  Eigen::MatrixXd gauge_m2, abbe_m2, temperature_m2;
+};
+
+/// Contributions of all kinds to the calibrated points.
+void set_uncertainty(BarCalibration& found, const PositioningCovariances& x) {
+  const Eigen::Index holes = std::ssize(found.bar.O_m);
+  constexpr double kNormal95 = 1.959964;
+  const double factor = found.student_t95 / kNormal95;
+  Eigen::MatrixXd& covariance_m2 = found.bar.covariance_m2;
+  covariance_m2 = Eigen::MatrixXd::Zero(3 * holes, 3 * holes);
+
+  for (Eigen::Index i = 1; i < holes; ++i) {
+    const bool last = i + 1 == holes;
+    Vector3 u_m = factor * found.u_repeats_m[static_cast<std::size_t>(i)];
+    if (last) {
+      u_m.tail<2>().setZero();
+    }
+    covariance_m2.diagonal().segment<3>(3 * i) = u_m.cwiseAbs2();
+    for (Eigen::Index k = 1; k < holes; ++k) {
+      covariance_m2(3 * i, 3 * k) += x.gauge_m2(i, k) + x.abbe_m2(i, k) + x.temperature_m2(i, k);
+    }
+  }
+
+  for (Eigen::Index i = 0; i < holes; ++i) {
+    const double repeats_m =
+        i == 0 ? 0.0 : factor * found.u_repeats_m[static_cast<std::size_t>(i)].x();
+    found.positioning.push_back({repeats_m, std::sqrt(x.gauge_m2(i, i)),
+                                 std::sqrt(std::max(0.0, x.abbe_m2(i, i))),
+                                 std::sqrt(x.temperature_m2(i, i))});
+    found.u_m.emplace_back(covariance_m2.diagonal().segment<3>(3 * i).cwiseSqrt());
+  }
+}
+
+void set_points(BarCalibration& found, const Bar& nominal, const CalibratedBar& reversal) {
+  const std::size_t holes = nominal.O_m.size();
+  for (std::size_t i = 0; i < holes; ++i) {
+    found.bar.O_m[i] += reversal.error_m[i];
+  }
+  // 0 by definition of the bar axes; here they have rounding errors.
+  found.bar.O_m.front().setZero();
+  found.bar.O_m.back().tail<2>().setZero();
+  found.u_repeats_m = reversal.u_mean_m;
+  found.machine_m = reversal.machine_m;
+  found.degrees_of_freedom = reversal.degrees_of_freedom;
+  found.student_t95 = student_quantile(0.05, reversal.degrees_of_freedom);
+}
+
+void add_notes(BarCalibration& found, const StepGauge& gauge, const Bar& nominal) {
+  const double beside_m = found.gauge_beside_m.norm();
+  if (beside_m > kBeside_m) {
+    double largest_m = 0.0;
+    for (const PositioningBudget& x : found.positioning) {
+      largest_m = std::max(largest_m, x.abbe_m);
+    }
+    found.notes.push_back(message("the step gauge lies ", kMmPerM * beside_m,
+                                  " mm beside the line of the bar: rotations of the machine of ",
+                                  kUmPerM * gauge.u_rotation_rad.value_or(0.0), " urad add up to ",
+                                  kUmPerM * largest_m, " um to u(x)"));
+  }
+  if (gauge.faces.front().readings_m.size() < 2) {
+    found.notes.emplace_back(
+        "the step gauge was measured once: its repeatability is not in the uncertainty");
+  }
+  if (!nominal.pattern.has_signature()) {
+    found.notes.emplace_back(
+        "the bar has no shifted holes: a bar that lies turned is not recognised");
+  }
+}
+
+/// The passes along the bar, and where they are on the machine.
+struct MeasuredPasses {
+  Observations observed;
+  AlongBar along;
+  std::vector<bool> reversed;  ///< by measurement
+  LineOfBar line;
+};
+
+Result<MeasuredPasses> measured_passes(const Bar& nominal, const Plan& plan,
+                                       std::span<const PassTouches> touches,
+                                       const ObserveLimits& limits) {
+  const Result<MfbMachine> machine = machine_without_limits();
+  if (!machine) {
+    return tl::unexpected(machine.error());
+  }
+  Result<Observations> o = observe(nominal, plan, touches, *machine, limits);
+  if (!o) {
+    return tl::unexpected(o.error());
+  }
+  const Result<AlongBar> along = along_bar(plan);
+  if (!along) {
+    return tl::unexpected(along.error());
+  }
+  Result<std::vector<bool>> reversed = reversed_passes(plan);
+  if (!reversed) {
+    return tl::unexpected(reversed.error());
+  }
+  LineOfBar line = line_of_bar(*o, *along);
+  return MeasuredPasses{*std::move(o), *along, *std::move(reversed), std::move(line)};
+}
+
+Result<CalibratedBar> reversal_of(const MeasuredPasses& passes, const Positioning& x) {
+  ReversalRuns runs;
+  for (const PassObservation& pass : passes.observed.passes) {
+    const bool reversed = passes.reversed[pass.measurement];
+    (reversed ? runs.reversed : runs.normal)
+        .push_back(deviations_of(passes.observed, pass, reversed));
+  }
+  runs.machine_x_m.assign(x.E_m.begin(), x.E_m.end());
+  return calibrate_by_reversal(runs);
+}
+
+PositioningCovariances covariances_of(const MeasuredPasses& passes, const Positioning& x,
+                                      double beside_m, double u_rotation) {
+  const std::vector<double>& along_m = passes.line.along_m;
+  Eigen::VectorXd distance_m(std::ssize(along_m));
+  for (Eigen::Index i = 0; i < distance_m.size(); ++i) {
+    distance_m(i) = along_m[static_cast<std::size_t>(i)] - along_m.front();
+  }
+  const double u_length = u_of_bar_temperature(passes.observed);
+  return {x.covariance_m2, abbe_covariance_m2(beside_m, u_rotation, along_m),
+          u_length * u_length * distance_m * distance_m.transpose()};
+}
+
+Vector3 beside_bar_m(const StepGauge& gauge, const MeasuredPasses& passes) {
+  const Matrix3 axes = passes.observed.plan.measurements.front().axes();
+  Vector3 beside_m = axes.transpose() * (gauge.origin_m - passes.line.middle_m);
+  beside_m.x() = 0.0;
+  return beside_m;
+}
+
+}  // namespace
+
+Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
+                                     std::span<const PassTouches> touches, const StepGauge& gauge,
+                                     const ObserveLimits& limits) {
+  const Result<MeasuredPasses> passes = measured_passes(nominal, plan, touches, limits);
+  if (!passes) {
+    return tl::unexpected(passes.error());
+  }
+  const Result<Positioning> x = positioning_by_gauge(gauge, passes->along, passes->line.along_m);
+  if (!x) {
+    return tl::unexpected(x.error());
+  }
+  if (Result<void> valid = check_origin(gauge, passes->along); !valid) {
+    return tl::unexpected(valid.error());
+  }
+
+  BarCalibration found{.bar = nominal};
+  found.gauge_beside_m = beside_bar_m(gauge, *passes);
+  const Result<double> u_rotation = u_rotation_rad(gauge, found.gauge_beside_m);
+  if (!u_rotation) {
+    return tl::unexpected(u_rotation.error());
+  }
+  const Result<CalibratedBar> reversal = reversal_of(*passes, *x);
+  if (!reversal) {
+    return tl::unexpected(reversal.error());
+  }
+
+  set_points(found, nominal, *reversal);
+  set_uncertainty(found, covariances_of(*passes, *x, found.gauge_beside_m.norm(), *u_rotation));
+  found.notes = outlying_features(nominal, plan, touches);
+  add_notes(found, gauge, nominal);
+  return found;
+}
+
+}  // namespace abbe::calib::mfb

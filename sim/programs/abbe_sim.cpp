@@ -59,7 +59,9 @@ constexpr std::array kExamples{
     Example{"truth", "--machine machine.toml --points points.csv -o truth.csv"},
     Example{"machine", "--machine machine.toml --seed 3 -o errors.csv"},
     Example{"replay", "run.mcap --speed 10"},
-    Example{"evemu", "--machine machine.toml --calibrator-out calibrator.toml"}};
+    Example{"evemu", "--machine machine.toml --calibrator-out calibrator.toml"},
+    Example{"mfb", "--seed 3 --drift-um 2 -o run"},
+    Example{"bar", "--bar-seed 3 --repeats 5 -o calibration"}};
 
 /// Puts an example before the footer of every subcommand.
 void add_examples(CLI::App& app) {
@@ -76,8 +78,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(footer());
   app.set_version_flag("--version", "abbe-sim " ABBE_VERSION);
-  const std::vector<Subcommand> commands{add_run(app), add_truth(app), add_machine(app),
-                                         add_replay(app), add_evemu(app)};
+  const std::vector<Subcommand> commands{add_run(app),    add_truth(app), add_machine(app),
+                                         add_replay(app), add_evemu(app), add_mfb(app),
+                                         add_bar(app)};
   add_examples(app);
 
   try {

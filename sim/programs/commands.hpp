@@ -26,6 +26,8 @@ struct Subcommand {
 [[nodiscard]] Subcommand add_machine(CLI::App& app);
 [[nodiscard]] Subcommand add_replay(CLI::App& app);
 [[nodiscard]] Subcommand add_evemu(CLI::App& app);
+[[nodiscard]] Subcommand add_mfb(CLI::App& app);
+[[nodiscard]] Subcommand add_bar(CLI::App& app);
 
 /// Prints "abbe-sim: " and the text of the error to stderr; returns the exit code of the error.
 int report(const Error& error);

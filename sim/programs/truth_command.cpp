@@ -20,6 +20,7 @@ struct TruthOptions {
   SetupChoices choices;
   std::string points_file;
   std::vector<std::size_t> grid;
+  std::vector<double> tool_mm;  // empty: the target of the machine file
   std::string out = "-";
 };
 
@@ -71,7 +72,9 @@ int write_or_report(const std::string& path, const std::string& text) {
 int truth_at_points(const TruthOptions& options) {
   const auto setup = load_setup(options.choices);
   if (!setup) return report(setup.error());
-  const TruthMachine& truth = setup->simulation.truth;
+  TruthMachine truth = setup->simulation.truth;
+  if (!options.tool_mm.empty())
+    truth.target_offset_m = 1e-3 * Eigen::Vector3d(options.tool_mm.data());
   if (options.points_file.empty())
     return write_or_report(options.out, as_csv(truth, grid_points(truth, options.grid)));
   const auto points = file_points(options.points_file);
@@ -107,6 +110,10 @@ Subcommand add_truth(CLI::App& app) {
       ->expected(3)
       ->check(CLI::Range(1, 1000))
       ->excludes(points);
+  sub->add_option("--tool", options->tool_mm,
+                  "x,y,z: tool offset in mm (default: [target] offset_mm of the machine)")
+      ->delimiter(',')
+      ->expected(3);
 
   return {sub, [options] { return truth_at_points(*options); }};
 }

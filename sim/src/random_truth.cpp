@@ -11,20 +11,21 @@
 namespace abbe::sim {
 namespace {
 
-constexpr std::uint64_t kHarmonics = 4;
+constexpr std::uint64_t kHarmonics = 4;  // at most; random numbers are reserved for them
 // Typical proportions of a medium machining centre, before scaling: a rotation of 60 urad moves a
 // point at 0.5 m by 30 um, the amplitude of the translations.
 constexpr double kTranslation_m = 30e-6;
 constexpr double kRotation_rad = 60e-6;
 constexpr double kSquareness_rad = 60e-6;
 
-std::vector<double> nodes_over(const AxisRange& range, double spacing_m) {
-  const double length = range.max_m - range.min_m;
-  const auto cells =
-      std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(length / spacing_m)));
+std::vector<double> nodes_over(const AxisRange& range, const RandomTruthOptions& options) {
+  const double first_m = range.min_m - options.beyond_m;
+  const double length = range.max_m + options.beyond_m - first_m;
+  const auto cells = std::max<std::size_t>(
+      1, static_cast<std::size_t>(std::lround(length / options.node_spacing_m)));
   std::vector<double> nodes(cells + 1);
   for (std::size_t i = 0; i <= cells; ++i) {
-    nodes[i] = range.min_m + length * static_cast<double>(i) / static_cast<double>(cells);
+    nodes[i] = first_m + length * static_cast<double>(i) / static_cast<double>(cells);
   }
   return nodes;
 }
@@ -35,7 +36,7 @@ ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude,
                             std::uint64_t sequence, const RandomTruthOptions& options) {
   std::vector<double> values(nodes.size(), 0.0);
   const double length = nodes.back() - nodes.front();
-  for (std::uint64_t k = 1; k <= kHarmonics; ++k) {
+  for (std::uint64_t k = 1; k <= std::min(options.harmonics, kHarmonics); ++k) {
     const std::uint64_t index = sequence * 2 * kHarmonics + 2 * k;
     const double phase = 2.0 * std::numbers::pi * uniform(options.seed, NoiseStream::Truth, index);
     const double order = static_cast<double>(k);
@@ -49,18 +50,20 @@ ErrorFunction smooth_random(const std::vector<double>& nodes, double amplitude,
   return {nodes, std::move(values), options.shape};
 }
 
-ErrorFunction minus_line(const ErrorFunction& f, double at_first, double at_last) {
+/// f minus the line through the two values at the ends of the range.
+ErrorFunction minus_line(const ErrorFunction& f, const AxisRange& range, double at_first,
+                         double at_last) {
   const auto nodes = f.nodes_m();
   std::vector<double> values(f.values().begin(), f.values().end());
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double u = (nodes[i] - nodes.front()) / (nodes.back() - nodes.front());
+    const double u = (nodes[i] - range.min_m) / (range.max_m - range.min_m);
     values[i] -= (1.0 - u) * at_first + u * at_last;
   }
   return f.with_values(std::move(values));
 }
 
-ErrorFunction zero_at(const ErrorFunction& f, double reference_m) {
-  return minus_line(f, f.at(reference_m), f.at(reference_m));
+ErrorFunction zero_at(const ErrorFunction& f, const AxisRange& range) {
+  return minus_line(f, range, f.at(range.reference_m), f.at(range.reference_m));
 }
 
 /// The displacement of the target by those rotations of `axis` that data with one target cannot
@@ -77,15 +80,15 @@ Eigen::Vector3d displacement_at_target(const TruthMachine& machine, Axis axis, d
 
 void remove_rigid_part(TruthMachine& machine, Axis axis) {
   AxisTruth& a = machine.axis(axis);
-  for (std::size_t m = 3; m < kMotions; ++m) a.error[m] = zero_at(a.error[m], a.range.reference_m);
+  for (std::size_t m = 3; m < kMotions; ++m) a.error[m] = zero_at(a.error[m], a.range);
   const Eigen::Vector3d first = displacement_at_target(machine, axis, a.range.min_m);
   const Eigen::Vector3d last = displacement_at_target(machine, axis, a.range.max_m);
   for (std::size_t m = 0; m < 3; ++m) {
     const auto k = static_cast<Eigen::Index>(m);
     ErrorFunction& f = a.error[m];
     f = m == static_cast<std::size_t>(axis)
-            ? zero_at(f, a.range.reference_m)
-            : minus_line(f, f.at(a.range.min_m) + first[k], f.at(a.range.max_m) + last[k]);
+            ? zero_at(f, a.range)
+            : minus_line(f, a.range, f.at(a.range.min_m) + first[k], f.at(a.range.max_m) + last[k]);
   }
 }
 
@@ -117,7 +120,7 @@ void add_backlash(TruthMachine& machine, const RandomTruthOptions& options) {
 TruthMachine random_truth(TruthMachine machine, const RandomTruthOptions& options) {
   for (const Axis axis : kAxes) {
     AxisTruth& a = machine.axis(axis);
-    const std::vector<double> nodes = nodes_over(a.range, options.node_spacing_m);
+    const std::vector<double> nodes = nodes_over(a.range, options);
     for (std::size_t m = 0; m < kMotions; ++m) {
       const double amplitude = m < 3 ? kTranslation_m : kRotation_rad;
       a.error[m] =

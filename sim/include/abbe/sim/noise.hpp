@@ -21,6 +21,13 @@ enum class NoiseStream : std::uint64_t {
   Artefact,
   Nest,
   Drift,
+  Bar,
+  BarCalibration,
+  BarPose,
+  BarTouch,
+  BarTemperature,
+  BarShape,
+  StepGauge,
   Encoder = 1000,
   CounterCard = 2000,
 };

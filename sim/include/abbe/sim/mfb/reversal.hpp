@@ -1,0 +1,46 @@
+#pragma once
+/// The calibration of a Multi-Feature Bar by reversal on a simulated measuring machine: the bar is
+/// probed as it lies and turned by 180 degrees about its x axis, again and again, and a step gauge
+/// gives the positioning of the machine. The bar lies along X. Pure; deterministic from the seed.
+
+#include "abbe/sim/mfb/files.hpp"
+
+namespace abbe::sim::mfb {
+
+/// A step gauge as its certificate and its file state it, and where it lies.
+struct StepGauge {
+  std::string name = "SG-1";
+  double step_m = 0.025;     ///< nominal; as many steps as the bar is long, and two more
+  double u_m = 0.15e-6;      ///< of a distance: independent part,
+  double u_per_m = 0.75e-6;  ///< and part in proportion to the distance, common to all
+  double alpha_per_K = 11.5e-6, u_alpha_per_K = 0.2e-6;
+  double temperature_C = 20.0, u_temperature_K = 0.02;
+  Eigen::Vector3d beside_bar_m = Eigen::Vector3d::Zero();  ///< y, z of its line from the bar's line
+  double u_rotation_rad = 2e-6;  ///< what the file states about the rotations of the machine
+  std::size_t runs = 5;
+};
+
+struct ReversalOptions {
+  std::size_t repeats = 5;  ///< normal and reversed passes, each with a clamping of its own
+  ProbingOptions probing;
+  StepGauge gauge;
+};
+
+struct ReversalRun {
+  std::vector<Measurement> plan;  ///< "N1", "R1", "N2", ...: normal, reversed
+  ProbedBar probed;
+  std::vector<double> distances_m;              ///< of the gauge's faces, from the certificate
+  std::vector<std::vector<double>> readings_m;  ///< of X, by face and run
+  Eigen::Vector3d gauge_origin_m = Eigen::Vector3d::Zero();  ///< tip at the first face
+};
+
+/// A machine of the size of the bar with errors of `mean_error_m`: axes X, Y, Z from 0.
+[[nodiscard]] TruthMachine measuring_machine(double mean_error_m, double bar_length_m,
+                                             std::uint64_t seed);
+
+[[nodiscard]] Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar,
+                                               const ReversalOptions& options);
+
+[[nodiscard]] std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge);
+
+}  // namespace abbe::sim::mfb

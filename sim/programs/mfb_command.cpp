@@ -1,0 +1,148 @@
+/// abbe-sim mfb: a simulated machine measures a Multi-Feature Bar; the files for `abbe identify
+/// mfb`, and the true errors.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <memory>
+
+#include "abbe/sim/random_truth.hpp"
+#include "abbe/sim/truth_table.hpp"
+#include "bar_options.hpp"
+#include "commands.hpp"
+#include "toml_section.hpp"
+
+namespace abbe::sim {
+namespace {
+
+struct MfbOptions : BarOptions {
+  std::string plan = "17", passes = "pairs";
+  std::uint64_t waves = 3;
+  double drift_um = 0.0;
+  std::vector<double> u_bar_um{0.2, 0.35, 0.35};
+};
+
+const std::map<std::string, mfb::PlanKind> kPlans{{"17", mfb::PlanKind::Full},
+                                                  {"12", mfb::PlanKind::Fewest},
+                                                  {"17-rolled", mfb::PlanKind::FullRolled}};
+const std::map<std::string, mfb::Passes> kPasses{{"pairs", mfb::Passes::Pairs},
+                                                 {"forward", mfb::Passes::ForwardAlone}};
+
+/// Tables that are smooth beyond the travel, too: the outer touches are there.
+TruthMachine cube_machine(const MfbOptions& options) {
+  TruthMachine machine;
+  for (const Axis axis : kAxes) machine.axis(axis).range = {0.0, options.length_m(), 0.0};
+  return random_truth(machine, {.seed = options.seed,
+                                .mean_error_m = options.mean_error_um * kMicro,
+                                .node_spacing_m = 0.005,
+                                .beyond_m = 0.025,
+                                .shape = Shape::Cubic,
+                                .harmonics = options.waves});
+}
+
+Result<mfb::ProbingOptions> stated_options(const MfbOptions& options) {
+  auto stated = probing_of(options);
+  if (stated) stated->drift_m = options.drift_um * kMicro;
+  return stated;
+}
+
+/// Readings on a grid over the travel and the true place of the tip there, for `abbe verify`.
+std::string verification_csv(TruthMachine machine, const Eigen::Vector3d& tool_offset_m) {
+  constexpr int kPerAxis = 6;
+  machine.target_offset_m = tool_offset_m;
+  std::string text = fmt::format(
+      "# the true place of the tip of the tool with the offset {:g},{:g},{:g} mm\n"
+      "x_mm,y_mm,z_mm,tracker_x_mm,tracker_y_mm,tracker_z_mm\n",
+      tool_offset_m.x() / kMilli, tool_offset_m.y() / kMilli, tool_offset_m.z() / kMilli);
+  const auto at = [&](Axis axis, int i) {
+    const AxisRange& r = machine.axis(axis).range;
+    return r.min_m + (r.max_m - r.min_m) * i / (kPerAxis - 1);
+  };
+
+  for (int i = 0; i < kPerAxis * kPerAxis * kPerAxis; ++i) {
+    const Eigen::Vector3d q_m(at(Axis::X, i / (kPerAxis * kPerAxis)),
+                              at(Axis::Y, i / kPerAxis % kPerAxis), at(Axis::Z, i % kPerAxis));
+    const Eigen::Vector3d q_mm = q_m / kMilli, p_mm = position_m(machine, q_m) / kMilli;
+    text += fmt::format("{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", q_mm.x(), q_mm.y(),
+                        q_mm.z(), p_mm.x(), p_mm.y(), p_mm.z());
+  }
+  return text;
+}
+
+std::string sim_toml(const MfbOptions& options) {
+  return fmt::format(
+      "# The machine that was measured, for abbe-sim truth --config\n"
+      "[sim]\nmachine = \"machine.toml\"\nseed = {}\n"
+      "[sim.truth]\nfile = \"truth.csv\"\nshape = \"cubic\"\n",
+      options.seed);
+}
+
+int run(const MfbOptions& options) {
+  const auto stated = stated_options(options);
+  if (!stated) return report(stated.error());
+  const mfb::TrueBar bar = bar_of(options);
+  const TruthMachine machine = cube_machine(options);
+  const auto plan =
+      mfb::reference_plan(kPlans.at(options.plan), kPasses.at(options.passes), options.length_m());
+  const auto probed = mfb::probe_bar(machine, bar, plan, simulated(*stated, options));
+  if (!probed) return report(as_usage(probed.error()));
+
+  const Eigen::Vector3d u_bar_m = kMicro * Eigen::Vector3d(options.u_bar_um.data());
+  mfb::StatedBar calibrated = mfb::calibrated_bar(bar, u_bar_m, options.seed);
+  if (options.exact) {
+    calibrated.O_m = mfb::calibrated_bar(bar, Eigen::Vector3d::Zero(), options.seed).O_m;
+  }
+  set_properties(calibrated, *stated);
+  const std::string name = fmt::format("simulated, seed {}", options.seed);
+  const auto written = write_folder(
+      options.folder,
+      {{"machine.toml", mfb::format_machine_toml(machine, name, options.pitch_mm * kMilli)},
+       {"bar.toml", mfb::format_bar_toml(calibrated)},
+       {"plan.toml", mfb::format_plan_toml(plan, *probed, *stated)},
+       {"points.csv", mfb::format_points_csv(plan, *probed)},
+       {"truth.csv", format_truth_csv(machine)},
+       {"sim.toml", sim_toml(options)},
+       {"truebar.csv", mfb::format_points_of_interest_csv(mfb::points_of_interest_m(bar))},
+       {"verification.csv", verification_csv(machine, plan.front().tool_offset_m)}});
+  if (!written) return report(written.error());
+  fmt::print("{} touches in {} passes; mean |V| {:.1f} um; files in {}\n", probed->touches.size(),
+             plan.size(), mean_error_m(machine) / kMicro, options.folder);
+  return kDone;
+}
+
+}  // namespace
+
+Subcommand add_mfb(CLI::App& app) {
+  auto options = std::make_shared<MfbOptions>();  // lives as long as the command line's callbacks
+  options->mean_error_um = 40.0;
+  CLI::App* sub = app.add_subcommand(
+      "mfb",
+      "a simulated machine measures a Multi-Feature Bar: bar.toml, plan.toml, points.csv and\n"
+      "machine.toml for `abbe identify mfb`; its true errors: truth.csv with sim.toml (abbe-sim\n"
+      "truth --config), verification.csv (abbe verify --points), truebar.csv (the bar)");
+  add_bar_options(*sub, *options);
+  sub->add_option(
+         "--plan", options->plan,
+         "17 measurements; 12, the least that show all errors; 17-rolled, the holes of X3 along Y")
+      ->check(CLI::IsMember({"17", "12", "17-rolled"}));
+  sub->add_option("--passes", options->passes, "every pass and its way back, or forward alone")
+      ->check(CLI::IsMember({"pairs", "forward"}));
+  sub->add_option(
+         "--waves", options->waves,
+         "sine waves in each error of the machine: 4 waves bend more between nodes of 50 mm "
+         "than a cubic follows (0.1 um)")
+      ->check(CLI::Range(1, 4));
+  sub->add_option("--drift-um", options->drift_um,
+                  "the bar drifts this far along each axis in a pass")
+      ->check(CLI::Range(0.0, 1000.0));
+  sub->add_option("--u-bar-um", options->u_bar_um,
+                  "standard uncertainty of the calibrated points in x, y, z")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::Range(0.0, 100.0));
+
+  return {sub, [options] { return run(*options); }};
+}
+
+}  // namespace abbe::sim

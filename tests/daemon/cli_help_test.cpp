@@ -67,6 +67,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "calibrate artefact",
                                     "plan",
                                     "plan otf",
+                                    "plan mfb",
                                     "reference",
                                     "machine",
                                     "machine where",

@@ -7,6 +7,7 @@
 #include "abbe/config/config.hpp"
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/tables/evemu_files.hpp"
+#include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe/tables/measured_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
@@ -71,6 +72,7 @@ TEST_F(ExampleFiles, OfAMultiFeatureBarAreAccepted) {
   for (auto& axis : nodes) axis.nodes_m = {0.0, 0.05, 0.5, 0.55};
   EXPECT_EQ(
       test::faults_text(read_bar_points_csv(printed("barpoints.csv"), bar->bar, *plan, nodes)), "");
+  EXPECT_EQ(test::faults_text(read_gauge_toml(printed("gauge.toml"))), "");
 }
 
 TEST_F(ExampleFiles, OfAJointIdentificationAreAccepted) {
@@ -95,8 +97,8 @@ TEST_F(ExampleFiles, AreListed) {
   EXPECT_EQ(ran.exit, 0) << ran.err;
   for (const char* name :
        {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv", "tracker.csv",
-        "encoder.csv", "touches.csv", "bar.toml", "plan.toml", "barpoints.csv", "parts.toml",
-        "errors.csv", "points.csv", "verification.csv", "truth.csv"})
+        "encoder.csv", "touches.csv", "bar.toml", "plan.toml", "barpoints.csv", "gauge.toml",
+        "parts.toml", "errors.csv", "points.csv", "verification.csv", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)

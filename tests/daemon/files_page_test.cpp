@@ -15,6 +15,7 @@
 #include "abbe/config/config.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "abbe/tables/evemu_files.hpp"
+#include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "abbe/tables/measured_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
@@ -124,6 +125,7 @@ std::map<std::string, FileReader> all_readers() {
   readers["calibrator.toml"] = reader(read_calibrator_toml);
   readers["parts.toml"] = reader(read_parts_toml);
   readers["bar.toml"] = reader(read_bar_toml);
+  readers["gauge.toml"] = reader(read_gauge_toml);
   readers["plan.toml"] = reader(read_plan_for_bar_of_page);
   readers["folds.txt"] = [](const fs::path& file) {
     return calib::sparse::parse_folds(test::text_of(file)) ? "" : "no folds";

@@ -149,8 +149,8 @@ TEST(DriftCommand, PrintsTheTableThatChangedAndExitsWith5) {
   const auto changed = test::run_abbe(folder.path(), "model drift a.json b.json");
   EXPECT_EQ(changed.exit, 5);
   EXPECT_THAT(changed.out, HasSubstr("B differs from A: EC0Y by 20 urad"));
-  const auto json = test::run_abbe(folder.path(), "model drift a.json b.json --json");
-  EXPECT_THAT(json.out, HasSubstr("\"drifted\": true"));
+  const auto printed = test::run_abbe(folder.path(), "model drift a.json b.json --json");
+  EXPECT_THAT(printed.out, HasSubstr("\"drifted\": true"));
 }
 
 /// The small machine of synthetic_otf_run.hpp; a run takes the samples of a noise-free tracker.

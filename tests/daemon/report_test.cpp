@@ -247,6 +247,19 @@ TEST(Report, TheCutsAreAcrossTheShortestAxis) {
 }
 
 /// The outline of the bars has two points per interval, between a first and a last one.
+TEST(Report, ADrawingHasALabelAtEveryEnd) {
+  const Vector3 low(0, 0, -200), high(400, 300, 0);
+  const std::string text = svg(SpaceDrawing{.title = "bars <1>",
+                                            .box_mm = {low, high},
+                                            .lines = {{"P1", low, {400, 0, -200}},
+                                                      {"P2", {0, 0, 0}, {0, 300, 0}},
+                                                      {"P3", {200, 300, 0}, {0, 300, 0}}}});
+  EXPECT_THAT(text, HasSubstr("bars &lt;1&gt;"));
+  EXPECT_THAT(text, HasSubstr(">P1</text>"));
+  EXPECT_THAT(text, HasSubstr(">P2, P3</text>")) << "both end at the same place";
+  EXPECT_EQ(count(text, "stroke-width"), 3u);
+}
+
 TEST(Report, AHistogramCountsEveryValue) {
   const std::vector<double> values{-1.9, -0.3, 0.1, 0.2, 0.25, 1.4};
   HtmlReport page("histogram");

@@ -12,6 +12,7 @@ namespace abbe::daemon {
 void add_identify_otf(CLI::App& parent, int& exit);
 void add_identify_evemu(CLI::App& parent, int& exit);
 void add_identify_mfb(CLI::App& parent, int& exit);
+void add_identify_bar(CLI::App& parent, int& exit);
 void add_identify_joint(CLI::App& parent, int& exit);
 void add_identify_artefact(CLI::App& parent, int& exit);
 void add_plan_otf(CLI::App& parent, int& exit);

@@ -27,6 +27,11 @@ constexpr std::array kExamples{
     Example{"plan otf",
             "-c abbed.toml --tracker-at=-750,-620,-350 --tracker-at=900,-600,-300\n"
             "           --budget 15 --feed 2500 --dialect linuxcnc -o plan"},
+    Example{
+        "plan mfb",
+        "-c machine.toml --bar bar.toml --stylus=0,0,-150 --stylus=100,0,-150 \\\n"
+        "           --stylus=-100,0,-150 --stylus=0,100,-150 --stylus=0,-100,-150 -o plan.toml\n"
+        "         abbe plan mfb -c machine.toml --bar bar.toml --check plan.toml"},
     Example{"reference", "--here --axis X"},
     Example{"machine", "where"},
     Example{"machine where", ""},
@@ -48,6 +53,9 @@ constexpr std::array kExamples{
             "--machine machine.toml --touches touches.csv --calibrator calibrator.toml -o result"},
     Example{"identify mfb",
             "--machine machine.toml --bar bar.toml --plan plan.toml --points points.csv -o result"},
+    Example{
+        "identify bar",
+        "--bar nominal.toml --plan plan.toml --points points.csv --gauge gauge.toml -o bar.toml"},
     Example{"identify joint", "--machine machine.toml --parts parts.toml -o result"},
     Example{"identify artefact",
             "--touches touches.csv --name array-1 --tip-radius-mm 2.5 -o calibrator.toml"},

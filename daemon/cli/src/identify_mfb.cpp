@@ -7,9 +7,11 @@
 #include <CLI/Validators.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,7 +48,7 @@ struct MfbInput {
   Config config;
   MfbTask task;
   std::vector<InputFile> sources;
-  std::vector<std::string> notes{};
+  std::vector<std::string> notes{}, against_pass{};
 };
 
 /// The machine as it was configured, for the readings of the file `points`.
@@ -69,20 +71,51 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
   return options;
 }
 
-void add_notes(MfbInput& input, const BarPointsFile& points) {
+/// What the drift of a pass is known from.
+void add_notes_on_pairs(std::span<const mfb::Measurement> measurements,
+                        std::vector<std::string>& notes) {
+  const auto forward_of = mfb::pairs_of(measurements);
+  std::vector<bool> paired(measurements.size(), false);
+  std::string single;
+  for (std::size_t i = 0; i < measurements.size(); ++i)
+    if (forward_of[i]) paired[i] = paired[*forward_of[i]] = true;
+  for (std::size_t i = 0; i < measurements.size(); ++i)
+    if (!paired[i]) single += (single.empty() ? "" : ", ") + measurements[i].name;
+
+  if (std::ranges::none_of(paired, [](bool one) { return one; }))
+    notes.emplace_back(
+        "no pass was measured backward as well: a drift during the passes looks like an error of "
+        "the machine");
+  else if (!single.empty())
+    notes.push_back(fmt::format(
+        "without a backward pass after the forward pass, in one position with one tool: {}; their "
+        "drift looks like an error of the machine",
+        single));
+}
+
+void add_notes_on_bar(const mfb::Bar& bar, std::span<const mfb::Measurement> measurements,
+                      std::vector<std::string>& notes) {
+  constexpr double kNoticed_K = 0.1;
+  const bool warm = std::ranges::any_of(measurements, [](const mfb::Measurement& m) {
+    return m.temperature_K &&
+           std::abs(*m.temperature_K - mfb::kReferenceTemperature_K) > kNoticed_K;
+  });
+  if (!bar.expansion && warm)
+    notes.emplace_back(
+        "the bar is taken as at 20 C: bar.toml has no alpha_um_per_m_K, although plan.toml states "
+        "other temperatures");
+  if (bar.covariance_m2.isZero(0.0))
+    notes.emplace_back(
+        "the bar is taken as exact: bar.toml states no uncertainty of its calibrated points");
+}
+
+void add_notes(MfbInput& input) {
   if (input.config.machine.interpolation == calib::estimation::Interpolation::Linear)
     input.notes.emplace_back(
         "the tables are linear between their nodes: for smooth errors set [model] basis = "
         "\"cubic\"");
-  const auto pairs = mfb::pairs_of(input.task.plan.measurements);
-  if (std::ranges::none_of(pairs, [](const auto& forward) { return forward.has_value(); }))
-    input.notes.emplace_back(
-        "no pass was measured backward as well: a drift during the passes looks like an error of "
-        "the machine");
-  for (const std::string& name : points.against_pass)
-    input.notes.push_back(fmt::format(
-        "{}: the rows of its touches run against its pass: they must be in the order of probing",
-        name));
+  add_notes_on_pairs(input.task.plan.measurements, input.notes);
+  add_notes_on_bar(input.task.bar, input.task.plan.measurements, input.notes);
 }
 
 Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
@@ -110,13 +143,16 @@ Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
                   points->source}};
   if (arguments.trials > 0)
     input.task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
-  add_notes(input, *points);
+  add_notes(input);
+  input.against_pass = std::move(points->against_pass);
   return input;
 }
 
-/// Errors of an identification name measurement and feature; the file of the touches is put before.
-Error in_points(const IdentifyMfbArguments& arguments, Error error) {
+/// Errors of an identification name measurement and feature. The file of the touches is put before,
+/// rows against their pass behind: they may be the cause.
+Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Error error) {
   error.text = fmt::format("{}: {}", arguments.points, error.text);
+  error.details = input.against_pass;
   return error;
 }
 
@@ -129,7 +165,10 @@ Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const Mfb
       identify_with_bar(input.task, input.config, other.model,
                         [&bar](std::string_view step, double share) { bar.show(step, share); });
   bar.clear();
-  if (!candidate) return tl::make_unexpected(in_points(arguments, candidate.error()));
+  if (!candidate) return tl::make_unexpected(in_points(arguments, input, candidate.error()));
+  if (!input.against_pass.empty())
+    return tl::make_unexpected(in_points(
+        arguments, input, {ErrorCode::BadInput, "the drift of the passes would be wrong"}));
   other.add_note(candidate->verdict);
   auto& notes = candidate->verdict.notes;
   notes.insert(notes.end(), input.notes.begin(), input.notes.end());

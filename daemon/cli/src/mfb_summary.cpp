@@ -81,30 +81,33 @@ nlohmann::json mfb_json(const ModelDocument& document, const MfbCandidate& candi
   const auto& found = candidate.found;
   const auto& held_out = candidate.verdict.held_out;
   const LargestUncertainty u(document.model);
-  nlohmann::json object{{"model", (folder / "model.json").string()},
-                        {"id", model_id(document)},
-                        {"hash", model_hash(document)},
-                        {"estimator", document.estimator},
-                        {"positions", found.observations.positions.size()},
-                        {"touches", s.samples},
-                        {"observations", s.observations},
-                        {"unknowns", s.unknowns},
-                        {"rank", s.rank},
-                        {"condition", s.condition},
-                        {"chi2", found.solution.statistics.chi2},
-                        {"degrees_of_freedom", found.solution.statistics.degrees_of_freedom},
-                        {"chi2_per_dof", s.chi2_per_dof},
-                        {"chi2_per_dof_limit", found.solution.statistics.chi2_per_dof_limit},
-                        {"likely_cause", mfb::name(found.cause.cause)},
-                        {"likely_cause_text", found.cause.text},
-                        {"largest_u_um", u.length_m * kUmPerM},
-                        {"largest_u_urad", u.angle_rad * kUradPerRad},
-                        {"residual_rms_before_um", s.before.rms_m * kUmPerM},
-                        {"residual_rms_after_um", s.after.rms_m * kUmPerM},
-                        {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
-                        {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
-                        {"budget", budget_json(found.solution.budget)},
-                        {"gate", verdict_json(candidate.verdict)}};
+  nlohmann::json object{
+      {"model", (folder / "model.json").string()},
+      {"id", model_id(document)},
+      {"hash", model_hash(document)},
+      {"estimator", document.estimator},
+      {"positions", found.observations.positions.size()},
+      {"touches", s.samples},
+      {"observations", s.observations},
+      {"unknowns", s.unknowns},
+      {"rank", s.rank},
+      {"condition", s.condition},
+      {"chi2", found.solution.statistics.chi2},
+      {"degrees_of_freedom", found.solution.statistics.degrees_of_freedom},
+      {"chi2_per_dof", s.chi2_per_dof},
+      {"chi2_per_dof_limit", found.solution.statistics.chi2_per_dof_limit},
+      {"all_chi2_per_dof", found.solution.statistics.all_chi2_per_dof},
+      {"all_chi2_per_dof_limit", found.solution.statistics.all_chi2_per_dof_limit},
+      {"likely_cause", mfb::name(found.cause.cause)},
+      {"likely_cause_text", found.cause.text},
+      {"largest_u_um", u.length_m * kUmPerM},
+      {"largest_u_urad", u.angle_rad * kUradPerRad},
+      {"residual_rms_before_um", s.before.rms_m * kUmPerM},
+      {"residual_rms_after_um", s.after.rms_m * kUmPerM},
+      {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
+      {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
+      {"budget", budget_json(found.solution.budget)},
+      {"gate", verdict_json(candidate.verdict)}};
   if (document.bar)
     object.update({{"measurements", measurements_json(*document.bar)},
                    {"drift_um_per_pass", drift_json(*document.bar)},
@@ -133,7 +136,6 @@ void print_mfb_summary(const ModelDocument& document, const MfbCandidate& candid
              document.estimator, s.observations, s.unknowns, s.rank, s.condition);
   fmt::print("chi-square  {:.3f} per degree of freedom, at most {:.3f}\n", s.chi2_per_dof,
              found.solution.statistics.chi2_per_dof_limit);
-  if (!found.cause.text.empty()) fmt::print("likely      {}\n", found.cause.text);
   fmt::print("uncertainty at most {:.3f} um and {:.2f} urad (k = 1)\n", u.length_m * kUmPerM,
              u.angle_rad * kUradPerRad);
   if (const auto& m = candidate.monte_carlo)

@@ -26,8 +26,6 @@ namespace {
 
 namespace mfb = calib::mfb;
 
-constexpr double kSecondsPerMinute = 60.0;
-
 void print_errors(const mfb::PlanPrediction& p) {
   for (const auto& e : p.errors) {
     const double scale = e.is_angle ? kUradPerRad : kUmPerM;
@@ -67,6 +65,31 @@ double least_step_m(const std::vector<double>& places_m) {
   return least_m;
 }
 
+/// What a plan lacks to show the errors of one axis at all of its nodes.
+std::vector<std::string> reasons_of_axis(const BarPlan& plan, const PlanInputs& inputs,
+                                         calib::Axis axis) {
+  constexpr double kCloser = 0.9;  // of the distance of the holes
+  const auto& nodes_m = inputs.machine.nodes[index(axis)].nodes_m;
+  const double pitch_m = least_step_m(inputs.bar.pattern.hole_x_m);
+  const double step_m = least_step_m(nodes_m);
+  std::vector<std::string> reasons;
+  if (step_m < kCloser * pitch_m)
+    reasons.push_back(
+        fmt::format("nodes of {} are {:.4g} mm apart, the holes of the bar {:.4g} mm: use [model] "
+                    "node_spacing_mm = {:.4g}",
+                    letter(axis), step_m * kMmPerM, pitch_m * kMmPerM, pitch_m * kMmPerM));
+
+  const double from_m = plan.readings.min_m[static_cast<Eigen::Index>(index(axis))];
+  const double to_m = plan.readings.max_m[static_cast<Eigen::Index>(index(axis))];
+  if (from_m > nodes_m[1] || to_m < nodes_m[nodes_m.size() - 2])
+    reasons.push_back(fmt::format(
+        "{}: the touches are from {:.1f} to {:.1f} mm, [axes.{}] is {:.1f} to {:.1f} mm: plan for "
+        "this machine, or identify this range only",
+        letter(axis), from_m * kMmPerM, to_m * kMmPerM, letter(axis), nodes_m.front() * kMmPerM,
+        nodes_m.back() * kMmPerM));
+  return reasons;
+}
+
 /// Why a plan that leaves errors open is no plan.
 Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
   const mfb::SolveOptions limits;
@@ -76,15 +99,14 @@ Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
                           plan.set, fmt::join(plan.prediction.not_seen, ", "),
                           limits.most_u_m * kUmPerM, limits.most_u_rad * kUradPerRad),
               plan.missing};
-  const double pitch_m = least_step_m(inputs.bar.pattern.hole_x_m);
-  for (const auto axis : calib::kAllAxes) {
-    const double step_m = least_step_m(inputs.machine.nodes[index(axis)].nodes_m);
-    if (step_m < 0.9 * pitch_m)
-      error.details.push_back(fmt::format(
-          "nodes of {} are {:.4g} mm apart, the holes of the bar {:.4g} mm: use [model] "
-          "node_spacing_mm = {:.4g}",
-          letter(axis), step_m * kMmPerM, pitch_m * kMmPerM, pitch_m * kMmPerM));
-  }
+  if (!plan.missing.empty())
+    error.details.emplace_back(
+        "the stem of a stylus is along the ram, the last axis of the chain, or across it if the "
+        "tip "
+        "is beside it; state another one: --stylus=x,y,z,-x");
+  for (const auto axis : calib::kAllAxes)
+    for (auto& reason : reasons_of_axis(plan, inputs, axis))
+      error.details.push_back(std::move(reason));
   error.details.emplace_back(
       "angles of an axis need bars at two places across it, or, next to the tool, two styli at one "
       "position; squareness needs bars along the diagonals");

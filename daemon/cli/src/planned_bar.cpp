@@ -19,8 +19,6 @@ namespace {
 
 namespace mfb = calib::mfb;
 
-constexpr double kSecondsPerMinute = 60.0;
-
 /// "x,y,z" or "x,y,z,-x": the stem along an axis.
 Result<mfb::Stylus> parse_stylus(const std::string& text, const calib::KinematicChain& chain) {
   const auto malformed = [&] {
@@ -179,8 +177,8 @@ Result<BarPlan> planned(const PlanMfbArguments& arguments, const PlanInputs& inp
     positions = chosen->positions;
     plan.start = chosen->start;
     if (chosen->exchanged > 0) plan.notes.clear();
-    plan.notes.push_back(fmt::format("{} of {} positions were exchanged, {} candidates",
-                                     chosen->exchanged, positions.size(), chosen->candidates));
+    plan.notes.push_back(fmt::format("{} exchanges of positions, {} candidates", chosen->exchanged,
+                                     chosen->candidates));
   }
   if (*table) {
     plan.indexed = mfb::indexed_positions(positions, inputs.bar, **table);

@@ -12,6 +12,8 @@
 
 namespace abbe::daemon {
 
+inline constexpr double kSecondsPerMinute = 60.0;
+
 struct PlanMfbArguments {
   std::string machine, bar, check, out;
   std::vector<std::string> styli;

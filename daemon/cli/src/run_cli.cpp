@@ -88,6 +88,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_identify_otf(*identify, exit);
   add_identify_evemu(*identify, exit);
   add_identify_mfb(*identify, exit);
+  add_identify_bar(*identify, exit);
   add_identify_joint(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "line_colours.hpp"
 #include "markup.hpp"
 
 namespace abbe::daemon {
@@ -19,16 +20,9 @@ namespace {
 
 using nlohmann::json;
 
-/// Colours that people with colour vision deficiency can distinguish [Okabe, Ito 2008].
-constexpr std::array<std::string_view, 6> kColours{"#0072b2", "#d55e00", "#009e73",
-                                                   "#cc79a7", "#e69f00", "#56b4e9"};
 /// Dashes and dots distinguish the curves of a print without colours.
 constexpr std::array<std::pair<int, int>, 3> kDashes{{{0, 0}, {7, 3}, {2, 3}}};
 constexpr std::array<std::string_view, 3> kDots{"circle", "triangle", "rect"};
-
-std::string_view colour(std::size_t i) {
-  return kColours[i % kColours.size()];
-}
 
 json points(const std::vector<double>& x, const std::vector<double>& y) {
   json list = json::array();
@@ -45,7 +39,7 @@ json edge(const std::vector<double>& x, const std::vector<double>& y, bool fille
           {"showLine", true},
           {"borderWidth", 0},
           {"pointRadius", 0},
-          {"backgroundColor", fmt::format("{}38", colour(number))},
+          {"backgroundColor", fmt::format("{}38", line_colour(number))},
           {"fill", filled ? json("-1") : json(false)}};
 }
 
@@ -85,8 +79,8 @@ json line(const Curve& curve, std::size_t number) {
           {"borderDash", dashes(number)},
           {"pointStyle", kDots[number % kDots.size()]},
           {"pointRadius", std::move(radii)},
-          {"borderColor", colour(number)},
-          {"backgroundColor", colour(number)}};
+          {"borderColor", line_colour(number)},
+          {"backgroundColor", line_colour(number)}};
 }
 
 json axis(std::string_view label) {
@@ -203,7 +197,7 @@ json chart_configuration(const Histogram& histogram) {
     json bars = line(outline(histogram.series[i], bins), 2 * i);
     bars["borderDash"] = json::array();
     bars["borderWidth"] = 0.75;
-    bars["backgroundColor"] = fmt::format("{}66", colour(2 * i));
+    bars["backgroundColor"] = fmt::format("{}66", line_colour(2 * i));
     bars["fill"] = "origin";
     datasets.push_back(std::move(bars));
   }
@@ -228,10 +222,14 @@ json chart_configuration(const VectorChart& chart) {
     for (const double radius : {2.0, 0.0, 0.0}) dots.push_back(radius);
   }
 
-  const json dataset{{"label", chart.name},      {"data", line},
-                     {"showLine", true},         {"spanGaps", false},
-                     {"borderWidth", 1.5},       {"pointRadius", dots},
-                     {"borderColor", colour(0)}, {"backgroundColor", colour(0)}};
+  const json dataset{{"label", chart.name},
+                     {"data", line},
+                     {"showLine", true},
+                     {"spanGaps", false},
+                     {"borderWidth", 1.5},
+                     {"pointRadius", dots},
+                     {"borderColor", line_colour(0)},
+                     {"backgroundColor", line_colour(0)}};
   return scatter(json::array({dataset}),
                  options(chart.title, axis(chart.x_label), axis(chart.y_label)));
 }

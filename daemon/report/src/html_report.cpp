@@ -95,6 +95,10 @@ void HtmlReport::maps(const ValueMaps& maps) {
   body_ += svg(maps);
 }
 
+void HtmlReport::drawing(const SpaceDrawing& drawing) {
+  body_ += svg(drawing);
+}
+
 void HtmlReport::canvas(std::string_view configuration, bool wide) {
   // Consecutive charts share a row.
   constexpr std::string_view kEnd = "</div>\n<!-- charts -->\n";

@@ -163,19 +163,47 @@ void check_readings(const NumberTable& table, const calib::MachineNodes& nodes, 
   }
 }
 
-/// True if the rows run against the direction of the pass: positions along the bar descend in a
-/// forward pass or ascend in a backward one.
-bool runs_against(const PassTouches& touches, PassDirection direction) {
-  double mean_row = 0.0, mean_index = 0.0, slope = 0.0;
+/// Correlation of the number of a row with the number of its feature: 1 for a pass from hole 1 to the
+/// last hole.
+double correlation_with_index(const PassTouches& touches) {
   const auto count = static_cast<double>(touches.size());
+  double mean_row = 0.0, mean_index = 0.0;
   for (std::size_t row = 0; row < touches.size(); ++row) {
     mean_row += static_cast<double>(row) / count;
     mean_index += static_cast<double>(touches[row].target.index) / count;
   }
-  for (std::size_t row = 0; row < touches.size(); ++row)
-    slope += (static_cast<double>(row) - mean_row) *
-             (static_cast<double>(touches[row].target.index) - mean_index);
-  return direction == PassDirection::Forward ? slope < 0.0 : slope > 0.0;
+
+  double product = 0.0, rows = 0.0, indices = 0.0;
+  for (std::size_t row = 0; row < touches.size(); ++row) {
+    const double r = static_cast<double>(row) - mean_row;
+    const double i = static_cast<double>(touches[row].target.index) - mean_index;
+    product += r * i;
+    rows += r * r;
+    indices += i * i;
+  }
+  return rows > 0.0 && indices > 0.0 ? product / std::sqrt(rows * indices) : 0.0;
+}
+
+/// The order of the rows is the time of the touches, from which the drift follows.
+std::vector<std::string> rows_against_pass(const std::string& file, const NumberTable& table,
+                                           const std::vector<PassTouches>& passes,
+                                           const std::vector<Measurement>& measurements) {
+  constexpr double kClearlyAgainst = -0.1;
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < passes.size(); ++i) {
+    const bool forward = measurements[i].direction == PassDirection::Forward;
+    const double along = correlation_with_index(passes[i]) * (forward ? 1.0 : -1.0);
+    if (along > kClearlyAgainst) continue;
+
+    std::size_t row = 0;
+    while (static_cast<std::size_t>(table.at(row, kMeasurement)) != i) ++row;
+    lines.push_back(
+        fmt::format("{}:{}:1: measurement: the rows of \"{}\" run against its pass = \"{}\": they "
+                    "must be in the "
+                    "order of probing",
+                    file, table.line(row), measurements[i].name, forward ? "forward" : "backward"));
+  }
+  return lines;
 }
 
 }  // namespace
@@ -192,11 +220,8 @@ Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file, con
   rows.check_complete();
   check_readings(table, nodes, faults);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
-
   BarPointsFile out{source, rows.take(), {}};
-  for (std::size_t i = 0; i < out.passes.size(); ++i)
-    if (runs_against(out.passes[i], plan.plan.measurements[i].direction))
-      out.against_pass.push_back(plan.plan.measurements[i].name);
+  out.against_pass = rows_against_pass(file.string(), table, out.passes, plan.plan.measurements);
   return out;
 }
 

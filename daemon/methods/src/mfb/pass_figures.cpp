@@ -36,7 +36,7 @@ LineChart chart_along_bar(std::string title, std::string y_label, const mfb::Bar
   for (std::size_t c = 0; c < kBarAxes.size(); ++c) {
     Curve curve{.name = kBarAxes.at(c), .x = {}, .y = {}};
     for (std::size_t i = 0; i < vectors_m.size(); ++i) {
-      curve.x.push_back(bar.O_m[i].x() * kMmPerM);
+      curve.x.push_back(bar.pattern.hole_x_m[i] * kMmPerM);
       curve.y.push_back(vectors_m[i](static_cast<Eigen::Index>(c)) * kUmPerM);
     }
     chart.curves.push_back(std::move(curve));
@@ -78,23 +78,30 @@ std::vector<std::string> measurements_of_positions(const mfb::Observations& o) {
   return names;
 }
 
-/// The bar from its first to its last point, in the plane of two machine axes. The dot is hole 1.
-LineChart view_of_bar(const MfbCandidate& candidate, Eigen::Index across, Eigen::Index up) {
+/// The range of the nodes, shifted from scale readings to the tip of the first measurement.
+std::array<calib::Vector3, 2> range_of_tip_mm(const mfb::Observations& o) {
+  std::array<calib::Vector3, 2> range_mm;
+  const calib::Vector3& t = o.plan.measurements.front().tool_offset_m;
+  for (const calib::Axis axis : calib::kAllAxes) {
+    const auto& nodes_m = o.basis.layout().nodes()[index(axis)].nodes_m;
+    const auto k = static_cast<Eigen::Index>(index(axis));
+    range_mm[0](k) = kMmPerM * (nodes_m.front() + t(k));
+    range_mm[1](k) = kMmPerM * (nodes_m.back() + t(k));
+  }
+  return range_mm;
+}
+
+SpaceDrawing drawing_of_positions(const MfbCandidate& candidate) {
   const mfb::Observations& o = candidate.found.observations;
   const auto& poses = candidate.found.solution.poses;
-  LineChart chart{.title = fmt::format("{} and {}", "XYZ"[across], "XYZ"[up]),
-                  .x_label = fmt::format("{} of the tip, mm", "XYZ"[across]),
-                  .y_label = fmt::format("{} of the tip, mm", "XYZ"[up]),
-                  .wide = true};
+  SpaceDrawing drawing{
+      .title = "The bar in its positions", .box_mm = range_of_tip_mm(o), .lines = {}};
   for (std::size_t p = 0; p < o.positions.size() && p < poses.size(); ++p) {
-    const calib::Vector3 first = poses[p].origin_m * kMmPerM;
-    const calib::Vector3 last = first + poses[p].axes * o.bar.O_m.back() * kMmPerM;
-    chart.curves.push_back({.name = o.positions[p].name,
-                            .x = {first(across), last(across)},
-                            .y = {first(up), last(up)},
-                            .dot_every = 2});
+    const calib::Vector3 first_m = poses[p].origin_m;
+    const calib::Vector3 last_m = first_m + poses[p].axes * o.bar.O_m.back();
+    drawing.lines.push_back({o.positions[p].name, kMmPerM * first_m, kMmPerM * last_m});
   }
-  return chart;
+  return drawing;
 }
 
 }  // namespace
@@ -115,11 +122,12 @@ void add_residuals_along_bar(HtmlReport& page, const MfbCandidate& candidate) {
 void add_positions_of_bar(HtmlReport& page, const MfbCandidate& candidate) {
   const mfb::Observations& o = candidate.found.observations;
   page.heading("The bar in the machine");
-  page.paragraph("Each line is the bar in one position, as it was found; the dot is hole 1.");
-  constexpr Eigen::Index kX = 0, kY = 1, kZ = 2;
-  page.chart(view_of_bar(candidate, kX, kY));
-  page.chart(view_of_bar(candidate, kX, kZ));
-  page.chart(view_of_bar(candidate, kY, kZ));
+  page.paragraph(
+      "Each line is the bar in one position, as it was found, where the tip touches it; the dot is "
+      "hole 1, the label stands at the last hole. Frame: the range of the nodes for the tool of "
+      "the "
+      "first measurement.");
+  page.drawing(drawing_of_positions(candidate));
 
   const auto measurements = measurements_of_positions(o);
   std::vector<std::vector<std::string>> rows;

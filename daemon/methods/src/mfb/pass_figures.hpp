@@ -9,7 +9,7 @@ namespace abbe::daemon {
 /// Adds the residuals of each measurement along the bar, and the corrections of its calibration.
 void add_residuals_along_bar(HtmlReport& page, const MfbCandidate& candidate);
 
-/// Adds a drawing of the bar in all its positions, in three views.
+/// Adds a drawing of the bar in all its positions.
 void add_positions_of_bar(HtmlReport& page, const MfbCandidate& candidate);
 
 /// Adds the drift of each pair of passes; nothing without pairs.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,7 +28,10 @@ void add_chi_square(HtmlReport& page, const mfb::Identification& found) {
       {"per degree of freedom (1: residuals as large as the stated noise)",
        fmt::format("{:.3f}, at most {:.3f}", s.chi2_per_dof, s.chi2_per_dof_limit)},
       {"chi-square, degrees of freedom",
-       fmt::format("{:.1f}, {:.1f}", s.chi2, s.degrees_of_freedom)}};
+       fmt::format("{:.1f}, {:.1f}", s.chi2, s.degrees_of_freedom)},
+      {"with the corrections of the bar and of other values that have a stated uncertainty, per "
+       "degree of freedom",
+       fmt::format("{:.3f}, at most {:.3f}", s.all_chi2_per_dof, s.all_chi2_per_dof_limit)}};
   if (found.cause.cause != mfb::Cause::None) {
     facts.emplace_back("likely cause", found.cause.text);
     facts.emplace_back("per degree of freedom with this cause taken into account",
@@ -35,32 +40,53 @@ void add_chi_square(HtmlReport& page, const mfb::Identification& found) {
   page.facts(facts);
 }
 
-/// Squareness errors and the names that begin with EA, EB, EC are angles.
+/// EA, EB, EC: rotations and squareness.
 bool is_angle_error(std::string_view name) {
   constexpr std::string_view kRotations = "ABC";
   return name.size() > 1 && kRotations.find(name[1]) != std::string_view::npos;
+}
+
+struct PartOfBudget {
+  const char* name;
+  double mfb::Budget::*value;
+};
+constexpr std::array kPartsOfBudget{PartOfBudget{"u", &mfb::Budget::u},
+                                    PartOfBudget{"probe", &mfb::Budget::probe},
+                                    PartOfBudget{"machine", &mfb::Budget::machine},
+                                    PartOfBudget{"bar", &mfb::Budget::bar},
+                                    PartOfBudget{"expansion", &mfb::Budget::expansion},
+                                    PartOfBudget{"temperature", &mfb::Budget::temperature},
+                                    PartOfBudget{"roll", &mfb::Budget::roll},
+                                    PartOfBudget{"of these: drift", &mfb::Budget::drift}};
+
+/// A table of the lengths or of the angles. A part that is 0 for all errors has no column.
+void add_budget_of(HtmlReport& page, const std::vector<mfb::Budget>& budget, bool angles) {
+  std::vector<std::string> columns{angles ? "urad" : "um"};
+  std::vector<std::vector<std::string>> rows;
+  for (const mfb::Budget& b : budget)
+    if (is_angle_error(b.name) == angles) rows.push_back({b.name});
+
+  for (const PartOfBudget& part : kPartsOfBudget) {
+    if (std::ranges::all_of(budget, [&](const auto& b) { return b.*part.value == 0.0; })) continue;
+    columns.emplace_back(part.name);
+    std::size_t row = 0;
+    for (const mfb::Budget& b : budget)
+      if (is_angle_error(b.name) == angles)
+        rows[row++].push_back(fmt::format("{:.3f}", b.*part.value * kUmPerM));
+  }
+  page.table(columns, rows);
 }
 
 void add_budget(HtmlReport& page, const std::vector<mfb::Budget>& budget) {
   if (budget.empty()) return;
   page.heading("Where the uncertainty comes from");
   page.paragraph(
-      "Standard uncertainty (k = 1) of each error where it is largest, and the parts of it: noise "
-      "of the probe, repeatability of the machine, calibration of the bar, its expansion "
-      "coefficient, its temperature, its roll. The estimation of the drift adds the last part to "
-      "those of probe and machine.");
-  std::vector<std::vector<std::string>> rows;
-  for (const mfb::Budget& b : budget) {
-    std::vector<std::string> row{
-        fmt::format("{}, {}", b.name, is_angle_error(b.name) ? "urad" : "um")};
-    for (const double part :
-         {b.u, b.probe, b.machine, b.bar, b.expansion, b.temperature, b.roll, b.drift})
-      row.push_back(fmt::format("{:.3f}", part * kUmPerM));
-    rows.push_back(std::move(row));
-  }
-  page.table(
-      {"", "u", "probe", "machine", "bar", "expansion", "temperature", "roll", "of these: drift"},
-      rows);
+      "Standard uncertainty (k = 1) of each error where it is largest, and its parts: noise of the "
+      "probe, repeatability of the machine, calibration of the bar, its expansion coefficient, its "
+      "temperature, its roll. The estimation of the drift adds the last part to those of probe and "
+      "machine.");
+  add_budget_of(page, budget, false);
+  add_budget_of(page, budget, true);
 }
 
 void add_monte_carlo(HtmlReport& page, const std::optional<mfb::MonteCarlo>& trials) {
@@ -92,7 +118,7 @@ void add_origin_with_bar(HtmlReport& page, const ModelDocument& document,
 
 std::string mfb_report(const ModelDocument& document, const MfbCandidate& candidate) {
   HtmlReport page(fmt::format("{}: calibration with a Multi-Feature Bar", document.machine));
-  add_verdict(page, candidate.verdict, "measurements", 3);
+  add_verdict(page, candidate.verdict, "points", 3);
   add_chi_square(page, candidate.found);
   add_error_tables(page, document.model);
   add_budget(page, candidate.found.solution.budget);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/report/space_drawing.hpp"
 #include "abbe/report/value_maps.hpp"
 
 namespace abbe::daemon {
@@ -71,6 +72,7 @@ class HtmlReport {
   void chart(const Histogram&);
   void chart(const VectorChart&);
   void maps(const ValueMaps&);
+  void drawing(const SpaceDrawing&);
 
   /// The complete page.
   [[nodiscard]] std::string text() const;

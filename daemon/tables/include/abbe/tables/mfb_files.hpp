@@ -41,7 +41,8 @@ struct BarPlanFile {
 struct BarPointsFile {
   InputFile source;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
-  /// Measurements of which the rows run against their `pass`.
+  /// A line with file, line and column for each measurement whose rows run against its `pass`. A bar
+  /// that lies turned may look like that, so that it is no fault of the file yet.
   std::vector<std::string> against_pass;
 };
 [[nodiscard]] Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file,

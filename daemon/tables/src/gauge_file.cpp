@@ -1,0 +1,82 @@
+// gauge.toml: a step gauge measured on the line of a bar.
+#include "abbe/tables/gauge_file.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "abbe/base/units.hpp"
+#include "expansivity.hpp"
+#include "toml_file.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::mfb::GaugeFace;
+using calib::mfb::StepGauge;
+
+void read_gauge_head(Section head, StepGauge& out) {
+  if (!head.present()) return;
+  head.get("name", out.name, Need::Required);
+  get_vector(head, "origin_mm", out.origin_m, kMilli, Need::Required);
+  get_vector(head, "tool_offset_mm", out.tool_offset_m, kMilli, Need::Required);
+  head.get("u_um", out.u_m, kMicro, kNotNegative, Need::Required);
+  head.get("u_um_per_m", out.u_per_m, kMicro, kNotNegative, Need::Required);
+  read_expansivity(head, out.expansion);
+
+  double temperature_C = 0.0;
+  const Need need = out.expansion ? Need::Required : Need::Optional;
+  if (head.get("temperature_C", temperature_C, kPlain, {-50.0, 100.0}, need))
+    out.temperature_K = temperature_C + kZeroCelsius_K;
+  head.get("u_temperature_K", out.u_temperature_K, kPlain, {0.0, 50.0});
+  double u_rotation_rad = 0.0;
+  if (head.get("u_rotation_urad", u_rotation_rad, kMicro, kNotNegative))
+    out.u_rotation_rad = u_rotation_rad;
+  head.close();
+}
+
+/// Distances ascend from 0; every face has the same number of readings.
+void read_faces(Section& root, StepGauge& out) {
+  for (Section& step : root.children("step")) {
+    GaugeFace face;
+    const bool placed =
+        step.get("distance_mm", face.distance_m, kMilli, kNotNegative, Need::Required);
+    const bool measured = step.get("readings_mm", face.readings_m, kMilli, Need::Required);
+    step.close();
+
+    const bool first = out.faces.empty();
+    if (placed && first && face.distance_m != 0.0)
+      step.fault("distance_mm",
+                 fmt::format("{:g}: distances are from the first face, which is at 0",
+                             kMmPerM * face.distance_m));
+    if (placed && !first && face.distance_m <= out.faces.back().distance_m)
+      step.fault("distance_mm",
+                 fmt::format("{:g} after {:g}: must ascend", kMmPerM * face.distance_m,
+                             kMmPerM * out.faces.back().distance_m));
+    if (measured && face.readings_m.empty())
+      step.fault("readings_mm", "is empty: needs the reading of one or more runs");
+    if (measured && !first && face.readings_m.size() != out.faces.front().readings_m.size())
+      step.fault("readings_mm",
+                 fmt::format("{} readings, the first face has {}: one per run",
+                             face.readings_m.size(), out.faces.front().readings_m.size()));
+    out.faces.push_back(std::move(face));
+  }
+  if (out.faces.size() < 2) root.fault("step", "needs at least two [[step]]");
+}
+
+}  // namespace
+
+Result<GaugeFile> read_gauge_toml(const std::filesystem::path& file) {
+  const auto parsed = parse_toml_file(file);
+  if (!parsed) return tl::make_unexpected(parsed.error());
+  Faults faults(file.string());
+  Section root(&parsed->table, "", {1, 1}, faults);
+  GaugeFile out{parsed->source, {}};
+  read_gauge_head(root.child("gauge", Need::Required), out.gauge);
+  read_faces(root, out.gauge);
+  root.close();
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return out;
+}
+
+}  // namespace abbe::daemon

@@ -145,7 +145,7 @@ TEST(MfbJudge, RefusesWhatTheStatedNoiseDoesNotExplain) {
   const auto verdict = judge(found, nullptr);
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_FALSE(verdict->accepted);
-  EXPECT_THAT(verdict->reasons.front(), HasSubstr("chi-square per degree of freedom is"));
+  EXPECT_THAT(verdict->reasons.front(), HasSubstr("chi-square per degree of freedom"));
   EXPECT_EQ(verdict->causes.size(), verdict->reasons.size());
 }
 

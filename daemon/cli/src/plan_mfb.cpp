@@ -102,8 +102,7 @@ Error not_seen(const BarPlan& plan, const PlanInputs& inputs) {
   if (!plan.missing.empty())
     error.details.emplace_back(
         "the stem of a stylus is along the ram, the last axis of the chain, or across it if the "
-        "tip "
-        "is beside it; state another one: --stylus=x,y,z,-x");
+        "tip is beside it; state another one: --stylus=x,y,z,-x");
   for (const auto axis : calib::kAllAxes)
     for (auto& reason : reasons_of_axis(plan, inputs, axis))
       error.details.push_back(std::move(reason));

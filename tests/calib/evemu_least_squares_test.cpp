@@ -62,15 +62,15 @@ TEST(EvemuOls, NoiseIsUnbiased) {
   const Eigen::MatrixXd L = noise_root(of);
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
-  constexpr int kDraws = 200;
+  constexpr int kNoiseDraws = 200;
   double mean = 0.0;
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < kNoiseDraws; ++k) {
     Eigen::VectorXd n(L.cols());
     for (double& value : n) {
       value = normal(random);
     }
     of.problem.y = exact + 8e-6 * (L * n);
-    mean += std::pow(fit_ols(of.problem)->s_m / 8e-6, 2) / kDraws;
+    mean += std::pow(fit_ols(of.problem)->s_m / 8e-6, 2) / kNoiseDraws;
   }
   EXPECT_NEAR(mean, 1.0, 0.04);
 }

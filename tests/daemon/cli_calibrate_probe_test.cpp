@@ -71,9 +71,9 @@ TEST_F(CliCalibrateProbe, FindsTheDelayFromThreeFeeds) {
   record(touches_at({1e-3, 4e-3, 8e-3}));
   const auto [exit, out] = calibrate("--json");
   ASSERT_EQ(exit, 0) << out;
-  const auto json = nlohmann::json::parse(out);
-  EXPECT_NEAR(json["delay_us"].get<double>(), 2000.0, 0.01);
-  EXPECT_EQ(json["feeds"], 3);
+  const auto found = nlohmann::json::parse(out);
+  EXPECT_NEAR(found["delay_us"].get<double>(), 2000.0, 0.01);
+  EXPECT_EQ(found["feeds"], 3);
 }
 
 TEST_F(CliCalibrateProbe, ADamagedRecordingShowsItsResultAndEndsWithOne) {

@@ -213,8 +213,8 @@ TEST_F(FilesPage, NamesEveryKeyOfAModel) {
   document.mode = "standstill";
   document.model = test::synthetic_travel_model(1);
   document.backlash = calib::otf::backlash_of(document.model);
-  const auto json = nlohmann::json::parse(to_json(document));
-  for (const auto& [key, value] : json.items())
+  const auto parsed = nlohmann::json::parse(to_json(document));
+  for (const auto& [key, value] : parsed.items())
     EXPECT_THAT(sections_.at("model.json").text, HasSubstr("`" + key + "`"));
 }
 

@@ -63,7 +63,7 @@ Result<std::optional<calib::joint::SharedRangeOffset>> shared_offset(
   if (!solution.offset_in_model)
     return fail(
         ErrorCode::BadInput,
-        fmt::format("{}: range_offset = \"{}\" needs [tracker] u_range_offset_um > 0, and a "
+        fmt::format("{}: range_offset = \"{}\" needs u_range_offset_um > 0 of the tracker, and a "
                     "run without reference nests: otherwise the offset is not estimated",
                     files.name, files.range_offset));
   return calib::joint::SharedRangeOffset{files.range_offset, *solution.offset_in_model};

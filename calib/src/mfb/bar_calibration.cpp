@@ -6,6 +6,7 @@
 #include <set>
 
 #include "abbe/calib/mfb/reversal.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 #include "mfb/gauge_line.hpp"
 #include "mfb/outlying_features.hpp"
@@ -123,8 +124,8 @@ double u_of_bar_temperature(const Observations& o) {
     from_20_K +=
         (pass.temperature_K - kReferenceTemperature_K) / static_cast<double>(o.passes.size());
   }
-  return std::hypot(o.bar.expansion->u_alpha_per_K * from_20_K,
-                    o.bar.expansion->alpha_per_K * o.plan.noise.u_temperature_K);
+  return root_sum_of_squares(o.bar.expansion->u_alpha_per_K * from_20_K,
+                             o.bar.expansion->alpha_per_K * o.plan.noise.u_temperature_K);
 }
 
 Result<double> u_rotation_rad(const StepGauge& gauge, const Vector3& beside_m) {

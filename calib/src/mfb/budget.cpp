@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "mfb/residuals.hpp"
 
 namespace abbe::calib::mfb {
@@ -66,7 +67,7 @@ Budget largest_of(std::string name, const VarianceParts& parts, Eigen::Index fir
   const Eigen::VectorXd touches =
       parts.total - parts.bar - parts.expansion - parts.temperature - parts.roll;
   const double probe = noise.probe_m, machine = noise.machine_m;
-  const double of_touch = most(touches) / std::hypot(probe, machine);
+  const double of_touch = most(touches) / root_sum_of_squares(probe, machine);
   return {.name = std::move(name),
           .u = most(parts.total),
           .probe = of_touch * probe,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
+#include "elementary.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -114,9 +116,9 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
 double u_of_scale(const StepGauge& gauge) {
   const Expansion expansion = gauge.expansion.value_or(Expansion{});
   const double from_20_K = gauge.temperature_K - kReferenceTemperature_K;
-  return std::sqrt(std::pow(gauge.u_per_m, 2) +
-                   std::pow(expansion.alpha_per_K * gauge.u_temperature_K, 2) +
-                   std::pow(expansion.u_alpha_per_K * from_20_K, 2));
+  return root_sum_of_squares(gauge.u_per_m,
+                             root_sum_of_squares(expansion.alpha_per_K * gauge.u_temperature_K,
+                                                 expansion.u_alpha_per_K * from_20_K));
 }
 
 }  // namespace
@@ -170,7 +172,7 @@ Eigen::MatrixXd abbe_covariance_m2(double beside_m, double u_rotation_rad,
   const Eigen::Index points = std::ssize(along_m);
   const double length_m = 0.25 * (along_m.back() - along_m.front());
   const auto correlation = [&](Eigen::Index i, Eigen::Index k) {
-    return std::exp(
+    return exponential(
         -std::abs(along_m[static_cast<std::size_t>(i)] - along_m[static_cast<std::size_t>(k)]) /
         length_m);
   };

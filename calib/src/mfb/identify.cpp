@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 #include "mfb/likely_cause.hpp"
 #include "mfb/set_aside_touches.hpp"
@@ -201,7 +202,7 @@ Result<Identification> identify(const Bar& bar, const Plan& plan,
                         std::move(outliers.set_aside),
                         std::move(outliers.unresolved),
                         std::move(touch_residuals),
-                        std::hypot(plan.noise.probe_m, plan.noise.machine_m),
+                        root_sum_of_squares(plan.noise.probe_m, plan.noise.machine_m),
                         std::move(cause),
                         std::move(notes)};
 }

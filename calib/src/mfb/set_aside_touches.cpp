@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "median.hpp"
 #include "message.hpp"
 #include "mfb/joint.hpp"
@@ -118,7 +119,7 @@ Suspects suspects_in(const ResidualsOfFeature& f, const Matrix3& axes, double sc
 }  // namespace
 
 ResidualScale::ResidualScale(const Observations& o, const std::vector<ResidualsOfFeature>& all)
-    : u_m_(std::hypot(o.plan.noise.probe_m, o.plan.noise.machine_m)) {
+    : u_m_(root_sum_of_squares(o.plan.noise.probe_m, o.plan.noise.machine_m)) {
   std::map<Feature, std::vector<double>> kinds;
   std::map<std::string, std::vector<double>> features;
   std::map<Feature, std::size_t> degrees_of_freedom;

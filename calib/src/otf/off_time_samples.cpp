@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "median.hpp"
 #include "otf/robust_line.hpp"
 
@@ -87,8 +88,8 @@ class OffTimeSearch {
     const Vector3 d = direction(k), beam_m = T.R * block.mean_tracker_m;
     const double range_m = beam_m.norm(), cosine = d.dot(beam_m) / range_m;
     const double sigma_m =
-        std::hypot(noise_.sigma_range_m * cosine,
-                   noise_.sigma_angle_rad * range_m * std::sqrt(1.0 - cosine * cosine));
+        root_sum_of_squares(noise_.sigma_range_m * cosine,
+                            noise_.sigma_angle_rad * range_m * std::sqrt(1.0 - cosine * cosine));
     const Vector3 row = T.R.transpose() * d / sigma_m;
 
     std::vector<AlongSample> all;

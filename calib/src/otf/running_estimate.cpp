@@ -9,6 +9,7 @@
 #include "abbe/calib/estimation/null_space.hpp"
 #include "abbe/calib/gauge.hpp"
 #include "abbe/calib/otf/backlash.hpp"
+#include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 
 namespace abbe::calib::otf {
@@ -90,7 +91,7 @@ double scale_effect(const ErrorMotion& motion, const AxisNodes& nodes, std::size
     return 0.0;
   }
   return (nodes.nodes_m[node] - nodes.reference_m) *
-         std::hypot(noise.u_scale, noise.u_axis_scale[index(motion.axis)]);
+         root_sum_of_squares(noise.u_scale, noise.u_axis_scale[index(motion.axis)]);
 }
 
 }  // namespace
@@ -250,7 +251,8 @@ Result<TablesSoFar> RunningEstimate::tables() const {
 
   const auto node = [&](std::size_t unknown, double further_u) {
     const auto i = static_cast<Eigen::Index>(unknown);
-    const double u = std::hypot(std::sqrt(result.variance_factor) * estimate.u(i), further_u);
+    const double u =
+        root_sum_of_squares(std::sqrt(result.variance_factor) * estimate.u(i), further_u);
     const bool determined = unseen.share(i) < kRoundingShare && u < kLargestU;
     return determined ? NodeSoFar{estimate.U(i), u, true} : NodeSoFar{};
   };
@@ -260,9 +262,9 @@ Result<TablesSoFar> RunningEstimate::tables() const {
     TableSoFar& out = result.tables.emplace_back(TableSoFar{.motion = table.motion, .nodes = {}});
     const AxisNodes& nodes = layout.nodes()[index(table.motion.axis)];
     for (std::size_t i = 0; i < nodes.nodes_m.size(); ++i) {
-      out.nodes.push_back(
-          node(table.offset + i, std::hypot(scale_effect(table.motion, nodes, i, setup_.noise),
-                                            half_difference(t, i, estimate.U))));
+      out.nodes.push_back(node(
+          table.offset + i, root_sum_of_squares(scale_effect(table.motion, nodes, i, setup_.noise),
+                                                half_difference(t, i, estimate.U))));
     }
   }
   for (std::size_t i = 0; i < result.squareness.size(); ++i) {

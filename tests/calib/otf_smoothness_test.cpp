@@ -11,6 +11,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "otf/about_bends.hpp"
 #include "otf/table_bends.hpp"
 #include "smooth_run.hpp"
 #include "standstill_run.hpp"
@@ -178,6 +179,35 @@ TEST(SmoothnessPrior, DoesNotSmoothAStepAway) {
   for (Eigen::Index i = 0; i < error.size(); ++i) {
     EXPECT_LE(std::abs(error(i)), 4.5 * u(i) + 1e-15) << i;  // u is 0 where the gauge fixes it
   }
+}
+
+/// Half the distance of the nodes: three of the bends are between the neighbours of the sharp one.
+TEST(SmoothnessPrior, IsLeftOutAtTheSamePlaceWithOtherNodes) {
+  Machine machine = case_a_machine();
+  machine.nodes[0] = *equidistant_nodes(-0.3, 0.3, 0.1);
+  const std::vector<TableBend> bends = bends_of(layout_of(machine));
+  machine.nodes[0] = *equidistant_nodes(-0.3, 0.3, 0.05);
+  const std::vector<TableBend> of_closer_nodes = bends_of(layout_of(machine));
+
+  const auto left_out = [](const Smoothness& s, const std::vector<TableBend>& all) {
+    std::vector<double> positions_m;
+    for (const TableBend& bend : all) {
+      if (is_left_out(s, bend)) {
+        EXPECT_EQ(bend.motion, s.sharp.front().motion);
+        positions_m.push_back(bend.position_m);
+      }
+    }
+    return positions_m;
+  };
+
+  const TableBend& sharp = bends[1];
+  ASSERT_EQ(sharp.motion.axis, Axis::X);
+  Smoothness s{.bend_m = {1e-6, 1e-6, 1e-6}};
+  s.sharp = {{sharp.motion, sharp.position_m, sharp.from_m, sharp.to_m}};
+  EXPECT_THAT(left_out(s, bends), testing::ElementsAre(sharp.position_m));
+  const auto near = [&](double x_m) { return testing::DoubleNear(sharp.position_m + x_m, 1e-12); };
+  EXPECT_THAT(left_out(s, of_closer_nodes),
+              testing::ElementsAre(near(-0.05), near(0.0), near(0.05)));
 }
 
 /// A prior ten times too narrow must not be applied to the tables that are rougher.

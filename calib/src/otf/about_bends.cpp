@@ -53,14 +53,23 @@ class Likelihood {
   Eigen::VectorXd l_, c2_;
 };
 
+/// The same bend, or one of other nodes at the same place. Neighbours of the same table only touch.
+bool is_at(const Bend& sharp, const TableBend& bend) {
+  constexpr double kSame_m = 1e-9;  // rounding of nodes at the same place
+  const auto is_inside = [](double x_m, const auto& b) {
+    return b.from_m + kSame_m < x_m && x_m < b.to_m - kSame_m;
+  };
+  return sharp.motion == bend.motion &&
+         (is_inside(bend.position_m, sharp) || is_inside(sharp.position_m, bend));
+}
+
 }  // namespace
 
 bool is_left_out(const Smoothness& s, const TableBend& bend) {
   return s.bend_m[index(bend.motion.axis)] <= 0.0 ||
          std::find(s.rough_tables.begin(), s.rough_tables.end(), bend.motion) !=
              s.rough_tables.end() ||
-         std::any_of(s.sharp.begin(), s.sharp.end(),
-                     [&](const Bend& b) { return b.motion == bend.motion && b.node == bend.node; });
+         std::any_of(s.sharp.begin(), s.sharp.end(), [&](const Bend& b) { return is_at(b, bend); });
 }
 
 double sigma_of(const Smoothness& s, const TableBend& bend) {

@@ -54,7 +54,9 @@ std::optional<Bend> sharpest(const AboutBends& about, const Smoothness& s, const
     if (times > (found ? found->times : 0.0) &&
         log_chi2_tail(times * times, 1) < natural_logarithm(limit)) {
       const TableBend& bend = about.bends[static_cast<std::size_t>(i)];
-      found = Bend{bend.motion, bend.node, bend.position_m, p.mean(i) * sigma_of(s, bend), times};
+      found =
+          Bend{bend.motion, bend.position_m, bend.from_m, bend.to_m, p.mean(i) * sigma_of(s, bend),
+               times};
     }
   }
   return found;
@@ -208,9 +210,10 @@ bool is_same(const Smoothness& a, const Smoothness& b) {
   return std::equal(a.bend_m.begin(), a.bend_m.end(), b.bend_m.begin(), near) &&
          near(std::sqrt(a.variance_factor), std::sqrt(b.variance_factor)) &&
          a.rough_tables == b.rough_tables &&
-         std::equal(
-             a.sharp.begin(), a.sharp.end(), b.sharp.begin(), b.sharp.end(),
-             [](const Bend& x, const Bend& y) { return x.motion == y.motion && x.node == y.node; });
+         std::equal(a.sharp.begin(), a.sharp.end(), b.sharp.begin(), b.sharp.end(),
+                    [](const Bend& x, const Bend& y) {
+                      return x.motion == y.motion && x.position_m == y.position_m;
+                    });
 }
 
 std::string size_text(const Smoothness& s) {

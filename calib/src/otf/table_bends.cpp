@@ -16,8 +16,9 @@ TableBend bend_at(const Table& table, const std::vector<double>& nodes_m, std::s
   const std::size_t at = table.offset + node;
   const double relative = h_m / kUnitDistance_m;
   return {.motion = table.motion,
-          .node = node,
           .position_m = nodes_m[node],
+          .from_m = nodes_m[node - 1],
+          .to_m = nodes_m[node + 1],
           .row = {{{at - 1, a}, {at, -(a + b)}, {at + 1, b}}},
           .sigma_of_unit = relative * std::sqrt(relative) *
                            (is_rotation(table.motion.motion) ? kRotationsInRad : 1.0)};

@@ -14,8 +14,8 @@ namespace abbe::calib::otf {
 
 struct TableBend {
   ErrorMotion motion;
-  std::size_t node = 0;  ///< index of the middle node in its table
-  double position_m = 0.0;
+  double position_m = 0.0;                    ///< of the middle node
+  double from_m = 0.0, to_m = 0.0;            ///< positions of the nodes beside it
   std::array<estimation::RowEntry, 3> row{};  ///< bend = row . U
   double sigma_of_unit = 1.0;                 ///< standard deviation of the prior for bend 1 m
 };

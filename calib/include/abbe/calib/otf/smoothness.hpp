@@ -38,13 +38,15 @@
 
 namespace abbe::calib::otf {
 
-/// A bend to which the prior is not applied.
+/// A bend to which the prior is not applied. With other nodes (lack_of_fit.hpp), neither is it to
+/// bends whose middle node is between from_m and to_m, nor to those whose three nodes contain
+/// position_m.
 struct Bend {
   ErrorMotion motion;
-  std::size_t node = 0;     ///< index of the middle node
-  double position_m = 0.0;  ///< of this node
-  double value = 0.0;       ///< estimate with the prior, m or rad
-  double times = 0.0;       ///< the estimate in units of its standard deviation under the prior
+  double position_m = 0.0;          ///< of the middle node
+  double from_m = 0.0, to_m = 0.0;  ///< of the nodes beside it
+  double value = 0.0;               ///< estimate with the prior, m or rad
+  double times = 0.0;  ///< the estimate in units of its standard deviation under the prior
 };
 
 /// The prior of an adjustment.

@@ -7,7 +7,6 @@
 #include "abbe/calib/estimation/row_batch.hpp"
 #include "chi2_tail.hpp"
 #include "elementary.hpp"
-#include "median.hpp"
 #include "message.hpp"
 #include "otf/about_bends.hpp"
 #include "units.hpp"
@@ -36,12 +35,13 @@ std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
   return tables;
 }
 
-/// Estimate of a bend in units of its standard deviation under the prior; 0 if the data hardly
+/// Estimate of a bend in units of its standard deviation under the prior; nullopt if the data hardly
 /// determine it.
-double times_sigma(const BendPosterior& p, Eigen::Index i) {
+std::optional<double> times_sigma(const BendPosterior& p, Eigen::Index i) {
   constexpr double kLeast = 1e-3;  // share of the variance
   const double variance = 1.0 - p.Q(i, i);
-  return variance > kLeast ? std::abs(p.mean(i)) / std::sqrt(variance) : 0.0;
+  return variance > kLeast ? std::optional(std::abs(p.mean(i)) / std::sqrt(variance))
+                           : std::nullopt;
 }
 
 /// The bend that fits the prior least, if this is no chance. Steps also increase the estimated bends
@@ -50,7 +50,7 @@ std::optional<Bend> sharpest(const AboutBends& about, const Smoothness& s, const
                              const std::vector<Eigen::Index>& rows, double limit) {
   std::optional<Bend> found;
   for (const Eigen::Index i : rows) {
-    const double times = times_sigma(p, i);
+    const double times = times_sigma(p, i).value_or(0.0);
     if (times > (found ? found->times : 0.0) &&
         log_chi2_tail(times * times, 1) < natural_logarithm(limit)) {
       const TableBend& bend = about.bends[static_cast<std::size_t>(i)];
@@ -76,15 +76,38 @@ bool is_rough(const BendPosterior& p, const std::vector<Eigen::Index>& rows, dou
   return log_chi2_tail(sum * dof / mean, static_cast<std::size_t>(dof)) < natural_logarithm(limit);
 }
 
-/// More than half of all bends are larger than the prior permits: the median of their absolute
-/// values is 0.67 standard deviations. A few steps do not change it.
+/// Number of independent ones with the variance of the sum of squares of these correlated bends, as
+/// in is_rough().
+double independent_bends(const BendPosterior& p, const std::vector<Eigen::Index>& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(n, n) - Eigen::MatrixXd(p.Q(rows, rows));
+  const Eigen::VectorXd scale = correlation.diagonal().cwiseSqrt().cwiseInverse();
+  correlation = (scale.asDiagonal() * correlation * scale.asDiagonal()).eval();
+  return static_cast<double>(n * n) / correlation.squaredNorm();
+}
+
+/// Clearly more than half of the bends that the data determine are above the median of their
+/// absolute values under the prior. A few steps do not change it. Binomial distribution, of as many
+/// independent bends.
 bool is_too_narrow(const BendPosterior& p, const std::vector<Eigen::Index>& rows) {
-  constexpr double kMedian = 1.35;  // twice the expected one
-  std::vector<double> times;
+  constexpr double kMedian = 0.6745;  // standard deviations
+  constexpr double kNormal999 = 3.090;
+  constexpr double kFewest = 20.0;
+  std::vector<Eigen::Index> determined;
+  double above = 0.0;
   for (const Eigen::Index i : rows) {
-    times.push_back(times_sigma(p, i));
+    if (const std::optional<double> times = times_sigma(p, i)) {
+      determined.push_back(i);
+      above += *times > kMedian ? 1.0 : 0.0;
+    }
   }
-  return !times.empty() && median(times) > kMedian;
+  if (static_cast<double>(determined.size()) < kFewest) {
+    return false;
+  }
+
+  const double n = independent_bends(p, determined);
+  const double excess = n * (above / static_cast<double>(determined.size()) - 0.5);
+  return excess - 0.5 > kNormal999 * 0.5 * std::sqrt(n);  // normal approximation, continuous
 }
 
 void leave_out_all(Smoothness& s, const AboutBends& about,

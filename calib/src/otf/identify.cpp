@@ -24,26 +24,30 @@ Options after_linearisation(Options options) {
   return options;
 }
 
-/// solve(), with the prior for smooth tables that these rows permit, if there is one.
+/// solve(), with the prior for smooth tables that these rows permit, if there is one. The bends are
+/// judged without the drift and the range offset that the fit without a prior shows.
 Result<Solution> solve_smooth(Observations& o, const RowInformation& rows, const Options& options) {
-  constexpr int kMostRounds = 4;  // the variance factor depends little on the prior
   Result<Solution> solution = solve(o, rows, options);
-  for (int round = 0; o.smoothness && solution && round < kMostRounds; ++round) {
-    Smoothness next = smoothness_for(rows.data, o.basis, *options.smoothness,
-                                     solution->statistics.variance_factor);
-    const bool same = is_same(next, *o.smoothness);
-    o.smoothness = std::move(next);
-    if (same) {
-      solution->smoothness = o.smoothness;
-      break;
-    }
-    solution = solve(o, rows, options);
+  if (!o.smoothness || !solution) {
+    return solution;
   }
 
-  if (o.smoothness && solution) {
-    const std::vector<std::string> notes = notes_on(*o.smoothness);
-    o.notes.insert(o.notes.end(), notes.begin(), notes.end());
+  const bool has_run_effects = o.drift || o.u_range_offset_m > 0.0;
+  const RowInformation judged =
+      has_run_effects ? information_of(without_run_effects(o, *solution)) : rows;
+  const Result<Smoothness> chosen = permitted_smoothness(
+      judged.data, o.basis, *options.smoothness, solution->statistics.variance_factor,
+      [&](const Smoothness& s) {
+        o.smoothness = s;
+        solution = solve(o, rows, options);
+        return solution.map([](const Solution& with) { return with.statistics.variance_factor; });
+      });
+  if (!chosen) {
+    return tl::unexpected(chosen.error());
   }
+
+  const std::vector<std::string> notes = notes_on(*chosen);
+  o.notes.insert(o.notes.end(), notes.begin(), notes.end());
   return solution;
 }
 

@@ -17,6 +17,9 @@ namespace {
 /// Probability that a bend or table is left out although all errors are as smooth as stated.
 constexpr double kSmoothFalseAlarm = 1e-3;
 
+/// The largest size that can be stated.
+constexpr double kWidestBend_m = 1e-3;
+
 /// Rows of the bends of each table that have the prior.
 std::vector<std::vector<Eigen::Index>> rows_of_tables(const AboutBends& about,
                                                       const Smoothness& s) {
@@ -179,8 +182,8 @@ void set_size(Smoothness& s, const AboutBends& about) {
 
 Smoothness first_smoothness(const SmoothnessOptions& options) {
   Smoothness s{.bend_m = options.bend_m, .estimated = options.estimated};
-  if (options.estimated) {
-    s.bend_m.fill(kLargestBend_m);
+  for (double& bend_m : s.bend_m) {
+    bend_m = bend_m > 0.0 || s.estimated ? kWidestBend_m : 0.0;
   }
   return s;
 }
@@ -202,8 +205,11 @@ void add_smoothness(estimation::Information& data, const estimation::TableBasis&
 
 Smoothness smoothness_for(const estimation::Information& data, const estimation::TableBasis& basis,
                           const SmoothnessOptions& options, double variance_factor) {
-  Smoothness s = first_smoothness(options);
-  s.variance_factor = variance_factor;
+  Smoothness s{
+      .bend_m = options.bend_m, .estimated = options.estimated, .variance_factor = variance_factor};
+  if (options.estimated) {
+    s.bend_m.fill(kLargestBend_m);
+  }
   const AboutBends about = about_bends(data, basis, variance_factor);
 
   constexpr int kMostRounds = 40;
@@ -225,6 +231,25 @@ Smoothness smoothness_for(const estimation::Information& data, const estimation:
     }
   }
   return s;
+}
+
+Result<Smoothness> permitted_smoothness(
+    const estimation::Information& data, const estimation::TableBasis& basis,
+    const SmoothnessOptions& options, double first_factor,
+    const std::function<Result<double>(const Smoothness&)>& factor_with) {
+  constexpr int kMostRounds = 4;  // the variance factor depends little on a permitted prior
+  Smoothness s = smoothness_for(data, basis, options, first_factor);
+  for (int round = 1;; ++round) {
+    const Result<double> factor = factor_with(s);
+    if (!factor) {
+      return tl::unexpected(factor.error());
+    }
+    Smoothness next = smoothness_for(data, basis, options, *factor);
+    if (is_same(next, s) || round == kMostRounds) {
+      return s;
+    }
+    s = std::move(next);
+  }
 }
 
 bool is_same(const Smoothness& a, const Smoothness& b) {

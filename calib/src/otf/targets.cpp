@@ -324,19 +324,70 @@ Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options
   return a;
 }
 
-/// The prior for smooth tables that the rows of all runs permit; `first`: with the first prior.
-void choose_smoothness(std::vector<Observations>& runs, const Adjustment& first,
-                       const SmoothnessOptions& options) {
-  const std::vector<Residuals> residuals = residuals_of_runs(runs, first.U);
-  const std::vector<Statistics> of_runs = statistics_of_runs(runs, first, residuals);
-  const double factor = statistics_of_all(of_runs, first, RunUnknowns(runs).size()).variance_factor;
-  const Smoothness chosen =
-      smoothness_for(rows_information(runs), runs.front().basis, options, factor);
-  for (Observations& o : runs) {
-    o.smoothness = chosen;
+/// What an adjustment of the rows states, with the offset of the ranges as one more unknown.
+struct FitOfRuns {
+  Eigen::VectorXd U;
+  RangeOffset offset;
+  Eigen::MatrixXd root_of_offset;    ///< what the offset adds to the covariance: root root^T
+  std::vector<Residuals> residuals;  ///< without the offset, as all figures
+  std::vector<Statistics> of_runs;
+  Statistics all;
+};
+
+FitOfRuns fit_of_runs(std::span<const Observations> runs, const Adjustment& a) {
+  const std::size_t unknowns = RunUnknowns(runs).size();
+  FitOfRuns fit{.U = a.U,
+                .root_of_offset = Eigen::MatrixXd::Zero(a.U.size(), 1),
+                .residuals = residuals_of_runs(runs, a.U)};
+  const auto set_figures = [&] {
+    fit.of_runs = statistics_of_runs(runs, a, fit.residuals);
+    fit.all = statistics_of_all(fit.of_runs, a, unknowns);
+  };
+  set_figures();
+
+  if (runs.front().u_range_offset_m > 0.0) {
+    const AddedColumns::Estimate e =
+        estimate_offset(runs, a, fit.residuals, fit.all.variance_factor);
+    fit.offset = {e.d(0), e.u(0)};
+    fit.U -= e.dU;
+    fit.root_of_offset = e.root_cov_dU;
+    subtract_offset(fit.residuals, runs, fit.U, fit.offset.value_m);
+    set_figures();
   }
-  const std::vector<std::string> notes = notes_on(chosen);
+  return fit;
+}
+
+/// adjust_runs(), with the prior for smooth tables that the rows of all runs permit, if there is
+/// one. The bends are judged without the range offset that the fit without a prior shows.
+Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options& options) {
+  Result<Adjustment> a = adjust_runs(runs, options);
+  if (!a || !runs.front().smoothness) {
+    return a;
+  }
+
+  const FitOfRuns first = fit_of_runs(runs, *a);
+  std::vector<Observations> judged = runs;
+  for (Observations& o : judged) {
+    o = without_range_offset(std::move(o), first.offset.value_m);
+  }
+  const Result<Smoothness> chosen =
+      permitted_smoothness(rows_information(judged), runs.front().basis, *options.smoothness,
+                           first.all.variance_factor, [&](const Smoothness& s) {
+                             for (Observations& o : runs) {
+                               o.smoothness = s;
+                             }
+                             a = adjust_runs(runs, options);
+                             return a.map([&](const Adjustment& with) {
+                               return fit_of_runs(runs, with).all.variance_factor;
+                             });
+                           });
+  if (!chosen) {
+    return tl::unexpected(chosen.error());
+  }
+
+  const std::vector<std::string> notes = notes_on(*chosen);
   runs.front().notes.insert(runs.front().notes.end(), notes.begin(), notes.end());
+  return a;
 }
 
 Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adjustments,
@@ -348,36 +399,18 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                            " observations for ", unknowns.size(), " unknowns"));
   }
 
-  Result<Adjustment> a = adjust_runs(runs, options);
-  if (a && runs.front().smoothness) {
-    choose_smoothness(runs, *a, *options.smoothness);
-    a = adjust_runs(runs, options);
-  }
+  Result<Adjustment> a = adjust_smooth(runs, options);
   if (!a) {
     return tl::unexpected(a.error());
   }
 
   const Adjustment of_rows = *a;
-  std::vector<Residuals> residuals = residuals_of_runs(runs, a->U);
-  std::vector<Statistics> of_runs = statistics_of_runs(runs, *a, residuals);
-  Statistics all = statistics_of_all(of_runs, *a, unknowns.size());
-  RangeOffset offset;
-  Eigen::MatrixXd root_of_offset = Eigen::MatrixXd::Zero(a->U.size(), 1);
-
-  if (runs.front().u_range_offset_m > 0.0) {
-    const AddedColumns::Estimate e = estimate_offset(runs, *a, residuals, all.variance_factor);
-    offset = {e.d(0), e.u(0)};
-    a->U -= e.dU;
-    root_of_offset = e.root_cov_dU;
-    subtract_offset(residuals, runs, a->U, offset.value_m);
-    of_runs = statistics_of_runs(runs, *a, residuals);
-    all = statistics_of_all(of_runs, *a, unknowns.size());
-  }
-
-  a->covariance *= all.variance_factor;
-  a->covariance += root_of_offset * root_of_offset.transpose();
+  FitOfRuns fit = fit_of_runs(runs, *a);
+  a->U = std::move(fit.U);
+  a->covariance *= fit.all.variance_factor;
+  a->covariance += fit.root_of_offset * fit.root_of_offset.transpose();
   add_scales_of_runs(a->covariance, runs, a->cofactor_Q);
-  all.iterations = adjustments;
+  fit.all.iterations = adjustments;
 
   const Result<VolumetricModel> model = model_of_runs(runs, *a);
   if (!model) {
@@ -386,7 +419,7 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
 
   const Estimator estimator =
       options.mode == Mode::OnTheFly ? options.estimator : Estimator::TwoStep;
-  TargetsIdentification found{.observations = {}, .solutions = {}, .statistics = all};
+  TargetsIdentification found{.observations = {}, .solutions = {}, .statistics = fit.all};
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const auto rigid = static_cast<Eigen::Index>(unknowns.rigid_offset(k));
     found.solutions.push_back({.estimator = estimator,
@@ -395,9 +428,9 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                .covariance_with_rigid = unknowns.block(a->covariance, k),
                                .adjustment = adjustment_of_run(of_rows, runs, k),
                                .T_machine_tracker = runs[k].alignment.T_machine_tracker,
-                               .statistics = of_runs[k],
-                               .residuals = std::move(residuals[k]),
-                               .range_offset = offset,
+                               .statistics = fit.of_runs[k],
+                               .residuals = std::move(fit.residuals[k]),
+                               .range_offset = fit.offset,
                                .backlash = backlash_of(runs[k], a->U, a->covariance),
                                .smoothness = runs[k].smoothness});
   }

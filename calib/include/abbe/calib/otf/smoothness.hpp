@@ -27,10 +27,12 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "abbe/calib/error.hpp"
 #include "abbe/calib/error_parameters.hpp"
 #include "abbe/calib/estimation/information.hpp"
 #include "abbe/calib/estimation/table_basis.hpp"
@@ -64,7 +66,8 @@ struct Smoothness {
   [[nodiscard]] std::size_t left_out() const { return sharp.size() + rough_tables.size(); }
 };
 
-/// With which an iteration begins: as stated, or the widest prior if its size is estimated.
+/// With which an iteration begins: the widest prior, almost none. It hides no bend, and determines
+/// what the data do not.
 [[nodiscard]] Smoothness first_smoothness(const SmoothnessOptions&);
 
 /// Adds the rows of the prior. The first unknowns of the information are those of the basis.
@@ -75,6 +78,13 @@ void add_smoothness(estimation::Information&, const estimation::TableBasis&, con
 [[nodiscard]] Smoothness smoothness_for(const estimation::Information& data,
                                         const estimation::TableBasis&, const SmoothnessOptions&,
                                         double variance_factor);
+/// The prior for these data (without it), with the variance factor that results with this prior.
+/// `first_factor`: that of an adjustment with first_smoothness(): where bends are sharp, a prior
+/// increases the residuals, and a larger factor would permit it. `factor_with`: variance factor of
+/// an adjustment with a prior; its last call is that with the returned one. Errors of `factor_with`.
+[[nodiscard]] Result<Smoothness> permitted_smoothness(
+    const estimation::Information& data, const estimation::TableBasis&, const SmoothnessOptions&,
+    double first_factor, const std::function<Result<double>(const Smoothness&)>& factor_with);
 /// True if an adjustment with `b` would give the result of one with `a`, within 1 % of the size of
 /// the prior.
 [[nodiscard]] bool is_same(const Smoothness& a, const Smoothness& b);

@@ -147,19 +147,6 @@ TEST(SmoothnessPrior, KeepsItsSizeWhenTheNoiseIsLargerThanStated) {
   EXPECT_NEAR(normalised_error_square(run, found->solution.model), 1.0, 0.25);
 }
 
-TEST(SmoothnessPrior, HasTheMostLikelySizeIfItIsEstimated) {
-  for (const double bend_m : {0.3e-6, 3e-6}) {
-    MadeRun run = smooth_run({.seed = 2, .bend_m = bend_m});
-    run.options.estimator = Estimator::TwoStep;
-    const auto found = identified_with(run, SmoothnessOptions{.estimated = true});
-    ASSERT_TRUE(found) << found.error().text;
-    const Smoothness& s = *found->solution.smoothness;
-    EXPECT_NEAR(std::log(s.bend_m[0] / bend_m), 0.0, std::log(1.25));
-    EXPECT_NEAR(s.chi2 / s.expected_chi2, 1.0, 0.1);
-    EXPECT_THAT(found->observations.notes, Contains(HasSubstr("estimated from the data")));
-  }
-}
-
 TEST(SmoothnessPrior, DoesNotSmoothAStepAway) {
   const SmoothRunOptions made{.seed = 1, .bend_m = 0.3e-6};
   MadeRun run = smooth_run(made);
@@ -235,7 +222,7 @@ TEST(SmoothnessPrior, IsPartOfTheHeldOutTest) {
 TEST(SmoothnessPrior, IsUsedForStandstills) {
   MadeRun run = make_standstill_run();
   const auto without = identified_with(run, {});
-  const auto with = identified_with(run, SmoothnessOptions{.estimated = true});
+  const auto with = identified_with(run, stated(10e-6));
   ASSERT_TRUE(without && with) << with.error().text;
   ASSERT_TRUE(with->solution.smoothness);
   EXPECT_GT(with->solution.smoothness->rows, 0u);

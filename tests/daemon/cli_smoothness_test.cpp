@@ -47,7 +47,6 @@ TEST_F(CliSmoothness, StatesThePriorThatWasUsed) {
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
   const auto& prior = summary.at("smoothness");
-  EXPECT_FALSE(prior.at("estimated").get<bool>());
   EXPECT_NEAR(prior.at("bend_um")[2].get<double>(), 20.0, 1e-9);
   EXPECT_EQ(prior.at("bends"), 14u);
   EXPECT_EQ(prior.at("left_out"), 0u);
@@ -55,15 +54,7 @@ TEST_F(CliSmoothness, StatesThePriorThatWasUsed) {
   EXPECT_THAT(test::text_of(folder_ / "out/report.html"), HasSubstr("a prior for smooth tables"));
 }
 
-TEST_F(CliSmoothness, EstimatesItsSizeAndTakesItFromTheConfiguration) {
-  const auto estimated = identify("--smoothness estimated --json");
-  ASSERT_EQ(estimated.exit, 0) << estimated.err;
-  const auto summary = nlohmann::json::parse(estimated.out);
-  const auto& prior = summary.at("smoothness");
-  EXPECT_TRUE(prior.at("estimated").get<bool>());
-  EXPECT_GT(prior.at("bend_um")[0].get<double>(), 5.0);
-  EXPECT_LT(prior.at("bend_um")[0].get<double>(), 60.0);
-
+TEST_F(CliSmoothness, TakesItsSizeFromTheConfiguration) {
   test::write_text(folder_ / "machine.toml",
                    test::synthetic_machine_toml() + "[otf]\nsmoothness_um = [20, 0, 30]\n");
   const auto configured = identify("", "text"), off = identify("--smoothness none", "off");
@@ -79,10 +70,10 @@ TEST_F(CliSmoothness, NamesTablesThatAreRougher) {
 }
 
 TEST_F(CliSmoothness, RefusesWhatIsNoSize) {
-  for (const char* text : {"-1", "0", "1,2", "1,2,x", "1e9", "nan", "smooth", "0,0,0"}) {
+  for (const char* text : {"-1", "0", "1,2", "1,2,x", "1e9", "nan", "estimated", "0,0,0"}) {
     const auto ran = identify(std::string("--smoothness=") + text, "none");
     EXPECT_EQ(ran.exit, 2) << text;
-    EXPECT_THAT(ran.err, HasSubstr("must be none, estimated, or the standard deviation")) << text;
+    EXPECT_THAT(ran.err, HasSubstr("must be none, or the standard deviation")) << text;
   }
   EXPECT_FALSE(fs::exists(folder_ / "none"));
 }
@@ -94,22 +85,23 @@ TEST(SmoothnessConfig, IsReadAndPassedToTheIdentification) {
   const auto options = otf_options({}, *config);
   ASSERT_TRUE(options.smoothness);
   EXPECT_THAT(options.smoothness->bend_m, ElementsAre(1e-6, 0.0, 2.5e-6));
-  EXPECT_TRUE(parse_config(kMachine + "[otf]\nsmoothness = \"estimated\"\n", "abbed.toml")
-                  ->otf.smoothness->estimated);
+  EXPECT_FALSE(
+      parse_config(kMachine + "[otf]\nsmoothness = \"none\"\n", "abbed.toml")->otf.smoothness);
 }
 
 TEST(SmoothnessConfig, RefusesTwoStatementsAndOtherSizes) {
-  EXPECT_THAT(
-      faults_of(kMachine + "[otf]\nsmoothness = \"estimated\"\nsmoothness_um = [1, 1, 1]\n"),
-      Contains(HasSubstr("otf.smoothness_um: must not be given beside")));
+  EXPECT_THAT(faults_of(kMachine + "[otf]\nsmoothness = \"estimated\"\n"),
+              Contains(HasSubstr("otf.smoothness: must be")));
+  EXPECT_THAT(faults_of(kMachine + "[otf]\nsmoothness = \"none\"\nsmoothness_um = [1, 1, 1]\n"),
+              Contains(HasSubstr("otf.smoothness_um: must not be given beside")));
   for (const char* size : {"[1, 1]", "[0, 0, 0]", "[1, -1, 1]", "[1, 1, 1e6]"}) {
     EXPECT_THAT(faults_of(kMachine + "[otf]\nsmoothness_um = " + size + "\n"),
                 Contains(HasSubstr("otf.smoothness_um: must be three numbers")))
         << size;
   }
   EXPECT_THAT(
-      faults_of(kMachine + "[otf]\nsmoothness = \"estimated\"\n[drift]\ncontinuous = true\n"),
-      Contains(HasSubstr("needs smoothness = \"none\"")));
+      faults_of(kMachine + "[otf]\nsmoothness_um = [1, 1, 1]\n[drift]\ncontinuous = true\n"),
+      Contains(HasSubstr("needs [otf] without smoothness_um")));
 }
 
 }  // namespace

@@ -2,56 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
-
-#include "elementary.hpp"
 
 namespace abbe::calib::otf {
 namespace {
-
-/// -2 log of the marginal likelihood, as a function of the size of the prior, without constants. In
-/// the eigenvectors of the information, one term for each:
-///     log(1 + s^2 l) - s^2 c^2 / (1 + s^2 l),   l: eigenvalue, c: component of g
-class Likelihood {
- public:
-  Likelihood(const AboutBends& about, const Smoothness& s) {
-    std::vector<Eigen::Index> kept, out;
-    for (std::size_t i = 0; i < about.bends.size(); ++i) {
-      (is_left_out(s, about.bends[i]) ? out : kept).push_back(static_cast<Eigen::Index>(i));
-    }
-    Eigen::MatrixXd H = about.H(kept, kept);
-    Eigen::VectorXd g = about.g(kept);
-    if (!out.empty()) {
-      const auto of_out = Eigen::MatrixXd(about.H(out, out)).completeOrthogonalDecomposition();
-      const Eigen::MatrixXd across = about.H(kept, out);
-      H -= across * of_out.solve(across.transpose());
-      g -= across * of_out.solve(Eigen::VectorXd(about.g(out)));
-    }
-
-    Eigen::VectorXd sigma(g.size());
-    for (Eigen::Index i = 0; i < g.size(); ++i) {
-      sigma(i) =
-          about.bends[static_cast<std::size_t>(kept[static_cast<std::size_t>(i)])].sigma_of_unit;
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-        sigma.asDiagonal() * H * sigma.asDiagonal() / about.variance_factor);
-    l_ = eigen.eigenvalues().cwiseMax(0.0);
-    c2_ = (eigen.eigenvectors().transpose() * sigma.cwiseProduct(g) / about.variance_factor)
-              .cwiseAbs2();
-  }
-
-  [[nodiscard]] double at(double bend_m) const {
-    double sum = 0.0;
-    for (Eigen::Index i = 0; i < l_.size(); ++i) {
-      const double s2 = bend_m * bend_m, one = 1.0 + s2 * l_(i);
-      sum += natural_logarithm(one) - s2 * c2_(i) / one;
-    }
-    return sum;
-  }
-
- private:
-  Eigen::VectorXd l_, c2_;
-};
 
 /// The same bend, or one of other nodes at the same place. Neighbours of the same table only touch.
 bool is_at(const Bend& sharp, const TableBend& bend) {
@@ -93,11 +46,12 @@ AboutBends about_bends(const estimation::Information& data, const estimation::Ta
 
 BendPosterior posterior_of(const AboutBends& about, const Smoothness& s) {
   const Eigen::Index n = about.g.size();
+  constexpr double kUnit_m = 100e-6;  // of a bend without the prior
   Eigen::VectorXd sigma(n), prior(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const TableBend& bend = about.bends[static_cast<std::size_t>(i)];
     const bool out = is_left_out(s, bend);
-    sigma(i) = out ? bend.sigma_of_unit * kLargestBend_m : sigma_of(s, bend);
+    sigma(i) = out ? bend.sigma_of_unit * kUnit_m : sigma_of(s, bend);
     // A bend that data do not determine has no other information.
     constexpr double kAlmostNoPrior = 1e-8;
     prior(i) = out ? kAlmostNoPrior : 1.0;
@@ -108,19 +62,6 @@ BendPosterior posterior_of(const AboutBends& about, const Smoothness& s) {
   const Eigen::LLT<Eigen::MatrixXd> factor(K);
   const Eigen::VectorXd g = sigma.cwiseProduct(about.g) / about.variance_factor;
   return {factor.solve(g), factor.solve(Eigen::MatrixXd::Identity(n, n))};
-}
-
-double most_likely_bend_m(const AboutBends& about, const Smoothness& s) {
-  constexpr double kStep = 1.0292;  // 80 steps per factor of ten
-  const Likelihood likelihood(about, s);
-  double best_m = kLargestBend_m, least = likelihood.at(best_m);
-  for (double bend_m = kLargestBend_m; bend_m >= kSmallestBend_m; bend_m /= kStep) {
-    if (const double value = likelihood.at(bend_m); value < least) {
-      least = value;
-      best_m = bend_m;
-    }
-  }
-  return best_m;
 }
 
 }  // namespace abbe::calib::otf

@@ -9,9 +9,6 @@
 
 namespace abbe::calib::otf {
 
-/// Sizes of the prior among which the most likely is chosen.
-inline constexpr double kSmallestBend_m = 0.1e-6, kLargestBend_m = 100e-6;
-
 [[nodiscard]] bool is_left_out(const Smoothness&, const TableBend&);
 /// Standard deviation of the prior of a bend.
 [[nodiscard]] double sigma_of(const Smoothness&, const TableBend&);
@@ -32,8 +29,5 @@ struct BendPosterior {
   Eigen::MatrixXd Q;  ///< covariance; a bend without the prior has its own unit
 };
 [[nodiscard]] BendPosterior posterior_of(const AboutBends&, const Smoothness&);
-
-/// The size of the prior with the largest marginal likelihood; the widest for tables without bends.
-[[nodiscard]] double most_likely_bend_m(const AboutBends&, const Smoothness&);
 
 }  // namespace abbe::calib::otf

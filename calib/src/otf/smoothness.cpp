@@ -172,18 +172,12 @@ void join_sharp_bends(Smoothness& s, const AboutBends& about) {
   }
 }
 
-void set_size(Smoothness& s, const AboutBends& about) {
-  if (s.estimated) {
-    s.bend_m.fill(most_likely_bend_m(about, s));
-  }
-}
-
 }  // namespace
 
 Smoothness first_smoothness(const SmoothnessOptions& options) {
-  Smoothness s{.bend_m = options.bend_m, .estimated = options.estimated};
+  Smoothness s{.bend_m = options.bend_m};
   for (double& bend_m : s.bend_m) {
-    bend_m = bend_m > 0.0 || s.estimated ? kWidestBend_m : 0.0;
+    bend_m = bend_m > 0.0 ? kWidestBend_m : 0.0;
   }
   return s;
 }
@@ -205,17 +199,12 @@ void add_smoothness(estimation::Information& data, const estimation::TableBasis&
 
 Smoothness smoothness_for(const estimation::Information& data, const estimation::TableBasis& basis,
                           const SmoothnessOptions& options, double variance_factor) {
-  Smoothness s{
-      .bend_m = options.bend_m, .estimated = options.estimated, .variance_factor = variance_factor};
-  if (options.estimated) {
-    s.bend_m.fill(kLargestBend_m);
-  }
+  Smoothness s{.bend_m = options.bend_m, .variance_factor = variance_factor};
   const AboutBends about = about_bends(data, basis, variance_factor);
 
   constexpr int kMostRounds = 40;
   BendPosterior p;
   for (int round = 0; round < kMostRounds; ++round) {
-    set_size(s, about);
     p = posterior_of(about, s);
     if (!leave_out_next(s, about, p)) {
       break;
@@ -278,8 +267,9 @@ std::vector<std::string> notes_on(const Smoothness& s) {
   std::vector<std::string> notes{message(
       "a prior for smooth tables was used: standard deviation of the bend over three nodes 50 mm "
       "apart ",
-      size_text(s), s.estimated ? ", estimated from the data" : ", as stated",
-      ", twice as many urad for angles; the uncertainties hold for errors as smooth as that")};
+      size_text(s),
+      ", as stated, twice as many urad for angles; the uncertainties hold for errors as smooth as "
+      "that")};
 
   std::string sharp, rough;
   for (const Bend& b : s.sharp) {

@@ -222,7 +222,6 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
       {"gate", verdict_json(outcome.verdict)}};
   if (const auto& prior = outcome.smoothness)
     object["smoothness"] = {
-        {"estimated", prior->estimated},
         {"bend_um",
          {prior->bend_m[0] * kUmPerM, prior->bend_m[1] * kUmPerM, prior->bend_m[2] * kUmPerM}},
         {"chi2", prior->chi2},
@@ -258,9 +257,8 @@ void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& argume
     fmt::print("ranges      offset {:.3f} um, standard uncertainty {:.3f} um\n",
                outcome.range_offset.value_m * kUmPerM, outcome.range_offset.u_m * kUmPerM);
   if (const auto& prior = outcome.smoothness)
-    fmt::print("smoothness  prior {}{}: chi-square {:.1f}, expected {:.1f}; left out: {}\n",
-               otf::size_text(*prior), prior->estimated ? " (estimated)" : "", prior->chi2,
-               prior->expected_chi2, prior->left_out());
+    fmt::print("smoothness  prior {}: chi-square {:.1f}, expected {:.1f}; left out: {}\n",
+               otf::size_text(*prior), prior->chi2, prior->expected_chi2, prior->left_out());
   print_backlash(outcome.document.backlash);
   if (outcome.document.tracker_drift)
     fmt::print("{}", tracker_drift_text(*outcome.document.tracker_drift));
@@ -386,11 +384,10 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->check(CLI::IsMember({"none", "per-table", "forward-backward"}));
   command->add_option(
       "--smoothness", arguments->smoothness,
-      "prior for smooth tables: none; estimated (its size from the data); or UM or X,Y,Z: "
-      "standard\n"
-      "deviation, in um, of the bend of a table over three nodes 50 mm apart (second difference;\n"
-      "twice as many urad for angles). Tables rougher than the prior are named and computed\n"
-      "without it; default: that of [otf], or none");
+      "prior for smooth tables: none; or UM or X,Y,Z: standard deviation, in um, of the bend of\n"
+      "a table over three nodes 50 mm apart (second difference; twice as many urad for angles).\n"
+      "Tables rougher than the prior are named and computed without it; default: that of [otf], or "
+      "none");
   command
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")

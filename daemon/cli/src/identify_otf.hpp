@@ -49,7 +49,7 @@ struct OtfOutcome {
 /// --u-scale-ppm, or that of the configured tracker; 0 without both.
 [[nodiscard]] double u_scale_of(const IdentifyOtfArguments& arguments, const Config& config);
 
-/// Sets the prior for smooth tables as --smoothness (`text`) states: none, estimated, UM or
+/// Sets the prior for smooth tables as --smoothness (`text`) states: none, UM or
 /// UM_X,UM_Y,UM_Z. Error Usage for another text.
 [[nodiscard]] Result<void> apply_smoothness(const std::string& text, Config& config);
 /// The options of the command replace those of the configuration; --smoothness apart.

@@ -43,10 +43,6 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
   if (text.empty()) return {};
   smoothness.reset();
   if (text == "none") return {};
-  if (text == "estimated") {
-    smoothness = otf::SmoothnessOptions{.estimated = true};
-    return {};
-  }
 
   const bool is_one = text.find(',') == std::string::npos;
   const auto size_mm = parse_mm("--smoothness", is_one ? fmt::format("{0},{0},{0}", text) : text);
@@ -57,9 +53,9 @@ Result<void> apply_smoothness(const std::string& text, Config& config) {
     valid = valid && (value_m == 0.0 || otf::is_bend_size(value_m));
   if (!valid)
     return fail(ErrorCode::Usage,
-                fmt::format("--smoothness \"{}\": must be none, estimated, or the standard "
-                            "deviation of the bend over nodes 50 mm apart in um, 0.01 to 1000: one "
-                            "number, or X,Y,Z with 0 for no prior",
+                fmt::format("--smoothness \"{}\": must be none, or the standard deviation of "
+                            "the bend over nodes 50 mm apart in um, 0.01 to 1000: one number, or "
+                            "X,Y,Z with 0 for no prior",
                             text));
   smoothness = otf::SmoothnessOptions{.bend_m = {bend_m[0], bend_m[1], bend_m[2]}};
   return {};

@@ -171,9 +171,9 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, Pro
                             arguments.machine));
   if (config->otf.smoothness)
     return fail(ErrorCode::BadInput,
-                fmt::format("{}: otf.smoothness: must be \"none\" for identify joint: every run "
-                            "would contain the prior, and all together would count it once for "
-                            "each of them",
+                fmt::format("{}: otf.smoothness_um: must not be given for identify joint: every "
+                            "run would contain the prior, and all together would count it once "
+                            "for each of them",
                             arguments.machine));
   const auto hash = sha256_hex_of_file(arguments.machine);
   if (!hash) return tl::make_unexpected(hash.error());

@@ -31,7 +31,7 @@ void read_drift(Section& root, Config& out) {
                   "every run, and an update would take it for noise that averages out");
   if (drift.continuous && out.otf.smoothness)
     section.fault("continuous",
-                  "needs smoothness = \"none\" in [otf]: every run would contain the prior, and an "
+                  "needs [otf] without smoothness_um: every run would contain the prior, and an "
                   "update would count it once for each of them");
   if (drift.hold && !drift.test) section.fault("hold", "needs test = true");
 

@@ -5,21 +5,19 @@
 namespace abbe::daemon {
 namespace {
 
-enum class SmoothnessWord { None, Estimated };
+enum class SmoothnessWord { None };
 
-/// smoothness = "estimated", or smoothness_um = [X, Y, Z].
+/// smoothness = "none", or smoothness_um = [X, Y, Z].
 void read_smoothness(Section& section, std::optional<calib::otf::SmoothnessOptions>& out) {
   SmoothnessWord word = SmoothnessWord::None;
   std::vector<double> bend_m;
-  const bool has_word = section.get_word<SmoothnessWord>(
-      "smoothness", word,
-      {{"none", SmoothnessWord::None}, {"estimated", SmoothnessWord::Estimated}});
+  const bool has_word =
+      section.get_word<SmoothnessWord>("smoothness", word, {{"none", SmoothnessWord::None}});
   const bool has_size = section.get("smoothness_um", bend_m, kMicro);
   if (has_word && has_size) {
     section.fault("smoothness_um", "must not be given beside smoothness: state one of them");
     return;
   }
-  if (word == SmoothnessWord::Estimated) out = calib::otf::SmoothnessOptions{.estimated = true};
   if (!has_size) return;
 
   const auto is_size = [](double value_m) {

@@ -17,10 +17,6 @@
 /// the test fails the prior is left out: there the data alone determine the table. Notes name these
 /// places.
 ///
-/// The size of the prior can be estimated: the `bend` with the largest likelihood of the data
-/// (marginal likelihood: over all tables that the prior allows), the same for all axes. Its own
-/// uncertainty is not in the covariance.
-///
 /// With the factor f of the variance of the data (Statistics::variance_factor) the rows of the prior
 /// have the weight f, because the covariance is multiplied with f afterwards:
 ///     Cov = f (H + f P)^-1 = (H / f + P)^-1
@@ -53,8 +49,7 @@ struct Bend {
 
 /// The prior of an adjustment.
 struct Smoothness {
-  std::array<double, 3> bend_m{};  ///< as SmoothnessOptions
-  bool estimated = false;
+  std::array<double, 3> bend_m{};           ///< as SmoothnessOptions
   double variance_factor = 1.0;             ///< f above
   std::vector<Bend> sharp{};                ///< left out: single bends
   std::vector<ErrorMotion> rough_tables{};  ///< left out: all bends of a table
@@ -73,7 +68,7 @@ struct Smoothness {
 /// Adds the rows of the prior. The first unknowns of the information are those of the basis.
 void add_smoothness(estimation::Information&, const estimation::TableBasis&, const Smoothness&);
 
-/// The prior for these data (without it): its size, if it is estimated, and what is left out.
+/// The prior for these data (without it): what is left out.
 /// `variance_factor`: f above.
 [[nodiscard]] Smoothness smoothness_for(const estimation::Information& data,
                                         const estimation::TableBasis&, const SmoothnessOptions&,

@@ -6,8 +6,6 @@
 namespace abbe::calib::otf {
 
 struct SmoothnessOptions {
-  /// The size of the prior is estimated from the data, one for all axes; `bend_m` is not used.
-  bool estimated = false;
   /// Of the tables of X, Y, Z: standard deviation of the bend of a table over three nodes 50 mm
   /// apart, see smoothness.hpp. 0: no prior for the tables of this axis.
   std::array<double, 3> bend_m{};

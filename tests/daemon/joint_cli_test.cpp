@@ -279,5 +279,19 @@ TEST_F(JointCli, WrongFilesAreNamedWithThePart) {
   expect_refused(identify(kFrontRun + kFrontRun, "none"), 3, "two parts have the name \"front\"");
 }
 
+TEST_F(JointCli, OneRangeOffsetIsThatOfOneInstrument) {
+  const std::string shared = "range_offset = \"home 1\"\n";
+  const auto ran =
+      identify(kFrontRun + shared + kBehindRun + shared + "instrument = \"other\"\n", "none");
+  expect_refused(ran, 3, "\"front\" and \"behind\" have range_offset = \"home 1\"");
+  EXPECT_THAT(ran.err, HasSubstr("\"tracker\" and \"other\""));
+}
+
+TEST_F(JointCli, ARangeOffsetOfOneRunIsNoted) {
+  const auto ran = identify(kFrontRun + "range_offset = \"home 1\"\n" + kBehindRun, "alone");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(test::text_of(folder_ / "alone/report.html"), HasSubstr("is that of this run only"));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

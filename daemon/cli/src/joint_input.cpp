@@ -69,6 +69,18 @@ Result<std::optional<calib::joint::SharedRangeOffset>> shared_offset(
   return calib::joint::SharedRangeOffset{files.range_offset, *solution.offset_in_model};
 }
 
+/// Notes every run with a range_offset that no other run has.
+void note_unshared_offsets(const std::vector<RunFiles>& runs, std::vector<PartFacts>& facts) {
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const std::string& name = runs[k].range_offset;
+    if (!name.empty() && std::ranges::count(runs, name, &RunFiles::range_offset) == 1)
+      facts[k].verdict.notes.push_back(
+          fmt::format("range_offset = \"{}\" is that of this run only: its offset of the ranges "
+                      "counts as independent; check the spelling in parts.toml",
+                      name));
+  }
+}
+
 Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& files,
                      JointInput& input, ProgressBar& bar) {
   const IdentifyOtfArguments of_run = arguments_of(arguments, files);
@@ -186,6 +198,7 @@ Result<JointInput> read_joint_input(const IdentifyJointArguments& arguments, Pro
   for (const RunFiles& run : files->runs)
     if (const auto added = add_run(arguments, run, input, bar); !added)
       return tl::make_unexpected(added.error());
+  note_unshared_offsets(files->runs, input.facts);
   for (const ArrayFiles& array : files->arrays)
     if (const auto added = add_array(arguments, array, input, bar); !added)
       return tl::make_unexpected(added.error());

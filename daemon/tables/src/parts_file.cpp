@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <set>
 
 #include "abbe/base/sha256.hpp"
@@ -82,6 +83,22 @@ void check_names(const PartsFile& parts, Section& root) {
   for (const ArrayFiles& array : parts.arrays) take("array", array.name);
 }
 
+/// Two instruments have no range offset in common.
+void check_range_offsets(const PartsFile& parts, Section& root) {
+  std::map<std::string, const RunFiles*> first;
+  for (const RunFiles& run : parts.runs) {
+    if (run.range_offset.empty()) continue;
+    const RunFiles& other = *first.try_emplace(run.range_offset, &run).first->second;
+    if (other.instrument != run.instrument)
+      root.fault(
+          "run",
+          fmt::format("\"{}\" and \"{}\" have range_offset = \"{}\", but instrument = "
+                      "\"{}\" and \"{}\": runs share an offset of the ranges only with "
+                      "the same instrument",
+                      other.name, run.name, run.range_offset, other.instrument, run.instrument));
+  }
+}
+
 }  // namespace
 
 Result<PartsFile> read_parts_toml(const std::filesystem::path& file) {
@@ -103,6 +120,7 @@ Result<PartsFile> read_parts_toml(const std::filesystem::path& file) {
   else if (out.runs.size() + out.arrays.size() < 2)
     root.fault("array", "needs two parts or more, each a [[run]] or an [[array]]");
   check_names(out, root);
+  check_range_offsets(out, root);
 
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;

@@ -49,7 +49,8 @@ struct PartsFile {
   std::vector<ArrayFiles> arrays;
 };
 
-/// BadInput without a run, with fewer than two parts, or if two parts have one name.
+/// BadInput without a run, with fewer than two parts, if two parts have one name, or if runs with the
+/// same range_offset have different instruments.
 [[nodiscard]] Result<PartsFile> read_parts_toml(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

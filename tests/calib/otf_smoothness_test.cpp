@@ -108,7 +108,7 @@ TEST(TableBends, AreCoordinatesOfTheTables) {
   EXPECT_EQ(c.others.size() + bends.size(), static_cast<std::size_t>(n));
 }
 
-TEST(SmoothnessPrior, ChangesNoBitWhenItIsOff) {
+TEST(SmoothnessPrior, OfNoAxisGivesTheSameBitsAsNoPrior) {
   const MadeRun run = make_run({.seed = 4});
   const auto off = identified_with(run, {}), of_no_axis = identified_with(run, stated(0.0));
   ASSERT_TRUE(off && of_no_axis);

@@ -15,7 +15,8 @@
 /// stated. Where they are not, the prior would hide it. So each bend, and all bends of each table
 /// together, are tested with their distribution under the prior and the noise of the data, and where
 /// the test fails the prior is left out: there the data alone determine the table. Notes name these
-/// places.
+/// places. The rows that are tested are those without the drift of the tracker and the offset of the
+/// ranges that a fit with almost no prior shows (solve.hpp).
 ///
 /// With the factor f of the variance of the data (Statistics::variance_factor) the rows of the prior
 /// have the weight f, because the covariance is multiplied with f afterwards:

@@ -64,9 +64,10 @@ TEST_F(CliSmoothness, TakesItsSizeFromTheConfiguration) {
   EXPECT_THAT(off.out, Not(HasSubstr("smoothness")));
 }
 
-TEST_F(CliSmoothness, NamesTablesThatAreRougher) {
+TEST_F(CliSmoothness, NamesErrorsThatAreRougher) {
   const auto ran = identify("--smoothness 0.1");
-  EXPECT_THAT(ran.out + ran.err, HasSubstr("rougher than the prior"));
+  EXPECT_THAT(ran.out + ran.err, HasSubstr("not as smooth as the prior: EZZ at 0 mm"));
+  EXPECT_THAT(ran.out, HasSubstr("left out: 12"));
 }
 
 TEST_F(CliSmoothness, RefusesWhatIsNoSize) {

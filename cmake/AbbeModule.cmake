@@ -72,7 +72,9 @@ endfunction()
 #   finds addresses that wrap around; ASan reports an access through such an address.
 # - These targets start no threads and decode no input, so the options of ThreadSanitizer and
 #   libFuzzer are removed. The targets are then compiled as in the release or ASan build, and ccache
-#   has the result. With ThreadSanitizer an identification would take minutes.
+#   has the result. With ThreadSanitizer an identification would take minutes. Such a target must not
+#   use std::shared_ptr: the linker may keep its copy of the reference counter for the whole program,
+#   and ThreadSanitizer, which does not see this copy, reports races where there are none.
 function(abbe_compile_mathematics target)
   if(ABBE_SANITIZE MATCHES "undefined")
     target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,pointer-overflow)

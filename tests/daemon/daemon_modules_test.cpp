@@ -135,6 +135,18 @@ TEST(DaemonModules, AreAllFoldersWithSources) {
   }
 }
 
+/// calib is compiled without ThreadSanitizer: the reason is in cmake/AbbeModule.cmake.
+TEST(CalibSources, HaveNoSharedPointers) {
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(kDaemon.parent_path() / "calib")) {
+    const auto extension = entry.path().extension();
+    if (extension != ".cpp" && extension != ".hpp") continue;
+    ++files;
+    EXPECT_EQ(text_of(entry.path()).find("shared_ptr"), std::string::npos) << entry.path();
+  }
+  EXPECT_GT(files, 100u);
+}
+
 TEST(DaemonModules, EveryKindOfForbiddenUseIsFound) {
   const fs::path folder =
       fs::path(testing::TempDir()) / ("daemon_modules_" + std::to_string(::getpid()));

@@ -99,7 +99,7 @@ Eigen::VectorXd whitened_deviations(const Observations& o, const JointSystem& sy
         s(static_cast<Eigen::Index>(k)) =
             pass.normal[k].dot(R.transpose() * V(pass.reading_m[k], t));
       }
-      const Eigen::VectorXd white = p.root[i]->matrixL().solve(pass.delta_m + pass.dO_dtouch * s);
+      const Eigen::VectorXd white = p.root[i].matrixL().solve(pass.delta_m + pass.dO_dtouch * s);
       all.insert(all.end(), white.data(), white.data() + white.size());
     }
   }
@@ -132,8 +132,8 @@ std::vector<PointGroup> point_groups(const Observations& o, const JointSystem& s
     for (std::size_t i = 0; i < p.passes.size(); ++i) {
       const PassObservation& pass = o.passes[p.passes[i]];
       const Eigen::Index n = p.rows_of_pass;
-      const Eigen::MatrixXd inverse = p.root[i]->matrixL().solve(Eigen::MatrixXd::Identity(n, n));
-      const Eigen::MatrixXd C = p.root[i]->reconstructedMatrix();
+      const Eigen::MatrixXd inverse = p.root[i].matrixL().solve(Eigen::MatrixXd::Identity(n, n));
+      const Eigen::MatrixXd C = p.root[i].reconstructedMatrix();
       for (Eigen::Index at = 0; at < n; at += 3) {
         const auto hole = static_cast<std::size_t>(at / 3);
         groups[{pass.position, pass.tool, hole}].push_back(

@@ -65,6 +65,11 @@ struct PlanPredictor::Parts {
   SharedUnknowns shared;
 };
 
+PlanPredictor::PlanPredictor(std::unique_ptr<const Parts> parts) : parts_(std::move(parts)) {}
+PlanPredictor::PlanPredictor(PlanPredictor&&) noexcept = default;
+PlanPredictor& PlanPredictor::operator=(PlanPredictor&&) noexcept = default;
+PlanPredictor::~PlanPredictor() = default;
+
 Eigen::VectorXd PlanPrediction::u() const {
   return covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 }
@@ -79,7 +84,7 @@ Result<PlanPredictor> PlanPredictor::of(const Bar& bar, const Plan& plan, const 
   return observations_of_plan(bar, none, machine).map([&](Observations o) {
     none.measurements.clear();
     SharedUnknowns shared(o);
-    return PlanPredictor(std::make_shared<const Parts>(
+    return PlanPredictor(std::make_unique<const Parts>(
         Parts{bar, std::move(none), machine, options, std::move(o), std::move(shared)}));
   });
 }

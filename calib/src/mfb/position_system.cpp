@@ -125,13 +125,12 @@ Result<void> eliminate_nuisances(PositionSystem& s, const std::string& position)
 
 }  // namespace
 
-Result<std::shared_ptr<const RootOfNoise>> root_of_noise(const TouchNoise& noise,
-                                                         const PassObservation& pass) {
+Result<RootOfNoise> root_of_noise(const TouchNoise& noise, const PassObservation& pass) {
   const double variance_m2 = noise.probe_m * noise.probe_m + noise.machine_m * noise.machine_m;
   Eigen::MatrixXd covariance_m2 = variance_m2 * times_own_transpose(pass.dO_dtouch);
   covariance_m2.diagonal().array() += kNeglected_m * kNeglected_m;
-  auto root = std::make_shared<const RootOfNoise>(covariance_m2);
-  if (root->info() != Eigen::Success) {
+  RootOfNoise root(covariance_m2);
+  if (root.info() != Eigen::Success) {
     return failure(ErrorCode::DegenerateGeometry,
                    "bar: the touches do not determine all points of interest");
   }
@@ -156,13 +155,13 @@ Result<PositionSystem> position_system(const Observations& o, std::size_t positi
 
   for (std::size_t k = 0; k < s.passes.size(); ++k) {
     const PassObservation& pass = o.passes[s.passes[k]];
-    const auto root = root_of_noise(o.plan.noise, pass);
+    Result<RootOfNoise> root = root_of_noise(o.plan.noise, pass);
     if (!root) {
       return tl::unexpected(root.error());
     }
     append_pass(s, s.rows_of_pass * static_cast<Eigen::Index>(k), shared_rows(o, pass, shared),
-                nuisance_rows(o, pass, k, s.layout, options), pass.delta_m, **root);
-    s.root.push_back(*root);
+                nuisance_rows(o, pass, k, s.layout, options), pass.delta_m, *root);
+    s.root.push_back(*std::move(root));
   }
   if (Result<void> done = eliminate_nuisances(s, o.positions[position].name); !done) {
     return tl::unexpected(done.error());
@@ -180,7 +179,7 @@ Eigen::MatrixXd gain_rows(const PositionSystem& s) {
   Eigen::MatrixXd gain = s.E.transpose() * turned.bottomRows(s.E.rows());
   for (std::size_t k = 0; k < s.passes.size(); ++k) {  // times the inverse of the root of the noise
     auto part = gain.middleCols(s.rows_of_pass * static_cast<Eigen::Index>(k), s.rows_of_pass);
-    part = s.root[k]->matrixU().solve(part.transpose()).transpose().eval();
+    part = s.root[k].matrixU().solve(part.transpose()).transpose().eval();
   }
   return gain;
 }

@@ -5,7 +5,6 @@
 ///                   [E 0 e]      what the position states about x
 
 #include <Eigen/Cholesky>
-#include <memory>
 #include <vector>
 
 #include "abbe/calib/estimation/information.hpp"
@@ -16,12 +15,11 @@ namespace abbe::calib::mfb {
 /// Root L of the covariance C_O = L L^T of the points of a pass. DegenerateGeometry if the touches
 /// do not determine all points.
 using RootOfNoise = Eigen::LLT<Eigen::MatrixXd>;
-[[nodiscard]] Result<std::shared_ptr<const RootOfNoise>> root_of_noise(const TouchNoise&,
-                                                                       const PassObservation&);
+[[nodiscard]] Result<RootOfNoise> root_of_noise(const TouchNoise&, const PassObservation&);
 
 struct PositionSystem {
   std::vector<std::size_t> passes;  ///< in Observations::passes; their rows follow each other
-  std::vector<std::shared_ptr<const RootOfNoise>> root;  ///< of each pass
+  std::vector<RootOfNoise> root;    ///< of each pass
   NuisanceLayout layout;
   Eigen::Index rows_of_pass = 0;
   RowMajorRows A;     ///< whitened, data only

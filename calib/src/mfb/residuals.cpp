@@ -124,7 +124,7 @@ void set_residuals(Solution& solution, const Observations& o, const JointSystem&
       const Eigen::Index first = s.rows_of_pass * static_cast<Eigen::Index>(k);
       PassResiduals& pass = solution.residuals[s.passes[k]];
       pass = residuals_of_pass(r.segment(first, s.rows_of_pass),
-                               no_errors.segment(first, s.rows_of_pass), *s.root[k]);
+                               no_errors.segment(first, s.rows_of_pass), s.root[k]);
       pass.measurement = o.plan.measurements[o.passes[s.passes[k]].measurement].name;
     }
     solution.poses.push_back(corrected_pose(o.positions[o.passes[s.passes.front()].position], c));

@@ -46,7 +46,7 @@ Result<Eigen::MatrixXd> root_of_result(const Observations& o, const Sequence& se
     }
     const Eigen::MatrixXd S = sequence.U().middleCols(1 + first, rows);
     of_noise.middleCols(first, rows) =
-        S * Eigen::MatrixXd((*root)->matrixL()) / std::sqrt(static_cast<double>(p.passes.size()));
+        S * Eigen::MatrixXd(root->matrixL()) / std::sqrt(static_cast<double>(p.passes.size()));
 
     of_others.leftCols(bar) += S * shared.bar_root();
     const Eigen::Map<const Eigen::VectorXd> O(o.bar.O_m.front().data(), rows);

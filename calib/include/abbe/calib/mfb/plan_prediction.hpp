@@ -53,6 +53,10 @@ struct PositionInformation {
 /// functions may be called from any thread.
 class PlanPredictor {
  public:
+  PlanPredictor(PlanPredictor&&) noexcept;
+  PlanPredictor& operator=(PlanPredictor&&) noexcept;
+  ~PlanPredictor();
+
   /// `plan`: tip, noise and gravity; its measurements are not used. BadInput as check(Bar).
   [[nodiscard]] static Result<PlanPredictor> of(const Bar&, const Plan& plan, const MfbMachine&,
                                                 const SolveOptions& = {});
@@ -64,8 +68,8 @@ class PlanPredictor {
 
  private:
   struct Parts;
-  explicit PlanPredictor(std::shared_ptr<const Parts> parts) : parts_(std::move(parts)) {}
-  std::shared_ptr<const Parts> parts_;
+  explicit PlanPredictor(std::unique_ptr<const Parts>);
+  std::unique_ptr<const Parts> parts_;
 };
 
 }  // namespace abbe::calib::mfb

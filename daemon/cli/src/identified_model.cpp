@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
@@ -15,6 +17,15 @@
 #include "terminal.hpp"
 
 namespace abbe::daemon {
+
+void add_result_options(CLI::App& command, std::string& keep, bool& json, std::string& out) {
+  command.add_option(
+      "--keep", keep,
+      "also add the model to this store, and compare it with its active model; to activate it,\n"
+      "use abbe model activate");
+  command.add_flag("--json", json, "print the summary as one JSON object");
+  command.add_option("-o,--out", out, "folder for the results; created if needed")->required();
+}
 
 Result<std::optional<ModelDocument>> active_model(const std::string& store) {
   std::optional<ModelDocument> active;

@@ -1,6 +1,8 @@
 #pragma once
-/// The common part of every `abbe identify METHOD`: storing the model, printing the verdict.
+/// The common part of every `abbe identify METHOD`: options of the result, storing the model,
+/// printing the verdict.
 
+#include <CLI/App.hpp>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
@@ -12,6 +14,9 @@
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
+
+/// Adds --keep, --json and --out.
+void add_result_options(CLI::App& command, std::string& keep, bool& json, std::string& out);
 
 /// The active model of the store in which the result will be kept; nullopt if `store` is empty.
 [[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);

@@ -311,11 +311,7 @@ void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {
       "--accept-shape-only", arguments.accept_shape_only,
       "do not refuse the model because its rotation about Ball1 is unknown; as [gate] accept =\n"
       "[\"evemu-shape-only\"]");
-  command.add_option("--keep", arguments.keep,
-                     "also add the model to this store, and compare it with its active model");
-  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
-  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
-      ->required();
+  add_result_options(command, arguments.keep, arguments.json, arguments.out);
 }
 
 }  // namespace

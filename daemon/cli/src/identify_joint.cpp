@@ -159,11 +159,7 @@ void add_joint_options(CLI::App& command, IdentifyJointArguments& arguments) {
   command.add_flag("--accept-path-orientation", arguments.accept_path_orientation,
                    "do not refuse the model because a path might be rotated by 180 degrees");
   add_scales_corrected(command, arguments.scales_corrected);
-  command.add_option("--keep", arguments.keep,
-                     "also add the model to this store, and compare it with its active model");
-  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
-  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
-      ->required();
+  add_result_options(command, arguments.keep, arguments.json, arguments.out);
 }
 
 }  // namespace

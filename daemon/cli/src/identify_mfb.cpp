@@ -56,7 +56,7 @@ Result<Config> read_config(const IdentifyMfbArguments& arguments) {
   auto config = load_config(arguments.machine);
   if (!config) return config;
   if (const auto valid =
-          check_scales("identify mfb", "points", *config, arguments.scales_corrected);
+          check_scales("identify mfb", "points", *config, arguments.scales_corrected, false);
       !valid)
     return tl::make_unexpected(valid.error());
   if (const auto valid = check_bar_machine(arguments.machine, config->machine); !valid)
@@ -229,11 +229,7 @@ void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
       ->needs(trials)
       ->capture_default_str();
   add_scales_corrected(command, arguments.scales_corrected);
-  command.add_option("--keep", arguments.keep,
-                     "also add the model to this store, and compare it with its active model");
-  command.add_flag("--json", arguments.json, "print the summary as one JSON object");
-  command.add_option("-o,--out", arguments.out, "folder for the results; created if needed")
-      ->required();
+  add_result_options(command, arguments.keep, arguments.json, arguments.out);
 }
 
 }  // namespace

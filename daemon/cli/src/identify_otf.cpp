@@ -361,10 +361,6 @@ void add_identify_otf(CLI::App& parent, int& exit) {
                        "all three\ncomponents; default: [otf] mode, or on-the-fly")
           ->check(CLI::IsMember({"on-the-fly", "standstill"}));
   recording->excludes(path)->excludes(tracker)->excludes(encoder)->excludes(mode);
-  command->add_option(
-      "--keep", arguments->keep,
-      "also add the model to this store, and compare it with its active model; to activate it,\n"
-      "use abbe model activate");
   command
       ->add_option("--estimator", arguments->estimator,
                    "joint: alignment and errors together, by Gauss-Newton;\n"
@@ -392,9 +388,7 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->add_option("--block-samples", arguments->block_samples,
                    "samples averaged in a block (on-the-fly); default: blocks of 8.3 mm of travel")
       ->check(CLI::Range(1, 1000));
-  command->add_flag("--json", arguments->json, "print the summary as one JSON object");
-  command->add_option("-o,--out", arguments->out, "folder for the results; created if needed")
-      ->required();
+  add_result_options(*command, arguments->keep, arguments->json, arguments->out);
 
   command->callback([arguments, &exit] {
     exit =

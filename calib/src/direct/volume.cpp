@@ -3,24 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "direct/common_nodes.hpp"
 #include "direct/scatter.hpp"
+#include "direct/tables_on_same_nodes.hpp"
 
 namespace abbe::calib::direct {
 namespace {
 
 Result<VolumetricModel> model_of(const ParameterLayout& layout, const TableValues& values,
                                  const VolumetricModel& like) {
-  std::vector<Vector3> corners;
-  for (int i = 0; i < 8; ++i) {
-    Vector3 corner;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::vector<double>& nodes_m = layout.nodes()[a].nodes_m;
-      corner(static_cast<Eigen::Index>(a)) = (i >> a & 1) != 0 ? nodes_m.back() : nodes_m.front();
-    }
-    corners.push_back(corner);
+  MachineNodes ends = layout.nodes();
+  for (AxisNodes& axis : ends) {
+    axis.nodes_m = {axis.nodes_m.front(), axis.nodes_m.back()};
   }
-  auto validity = ValidityVolume::hull_of(corners);
+  auto validity = ValidityVolume::hull_of(tensor_grid(ends));
   if (!validity) {
     return tl::make_unexpected(validity.error());
   }

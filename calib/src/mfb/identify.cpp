@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "message.hpp"
 #include "mfb/likely_cause.hpp"
@@ -11,7 +12,7 @@
 namespace abbe::calib::mfb {
 namespace {
 
-/// Observations and solution of the touches that are not set aside.
+/// Observations and solution of the touches that are not excluded.
 struct Adjusted {
   Observations observations;
   Solution solution;
@@ -28,7 +29,7 @@ Result<Adjusted> adjusted(const Bar& bar, const Plan& plan, std::span<const Pass
   });
 }
 
-/// The touches of a pass that may be set aside.
+/// The touches of a pass that may be excluded.
 std::size_t most_of_pass(const PassTouches& touches, const SetAsideOptions& options) {
   return static_cast<std::size_t>(
       std::ceil(options.most_of_pass * static_cast<double>(touches.size())));
@@ -47,7 +48,7 @@ std::size_t most_of_all(std::span<const PassTouches> touches, const SetAsideOpti
   return static_cast<std::size_t>(std::ceil(options.most_of_all * static_cast<double>(all)));
 }
 
-/// Sets touches aside one after another and adjusts again after each.
+/// Excludes touches one after another and adjusts again after each.
 Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
                                   std::vector<PassTouches>& touches, const MfbMachine& machine,
                                   const Options& options, Outliers& outliers) {
@@ -81,26 +82,21 @@ Result<Adjusted> without_outliers(Adjusted at, const Bar& bar, const Plan& plan,
 
 /// Box of the readings of all touches, inside the nodes.
 Result<ValidityVolume> touched_box(const Observations& o) {
-  Vector3 low = Vector3::Constant(1e9), high = -low;
+  Vector3 low_m = o.passes.front().reading_m.front(), high_m = low_m;
   for (const PassObservation& pass : o.passes) {
-    for (const Vector3& q : pass.reading_m) {
-      low = low.cwiseMin(q);
-      high = high.cwiseMax(q);
+    for (const Vector3& q_m : pass.reading_m) {
+      low_m = low_m.cwiseMin(q_m);
+      high_m = high_m.cwiseMax(q_m);
     }
   }
+
+  MachineNodes ends = o.basis.layout().nodes();
   for (const Axis a : kAllAxes) {
     const auto k = static_cast<Eigen::Index>(index(a));
-    const std::vector<double>& nodes_m = o.basis.layout().nodes()[index(a)].nodes_m;
-    low(k) = std::max(low(k), nodes_m.front());
-    high(k) = std::min(high(k), nodes_m.back());
+    std::vector<double>& nodes_m = ends[index(a)].nodes_m;
+    nodes_m = {std::max(low_m(k), nodes_m.front()), std::min(high_m(k), nodes_m.back())};
   }
-  std::vector<Vector3> corners;
-  for (int corner = 0; corner < 8; ++corner) {
-    corners.emplace_back((corner & 1) != 0 ? high.x() : low.x(),
-                         (corner & 2) != 0 ? high.y() : low.y(),
-                         (corner & 4) != 0 ? high.z() : low.z());
-  }
-  return ValidityVolume::hull_of(corners);
+  return ValidityVolume::hull_of(tensor_grid(ends));
 }
 
 std::vector<Vector3> tools_of(const Plan& plan) {

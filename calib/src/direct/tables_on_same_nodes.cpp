@@ -1,4 +1,4 @@
-#include "direct/common_nodes.hpp"
+#include "direct/tables_on_same_nodes.hpp"
 
 #include <algorithm>
 

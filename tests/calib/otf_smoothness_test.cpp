@@ -11,6 +11,7 @@
 
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/calib/otf/identify.hpp"
+#include "normalised_error.hpp"
 #include "otf/about_bends.hpp"
 #include "otf/table_bends.hpp"
 #include "smooth_run.hpp"

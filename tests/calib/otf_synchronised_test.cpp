@@ -1,7 +1,6 @@
 // Scale readings beside the tracker's points. Case B of the reference data, and simulated runs.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 #include <string>
@@ -10,6 +9,7 @@
 #include "abbe/calib/otf/identify.hpp"
 #include "abbe/calib/otf/judge.hpp"
 #include "encoder_run.hpp"
+#include "normalised_error.hpp"
 
 namespace {
 using namespace abbe::calib;
@@ -107,22 +107,6 @@ TEST(SynchronisedEstimate, FindsTheClock) {
   }
 }
 
-/// Squared error of the parameters in the metric of their covariance, per determined combination.
-double normalised_square(const MadeRun& run, const VolumetricModel& model) {
-  const Eigen::VectorXd error = model.U() - run.truth;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of(model.covariance());
-  const double least = 1e-9 * of.eigenvalues().maxCoeff();
-  double sum = 0.0, combinations = 0.0;
-  for (Eigen::Index i = 0; i < error.size(); ++i) {
-    if (of.eigenvalues()(i) > least) {
-      const double along = of.eigenvectors().col(i).dot(error);
-      sum += along * along / of.eigenvalues()(i);
-      combinations += 1.0;
-    }
-  }
-  return sum / combinations;
-}
-
 /// Eight runs of 31 combinations each: standard deviation of the mean 0.09.
 TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
   double of_tables = 0.0, of_clock = 0.0;
@@ -136,7 +120,7 @@ TEST(SynchronisedEstimate, StatesAnHonestUncertainty) {
     const Synchronisation& s = *id->solution.synchronisation;
     of_clock += std::pow((s.clock.offset_s - run.clock.offset_s) / s.u_offset_s, 2);
     of_clock += std::pow((s.clock.drift - run.clock.drift) / s.u_drift, 2);
-    of_tables += normalised_square(run.run, id->solution.model) / kRuns;
+    of_tables += normalised_error_square(run.run, id->solution.model) / kRuns;
   }
   RecordProperty("mean_squared_normalised_error", std::to_string(of_tables));
   EXPECT_NEAR(of_tables, 1.0, 0.25);

@@ -3,7 +3,7 @@
 // - case A, five draws of 1 % outliers of 0.2 mm with six beam breaks of 0.3 to 3 s: mean error
 //   within 15 % of that of the run without them;
 // - simulated machines: the same, and a mean squared normalised error of 0.8 to 1.2;
-// - without faults no sample is set aside.
+// - without faults no sample is excluded.
 // "all samples" is the estimate without setting aside. ABBE_REF_DIR names the folder of the
 // reference data, by default beside the clone.
 //
@@ -121,7 +121,7 @@ void case_a_with(const StreamFault& fault, const Stream& stream, double& clean_m
   clean_m = clean_m > 0.0 ? clean_m : error_m;
   std::printf(
       "  %-28s mean error %.4f um, %.3f of the clean run, all samples %.4f um, "
-      "%.0f set aside (%.1f s)\n",
+      "%.0f excluded (%.1f s)\n",
       fault.name, 1e6 * error_m, error_m / clean_m, 1e6 * of_all_m, aside,
       static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
   ask(!fault.is_asked || error_m <= 1.15 * clean_m, std::string("case A, ") + fault.name);
@@ -173,10 +173,10 @@ void simulate(const StreamFault& fault, std::uint64_t first_seed, std::uint64_t 
 
   sums.robust.print(fault.name);
   sums.all.print("   all samples");
-  std::printf("   %zu samples set aside, %zu runs refused\n", sums.set_aside, sums.refused);
+  std::printf("   %zu samples excluded, %zu runs refused\n", sums.set_aside, sums.refused);
   if (std::string(fault.name) == "none") {
     clean_m = sums.robust.rms_m();
-    ask(sums.set_aside == 0, "no sample of a sound run is set aside");
+    ask(sums.set_aside == 0, "no sample of a sound run is excluded");
     ask(sums.robust.over_bound() <= 1.02, "white noise: 1.02 of the Cramer-Rao bound");
   }
   ask(!fault.is_asked || sums.robust.rms_m() <= 1.15 * clean_m,

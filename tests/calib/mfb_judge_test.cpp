@@ -155,7 +155,7 @@ TEST(MfbJudge, NotesTouchesThatWereSetAside) {
   const auto verdict = judge(found, nullptr);
   ASSERT_TRUE(verdict) << verdict.error().text;
   EXPECT_THAT(verdict->notes,
-              Contains(HasSubstr("X1: hole 5, k = 2 is set aside: it is 52 um off its feature")));
+              Contains(HasSubstr("X1: hole 5, k = 2 is excluded: it is 52 um off its feature")));
 }
 
 TEST(MfbJudge, StatesThatTheSequenceIsNotFittedAgain) {

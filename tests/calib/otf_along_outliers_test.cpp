@@ -72,7 +72,7 @@ double rms_m(const EncoderRun& made, const Identification& id) {
 struct WrongAlong {
   const char* name;
   EncoderRun (*made)();
-  const char* note;  ///< null: the samples are set aside
+  const char* note;  ///< null: the samples are excluded
 };
 
 class OutliersAlong : public testing::TestWithParam<WrongAlong> {};

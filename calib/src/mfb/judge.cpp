@@ -22,7 +22,7 @@ void judge_chi_square(Verdict& verdict, const Identification& found) {
 void note_set_aside(Verdict& verdict, const Identification& found) {
   for (const SetAsideTouch& touch : found.set_aside) {
     verdict.notes.push_back(message(touch.measurement_name, ": ", name(touch.target),
-                                    " is set aside: it is ", kUmPerM * touch.residual_m,
+                                    " is excluded: it is ", kUmPerM * touch.residual_m,
                                     " um off its feature"));
   }
 }
@@ -37,7 +37,7 @@ void note_small_residuals(Verdict& verdict, const Statistics& s) {
   }
 }
 
-/// Too many touches set aside are no single outliers.
+/// More than a few excluded touches are no single outliers.
 void judge_set_aside(Verdict& verdict, const Identification& found) {
   constexpr double kMostSetAside = 0.005;
   std::size_t touches = found.set_aside.size();
@@ -51,7 +51,7 @@ void judge_set_aside(Verdict& verdict, const Identification& found) {
   }
   if (static_cast<double>(found.set_aside.size()) > kMostSetAside * static_cast<double>(touches)) {
     verdict.refuse("outliers", message(found.set_aside.size(), " of ", touches,
-                                       " touches are set aside, at most ", 100 * kMostSetAside,
+                                       " touches are excluded, at most ", 100 * kMostSetAside,
                                        " %: look for dirt, a loose stylus or false triggers"));
   }
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// Search of touches to be set aside (identify.hpp).
+/// Search of touches to be excluded (identify.hpp).
 
 #include <map>
 #include <optional>

@@ -25,7 +25,7 @@ KeptSamples without_aside(std::span<const TrackerObservation> samples,
   return kept;
 }
 
-/// Adds where samples are set aside.
+/// Adds where samples are excluded.
 void add_places(SetAside& a, std::span<const TrackerObservation> samples,
                 const std::vector<bool>& aside, const AlignedBlocks& run) {
   std::size_t in_a_row = 0;
@@ -156,7 +156,7 @@ class Screening {
   const Path& path_;
   const Noise& noise_;
   Options options_;
-  std::vector<bool> aside_;  ///< one value per sample; empty if none is set aside
+  std::vector<bool> aside_;  ///< one value per sample; empty if none is excluded
   SetAside found_;
 };
 

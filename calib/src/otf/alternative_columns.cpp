@@ -236,7 +236,7 @@ std::string AlternativeColumns::text(const Added& added, const Eigen::VectorXd& 
         return row.block >= added.place;
       });
       return message("the ranges of the tracker changed by ", 1e6 * d(0),
-                     " um at a beam break, or where samples are set aside, before leg ",
+                     " um at a beam break, or where samples are excluded, before leg ",
                      at == o_.rows.end() ? 0 : at->leg, " (block ", added.place,
                      "): the distance was set again");
     }

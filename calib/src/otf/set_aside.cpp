@@ -8,7 +8,7 @@ std::string set_aside_text(const SetAside& a) {
   std::string all;
   if (a.samples() > 0) {
     const double share = static_cast<double>(a.samples()) / static_cast<double>(a.of_samples);
-    all = message(a.samples(), " samples (", 100.0 * share, " %) are set aside: ", a.off_line,
+    all = message(a.samples(), " samples (", 100.0 * share, " %) are excluded: ", a.off_line,
                   " off the line through their neighbours, ", a.unreachable,
                   " at places that the target cannot have reached; the most on leg ", a.worst_leg,
                   " (", a.on_worst_leg, "), the longest part ", a.longest, " samples at ",

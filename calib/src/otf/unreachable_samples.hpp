@@ -8,7 +8,7 @@
 
 namespace abbe::calib::otf {
 
-/// True for each sample that is set aside; empty if there is none. Times ascend.
+/// True for each sample that is excluded; empty if there is none. Times ascend.
 [[nodiscard]] std::vector<bool> unreachable_samples(std::span<const TrackerObservation>);
 
 }  // namespace abbe::calib::otf

@@ -129,7 +129,7 @@ void print_mfb_summary(const ModelDocument& document, const MfbCandidate& candid
   const LargestUncertainty u(document.model);
   fmt::print("model       {}  ({} tables, any tool of machine \"{}\")\n", model_id(document),
              document.model.tables()->layout().tables().size(), document.machine);
-  fmt::print("bar         {}: {} measurements in {} positions, {} touches, {} set aside\n",
+  fmt::print("bar         {}: {} measurements in {} positions, {} touches, {} excluded\n",
              found.observations.bar.name, found.observations.passes.size(),
              found.observations.positions.size(), s.samples, s.lost_samples);
   fmt::print("solution    {}: {} observations, {} unknowns, rank {}, condition {:.3g}\n",

@@ -159,7 +159,7 @@ void add_drift_of_passes(HtmlReport& page, const MfbCandidate& candidate) {
 }
 
 void add_touches_set_aside(HtmlReport& page, const MfbCandidate& candidate) {
-  page.heading("Touches that were set aside");
+  page.heading("Excluded touches");
   if (candidate.found.set_aside.empty()) {
     page.paragraph("None.");
     return;

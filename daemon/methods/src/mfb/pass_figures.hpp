@@ -15,7 +15,7 @@ void add_positions_of_bar(HtmlReport& page, const MfbCandidate& candidate);
 /// Adds the drift of each pair of passes; nothing without pairs.
 void add_drift_of_passes(HtmlReport& page, const MfbCandidate& candidate);
 
-/// Adds the touches that were set aside.
+/// Adds the excluded touches.
 void add_touches_set_aside(HtmlReport& page, const MfbCandidate& candidate);
 
 }  // namespace abbe::daemon

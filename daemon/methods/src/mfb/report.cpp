@@ -108,7 +108,7 @@ void add_origin_with_bar(HtmlReport& page, const ModelDocument& document,
       page, document, document.inputs,
       {{"bar", fmt::format("{}, {} holes", o.bar.name, o.bar.pattern.holes())},
        {"measurements",
-        fmt::format("{} in {} positions, {} touches used, {} set aside", o.passes.size(),
+        fmt::format("{} in {} positions, {} touches used, {} excluded", o.passes.size(),
                     o.positions.size(), s.samples, s.lost_samples)},
        {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
                                     s.unknowns, s.rank, s.condition)}});

@@ -3,7 +3,7 @@
 /// observe(), solve(), and the judgement of the residuals. Touches far from their feature are set
 /// aside: touches are corrected by the identified errors of the machine, and a feature whose
 /// residuals exceed SetAsideOptions::limit times the noise of a touch is searched; of its touches
-/// the one is set aside without which chi-square is smallest, because opposite touches of a hole
+/// the one is excluded without which chi-square is smallest, because opposite touches of a hole
 /// have the same residuals. Raw residuals would not do: a good hole on a diagonal shows the shear
 /// of the machine.
 

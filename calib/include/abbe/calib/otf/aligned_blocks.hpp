@@ -1,6 +1,6 @@
 #pragma once
 /// Blocks of a run and their alignment, without samples that are not of the target on its path.
-/// Samples are set aside in two steps. A run in which no sample is set aside and no block is noisy
+/// Samples are excluded in two steps. A run in which no sample is excluded and no block is noisy
 /// has the blocks of make_blocks().
 ///
 /// Before the alignment, unreachable samples: the run is divided where the target would have moved,
@@ -10,13 +10,13 @@
 /// samples before or after, but at most ten times the former; n: number of sample periods, more
 /// than 1 after a beam break. Of the parts, those are kept that follow one another within this
 /// limit and have the most samples. If the kept parts do not fit the path, or are less than four
-/// fifths of the run, nothing is set aside in this step.
+/// fifths of the run, nothing is excluded in this step.
 ///
 /// After it, samples off the line: a block whose samples deviate in one direction across the travel
 /// by five standard deviations from their median, or whose mean deviates by as much from the means
 /// before and after, is compared, as are its two neighbours, with a straight line over five blocks.
 /// The slope of the line is that of repeated medians, from the medians of 15 parts, so that a third
-/// of the samples may be wrong. A sample is set aside if it is off this line by more than
+/// of the samples may be wrong. A sample is excluded if it is off this line by more than
 ///     7 max(1, f, g) sigma
 /// sigma: stated for one sample; f: 1.4826 times the median absolute deviation of the samples from
 /// the median of their block, in units of sigma, median over all blocks; g: the same of the samples

@@ -139,7 +139,7 @@ void append_rows(Observations&, const PointOnPath&, std::span<const Vector3> sub
 /// On the fly: observations of aligned_blocks().
 [[nodiscard]] Result<Observations> observe(std::span<const TrackerObservation>, const Machine&,
                                            const Path&, const Noise&, const Options& = {});
-/// The same from blocks that are already averaged. No sample of them is set aside.
+/// The same from blocks that are already averaged. No sample of them is excluded.
 [[nodiscard]] Result<Observations> observe_blocks(const BlockSeries&, const Machine&, const Path&,
                                                   const Noise&, const Options& = {});
 

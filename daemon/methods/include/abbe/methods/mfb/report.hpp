@@ -10,7 +10,7 @@
 namespace abbe::daemon {
 
 /// A self-contained HTML page: verdict, chi-square, the 21 errors with their uncertainties and
-/// budgets, residuals along the bar, the bar in its positions, drift, touches that were set aside,
+/// budgets, residuals along the bar, the bar in its positions, drift, excluded touches,
 /// volume, origin.
 [[nodiscard]] std::string mfb_report(const ModelDocument& document, const MfbCandidate& candidate);
 

@@ -2,9 +2,10 @@
 // machine [w X' b Y Z (C1) t]? Requirement for each of the six orders: root mean square of the
 // error at most 1.05 times the Cramer-Rao bound, and mean squared normalised error 0.9 to 1.1. The
 // same seeds give the same ranges, tool, tracker and true tables for each order. The true machine
-// is that of abbe-sim, with exact transforms.
+// is that of abbe-sim, with exact transforms. With 20 machines the mean squared normalised error
+// scatters by 7 %, with 100 by 3 %.
 //
-//   bench_otf_axis_orders [machines = 20] [first seed = 1]
+//   bench_otf_axis_orders [machines = 100] [first seed = 1]
 
 #include <array>
 #include <cstdio>
@@ -46,7 +47,7 @@ Sums simulate(const char* chain, std::uint64_t first_seed, std::uint64_t machine
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto machines = static_cast<std::uint64_t>(argc > 1 ? std::atoi(argv[1]) : 20);
+  const auto machines = static_cast<std::uint64_t>(argc > 1 ? std::atoi(argv[1]) : 100);
   const auto first_seed = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 1);
   bool reached = true;
 

@@ -7,6 +7,7 @@
 
 #include "abbe/calib/evemu/solve.hpp"
 #include "message.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::evemu {
 namespace {
@@ -112,15 +113,6 @@ Turn turn_onto(const ReferenceRows& rows, const Eigen::MatrixXd& C_shape, double
   return turn;
 }
 
-/// The value of chi-square that one correct reference in 1000 exceeds. Approximation of Wilson and
-/// Hilferty, 2 % high at 3 degrees of freedom, more accurate above.
-double chi2_of_one_in_1000(double dof) {
-  constexpr double kNormal = 3.0902;  // one-sided 99.9 %
-  const double s = 2.0 / (9.0 * dof);
-  const double root = 1.0 - s + kNormal * std::sqrt(s);
-  return dof * root * root * root;
-}
-
 /// Covariance of the coefficients without the uncertainty of the rotation about Ball1, which
 /// set_datum() (solve.cpp) added.
 Eigen::MatrixXd shape_covariance(const EvemuModel& model, const MeanRotation& rotation) {
@@ -165,7 +157,7 @@ Result<Solution> with_rotation_reference(Solution solution, const RotationRefere
 
   const Eigen::MatrixXd C_shape = shape_covariance(evemu, solution.rotation);
   const Turn turn = turn_onto(rows, C_shape, reference.sigma_m);
-  const double chi2_limit = chi2_of_one_in_1000(turn.dof);
+  const double chi2_limit = turn.dof * chi2_per_dof_999(turn.dof);
 
   // Errors of a real machine are not exactly polynomials. With many points chi-square therefore
   // exceeds its limit even if the reference is correct. Residuals of up to twice the stated

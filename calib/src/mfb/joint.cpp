@@ -8,6 +8,7 @@
 #include "mfb/budget.hpp"
 #include "mfb/residuals.hpp"
 #include "mfb/triangle.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -68,14 +69,14 @@ void set_statistics(Solution& solution, const JointSystem& system, const SharedE
 
   if (s.degrees_of_freedom > 0.0) {
     s.chi2_per_dof = s.chi2 / s.degrees_of_freedom;
-    s.chi2_per_dof_limit = chi2_per_dof_quantile(s.degrees_of_freedom);
+    s.chi2_per_dof_limit = chi2_per_dof_999(s.degrees_of_freedom);
   }
   s.sigma0 = std::sqrt(s.chi2_per_dof);
   const double of_all =
       static_cast<double>(s.observations + priors_of(system)) - static_cast<double>(s.rank);
   if (of_all > 0.0) {
     s.all_chi2_per_dof = estimate.rest / of_all;
-    s.all_chi2_per_dof_limit = chi2_per_dof_quantile(of_all);
+    s.all_chi2_per_dof_limit = chi2_per_dof_999(of_all);
   }
 }
 
@@ -130,12 +131,6 @@ SharedEstimate estimate_of(const JointSystem& system) {
 
 NuisanceOptions nuisance_options(const SolveOptions& options) {
   return {.u_roll_rad = options.u_roll_rad};
-}
-
-double chi2_per_dof_quantile(double k) {
-  constexpr double kNormal = 3.0902323;  // 99.9 % of the normal distribution
-  const double a = 2.0 / (9.0 * k), root = 1.0 - a + kNormal * std::sqrt(a);
-  return root * root * root;
 }
 
 Result<Statistics> joint_statistics(const Observations& o, const NuisanceOptions& options) {

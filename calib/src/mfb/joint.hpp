@@ -41,9 +41,6 @@ struct SharedEstimate {
 /// adjustment minimises.
 [[nodiscard]] Result<double> joint_chi2(const Observations&, const NuisanceOptions&);
 
-/// Upper 99.9 % quantile of chi-square / k with k degrees of freedom, by [Wilson 1931].
-[[nodiscard]] double chi2_per_dof_quantile(double k);
-
 /// RankDeficient if an uncertainty exceeds the limits; the text names the errors.
 [[nodiscard]] Result<void> check_shown(const Observations&, const Solution&, const SolveOptions&);
 

@@ -7,6 +7,7 @@
 #include "mfb/joint.hpp"
 #include "mfb/residuals.hpp"
 #include "mfb/sequence.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
@@ -90,7 +91,7 @@ Result<void> set_residuals_of_sequence(Solution& solution, const Observations& o
   }
   s.chi2_per_dof = s.chi2 / s.degrees_of_freedom;
   s.sigma0 = std::sqrt(s.chi2_per_dof);
-  s.chi2_per_dof_limit = chi2_per_dof_quantile(s.degrees_of_freedom);
+  s.chi2_per_dof_limit = chi2_per_dof_999(s.degrees_of_freedom);
   return {};
 }
 

@@ -9,11 +9,10 @@
 #include "median.hpp"
 #include "message.hpp"
 #include "otf/drift_observations.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::otf {
 namespace {
-
-constexpr double kQuantile999 = 3.090;  // of the normal distribution
 
 /// Stated standard deviation of one sample along the axes of a standstill.
 Vector3 stated_sigma_m(const Standstill& s, const Noise& noise) {
@@ -31,7 +30,7 @@ Vector3 common_excess(const Standstills& all, const Noise& noise) {
       ratios.push_back(ratio * ratio);
     }
     const double unsuspicious =
-        1.0 + kQuantile999 * std::sqrt(2.0 / static_cast<double>(all.found.front().samples));
+        1.0 + kNormal999 * std::sqrt(2.0 / static_cast<double>(all.found.front().samples));
     const double typical = median(ratios);
     excess(k) = typical > unsuspicious ? typical : 1.0;
   }
@@ -43,7 +42,7 @@ Vector3 common_excess(const Standstills& all, const Noise& noise) {
 double variance_of_mean(const Standstill& s, Eigen::Index k, double sigma2, double correlation) {
   const auto n = static_cast<double>(s.samples);
   const double scatter2 = s.scatter_m(k) * s.scatter_m(k);
-  const double unsuspicious = 1.0 + kQuantile999 * std::sqrt(2.0 * correlation / n);
+  const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 * correlation / n);
   if (scatter2 > unsuspicious * sigma2) {
     sigma2 = scatter2;
   }
@@ -51,7 +50,7 @@ double variance_of_mean(const Standstill& s, Eigen::Index k, double sigma2, doub
   // The slope of n independent samples has the standard deviation sigma sqrt(12 / n) per length.
   const double variance = sigma2 * correlation / n, creep2 = s.creep_m(k) * s.creep_m(k);
   constexpr double kUniform = 12.0;  // variance of a uniform distribution of unit width: 1/12
-  const bool significant = creep2 > kQuantile999 * kQuantile999 * kUniform * variance;
+  const bool significant = creep2 > kNormal999 * kNormal999 * kUniform * variance;
   return variance + (significant ? creep2 / kUniform : 0.0);
 }
 

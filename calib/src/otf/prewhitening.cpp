@@ -12,6 +12,7 @@
 #include "otf/systematic_effects.hpp"
 #include "otf/whitened_rows.hpp"
 #include "otf/with_drift.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -54,7 +55,6 @@ Autocorrelation autocorrelation(const Observations& o, std::span<const double> r
 Autoregression autoregression(const Autocorrelation& of) {
   // 99.9 % quantile; for a lower order the last coefficient has standard
   // deviation 1/sqrt(n)
-  constexpr double kNormal999 = 3.090;
   const double significant = kNormal999 / std::sqrt(std::max(1.0, of.pairs));
   Autoregression found;
 

@@ -3,6 +3,7 @@
 
 #include "abbe/calib/otf/lack_of_fit.hpp"
 #include "median.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -73,7 +74,6 @@ ResidualNoise residual_noise(const Observations& o, std::span<const double> resi
 
   // 99.9 % quantile of the normal distribution. For white noise an autocorrelation coefficient from
   // n pairs has the standard deviation 1/sqrt(n).
-  constexpr double kNormal999 = 3.090;
   for (std::size_t lag = 1; lag <= kMostLags && pairs[lag] > 0; ++lag) {
     const auto n = static_cast<double>(pairs[lag]);
     const double coefficient = products[lag] / n / (products[0] / static_cast<double>(pairs[0]));

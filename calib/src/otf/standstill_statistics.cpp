@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "median.hpp"
+#include "quantile_999.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -200,7 +201,6 @@ void MeanVariances::add(std::span<const Vector3> residual_m) {
 }
 
 Vector3 MeanVariances::correlation() const {
-  constexpr double kNormal999 = 3.090;  // 99.9 % quantile
   Vector3 largest = Vector3::Ones();
   for (const Level& level : levels_) {
     const double unsuspicious = 1.0 + kNormal999 * std::sqrt(2.0 / level.degrees_of_freedom);

@@ -140,7 +140,7 @@ TEST(MfbPlan, ImpossibleMeasurementsAreRefused) {
   EXPECT_THAT(refusal([](Plan& p) { p.tip_radius_m = 9e-3; }, bar), HasSubstr("does not fit"));
   EXPECT_THAT(refusal([](Plan& p) { p.measurements.clear(); }, bar), HasSubstr("no measurement"));
   Bar steel = bar;
-  steel.expansion = Expansion{1e-6, 0.05e-6};
+  steel.expansion = Expansivity{1e-6, 0.05e-6};
   EXPECT_THAT(refusal([](Plan&) {}, steel), StartsWith("X1: the temperature"));
 }
 
@@ -179,7 +179,7 @@ double chi2_per_dof(const ProbingOptions& options, const std::function<void(Bar&
 }
 
 TEST(MfbIdentify, CorrectsTheExpansionOfTheBar) {
-  ProbingOptions steel{.expansion = Expansion{11e-6, 0.5e-6}, .warmer_K = 3.0};
+  ProbingOptions steel{.expansion = Expansivity{11e-6, 0.5e-6}, .warmer_K = 3.0};
   EXPECT_NEAR(chi2_per_dof(steel, [](Bar&, Plan&) {}), 1.0, 0.25);
   steel.alpha_error_per_K = 0.7e-6;  // 1.4 u: covered by the uncertainty of alpha
   EXPECT_NEAR(chi2_per_dof(steel, [](Bar&, Plan& p) { p.noise.u_temperature_K = 0.05; }), 1.0,

@@ -172,7 +172,7 @@ BarPlan plan_to_write(const mfb::PlanTask& task) {
 
 TEST_F(PlanMfb, TheFileIsReadAsItWasWritten) {
   auto task = tests::mfb::task_for(12, {0.55, 0.55, 0.4});
-  task.bar.expansion = mfb::Expansion{1e-6, 5e-8};
+  task.bar.expansion = calib::Expansivity{1e-6, 5e-8};
   task.backward = true;
   task.temperature_K = 295.15;
   task.settings.noise.u_temperature_K = 0.05;

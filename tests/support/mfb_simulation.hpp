@@ -110,7 +110,7 @@ struct ProbingOptions {
   double drift_m = 0.0;      ///< of each pass, in a random direction
   double form_m = 0.0;       ///< form errors of the features, the same in all passes
   double origin_m = 0.5e-3, axes_rad = 0.5e-3;     ///< pose beside the plan
-  std::optional<calib::mfb::Expansion> expansion;  ///< as the bar states it
+  std::optional<calib::Expansivity> expansion;  ///< as the bar states it
   double warmer_K = 0.0;                           ///< the bar above 20 degC, as measured
   double alpha_error_per_K = 0.0;
   std::optional<calib::mfb::Sag> sag;

@@ -41,7 +41,7 @@ inline calib::mfb::Bar bar_of(const sim::mfb::StatedBar& stated) {
   }
   bar.covariance_m2 = variances.asDiagonal();
   if (stated.alpha_per_K != 0.0 || stated.u_alpha_per_K != 0.0) {
-    bar.expansion = calib::mfb::Expansion{stated.alpha_per_K, stated.u_alpha_per_K};
+    bar.expansion = calib::Expansivity{stated.alpha_per_K, stated.u_alpha_per_K};
   }
   if (const auto& sag = stated.sag) {
     bar.sag = calib::mfb::Sag{sag->beam_x_m, sag->supports_m, sag->section_yz_m,
@@ -94,7 +94,7 @@ inline calib::mfb::StepGauge gauge_of(const sim::mfb::ReversalRun& run,
       .name = stated.name,
       .u_m = stated.u_m,
       .u_per_m = stated.u_per_m,
-      .expansion = calib::mfb::Expansion{stated.alpha_per_K, stated.u_alpha_per_K},
+      .expansion = calib::Expansivity{stated.alpha_per_K, stated.u_alpha_per_K},
       .temperature_K = stated.temperature_C + kZeroCelsius_K,
       .u_temperature_K = stated.u_temperature_K,
       .origin_m = run.gauge_origin_m,

@@ -70,7 +70,7 @@ Result<void> check_faces(const StepGauge& gauge) {
 }
 
 Result<void> check_gauge(const StepGauge& gauge) {
-  const Expansion expansion = gauge.expansion.value_or(Expansion{});
+  const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
   const bool valid = valid_number(gauge.u_m) && valid_number(gauge.u_per_m) &&
                      std::isfinite(gauge.temperature_K) && valid_number(gauge.u_temperature_K) &&
                      std::isfinite(expansion.alpha_per_K) &&
@@ -114,7 +114,7 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
 
 /// Relative standard uncertainty of all distances at the temperature of the gauge.
 double u_of_scale(const StepGauge& gauge) {
-  const Expansion expansion = gauge.expansion.value_or(Expansion{});
+  const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
   const double from_20_K = gauge.temperature_K - kReferenceTemperature_K;
   return root_sum_of_squares(gauge.u_per_m,
                              root_sum_of_squares(expansion.alpha_per_K * gauge.u_temperature_K,

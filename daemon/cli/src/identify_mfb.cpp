@@ -98,7 +98,7 @@ void add_notes_on_bar(const mfb::Bar& bar, std::span<const mfb::Measurement> mea
   constexpr double kNoticed_K = 0.1;
   const bool warm = std::ranges::any_of(measurements, [](const mfb::Measurement& m) {
     return m.temperature_K &&
-           std::abs(*m.temperature_K - mfb::kReferenceTemperature_K) > kNoticed_K;
+           std::abs(*m.temperature_K - calib::kReferenceTemperature_K) > kNoticed_K;
   });
   if (!bar.expansion && warm)
     notes.emplace_back(

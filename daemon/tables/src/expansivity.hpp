@@ -4,14 +4,14 @@
 
 #include <optional>
 
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/config/section.hpp"
 
 namespace abbe::daemon {
 
-/// `Expansivity` has alpha_per_K and u_alpha_per_K. Adds a fault if one of the keys is missing.
-template <class Expansivity>
-void read_expansivity(Section& head, std::optional<Expansivity>& out) {
-  Expansivity given;
+/// Adds a fault if one of the keys is missing.
+inline void read_expansivity(Section& head, std::optional<calib::Expansivity>& out) {
+  calib::Expansivity given;
   const bool alpha = head.get("alpha_um_per_m_K", given.alpha_per_K, kMicro, {-50.0, 50.0});
   const bool u_alpha = head.get("u_alpha_um_per_m_K", given.u_alpha_per_K, kMicro, {0.0, 50.0});
   if (alpha && u_alpha) out = given;

@@ -8,6 +8,12 @@ namespace abbe::calib {
 
 inline constexpr double kReferenceTemperature_K = 293.15;  ///< [ISO 1]
 
+/// Coefficient of linear thermal expansion with its standard uncertainty.
+struct Expansivity {
+  double alpha_per_K = 0.0;
+  double u_alpha_per_K = 0.0;
+};
+
 /// Linear thermal expansion of a scale or part. Standard uncertainties (k = 1), assumed to be
 /// independent.
 struct Expansion {

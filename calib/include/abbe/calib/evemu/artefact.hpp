@@ -33,10 +33,6 @@ struct Calibrator {
     Vector3 normal = Vector3::UnitZ();  ///< outward normal
     double u_rad = 0.0;  ///< standard uncertainty of the direction, about each perpendicular axis
   };
-  struct Expansivity {
-    double alpha_per_K = 0.0;
-    double u_alpha_per_K = 0.0;
-  };
   std::string name;
   double tip_radius_m = 0.0;
   std::vector<Ball> balls;                   ///< 1, 2, 3 ... in this order, at 20 C

@@ -11,13 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/geometry.hpp"
 #include "abbe/calib/mfb/features.hpp"
 
 namespace abbe::calib::mfb {
-
-/// Reference temperature of lengths.
-inline constexpr double kReferenceTemperature_K = 293.15;
 
 enum class Feature { Hole, Rod, Plane };
 
@@ -75,12 +73,6 @@ struct NominalTouch {
 /// along the bar, a rod and its planes after the hole before them.
 [[nodiscard]] std::vector<std::size_t> probing_order(const std::vector<NominalTouch>&);
 
-/// Thermal expansion of the bar.
-struct Expansion {
-  double alpha_per_K = 0.0;
-  double u_alpha_per_K = 0.0;
-};
-
 /// The bar as a uniform beam on two supports: deflection w below the line of the supports,
 ///     EI w(x) / q = (x-x0)^4/24 - R_a <x-a>^3/6 - R_b <x-b>^3/6 + c1 x + c2,   w(a) = w(b) = 0
 ///     <v> = max(v, 0),   R_b = L ((x0+x1)/2 - a)/(b - a),   R_a = L - R_b,   L = x1 - x0
@@ -104,7 +96,7 @@ struct Bar {
   /// Covariance of x1 y1 z1 x2 ... in m^2, 3N x 3N; may be singular. Rows of the coordinates that
   /// are 0 by definition (O_1, y and z of O_N) are 0.
   Eigen::MatrixXd covariance_m2;
-  std::optional<Expansion> expansion;
+  std::optional<Expansivity> expansion;  ///< absent: taken as at 20 C
   std::optional<Sag> sag;  ///< absent: the bar is stiff
 };
 

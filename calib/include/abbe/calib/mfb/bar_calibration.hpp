@@ -29,7 +29,7 @@ struct StepGauge {
   std::vector<GaugeFace> faces;  ///< ascending distances from 0
   double u_m = 0.0;              ///< of a distance: independent part
   double u_per_m = 0.0;          ///< and part in proportion to it, common to all
-  std::optional<Expansion> expansion;
+  std::optional<Expansivity> expansion;
   double temperature_K = kReferenceTemperature_K, u_temperature_K = 0.0;
   Vector3 origin_m = Vector3::Zero();       ///< centre of the tip at the first face, machine axes
   Vector3 tool_offset_m = Vector3::Zero();  ///< tool reference point to tip

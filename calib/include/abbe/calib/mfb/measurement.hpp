@@ -29,7 +29,7 @@ struct Measurement {
   Vector3 bar_z = Vector3::UnitZ();
   Vector3 tool_offset_m = Vector3::Zero();
   PassDirection direction = PassDirection::Forward;
-  std::optional<double> temperature_K;  ///< of the bar; required if the bar has an Expansion
+  std::optional<double> temperature_K;  ///< of the bar; required if the bar states its expansion
 
   /// Planned bar axes as columns x, y, z; orthonormal if bar_x and bar_z are perpendicular.
   [[nodiscard]] Matrix3 axes() const;
@@ -58,8 +58,8 @@ struct MfbMachine {
 
 /// BadInput: no measurement, a name that is empty or repeated, axes that are zero or more than 1
 /// mrad from perpendicular, a position with two poses, a tool offset or radius of the tip that is
-/// not possible, a noise that is not positive, a temperature missing where the bar has an
-/// Expansion. NotFinite for NaN. The text names the measurement.
+/// not possible, a noise that is not positive, a temperature missing where the bar states its
+/// expansion. NotFinite for NaN. The text names the measurement.
 [[nodiscard]] Result<void> check(const Plan&, const Bar&);
 
 /// One touch of a pass.

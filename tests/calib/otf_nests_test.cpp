@@ -13,6 +13,7 @@
 
 #include "abbe/calib/otf/judge.hpp"
 #include "nest_run.hpp"
+#include "normalised_error.hpp"
 #include "standstill_run.hpp"
 
 namespace {
@@ -126,20 +127,36 @@ TEST(Nests, TheCourseOfTheDriftIsEstimated) {
   }
 }
 
-/// A random walk is far from the prior: the amplitude becomes large, and with it the covariance.
-TEST(Nests, ADriftThatIsNotSmoothStillGivesAModel) {
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> step(0.0, 1.0 / std::sqrt(1000.0));
+/// A run whose drift is a random walk of the standard deviation `walk_m` per axis.
+NestResult with_random_walk(unsigned seed, const Vector3& walk_m) {
+  constexpr double kSteps_hz = 10.0, kRun_s = 1000.0;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> step(0.0, 1.0 / std::sqrt(kSteps_hz * kRun_s));
   std::vector<double> walk{0.0};
-  while (walk.size() < 2000) {
+  while (walk.size() < 20000) {
     walk.push_back(walk.back() + step(random));
   }
-  const MadeRun run = make_nest_run(two_nests({.drift_m = kDrift_m, .course = [&](double time_s) {
-                                                 return walk[static_cast<std::size_t>(time_s)];
-                                               }}));
-  const auto id = identify_nest_run(run);
-  ASSERT_TRUE(id) << id.error().text;
-  EXPECT_TRUE(id->solution.drift);
+  return result_of(two_nests({.seed = seed, .drift_m = walk_m, .course = [&](double time_s) {
+                                return walk[static_cast<std::size_t>(kSteps_hz * time_s)];
+                              }}));
+}
+
+/// Between the knots the walk is not known: without this part of the covariance the mean is 2.7.
+TEST(Nests, TheUncertaintyContainsARandomWalk) {
+  double normalised = 0.0;
+  for (const unsigned seed : {1u, 2u}) {
+    const NestResult result = with_random_walk(seed, kDrift_m);
+    normalised += normalised_error_square(result.run, result.id.solution.model) / 2.0;
+    EXPECT_GT(result.drift().walk_m, 4e-6);
+    EXPECT_THAT(verdict_on(result).notes, Contains(HasSubstr("is not smooth: it contains a random")));
+  }
+  EXPECT_LT(normalised, 1.3);
+  EXPECT_GT(normalised, 0.1);
+}
+
+TEST(Nests, ASmoothDriftContainsNoRandomWalk) {
+  EXPECT_LT(with_drift_and_nests().drift().walk_m, 0.5e-6);
+  EXPECT_THAT(verdict_on(with_drift_and_nests()).notes, Not(Contains(HasSubstr("not smooth"))));
 }
 
 TEST(Nests, ARotationIsEstimatedFromThreeNestsThatAreNotOnALine) {

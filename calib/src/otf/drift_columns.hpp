@@ -1,7 +1,8 @@
 #pragma once
 /// The columns that the drift of the tracker, and an offset of its ranges, add to the rows of a run:
-/// the offset first (only if it has a prior), then the coefficients of the drift. A row has at most
-/// 13 of them.
+/// the offset first (only if it has a prior), then the coefficients of the drift, then those between
+/// its knots (only if they are asked for). A row has at most 13 of the first two, and 18 between the
+/// knots.
 
 #include <Eigen/Core>
 #include <functional>
@@ -17,11 +18,16 @@ namespace abbe::calib::otf {
 
 class DriftColumns {
  public:
-  /// For observations with a drift; `o` must outlive it. `offsets`: 1 with the range offset, else 0.
-  explicit DriftColumns(const Observations& o, std::size_t offsets = 0)
-      : o_(o), basis_(*o.drift), offsets_(offsets) {}
+  enum class BetweenKnots { Straight, Walk };
 
-  [[nodiscard]] std::size_t size() const { return offsets_ + basis_.size(); }
+  /// For observations with a drift; `o` must outlive it. `offsets`: 1 with the range offset, else 0.
+  explicit DriftColumns(const Observations& o, std::size_t offsets = 0,
+                        BetweenKnots between = BetweenKnots::Straight)
+      : o_(o), basis_(*o.drift), offsets_(offsets), between_(between) {}
+
+  [[nodiscard]] std::size_t size() const {
+    return offsets_ + basis_.size() + (between_ == BetweenKnots::Walk ? basis_.between_knots() : 0);
+  }
   [[nodiscard]] const DriftBasis& basis() const { return basis_; }
   /// Change of y of the row caused by d.
   [[nodiscard]] double effect_m(const Observation& row, const Eigen::VectorXd& d) const;
@@ -38,6 +44,7 @@ class DriftColumns {
   const Observations& o_;
   DriftBasis basis_;
   std::size_t offsets_;
+  BetweenKnots between_;
 };
 
 }  // namespace abbe::calib::otf

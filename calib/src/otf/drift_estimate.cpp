@@ -14,7 +14,7 @@ DriftEstimate mean_estimate(const DriftLikelihood& likelihood, const LikelihoodG
   const double most = grid.best().log_likelihood;
   const Eigen::Index n = grid.equations.front().b.size();
   DriftEstimate e{.d = Eigen::VectorXd::Zero(n), .covariance = Eigen::MatrixXd::Zero(n, n)};
-  double weights = 0.0, u_m2 = 0.0;
+  double weights = 0.0, u_m2 = 0.0, walk_m2 = 0.0;
 
   for (const DriftCell& cell : grid.cells) {
     const double weight = exponential(cell.log_likelihood - most);
@@ -22,6 +22,7 @@ DriftEstimate mean_estimate(const DriftLikelihood& likelihood, const LikelihoodG
       const Eigen::VectorXd d = likelihood.unknowns(grid, cell);
       weights += weight;
       u_m2 += weight * grid.u_m(cell) * grid.u_m(cell);
+      walk_m2 += weight * grid.walk_m(cell) * grid.walk_m(cell);
       e.d += weight * d;
       e.covariance += weight * (likelihood.covariance(grid, cell) + d * d.transpose());
     }
@@ -30,6 +31,7 @@ DriftEstimate mean_estimate(const DriftLikelihood& likelihood, const LikelihoodG
   e.d /= weights;
   e.covariance = e.covariance / weights - e.d * e.d.transpose();
   e.u_repeatability_m = std::sqrt(u_m2 / weights);
+  e.walk_m = std::sqrt(walk_m2 / weights);
   return e;
 }
 

@@ -15,6 +15,7 @@ struct DriftEstimate {
   Eigen::VectorXd d;
   Eigen::MatrixXd covariance;
   double u_repeatability_m = 0.0;    ///< rms over the factors of the stated one
+  double walk_m = 0.0;               ///< rms of the standard deviation of the random walk
   std::size_t visits = 0;            ///< of positions that were visited at least twice
   std::vector<std::string> notes{};  ///< nests that moved, visits not used
 };

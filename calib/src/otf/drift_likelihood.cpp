@@ -67,27 +67,34 @@ const DriftCell& LikelihoodGrid::best() const {
 }
 
 DriftLikelihood::DriftLikelihood(const DriftObservations& d, const DriftEquations& equations)
-    : d_(d), equations_(equations), basis_(d), nests_(d, basis_), root_(basis_.root_of_prior()) {}
+    : d_(d), equations_(equations), basis_(d), nests_(d, basis_) {
+  for (const DriftCourse course : kDriftCourses) {
+    roots_.emplace(course, basis_.root_of_prior(course));
+  }
+}
 
-Eigen::MatrixXd DriftLikelihood::root_times(const Eigen::MatrixXd& x) const {
+Eigen::MatrixXd DriftLikelihood::root_times(DriftCourse course, const Eigen::MatrixXd& x) const {
+  const Eigen::MatrixXd& root = roots_.at(course);
   const Eigen::Index k = equations_.offsets(), m = static_cast<Eigen::Index>(basis_.modes());
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(x.rows(), x.cols());
   product.topRows(k) = equations_.u_range_offset_m * x.topRows(k);
-  for (Eigen::Index i = 0; i < root_.rows(); ++i) {
+  for (Eigen::Index i = 0; i < root.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
-      product.middleRows(k + i * m, m) += root_(i, j) * x.middleRows(k + j * m, m);
+      product.middleRows(k + i * m, m) += root(i, j) * x.middleRows(k + j * m, m);
     }
   }
   return product;
 }
 
-Eigen::MatrixXd DriftLikelihood::root_transposed_times(const Eigen::MatrixXd& x) const {
+Eigen::MatrixXd DriftLikelihood::root_transposed_times(DriftCourse course,
+                                                       const Eigen::MatrixXd& x) const {
+  const Eigen::MatrixXd& root = roots_.at(course);
   const Eigen::Index k = equations_.offsets(), m = static_cast<Eigen::Index>(basis_.modes());
   Eigen::MatrixXd product = Eigen::MatrixXd::Zero(x.rows(), x.cols());
   product.topRows(k) = equations_.u_range_offset_m * x.topRows(k);
-  for (Eigen::Index i = 0; i < root_.rows(); ++i) {
+  for (Eigen::Index i = 0; i < root.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
-      product.middleRows(k + j * m, m) += root_(i, j) * x.middleRows(k + i * m, m);
+      product.middleRows(k + j * m, m) += root(i, j) * x.middleRows(k + i * m, m);
     }
   }
   return product;
@@ -96,20 +103,24 @@ Eigen::MatrixXd DriftLikelihood::root_transposed_times(const Eigen::MatrixXd& x)
 Result<LikelihoodGrid> DriftLikelihood::grid(const NestPlaces& place,
                                              const Stopped& stopped) const {
   LikelihoodGrid grid;
-  for (std::size_t i = 0; i < kRepeatabilityFactors.size(); ++i) {
-    if (Result<void> running = check_stopped(stopped); !running) {
-      return tl::unexpected(running.error());
-    }
-    grid.equations.push_back(scaled(place, kRepeatabilityFactors[i] * d_.u_repeatability_m));
-    double amplitude_m = kLeastAmplitude_m;
-    for (int k = 0; k < kAmplitudes; ++k, amplitude_m *= 2.0) {
-      grid.cells.push_back({i, amplitude_m, log_likelihood(grid.equations.back(), amplitude_m)});
+  for (const DriftCourse course : kDriftCourses) {
+    for (const double factor : kRepeatabilityFactors) {
+      if (Result<void> running = check_stopped(stopped); !running) {
+        return tl::unexpected(running.error());
+      }
+      grid.equations.push_back(scaled(place, factor * d_.u_repeatability_m, course));
+      double amplitude_m = kLeastAmplitude_m;
+      for (int k = 0; k < kAmplitudes; ++k, amplitude_m *= 2.0) {
+        grid.cells.push_back({grid.equations.size() - 1, amplitude_m,
+                              log_likelihood(grid.equations.back(), amplitude_m)});
+      }
     }
   }
   return grid;
 }
 
-ScaledEquations DriftLikelihood::scaled(const NestPlaces& place, double u_m) const {
+ScaledEquations DriftLikelihood::scaled(const NestPlaces& place, double u_m,
+                                        DriftCourse course) const {
   const NestInformation nests = nests_.information(place, u_m);
   const Eigen::Index m = nests.Nc.size();
   Eigen::MatrixXd information = equations_.S;
@@ -117,8 +128,12 @@ ScaledEquations DriftLikelihood::scaled(const NestPlaces& place, double u_m) con
   Eigen::VectorXd g = equations_.g;
   g.tail(m) += nests.Nc;
 
-  const Eigen::MatrixXd P = root_transposed_times(root_transposed_times(information).transpose());
-  ScaledEquations e{.P = 0.5 * (P + P.transpose()), .b = root_transposed_times(g), .u_m = u_m};
+  const Eigen::MatrixXd P =
+      root_transposed_times(course, root_transposed_times(course, information).transpose());
+  ScaledEquations e{.P = 0.5 * (P + P.transpose()),
+                    .b = root_transposed_times(course, g),
+                    .u_m = u_m,
+                    .course = course};
   e.constant = nests.constant;
   make_tridiagonal(e, equations_.offsets());
   return e;
@@ -138,13 +153,14 @@ Eigen::VectorXd DriftLikelihood::unknowns(const LikelihoodGrid& grid, const Drif
   const ScaledEquations& e = grid.equations[cell.equations];
   const Factors f = factors(e, cell.amplitude_m);
   const Eigen::VectorXd x = f.llt.solve(Eigen::VectorXd(f.scale.asDiagonal() * e.b));
-  return root_times(f.scale.asDiagonal() * x);
+  return root_times(e.course, f.scale.asDiagonal() * x);
 }
 
 Eigen::MatrixXd DriftLikelihood::covariance(const LikelihoodGrid& grid,
                                             const DriftCell& cell) const {
-  const Factors f = factors(grid.equations[cell.equations], cell.amplitude_m);
-  const Eigen::MatrixXd scaled_root = root_times(f.scale.asDiagonal());
+  const ScaledEquations& e = grid.equations[cell.equations];
+  const Factors f = factors(e, cell.amplitude_m);
+  const Eigen::MatrixXd scaled_root = root_times(e.course, f.scale.asDiagonal());
   const Eigen::MatrixXd half = f.llt.matrixL().solve(Eigen::MatrixXd(scaled_root.transpose()));
   return half.transpose() * half;
 }

@@ -1,10 +1,11 @@
 #pragma once
-/// Likelihood of the amplitude of the drift, of the repeatability of the nests, and of the positions
-/// to which the visits belong (tracker_drift.hpp).
+/// Likelihood of course and amplitude of the drift, of the repeatability of the nests, and of the
+/// positions to which the visits belong (tracker_drift.hpp).
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "abbe/calib/otf/run.hpp"
@@ -25,11 +26,13 @@ struct DriftEquations {
 /// For each visit the position to which it belongs.
 using NestPlaces = std::vector<std::size_t>;
 
-/// The equations for one repeatability, with the prior as unit matrix for the amplitude 1.
+/// The equations for one course and one repeatability, with the prior as unit matrix for the
+/// amplitude 1.
 struct ScaledEquations {
   Eigen::MatrixXd P;
   Eigen::VectorXd b;
   double u_m = 0.0;
+  DriftCourse course = DriftCourse::Smooth;
 
   // The same without the range offset, in coordinates in which P is tridiagonal: with it a
   // likelihood takes O(n) operations.
@@ -37,20 +40,24 @@ struct ScaledEquations {
   double constant = 0.0;  ///< part of -2 ln(likelihood) that does not depend on the amplitude
 };
 
-/// One pair of amplitude and repeatability.
+/// One combination of course, amplitude and repeatability.
 struct DriftCell {
   std::size_t equations = 0;  ///< index in LikelihoodGrid::equations
   double amplitude_m = 0.0;
   double log_likelihood = 0.0;
 };
 
-/// All pairs for the same places.
+/// All combinations for the same places.
 struct LikelihoodGrid {
-  std::vector<ScaledEquations> equations{};  ///< by repeatability
+  std::vector<ScaledEquations> equations{};  ///< by course and repeatability
   std::vector<DriftCell> cells{};
 
   [[nodiscard]] const DriftCell& best() const;
   [[nodiscard]] double u_m(const DriftCell& cell) const { return equations[cell.equations].u_m; }
+  /// Standard deviation of the random walk over the duration of the run.
+  [[nodiscard]] double walk_m(const DriftCell& cell) const {
+    return cell.amplitude_m * walk_of(equations[cell.equations].course);
+  }
 };
 
 class DriftLikelihood {
@@ -70,17 +77,17 @@ class DriftLikelihood {
 
  private:
   struct Factors;
-  [[nodiscard]] ScaledEquations scaled(const NestPlaces&, double u_m) const;
+  [[nodiscard]] ScaledEquations scaled(const NestPlaces&, double u_m, DriftCourse) const;
   /// Root of the prior of all unknowns times x, and its transpose times x.
-  [[nodiscard]] Eigen::MatrixXd root_times(const Eigen::MatrixXd& x) const;
-  [[nodiscard]] Eigen::MatrixXd root_transposed_times(const Eigen::MatrixXd& x) const;
+  [[nodiscard]] Eigen::MatrixXd root_times(DriftCourse, const Eigen::MatrixXd& x) const;
+  [[nodiscard]] Eigen::MatrixXd root_transposed_times(DriftCourse, const Eigen::MatrixXd& x) const;
   [[nodiscard]] Factors factors(const ScaledEquations&, double amplitude_m) const;
 
   const DriftObservations& d_;
   const DriftEquations& equations_;
   DriftBasis basis_;
   NestRows nests_;
-  Eigen::MatrixXd root_;  ///< of the prior of one mode, for the amplitude 1
+  std::map<DriftCourse, Eigen::MatrixXd> roots_{};  ///< of the prior of one mode, amplitude 1
 };
 
 }  // namespace abbe::calib::otf

@@ -100,6 +100,15 @@ void note_drift(Verdict& verdict, const Observations& o, const Solution& solutio
     verdict.notes.push_back(run + note);
   }
 
+  constexpr double kNoticedWalk_m = 1e-6;
+  if (solution.drift->walk_m > kNoticedWalk_m) {
+    verdict.notes.push_back(message(
+        run, "the drift of the tracker is not smooth: it contains a random walk of ",
+        1e6 * solution.drift->walk_m,
+        " um over the run, which the nests show incompletely; the uncertainty contains it: let the "
+        "tracker warm up, keep draught from its beam"));
+  }
+
   constexpr double kSlightlyLarger = 1.2;
   const double stated_m = o.drift->u_repeatability_m, used_m = solution.drift->u_repeatability_m;
   if (used_m > kSlightlyLarger * stated_m) {

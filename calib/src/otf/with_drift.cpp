@@ -42,6 +42,22 @@ std::vector<double> residuals_with_drift_m(const Observations& o, const DriftCol
   return r;
 }
 
+/// What the course of the drift between its knots adds to the covariance of U. It is not estimated:
+/// its coefficients b have the standard deviation of the walk, and change U by
+///     dU/db = Q A^T W^2 B - (Q A^T W^2 C) cov(d) (C^T W^2 (1 - A Q A^T W^2) B) / factor
+Eigen::MatrixXd covariance_between_knots(const Observations& o, const WhitenedRows& rows,
+                                         const Eigen::MatrixXd& cofactor_Q,
+                                         std::span<const double> residual_m,
+                                         const DriftEstimate& estimate, double factor,
+                                         std::size_t offsets) {
+  const DriftColumns columns(o, offsets, DriftColumns::BetweenKnots::Walk);
+  const AddedColumns::Reduced all = columns.sums(rows, residual_m).reduced(cofactor_Q);
+  const Eigen::Index d = estimate.d.size(), b = all.g.size() - d;
+  const Eigen::MatrixXd dd_db = estimate.covariance * all.S.topRightCorner(d, b) / factor;
+  const Eigen::MatrixXd dU_db = all.dU_dd.rightCols(b) - all.dU_dd.leftCols(d) * dd_db;
+  return estimate.walk_m * estimate.walk_m * (dU_db * dU_db.transpose());
+}
+
 }  // namespace
 
 Observations without_drift(Observations o, const TrackerDrift& drift) {
@@ -83,8 +99,9 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
 
   WithDrift with;
   DriftEstimate estimate;
-  double factor = 1.0;
+  double factor = 1.0, factor_used = 1.0;
   for (int round = 0; round < kRounds; ++round) {
+    factor_used = factor;
     equations.S = reduced.S / factor;
     equations.g = reduced.g / factor;
     Result<DriftEstimate> found = estimate_drift(*o.drift, equations, stopped);
@@ -104,8 +121,14 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
   with.drift.points = drift_points(o, columns.basis(), with.drift.coefficients);
   with.drift.visits = estimate.visits;
   with.drift.u_repeatability_m = estimate.u_repeatability_m;
+  with.drift.walk_m = estimate.walk_m;
   with.drift.notes = std::move(estimate.notes);
-  const Eigen::MatrixXd added = reduced.dU_dd * estimate.covariance * reduced.dU_dd.transpose();
+  Eigen::MatrixXd added = reduced.dU_dd * estimate.covariance * reduced.dU_dd.transpose();
+  constexpr double kNegligibleWalk_m = 50e-9;
+  if (estimate.walk_m > kNegligibleWalk_m) {
+    added += covariance_between_knots(o, rows, a.cofactor_Q, residual_m, estimate, factor_used,
+                                      static_cast<std::size_t>(offsets));
+  }
   with.added_covariance = 0.5 * (added + added.transpose());  // symmetric in spite of rounding
   return with;
 }

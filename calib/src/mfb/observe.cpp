@@ -14,12 +14,13 @@
 namespace abbe::calib::mfb {
 namespace {
 
-double rms_to_signature(const std::vector<Vector3>& O_bar_m, const std::vector<double>& y_m) {
+double rms_to_signature(const std::vector<Vector3>& O_bar_m, const Bar& calibrated) {
   double squares = 0.0;
-  for (std::size_t i = 0; i < y_m.size(); ++i) {
-    squares += (O_bar_m[i].y() - y_m[i]) * (O_bar_m[i].y() - y_m[i]);
+  for (std::size_t i = 0; i < O_bar_m.size(); ++i) {
+    const double off_m = O_bar_m[i].y() - calibrated.O_m[i].y();
+    squares += off_m * off_m;
   }
-  return std::sqrt(squares / static_cast<double>(y_m.size()));
+  return std::sqrt(squares / static_cast<double>(O_bar_m.size()));
 }
 
 std::vector<Vector3> in_bar_frame(const ExtractedBar& bar) {
@@ -46,27 +47,36 @@ Result<void> check_calibrated_places(const ExtractedBar& bar, const Bar& calibra
   return {};
 }
 
-/// The signature is the calibrated y of the holes, which contains the nominal shifts.
-Result<void> check_orientation(const ExtractedBar& bar, const Bar& calibrated) {
-  if (!calibrated.pattern.has_signature()) {
-    return {};
-  }
+/// How the bar lies. The signature is the calibrated y of the holes, which contains the nominal
+/// shifts.
+Result<OrientationFit> found_orientation(const ExtractedBar& bar, const Bar& calibrated) {
   std::vector<double> signature_m;
   for (const Vector3& O : calibrated.O_m) {
     signature_m.push_back(O.y());
   }
-  const std::vector<Vector3> O_bar_m = in_bar_frame(bar);
-  const Result<OrientationFit> fit = orientation_of(O_bar_m, signature_m);
-  if (!fit) {
-    return tl::unexpected(fit.error());
-  }
-  if (fit->orientation == Orientation::Normal) {
+  return orientation_of(in_bar_frame(bar), signature_m);
+}
+
+Result<void> check_not_turned(const OrientationFit& fit, double as_planned_rms_m) {
+  if (fit.orientation == Orientation::Normal) {
     return {};
   }
-  return failure(ErrorCode::NotApplicable,
-                 message("the bar lies ", name(fit->orientation), ": ", kMmPerM * fit->rms_m,
-                         " mm against ", kMmPerM * rms_to_signature(O_bar_m, signature_m),
-                         " mm as planned: turn it and measure again"));
+  return failure(
+      ErrorCode::NotApplicable,
+      message("the bar lies ", name(fit.orientation), ": ", kMmPerM * fit.rms_m, " mm against ",
+              kMmPerM * as_planned_rms_m, " mm as planned: turn it and measure again"));
+}
+
+/// `of_known_bar`: features and sizes are those of the bar, so that its orientation must be found.
+Result<void> check_orientation(const ExtractedBar& bar, const Bar& calibrated, bool of_known_bar) {
+  if (!calibrated.pattern.has_signature()) {
+    return {};
+  }
+  const Result<OrientationFit> fit = found_orientation(bar, calibrated);
+  if (!fit) {
+    return of_known_bar ? tl::unexpected(fit.error()) : Result<void>{};
+  }
+  return check_not_turned(*fit, rms_to_signature(in_bar_frame(bar), calibrated));
 }
 
 Result<void> check_beside_plan(const BarPose& found, const BarPose& planned,
@@ -92,8 +102,12 @@ Result<ExtractedBar> checked_bar(const Observations& o, const PassObservation& p
   return extracted(bar_touches(pattern, sorted.place, sorted.tip_m), planned.axes)
       .and_then([&](ExtractedBar bar) -> Result<ExtractedBar> {
         Result<void> valid =
-            check_features(bar.features, pattern, o.plan.tip_radius_m, bar.pose, limits)
-                .and_then([&] { return check_orientation(bar, o.bar); })
+            check_orientation(bar, o.bar, false)
+                .and_then([&] {
+                  return check_features(bar.features, pattern, o.plan.tip_radius_m, bar.pose,
+                                        limits);
+                })
+                .and_then([&] { return check_orientation(bar, o.bar, true); })
                 .and_then([&] { return check_beside_plan(bar.pose, planned, limits); })
                 .and_then([&] { return check_calibrated_places(bar, o.bar, limits); });
         if (!valid) {

@@ -4,17 +4,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <iterator>
 #include <memory>
 
 #include "abbe/sim/noise.hpp"
 #include "abbe/sim/simulation.hpp"
 #include "commands.hpp"
-#include "event_loop.hpp"
 #include "files.hpp"
-#include "ports_file.hpp"
 #include "setup_file.hpp"
+#include "touching_loop.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -30,14 +28,6 @@ struct EvemuOptions {
   double u_reference_um = 5.0;
   bool start_on_signal = false;
 };
-
-volatile std::sig_atomic_t start_requested = 0;
-
-void start_on_sigusr1() {
-  struct sigaction action {};
-  action.sa_handler = [](int) { start_requested = 1; };
-  sigaction(SIGUSR1, &action, nullptr);
-}
 
 Result<LoadedSetup> load(const EvemuOptions& options) {
   auto setup = load_setup(options.choices);
@@ -145,19 +135,6 @@ Result<void> write_files(const EvemuOptions& options, const LoadedSetup& setup,
       });
 }
 
-void print_progress(const Simulation& simulation, HostTime now, double speed, int& printed) {
-  const VirtualMachine& machine = simulation.machine();
-  if (machine.started() && printed == 0) {
-    printed = 1;
-    fmt::print(stderr, "machine: touching, {:.0f} s ({:.0f} s of wall-clock time)\n",
-               machine.path().duration_s(), machine.path().duration_s() / speed);
-  }
-  if (machine.finished() && now >= *machine.finished() && printed == 1) {
-    printed = 2;
-    fmt::print(stderr, "machine: all touches made, stopped\n");
-  }
-}
-
 int run(const EvemuOptions& options) {
   auto setup = load(options);
   if (!setup) return report(setup.error());
@@ -171,27 +148,11 @@ int run(const EvemuOptions& options) {
   if (!motion) return report(motion.error());
   setup->simulation.edges_s =
       edge_times_s(program, truth, *motion, array.tip_radius_m, setup->touching);
-  start_on_sigusr1();
-  const EventLoop loop(setup->speed);
-  auto simulation = Simulation::open(setup->simulation, loop.clock().now());
-  if (!simulation) return report(simulation.error());
-  if (const auto announced = announce_ports(ports_of(**simulation), options.ports_file); !announced)
-    return report(announced.error());
-  fmt::print(stderr, "{} touches{}\n", program.moves.size(),
-             options.start_on_signal ? ", start on SIGUSR1" : ", start when the card is scanning");
-  int printed = 0;
-
-  while (!loop.stopped()) {
-    std::vector<pollfd> fds;
-    (*simulation)->add_poll_fds(fds);
-    loop.wait(fds, (*simulation)->next_due());
-    const HostTime now = loop.clock().now();
-    if (start_requested != 0 && !(*simulation)->machine().started()) (*simulation)->release(now);
-    (*simulation)->poll(now);
-    print_progress(**simulation, now, setup->speed, printed);
-  }
-
-  return kDone;
+  return run_touching(setup->simulation,
+                      {.ports_file = options.ports_file,
+                       .start_on_signal = options.start_on_signal,
+                       .speed = setup->speed},
+                      fmt::format("{} touches", program.moves.size()));
 }
 
 }  // namespace

@@ -4,19 +4,34 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <utility>
 
+#include "abbe/sim/mfb/live_probing.hpp"
 #include "abbe/sim/random_truth.hpp"
 #include "abbe/sim/truth_table.hpp"
 #include "bar_options.hpp"
 #include "commands.hpp"
+#include "setup_file.hpp"
 #include "toml_section.hpp"
+#include "touching_loop.hpp"
 
 namespace abbe::sim {
 namespace {
 
+/// With a [sim] table the machine and its devices are simulated, too.
+struct LiveOptions {
+  SetupChoices choices;
+  std::string ports_file;
+  bool start_on_signal = false;
+  std::size_t from = 0;  ///< number of the first touch
+  std::vector<std::size_t> silent, doubled, stray;
+};
+
 struct MfbOptions : BarOptions {
+  LiveOptions live;
   std::string plan = "17", passes = "pairs";
   std::uint64_t waves = 3;
   double drift_um = 0.0;
@@ -78,6 +93,38 @@ std::string sim_toml(const MfbOptions& options) {
       options.seed);
 }
 
+/// Scales and probe on a counter card: the same touches as in points.csv.
+int run_live(const MfbOptions& options, const TruthMachine& machine, mfb::ProbedBar probed) {
+  const std::size_t from = std::min(options.live.from, probed.touches.size());
+  probed.touches.erase(probed.touches.begin(),
+                       probed.touches.begin() + static_cast<std::ptrdiff_t>(from));
+  auto setup = load_setup(options.live.choices);
+  if (!setup) return report(setup.error());
+  SimulationSetup& simulation = setup->simulation;
+  if (simulation.counter_cards.empty())
+    return report({ErrorCode::BadInput,
+                   "the machine file has no [counter_card], which counts the axes and the probe: "
+                   "add it"});
+  mfb::LiveProbing probing{.seed = options.seed};
+  probing.missed.insert(options.live.silent.begin(), options.live.silent.end());
+  probing.doubled.insert(options.live.doubled.begin(), options.live.doubled.end());
+  probing.stray.insert(options.live.stray.begin(), options.live.stray.end());
+  const auto program = mfb::live_program(probed, probing);
+  if (!program) return report(program.error());
+
+  simulation.truth = machine;
+  simulation.tracker.reset();
+  simulation.bus.reset();
+  simulation.held = options.live.start_on_signal;
+  simulation.path = program->path;
+  simulation.edges_s = program->edges_s;
+  return run_touching(simulation,
+                      {.ports_file = options.live.ports_file,
+                       .start_on_signal = options.live.start_on_signal,
+                       .speed = setup->speed},
+                      fmt::format("{} touches", probed.touches.size()));
+}
+
 int run(const MfbOptions& options) {
   const auto stated = stated_options(options);
   if (!stated) return report(stated.error());
@@ -85,7 +132,7 @@ int run(const MfbOptions& options) {
   const TruthMachine machine = cube_machine(options);
   const auto plan =
       mfb::reference_plan(kPlans.at(options.plan), kPasses.at(options.passes), options.length_m());
-  const auto probed = mfb::probe_bar(machine, bar, plan, simulated(*stated, options));
+  auto probed = mfb::probe_bar(machine, bar, plan, simulated(*stated, options));
   if (!probed) return report(as_usage(probed.error()));
 
   const Eigen::Vector3d u_bar_m = kMicro * Eigen::Vector3d(options.u_bar_um.data());
@@ -108,7 +155,41 @@ int run(const MfbOptions& options) {
   if (!written) return report(written.error());
   fmt::print("{} touches in {} passes; mean |V| {:.1f} um; files in {}\n", probed->touches.size(),
              plan.size(), mean_error_m(machine) / kMicro, options.folder);
-  return kDone;
+  return options.live.choices.config_file.empty() ? kDone
+                                                  : run_live(options, machine, *std::move(probed));
+}
+
+void add_live_options(CLI::App& sub, LiveOptions& live) {
+  live.choices.needs_path = false;
+  auto* config =
+      sub.add_option(
+             "--config", live.choices.config_file,
+             "TOML file with a [sim] table: after the files are written, the machine makes\n"
+             "the touches, scales and probe on the counter card of its machine file, on\n"
+             "127.0.0.1 until SIGINT or SIGTERM; then `abbe calibrate mfb`")
+          ->type_name("FILE");
+  sub.add_option("--speed", live.choices.speed,
+                 "simulated seconds per second; the daemon must be given the same")
+      ->check(CLI::Range(1e-3, 1e4))
+      ->needs(config);
+  sub.add_option("--usbip-port", live.choices.usbip_port,
+                 "TCP, of the counter card; 0 = any free one")
+      ->needs(config);
+  sub.add_flag("--start-on-signal", live.start_on_signal,
+               "start on SIGUSR1; default: when the card is scanning; then [sim.path] standstill_s")
+      ->needs(config);
+  sub.add_option("--ports-file", live.ports_file, "written when the card listens: usbip_port=N")
+      ->type_name("FILE")
+      ->needs(config);
+  sub.add_option("--from", live.from,
+                 "begins with this touch, by number from 0: the session before was interrupted")
+      ->needs(config);
+  sub.add_option("--silent", live.silent,
+                 "touches that the probe does not report, by number from 0")
+      ->needs(config);
+  sub.add_option("--double", live.doubled, "touches made twice, by number")->needs(config);
+  sub.add_option("--stray", live.stray, "before these touches, a trigger far from the bar")
+      ->needs(config);
 }
 
 }  // namespace
@@ -122,6 +203,7 @@ Subcommand add_mfb(CLI::App& app) {
       "machine.toml for `abbe identify mfb`; its true errors: truth.csv with sim.toml (abbe-sim\n"
       "truth --config), verification.csv (abbe verify --points), truebar.csv (the bar)");
   add_bar_options(*sub, *options);
+  add_live_options(*sub, options->live);
   sub->add_option(
          "--plan", options->plan,
          "17 measurements; 12, the least that show all errors; 17-rolled, the holes of X3 along Y")

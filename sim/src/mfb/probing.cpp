@@ -112,7 +112,7 @@ class PassProbing {
       const std::string key = plan_[m_].name + "," + name(all_[number]);
       if (options_.missed.contains(key)) continue;
       const double time = static_cast<double>(row) / static_cast<double>(all_.size() - 1);
-      touches.push_back({m_, all_[number], reading_m(number, time, key)});
+      touches.push_back({m_, all_[number], reading_m(number, time, key), normal_of(all_[number])});
     }
   }
 
@@ -201,10 +201,14 @@ class PassProbing {
            probe.noise_m * draw.number(1);
   }
 
+  [[nodiscard]] Vector3d normal_of(const Target& target) const {
+    return T_machine_planned_.linear() * target.normal;
+  }
+
   [[nodiscard]] Vector3d reading_m(std::size_t number, double time, const std::string& key) const {
     const Target& target = all_[number];
     const Numbers draw{options_.seed, NoiseStream::BarTouch, m_ * all_.size() + number};
-    const Vector3d normal = T_machine_planned_.linear() * target.normal;
+    const Vector3d normal = normal_of(target);
     Vector3d tip_m = T_machine_planned_ * tip_in_plan_m(target);
     tip_m += (time + passes_before_) * drift_m_ - pretravel_m(normal, draw) * normal;
 

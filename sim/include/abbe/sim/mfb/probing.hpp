@@ -71,6 +71,7 @@ struct Touch {
   std::size_t measurement = 0;
   Target target;
   Eigen::Vector3d reading_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of the surface, to the tip; machine axes
 };
 
 struct ProbedBar {

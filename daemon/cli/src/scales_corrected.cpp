@@ -15,14 +15,15 @@ CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected) {
 }
 
 Result<void> check_scales(std::string_view command, std::string_view what, const Config& config,
-                          bool corrected, bool takes_recording) {
+                          bool corrected) {
   if (config.thermal.empty() || corrected) return {};
   return fail(
       ErrorCode::BadInput,
       fmt::format(
-          "{}: [[thermal]] is configured, and the files hold no temperatures: {}give {} corrected "
-          "for the temperature of the scales and add --scales-corrected",
-          command, takes_recording ? "use --recording, or " : "", what));
+          "{}: [[thermal]] is configured, and the files hold no temperatures: use --recording, "
+          "or give {} corrected for the temperature of the scales and add "
+          "--scales-corrected",
+          command, what));
 }
 
 }  // namespace abbe::daemon

@@ -16,9 +16,8 @@ namespace abbe::daemon {
 CLI::Option* add_scales_corrected(CLI::App& command, bool& corrected);
 
 /// BadInput if the configuration has [[thermal]] and the user has not stated (`corrected`) that the
-/// readings of `what` ("the path") are corrected. `takes_recording`: the text advises --recording.
+/// readings of `what` ("the path") are corrected.
 [[nodiscard]] Result<void> check_scales(std::string_view command, std::string_view what,
-                                        const Config& config, bool corrected,
-                                        bool takes_recording = true);
+                                        const Config& config, bool corrected);
 
 }  // namespace abbe::daemon

@@ -92,8 +92,10 @@ void print_positions(const json& status) {
 }
 
 void print_next(const json& next) {
-  fmt::print("next       {} of position {}, {} of {} points touched\n",
-             next["on"].get<std::string>(), next["position"].get<int>(),
+  const std::string of = next.contains("measurement")
+                             ? fmt::format("measurement {}", next["measurement"].get<std::string>())
+                             : fmt::format("position {}", next["position"].get<int>());
+  fmt::print("next       {} of {}, {} of {} points touched\n", next["on"].get<std::string>(), of,
              next["touched"].get<std::size_t>(), next["points"].get<std::size_t>());
 }
 

@@ -23,7 +23,7 @@ std::string_view method_of(const Candidate& candidate) noexcept {
 }
 
 const calib::VolumetricModel& model_of(const Candidate& candidate) {
-  return std::visit([](const auto& c) -> const calib::VolumetricModel& { return c.solution.model; },
+  return std::visit([](const auto& c) -> const calib::VolumetricModel& { return c.model(); },
                     candidate);
 }
 

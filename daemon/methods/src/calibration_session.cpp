@@ -26,9 +26,9 @@ constexpr bool kLive = requires(Acquisition& acquisition) {
   acquisition.remaining();
 };
 
-std::optional<calib::evemu::NextTouch> next_of(const Acquisition& acquisition) {
+std::optional<RequestedTouch> next_of(const Acquisition& acquisition) {
   return std::visit(
-      [](const auto& of_method) -> std::optional<calib::evemu::NextTouch> {
+      [](const auto& of_method) -> std::optional<RequestedTouch> {
         if constexpr (kGuided<std::remove_cvref_t<decltype(of_method)>>) return of_method.next();
         return std::nullopt;
       },

@@ -57,12 +57,16 @@ json device_json(const StreamHealth& h) {
           {"latency_counts", latency_json(h.latency)}};
 }
 
-json next_json(const calib::evemu::NextTouch& next) {
-  return {{"position", next.position},
-          {"place", next.place + 1},
-          {"on", calib::evemu::name(next.on)},
-          {"touched", next.touched},
-          {"points", next.points}};
+json next_json(const RequestedTouch& next) {
+  json out{{"place", next.place + 1},
+           {"on", next.on},
+           {"touched", next.touched},
+           {"points", next.points}};
+  if (next.measurement.empty())
+    out["position"] = next.position;
+  else
+    out["measurement"] = next.measurement;
+  return out;
 }
 
 /// JSON has no NaN: null in its place.

@@ -248,7 +248,13 @@ Bar read_bar(Section& root, const Faults& faults) {
 }  // namespace
 
 Result<BarFile> read_bar_toml(const std::filesystem::path& file) {
-  const auto parsed = parse_toml_file(file);
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_bar_toml(*text, file);
+}
+
+Result<BarFile> parse_bar_toml(std::string_view text, const std::filesystem::path& file) {
+  const auto parsed = parse_toml_text(text, file);
   if (!parsed) return tl::make_unexpected(parsed.error());
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);

@@ -153,7 +153,14 @@ Plan read_plan(Section& root, const toml::table& table, const Bar& bar,
 }  // namespace
 
 Result<BarPlanFile> read_bar_plan_toml(const std::filesystem::path& file, const Bar& bar) {
-  const auto parsed = parse_toml_file(file);
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_bar_plan_toml(*text, file, bar);
+}
+
+Result<BarPlanFile> parse_bar_plan_toml(std::string_view text, const std::filesystem::path& file,
+                                        const Bar& bar) {
+  const auto parsed = parse_toml_text(text, file);
   if (!parsed) return tl::make_unexpected(parsed.error());
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);

@@ -22,14 +22,21 @@ struct TomlFile {
   toml::table table;
 };
 
+/// BadInput if the text is not TOML. `file`: its name in messages.
+[[nodiscard]] inline Result<TomlFile> parse_toml_text(std::string_view text,
+                                                      const std::filesystem::path& file,
+                                                      const TomlBounds& bounds = {}) {
+  auto table = parse_toml(text, file.string(), bounds);
+  if (!table) return tl::make_unexpected(table.error());
+  return TomlFile{{file.filename().string(), sha256_hex(text)}, std::move(*table)};
+}
+
 /// Io if the file cannot be read, BadInput if it is not TOML.
 [[nodiscard]] inline Result<TomlFile> parse_toml_file(const std::filesystem::path& file,
                                                       const TomlBounds& bounds = {}) {
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
-  auto table = parse_toml(*text, file.string(), bounds);
-  if (!table) return tl::make_unexpected(table.error());
-  return TomlFile{{file.filename().string(), sha256_hex(*text)}, std::move(*table)};
+  return parse_toml_text(*text, file, bounds);
 }
 
 /// Reads three numbers.

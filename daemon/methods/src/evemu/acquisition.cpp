@@ -2,40 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <span>
 #include <utility>
 
 #include "abbe/base/units.hpp"
 #include "abbe/calib/axis_mistakes.hpp"
 #include "abbe/config/calib_error.hpp"
-#include "abbe/config/linear_axes.hpp"
+#include "usable_touch.hpp"
 
 namespace abbe::daemon {
 namespace {
 
 namespace evemu = calib::evemu;
 using protocol::HostTime;
-using protocol::TouchFlag;
-
-/// Why the touch cannot be used; empty if it can be used.
-std::string_view fault_of(const protocol::Snapshot& touch) {
-  const auto flags = touch.trigger.touch_flags;
-  static constexpr std::array<std::pair<TouchFlag, std::string_view>, 6> kFaults{
-      {{TouchFlag::NoPosition, "it has no position, because scans around it were lost"},
-       {TouchFlag::Refused, "the measuring machine reported a warning for it"},
-       {TouchFlag::SpeedTooLow, "the approach was slower than the probe is qualified for"},
-       {TouchFlag::SpeedTooHigh, "the approach was faster than the probe is qualified for"},
-       {TouchFlag::SpeedUnsteady, "the speed of the approach changed"},
-       {TouchFlag::LatchRefused, "the latched clock count is not within its scan interval"}}};
-
-  for (const auto& [flag, text] : kFaults) {
-    if (has(flags, flag)) return text;
-  }
-
-  if (!has_linear_axes(touch)) return "an axis was not known";
-  return {};
-}
 
 /// The text of a fault if the reading is outside the travel by more than kTolerance_m; else empty.
 std::string outside(const calib::Vector3& reading_m,
@@ -77,9 +56,15 @@ double EvemuAcquisition::progress() const noexcept {
              : static_cast<double>(guide_.taken()) / static_cast<double>(guide_.planned());
 }
 
-std::optional<evemu::NextTouch> EvemuAcquisition::next() const {
+std::optional<RequestedTouch> EvemuAcquisition::next() const {
   if (phase_ == Phase::Complete || phase_ == Phase::Failed) return std::nullopt;
-  return guide_.next();
+  const evemu::NextTouch next = guide_.next();
+  return RequestedTouch{.position = next.position,
+                        .measurement = {},
+                        .place = next.place,
+                        .on = evemu::name(next.on),
+                        .touched = next.touched,
+                        .points = next.points};
 }
 
 void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
@@ -96,7 +81,7 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
     return;
   }
 
-  if (const auto fault = fault_of(snapshot); !fault.empty()) return refuse(snapshot, fault);
+  if (const auto fault = touch_fault(snapshot); !fault.empty()) return refuse(snapshot, fault);
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   if (const auto fault = outside(reading_m, options_.travel); !fault.empty())
     return refuse(snapshot, fault);

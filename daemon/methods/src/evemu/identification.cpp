@@ -2,15 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
-#include "abbe/pipeline/datum.hpp"
 #include "abbe/tables/evemu_files.hpp"
+#include "usable_touch.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -57,15 +56,7 @@ EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
   options.artefact = config.evemu.artefact;
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
-
-  // Reference marks give an axis the same zero again after the counters restarted. A zero that the
-  // operator states again is only approximately the same, so it counts as lost.
-  const auto counted = counted_axes(config);
-  options.zero_is_lost_by_restart =
-      touches && !touches->reports_positions && counted &&
-      std::ranges::any_of(counted->axes(),
-                          [&config](const auto& axis) { return !has_marks(config, axis.name); });
-
+  options.zero_is_lost_by_restart = zero_is_lost_by_restart(config);
   return options;
 }
 

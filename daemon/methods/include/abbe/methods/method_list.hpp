@@ -8,7 +8,7 @@
 ///     Acquisition       takes snapshots: begin, take, tick, phase, reason, progress, points;
 ///                       next and take_notes where the operator is guided
 ///     Run               the acquired data: run_of(Acquisition)
-///     Candidate         a judged model: solution.model, verdict
+///     Candidate         a judged model: model(), verdict
 ///     needs(Config)     which devices it reads
 ///     to_json(Request), request_from(json, Config*)
 ///     check(Request, Config), acquire(Request, Options)

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
-#include "abbe/calib/evemu/touch_guide.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
@@ -49,6 +48,16 @@ struct LiveTables {
   double variance_factor = 1.0;
 };
 
+/// The touch that a guided acquisition asks for.
+struct RequestedTouch {
+  int position = 0;         ///< of a ball array, from 1; 0: `measurement` names it
+  std::string measurement;  ///< with a bar
+  std::size_t place = 0;    ///< index of position or measurement in the plan, from 0
+  std::string on;           ///< the feature: "ball 3", "hole 4"
+  std::size_t touched = 0;  ///< points taken on this feature
+  std::size_t points = 0;   ///< points planned on this feature
+};
+
 struct SessionStatus {
   std::uint64_t id = 0;  ///< number of the session in this process, from 1; 0: none yet
   SessionState state = SessionState::Idle;
@@ -63,10 +72,10 @@ struct SessionStatus {
   /// Tables of the run so far; null: there are none yet. Shared with replies that other threads
   /// write; never changed.
   std::shared_ptr<const LiveTables> live{};
-  std::string model_id;                         ///< the model of this session, active or refused
-  std::optional<calib::evemu::NextTouch> next;  ///< touch requested by a guided acquisition
-  std::vector<std::string> notes;               ///< remarks on touches, the latest kMostNotes
-  std::size_t noted = 0;                        ///< number of all remarks of the session
+  std::string model_id;                ///< the model of this session, active or refused
+  std::optional<RequestedTouch> next;  ///< touch requested by a guided acquisition
+  std::vector<std::string> notes;      ///< remarks on touches, the latest kMostNotes
+  std::size_t noted = 0;               ///< number of all remarks of the session
 
   static constexpr std::size_t kMostNotes = 50;
 };

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/base/error.hpp"
@@ -24,6 +25,9 @@ struct BarFile {
   calib::mfb::Bar bar;
 };
 [[nodiscard]] Result<BarFile> read_bar_toml(const std::filesystem::path& file);
+/// The same from the text of the file; `file`: its name in messages.
+[[nodiscard]] Result<BarFile> parse_bar_toml(std::string_view text,
+                                             const std::filesystem::path& file);
 
 /// plan.toml: [plan], [noise], [[measurement]]. `bar`: with its thermal expansion every measurement
 /// needs temperature_C.
@@ -34,6 +38,9 @@ struct BarPlanFile {
 };
 [[nodiscard]] Result<BarPlanFile> read_bar_plan_toml(const std::filesystem::path& file,
                                                      const calib::mfb::Bar& bar);
+[[nodiscard]] Result<BarPlanFile> parse_bar_plan_toml(std::string_view text,
+                                                      const std::filesystem::path& file,
+                                                      const calib::mfb::Bar& bar);
 
 /// The touches: `measurement,feature,index,side,k,x_mm,y_mm,z_mm`, scale readings. They must belong
 /// to the measurements of `plan` and to the pattern of `bar`, and lie at most half a node spacing

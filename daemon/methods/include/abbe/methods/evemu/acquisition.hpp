@@ -16,6 +16,7 @@
 #include "abbe/calib/evemu/touch_guide.hpp"
 #include "abbe/methods/evemu/artefact_thermometer.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
+#include "abbe/pipeline/session_status.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -82,7 +83,7 @@ class EvemuAcquisition {
   [[nodiscard]] double progress() const noexcept;  ///< fraction of the planned points, 0 to 1
   [[nodiscard]] std::size_t points() const { return guide_.taken(); }
   /// The next touch that the operator must make; nullopt once the run is complete or failed.
-  [[nodiscard]] std::optional<calib::evemu::NextTouch> next() const;
+  [[nodiscard]] std::optional<RequestedTouch> next() const;
   /// Remarks on touches since the last call, one sentence each.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] EvemuRun release();

@@ -19,6 +19,8 @@ struct EvemuCandidate {
   calib::evemu::Observations observations;
   calib::evemu::Solution solution;
   calib::Verdict verdict;
+
+  [[nodiscard]] const calib::VolumetricModel& model() const { return solution.model; }
 };
 
 /// Identifies and judges. `active`: the active model, with which the gate compares; null if there

@@ -42,6 +42,8 @@ struct OtfCandidate {
   calib::Verdict verdict;
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   std::vector<RunResiduals> residuals{};  ///< one element, or one per run of several targets
+
+  [[nodiscard]] const calib::VolumetricModel& model() const { return solution.model; }
 };
 
 /// What identify_run() computed, with the observations.

@@ -32,7 +32,7 @@ TEST(CalibrationSession, GoesThroughItsStatesAlongThePath) {
 
 std::string reason_of_a_run_along(const std::vector<AxisPosition>& file,
                                   const AcquisitionOptions& options = {}) {
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
   EXPECT_TRUE(session.start({OtfRequest{file}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -102,7 +102,7 @@ TEST(CalibrationSession, EverySessionHasANumberOfItsOwn) {
 TEST(CalibrationSession, AMachineThatRepeatsItsPathEndsTheRunAtThePointLimit) {
   AcquisitionOptions options;
   options.most_points = 5000;
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -118,7 +118,7 @@ TEST(CalibrationSession, TheRunContainsTheTemperaturesOfScalesAndAir) {
   constexpr double kAlpha = 10e-6, kFixed_m = -0.05;
   options.environment.thermal = {{0, {.axis = "X", .alpha_per_K = kAlpha, .fixed_m = kFixed_m}}};
   options.environment.air.assumed_index = 1.00027;
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   protocol::EnvironmentSample warm;
@@ -148,7 +148,7 @@ TEST(CalibrationSession, TheRunContainsTheUncertaintyLeftByTheControllersAirCorr
   config.of<TrackerConfig>().emplace();
   AcquisitionOptions options;
   options.environment = environment_use(config);
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
 
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -166,7 +166,7 @@ TEST(CalibrationSession, TheRunNamesAirThatIsNotMeasured) {
   config.of<TrackerConfig>().emplace().weather = WeatherConfig::None;
   AcquisitionOptions options;
   options.environment = environment_use(config);
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
 
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
@@ -194,7 +194,7 @@ TEST(CalibrationSession, TheStandstillOfASlowTrackerLastsTwentyPoints) {
 TEST(CalibrationSession, ATooShortStandstillAtTheStartIsTheReasonGiven) {
   Config config;
   config.of<TrackerConfig>().emplace().point_rate_hz = 5.0;
-  CalibrationSession session{{acquisition_options(config), {}}};
+  CalibrationSession session{{acquisition_options(config), {}, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 1s);
@@ -211,7 +211,7 @@ TEST(CalibrationSession, ATooShortStandstillAtTheStartIsTheReasonGiven) {
 TEST(CalibrationSession, AMachineThatStaysAtTheStartIsTheReasonGiven) {
   AcquisitionOptions options;
   options.wait_for_start = 5s;
-  CalibrationSession session{{options, {}}};
+  CalibrationSession session{{options, {}, {}}};
   ASSERT_TRUE(session.start({OtfRequest{kPath}, HostTime{10s}}));
   Drive drive{session};
   drive.stand(kPath[0], 6s);

@@ -21,11 +21,13 @@
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/methods/mfb/method.hpp"
 #include "abbe/methods/mfb/report.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
+#include "mfb_recording.hpp"
 #include "mfb_summary.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
@@ -37,7 +39,7 @@ namespace mfb = calib::mfb;
 namespace {
 
 struct IdentifyMfbArguments {
-  std::string machine, bar, plan, points, keep, out;
+  std::string machine, bar, plan, points, recording, keep, out;
   std::string estimator{mfb::name(mfb::Estimator::Joint)};
   std::size_t trials = 0;  // 0: no Monte Carlo
   std::uint64_t seed = mfb::MonteCarloOptions{}.seed;
@@ -56,7 +58,7 @@ Result<Config> read_config(const IdentifyMfbArguments& arguments) {
   auto config = load_config(arguments.machine);
   if (!config) return config;
   if (const auto valid =
-          check_scales("identify mfb", "points", *config, arguments.scales_corrected, false);
+          check_scales("identify mfb", "points", *config, arguments.scales_corrected);
       !valid)
     return tl::make_unexpected(valid.error());
   if (const auto valid = check_bar_machine(arguments.machine, config->machine); !valid)
@@ -118,7 +120,26 @@ void add_notes(MfbInput& input) {
   add_notes_on_bar(input.task.bar, input.task.plan.measurements, input.notes);
 }
 
-Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
+/// Bar, plan and touches of a session; nothing is against its pass, because the guide of the session
+/// takes no such touch.
+Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
+  auto recording = open_recording(arguments.recording, arguments.machine);
+  if (!recording) return tl::make_unexpected(recording.error());
+  auto run = last_complete_bar_run(*recording);
+  if (!run) return tl::make_unexpected(run.error());
+
+  MfbInput input{std::move(recording->config),
+                 {.bar = {}, .plan = {}, .passes = {}, .options = options_of(arguments)},
+                 {recording->source}};
+  const auto entered = MfbMethod::inputs_of(*run);
+  input.sources.insert(input.sources.end(), entered.begin(), entered.end());
+  input.task.bar = std::move(run->bar);
+  input.task.plan = std::move(run->plan);
+  input.task.passes = std::move(run->passes);
+  return input;
+}
+
+Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
   auto config = read_config(arguments);
   if (!config) return tl::make_unexpected(config.error());
   const auto hash = sha256_hex_of_file(arguments.machine);
@@ -141,17 +162,25 @@ Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
                   bar->source,
                   plan->source,
                   points->source}};
-  if (arguments.trials > 0)
-    input.task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
-  add_notes(input);
   input.against_pass = std::move(points->against_pass);
+  return input;
+}
+
+Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
+  auto input =
+      arguments.recording.empty() ? input_of_files(arguments) : input_of_recording(arguments);
+  if (!input) return input;
+  if (arguments.trials > 0)
+    input->task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
+  add_notes(*input);
   return input;
 }
 
 /// Errors of an identification name measurement and feature. The file of the touches is put before,
 /// rows against their pass behind: they may be the cause.
 Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Error error) {
-  error.text = fmt::format("{}: {}", arguments.points, error.text);
+  const std::string& file = arguments.recording.empty() ? arguments.points : arguments.recording;
+  error.text = fmt::format("{}: {}", file, error.text);
   error.details = input.against_pass;
   return error;
 }
@@ -202,18 +231,29 @@ int run(const IdentifyMfbArguments& arguments) {
 }
 
 void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
-  command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml")
-      ->required();
-  command.add_option("--bar", arguments.bar, "bar.toml: the calibrated bar")->required();
-  command
-      .add_option("--plan", arguments.plan,
-                  "plan.toml: where the bar stood, with which tool it was probed, noise")
-      ->required();
-  command
-      .add_option("--points", arguments.points,
-                  "touches: measurement,feature,index,side,k,x_mm,y_mm,z_mm; scale readings.\n"
-                  "`abbe example bar.toml`, plan.toml and barpoints.csv print commented examples")
-      ->required();
+  auto* machine =
+      command.add_option("--machine", arguments.machine, "machine.toml or the daemon's abbed.toml");
+  auto* bar = command.add_option("--bar", arguments.bar, "bar.toml: the calibrated bar");
+  auto* plan =
+      command.add_option("--plan", arguments.plan,
+                         "plan.toml: where the bar stood, with which tool it was probed, noise");
+  auto* points =
+      command
+          .add_option(
+              "--points", arguments.points,
+              "touches: measurement,feature,index,side,k,x_mm,y_mm,z_mm; scale readings.\n"
+              "`abbe example bar.toml`, plan.toml and barpoints.csv print commented examples")
+          ->needs(machine)
+          ->needs(bar)
+          ->needs(plan);
+  auto* recording = command
+                        .add_option("--recording", arguments.recording,
+                                    "instead of files, a recording of the daemon (.mcap): its last "
+                                    "complete run with\na bar, with the recorded configuration "
+                                    "unless --machine is given")
+                        ->excludes(points)
+                        ->excludes(bar)
+                        ->excludes(plan);
   command
       .add_option("--estimator", arguments.estimator,
                   "joint: one weighted least-squares adjustment of all touches; sequential: as\n"
@@ -228,7 +268,7 @@ void add_options(CLI::App& command, IdentifyMfbArguments& arguments) {
   command.add_option("--seed", arguments.seed, "of the Monte Carlo trials")
       ->needs(trials)
       ->capture_default_str();
-  add_scales_corrected(command, arguments.scales_corrected);
+  recording->excludes(add_scales_corrected(command, arguments.scales_corrected));
   add_result_options(command, arguments.keep, arguments.json, arguments.out);
 }
 
@@ -243,7 +283,14 @@ void add_identify_mfb(CLI::App& parent, int& exit) {
       "model predicts measurements that were not used in the fit. Exit code 5 if the gate would\n"
       "refuse the model; the files are written in any case.");
   add_options(*command, *arguments);
-  command->callback([arguments, &exit] { exit = run(*arguments); });
+  command->callback([arguments, &exit] {
+    exit = arguments->points.empty() && arguments->recording.empty()
+               ? report({ErrorCode::Usage,
+                         "identify mfb: give --points with --machine, --bar and --plan, or "
+                         "--recording",
+                         {}})
+               : run(*arguments);
+  });
 }
 
 }  // namespace abbe::daemon

@@ -72,6 +72,7 @@ void add_commands(CLI::App& app, int& exit) {
   calibrate->require_subcommand(1);
   add_calibrate_otf(*calibrate, exit);
   add_calibrate_evemu(*calibrate, exit);
+  add_calibrate_mfb(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
   add_calibrate_artefact(*calibrate, exit);
   auto* plan = app.add_subcommand("plan", "Plan a calibration before the machine moves");

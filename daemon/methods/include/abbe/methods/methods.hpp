@@ -4,11 +4,13 @@
 
 #include "abbe/methods/evemu/method.hpp"
 #include "abbe/methods/method_list.hpp"
+#include "abbe/methods/mfb/method.hpp"
 #include "abbe/methods/otf/method.hpp"
 
 namespace abbe::daemon {
 
-using Methods = MethodList<OtfMethod,     // on the fly, with a laser tracker
-                           EvemuMethod>;  // touches of a ball array
+using Methods = MethodList<OtfMethod,    // on the fly, with a laser tracker
+                           EvemuMethod,  // touches of a ball array
+                           MfbMethod>;   // touches of a Multi-Feature Bar
 
 }  // namespace abbe::daemon

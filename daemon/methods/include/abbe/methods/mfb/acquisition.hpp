@@ -1,0 +1,103 @@
+#pragma once
+/// Collects the touches of one calibration with a Multi-Feature Bar, and tells which feature to
+/// touch next. calib's TouchGuide assigns touches to their places. This class rejects unusable
+/// touches, with device and reason, and ends the run when touches stop arriving. The decisions
+/// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
+/// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/base/error.hpp"
+#include "abbe/base/input_file.hpp"
+#include "abbe/calib/mfb/touch_guide.hpp"
+#include "abbe/pipeline/acquisition_phase.hpp"
+#include "abbe/pipeline/session_status.hpp"
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+/// Request for a calibration with a bar. The files are contained as text, so that a replay reads the
+/// same.
+struct MfbRequest {
+  struct File {
+    std::string name;
+    std::string text;
+  };
+  File bar, plan;  ///< bar.toml, plan.toml
+  /// Readings of the touches that earlier sessions took, in their order; the session continues after
+  /// the last one.
+  std::vector<calib::Vector3> earlier_m;
+};
+
+struct MfbRun {
+  calib::mfb::Bar bar;
+  calib::mfb::Plan plan;
+  std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
+  std::vector<InputFile> sources;
+};
+
+struct MfbAcquisitionOptions {
+  std::string device = "probe";  ///< name of the probing device, for messages
+  /// True: a restart of the device during the run fails the run (EvemuAcquisitionOptions).
+  bool zero_is_lost_by_restart = true;
+  /// The run fails if no touch arrives for longer than this host time: the operator clamps the bar
+  /// by hand between positions.
+  std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
+  /// A run that has no usable touch yet fails after this many unusable ones.
+  std::size_t most_refused = 20;
+  /// Error: the configuration describes no machine that can be calibrated with a bar.
+  Result<calib::mfb::MfbMachine> machine = fail(ErrorCode::Refused, "no machine is configured");
+};
+
+class MfbAcquisition {
+ public:
+  using Phase = AcquisitionPhase;
+
+  /// Creates the acquisition and takes the earlier touches. BadInput for an invalid bar or plan,
+  /// with file, line and key, for one outside the travel, and for earlier touches of another bar.
+  [[nodiscard]] static Result<MfbAcquisition> create(const MfbRequest& request,
+                                                     MfbAcquisitionOptions options);
+
+  /// To be called before the first take(). Touches before `from` are ignored.
+  void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
+
+  void take(const protocol::Snapshot& snapshot);
+  void tick(protocol::HostTime now);
+
+  [[nodiscard]] Phase phase() const noexcept { return phase_; }
+  /// Instruction for the operator, or the reason of the failure.
+  [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+  [[nodiscard]] double progress() const;  ///< fraction of the planned touches, 0 to 1
+  [[nodiscard]] std::size_t points() const { return guide_.taken(); }
+  /// The next touch that the operator must make; nullopt once the run is complete or failed.
+  [[nodiscard]] std::optional<RequestedTouch> next() const;
+  /// Remarks on touches since the last call, one sentence each.
+  [[nodiscard]] std::vector<std::string> take_notes();
+  /// Readings of all touches taken so far, in their order.
+  [[nodiscard]] std::vector<calib::Vector3> readings_m() const;
+  [[nodiscard]] MfbRun release();
+
+ private:
+  MfbAcquisition(calib::mfb::Bar bar, std::vector<InputFile> sources, calib::mfb::TouchGuide guide,
+                 MfbAcquisitionOptions options);
+  void refuse(const protocol::Snapshot& touch, std::string_view fault);
+  void note(const protocol::Snapshot& touch, const std::string& what);
+  void follow_guide();
+
+  calib::mfb::Bar bar_;
+  std::vector<InputFile> sources_;
+  calib::mfb::TouchGuide guide_;
+  MfbAcquisitionOptions options_;
+  protocol::HostTime from_{};
+  Phase phase_ = Phase::WaitingAtStart;
+  std::string reason_;
+  std::vector<std::string> notes_;
+  protocol::HostTime last_touch_{};
+  std::size_t refused_in_a_row_ = 0;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,190 @@
+/// A Multi-Feature Bar from the first touch on the wire to the model and its replays, touches that
+/// are wrong, and a session that is interrupted.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <filesystem>
+
+#include "config_tables.hpp"
+#include "spine.hpp"
+
+namespace abbe::test {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// The machine of abbe-sim mfb with a bar of 6 holes, 110 mm apart.
+std::string bar_machine_tables(const std::string& at_its_port = {}) {
+  std::string machine =
+      "[machine]\nname = \"probed\"\nchain = \"[w b X Y Z t]\"\n"
+      "[target]\noffset_mm = [0, 0, -150]\n"
+      "[model]\nbasis = \"cubic\"\nnode_spacing_mm = 110\n";
+  for (const char axis : {'X', 'Y', 'Z'})
+    machine += fmt::format("[axes.{}]\nmin_mm = 0\nmax_mm = 550\n", axis);
+  return machine + to_toml(config_tables::CounterCard{.scan_rate_hz = 200, .more = at_its_port});
+}
+
+struct BarSession : Spine {
+  BarSession() {
+    write("machine.toml", bar_machine_tables());
+    write("sim.toml", fmt::format("[sim]\nmachine = \"machine.toml\"\nseed = 1\nspeed = {}\n",
+                                  ABBE_SPINE_SPEED));
+  }
+
+  /// 12 passes of 148 touches.
+  void start_both(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> command{ABBE_SIM_PROGRAM,
+                                     "mfb",
+                                     "--config",
+                                     file("sim.toml"),
+                                     "--start-on-signal",
+                                     "--ports-file",
+                                     file("ports"),
+                                     "-o",
+                                     file("bar"),
+                                     "--holes",
+                                     "6",
+                                     "--pitch-mm",
+                                     "110",
+                                     "--waves",
+                                     "1",
+                                     "--plan",
+                                     "12",
+                                     "--passes",
+                                     "forward"};
+    command.insert(command.end(), more.begin(), more.end());
+    std::filesystem::remove(file("ports"));  // of the simulator before
+    ASSERT_NO_FATAL_FAILURE(start_simulator_as(std::move(command)));
+    write("abbed.toml", bar_machine_tables(fmt::format("port = {}\n", port("usbip_port"))) +
+                            "[probe]\ndelay_us = 5\njitter_us = 1\nmax_speed_mm_s = 25\n" +
+                            daemon_tables("off"));
+    ASSERT_NO_FATAL_FAILURE(start_abbed());
+  }
+
+  [[nodiscard]] std::vector<std::string> calibrate(const std::vector<std::string>& more) const {
+    std::vector<std::string> command{ABBE_PROGRAM, "calibrate", "mfb", "-c", file("abbed.toml")};
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  }
+  [[nodiscard]] std::vector<std::string> of_files() const {
+    return {"--bar", file("bar") + "/bar.toml", "--plan", file("bar") + "/plan.toml"};
+  }
+  [[nodiscard]] json session() const {
+    const json now = status();
+    return now.is_object() ? now["session"] : json();
+  }
+  /// To its end; the machine begins once the session waits for it.
+  [[nodiscard]] Outcome calibrated(const std::vector<std::string>& more) const {
+    Program calibration(calibrate(more), directory_ / "calibrate");
+    EXPECT_TRUE(eventually([&] {
+      const json now = session();
+      return !calibration.running() || (now.is_object() && now["state"] == "warming");
+    }));
+    simulator_->signal(SIGUSR1);
+    const int code = calibration.wait_for_end(kPatienceForARun);
+    return {code, calibration.out(), calibration.err()};
+  }
+
+  void expect_the_same_again(const std::string& recording,
+                             const std::vector<std::string>& options) const {
+    std::vector<std::string> command{ABBE_PROGRAM, "replay", "--json", recording};
+    command.insert(command.end(), options.begin(), options.end());
+    const auto replayed = run(command);
+    EXPECT_EQ(replayed.code, 0) << replayed.err << replayed.out;
+    const json said = json::parse(replayed.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << replayed.out;
+    EXPECT_TRUE(said["same_as_live"]) << said.dump(1);
+  }
+  void expect_the_live_model_from(const std::string& recording, const json& live) const {
+    const auto identified = run({ABBE_PROGRAM, "identify", "mfb", "--recording", recording,
+                                 "--json", "-o", file("identified")});
+    EXPECT_EQ(identified.code, 0) << identified.err;
+    const json said = json::parse(identified.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << identified.out;
+    EXPECT_EQ(said["id"], live["id"]);
+  }
+  void expect_smaller_errors() const {
+    const auto verified = run({ABBE_PROGRAM, "verify", "active", "-c", file("abbed.toml"),
+                               "--points", file("bar") + "/verification.csv", "--json"});
+    EXPECT_EQ(verified.code, 0) << verified.err;
+    const json said = json::parse(verified.out, nullptr, false);
+    ASSERT_TRUE(said.is_object()) << verified.out;
+    EXPECT_LT(said["after"]["rms_um"], 2.0);
+    EXPECT_GT(said["before"]["rms_um"], 20.0);
+  }
+};
+
+TEST_F(BarSession, IsGuidedIdentifiedAndReplayedTheSame) {
+  ASSERT_NO_FATAL_FAILURE(start_both({"--silent", "30", "--double", "200", "--stray", "400"}));
+  const auto outcome = calibrated(of_files());
+  ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(session()["notes"].get<std::vector<std::string>>(),
+              ElementsAre(HasSubstr("was not touched: touch it after the pass"),
+                          HasSubstr("ends without 1 of 148 touches"),
+                          HasSubstr("was touched twice; it counts once"),
+                          HasSubstr("mm from the nearest place")));
+  EXPECT_EQ(session()["points"], 12 * 148 - 1);
+  const json model = status()["model"];
+  EXPECT_EQ(model["state"], "ACTIVE");
+  EXPECT_EQ(model["method"], "mfb");
+  expect_smaller_errors();
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+  expect_the_same_again(recordings().front(), {});
+  expect_the_same_again(recordings().front(), {"--raw"});
+  expect_the_live_model_from(recordings().front(), model);
+}
+
+TEST_F(BarSession, ContinuesWhereItWasInterrupted) {
+  ASSERT_NO_FATAL_FAILURE(start_both());
+  auto detached = calibrate(of_files());
+  detached.emplace_back("--detach");
+  ASSERT_EQ(run(detached).code, 0);
+  EXPECT_EQ(session()["next"]["on"], "hole 1");
+  EXPECT_EQ(session()["next"]["measurement"], "X1");
+  simulator_->signal(SIGUSR1);
+  ASSERT_TRUE(eventually([this] { return session()["points"] > 200; })) << session().dump(1);
+  EXPECT_EQ(run(calibrate({"--cancel"})).code, 0);
+  const auto taken = session()["points"].get<std::size_t>();
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+  simulator_->stop();
+  const std::string interrupted = recordings().front();
+
+  // Another day: the machine goes on after the last touch that was taken.
+  ASSERT_NO_FATAL_FAILURE(start_both({"--from", std::to_string(taken)}));
+  const auto outcome = calibrated({"--continue", interrupted});
+  ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr(fmt::format("{} touches of", taken)));
+  EXPECT_EQ(session()["points"], 12 * 148);
+  EXPECT_EQ(session()["noted"], 0) << session().dump(1);
+  const json model = status()["model"];
+  EXPECT_EQ(model["state"], "ACTIVE");
+  EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
+  expect_the_same_again(recordings().back(), {"--raw"});
+  expect_the_live_model_from(recordings().back(), model);
+}
+
+TEST_F(BarSession, ARequestThatCannotGiveAModelIsRefusedBeforeTheFirstTouch) {
+  ASSERT_NO_FATAL_FAILURE(start_both());
+  const std::string plan = text_of(file("bar") + "/plan.toml");
+  const auto refused = [&](const std::string& text, int code, const std::string& why) {
+    write("wrong.toml", text);
+    const auto outcome =
+        run(calibrate({"--bar", file("bar") + "/bar.toml", "--plan", file("wrong.toml")}));
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+  };
+  refused(plan.substr(0, plan.find("[[measurement]]", plan.find("name = \"Y1\""))), 3,
+          "the measurements do not show");
+  refused(replaced(plan, "origin_mm = \\[0, 100, 0\\]", "origin_mm = [90, 100, 0]"), 3, "X1");
+  refused("[plan]\n", 3, "wrong.toml");
+  EXPECT_EQ(run(calibrate({})).code, 2);
+  EXPECT_EQ(run(calibrate({"--continue", file("machine.toml")})).code, 3);
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -6,8 +6,8 @@ namespace abbe::sim {
 /// bit of a double. Precondition: `crossed` is false at `before` and true at `after`.
 template <class Crossed>
 [[nodiscard]] double crossing(double before, double after, const Crossed& crossed) {
-  constexpr int kHalvings = 60;
-  for (int i = 0; i < kHalvings; ++i) {
+  constexpr int kHalvingsToLastBit = 60;
+  for (int i = 0; i < kHalvingsToLastBit; ++i) {
     const double middle = 0.5 * (before + after);
     (crossed(middle) ? after : before) = middle;
   }

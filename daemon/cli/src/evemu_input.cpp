@@ -6,19 +6,18 @@
 #include <filesystem>
 #include <memory>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/calibration_machine.hpp"
-#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/identification.hpp"
-#include "abbe/replay/replay.hpp"
+#include "abbe/methods/evemu/method.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/touches_not_seen.hpp"
 #include "abbe/tables/travel_faults.hpp"
+#include "last_complete_run.hpp"
 #include "opened_recording.hpp"
 #include "scales_corrected.hpp"
 #include "target_offset.hpp"
@@ -154,28 +153,6 @@ Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
   return input;
 }
 
-/// The last run of the recording in which all touches were made.
-Result<EvemuRun> last_complete_run(const OpenedRecording& recording) {
-  std::optional<EvemuRun> last;
-  ProgressBar bar;
-  const auto replayed = replay(recording.reader, recording.config,
-                               {.progress = [&bar](double share) { bar.show("replaying", share); },
-                                .runs =
-                                    [&last](CalibrationRun run) {
-                                      if (auto* touched = std::get_if<EvemuRun>(&run))
-                                        last = std::move(*touched);
-                                    }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
-  if (last) return std::move(*last);
-  std::string why = "none was requested";
-  for (const auto& c : replayed->calibrations)
-    if (c.ended.method == "evemu") why = c.ended.reason;
-
-  return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete calibration with a ball array: {}",
-                          recording.source.name, why));
-}
-
 Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
@@ -184,7 +161,9 @@ Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   const auto machine = evemu_machine(recording->config.machine);
   if (!machine) return tl::make_unexpected(machine.error());
 
-  const auto run = last_complete_run(*recording);
+  ProgressBar bar;
+  const auto run = last_complete_run<EvemuMethod>(*recording, recording->source.name,
+                                                  "calibration with a ball array", bar);
   if (!run) return tl::make_unexpected(run.error());
   auto options =
       observe_options(arguments, recording->config.evemu, run->asked.plan.positions.size());

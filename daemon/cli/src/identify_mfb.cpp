@@ -5,13 +5,10 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/Validators.hpp>
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,7 +24,7 @@
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
-#include "mfb_recording.hpp"
+#include "last_complete_run.hpp"
 #include "mfb_summary.hpp"
 #include "scales_corrected.hpp"
 #include "terminal.hpp"
@@ -50,7 +47,7 @@ struct MfbInput {
   Config config;
   MfbTask task;
   std::vector<InputFile> sources;
-  std::vector<std::string> notes{}, against_pass{};
+  std::vector<std::string> against_pass{};
 };
 
 /// The machine as it was configured, for the readings of the file `points`.
@@ -73,59 +70,14 @@ mfb::Options options_of(const IdentifyMfbArguments& arguments) {
   return options;
 }
 
-/// What the drift of a pass is known from.
-void add_notes_on_pairs(std::span<const mfb::Measurement> measurements,
-                        std::vector<std::string>& notes) {
-  const auto forward_of = mfb::pairs_of(measurements);
-  std::vector<bool> paired(measurements.size(), false);
-  std::string single;
-  for (std::size_t i = 0; i < measurements.size(); ++i)
-    if (forward_of[i]) paired[i] = paired[*forward_of[i]] = true;
-  for (std::size_t i = 0; i < measurements.size(); ++i)
-    if (!paired[i]) single += (single.empty() ? "" : ", ") + measurements[i].name;
-
-  if (std::ranges::none_of(paired, [](bool one) { return one; }))
-    notes.emplace_back(
-        "no pass was measured backward as well: a drift during the passes looks like an error of "
-        "the machine");
-  else if (!single.empty())
-    notes.push_back(fmt::format(
-        "without a backward pass after the forward pass, in one position with one tool: {}; their "
-        "drift looks like an error of the machine",
-        single));
-}
-
-void add_notes_on_bar(const mfb::Bar& bar, std::span<const mfb::Measurement> measurements,
-                      std::vector<std::string>& notes) {
-  constexpr double kNoticed_K = 0.1;
-  const bool warm = std::ranges::any_of(measurements, [](const mfb::Measurement& m) {
-    return m.temperature_K &&
-           std::abs(*m.temperature_K - calib::kReferenceTemperature_K) > kNoticed_K;
-  });
-  if (!bar.expansion && warm)
-    notes.emplace_back(
-        "the bar is taken as at 20 C: bar.toml has no alpha_um_per_m_K, although plan.toml states "
-        "other temperatures");
-  if (bar.covariance_m2.isZero(0.0))
-    notes.emplace_back(
-        "the bar is taken as exact: bar.toml states no uncertainty of its calibrated points");
-}
-
-void add_notes(MfbInput& input) {
-  if (input.config.machine.interpolation == calib::estimation::Interpolation::Linear)
-    input.notes.emplace_back(
-        "the tables are linear between their nodes: for smooth errors set [model] basis = "
-        "\"cubic\"");
-  add_notes_on_pairs(input.task.plan.measurements, input.notes);
-  add_notes_on_bar(input.task.bar, input.task.plan.measurements, input.notes);
-}
-
 /// Bar, plan and touches of a session; nothing is against its pass, because the guide of the session
 /// takes no such touch.
 Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
-  auto run = last_complete_bar_run(*recording);
+  ProgressBar bar;
+  auto run =
+      last_complete_run<MfbMethod>(*recording, arguments.recording, "calibration with a bar", bar);
   if (!run) return tl::make_unexpected(run.error());
 
   MfbInput input{std::move(recording->config),
@@ -172,7 +124,6 @@ Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
   if (!input) return input;
   if (arguments.trials > 0)
     input->task.monte_carlo = {.trials = arguments.trials, .seed = arguments.seed};
-  add_notes(*input);
   return input;
 }
 
@@ -199,8 +150,6 @@ Result<MfbCandidate> identified(const IdentifyMfbArguments& arguments, const Mfb
     return tl::make_unexpected(in_points(
         arguments, input, {ErrorCode::BadInput, "the drift of the passes would be wrong"}));
   other.add_note(candidate->verdict);
-  auto& notes = candidate->verdict.notes;
-  notes.insert(notes.end(), input.notes.begin(), input.notes.end());
   return candidate;
 }
 

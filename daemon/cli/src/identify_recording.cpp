@@ -5,9 +5,11 @@
 #include <variant>
 
 #include "abbe/config/calibration_machine.hpp"
+#include "abbe/methods/otf/method.hpp"
 #include "abbe/replay/replay.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
+#include "last_complete_run.hpp"
 #include "opened_recording.hpp"
 
 namespace abbe::daemon {
@@ -25,26 +27,6 @@ Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string&
   }
   return fail(ErrorCode::DataInsufficient,
               fmt::format("{}: contains no complete calibration: {}", file, why));
-}
-
-/// The last complete run along a path, as it was acquired.
-Result<OtfRun> last_run(const OpenedRecording& recording, const std::string& file,
-                        ProgressBar& bar) {
-  std::optional<OtfRun> last;
-  const auto replayed = replay(recording.reader, recording.config,
-                               {.progress = [&bar](double share) { bar.show("replaying", share); },
-                                .runs =
-                                    [&last](CalibrationRun run) {
-                                      if (auto* otf = std::get_if<OtfRun>(&run))
-                                        last = std::move(*otf);
-                                    }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
-  if (last) return *std::move(last);
-  const auto& all = replayed->calibrations;
-  std::string why = all.empty() ? "no calibration was requested" : all.back().ended.reason;
-  if (why.empty()) why = "its calibrations are of another method";
-  return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete run along a path: {}", file, why));
 }
 
 /// The configuration for the identification of a recorded run.
@@ -75,7 +57,7 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, Pr
   if (!recording) return tl::make_unexpected(recording.error());
   auto config = config_for(arguments, recording->config);
   if (!config) return tl::make_unexpected(config.error());
-  auto run = last_run(*recording, arguments.recording, bar);
+  auto run = last_complete_run<OtfMethod>(*recording, arguments.recording, "run along a path", bar);
   if (!run) return tl::make_unexpected(run.error());
   if (arguments.u_scale_ppm) run->u_scale = u_scale_of(arguments, *config);
 

@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "abbe/methods/calibration_request.hpp"
-#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/replay/replay.hpp"
 #include "terminal.hpp"
@@ -30,27 +29,6 @@ Result<CalibrationRequest> last_bar_request(const OpenedRecording& recording) {
 }
 
 }  // namespace
-
-Result<MfbRun> last_complete_bar_run(const OpenedRecording& recording) {
-  std::optional<MfbRun> last;
-  ProgressBar bar;
-  const auto replayed = replay(recording.reader, recording.config,
-                               {.progress = [&bar](double share) { bar.show("replaying", share); },
-                                .runs =
-                                    [&last](CalibrationRun run) {
-                                      if (auto* touched = std::get_if<MfbRun>(&run))
-                                        last = std::move(*touched);
-                                    }});
-  if (!replayed) return tl::make_unexpected(replayed.error());
-  if (last) return std::move(*last);
-
-  std::string why = "none was requested";
-  for (const auto& c : replayed->calibrations)
-    if (c.ended.method == MfbMethod::kName) why = c.ended.reason;
-  return fail(ErrorCode::DataInsufficient,
-              fmt::format("{}: contains no complete calibration with a bar: {}",
-                          recording.source.name, why));
-}
 
 Result<MfbRequest> bar_request_to_continue(const OpenedRecording& recording) {
   auto request = last_bar_request(recording);

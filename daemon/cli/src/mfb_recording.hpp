@@ -1,5 +1,5 @@
 #pragma once
-/// The touches of a Multi-Feature Bar in recordings of the daemon.
+/// An interrupted calibration with a Multi-Feature Bar in a recording of the daemon.
 
 #include <string>
 #include <vector>
@@ -9,10 +9,6 @@
 #include "opened_recording.hpp"
 
 namespace abbe::daemon {
-
-/// The last run of the recording in which all touches were made. DataInsufficient without one; the
-/// text gives the reason.
-[[nodiscard]] Result<MfbRun> last_complete_bar_run(const OpenedRecording& recording);
 
 /// The last calibration with a bar in the recording, complete or not: its request with all touches
 /// that were taken until the end, to be continued. DataInsufficient without one.

@@ -31,6 +31,8 @@ Result<MfbCandidate> identify_with_bar(const MfbTask& task, const Config& config
   auto verdict =
       mfb::judge(*found, active, {.limits = gate_limits(config.gate), .solve = task.options.solve});
   if (!verdict) return tl::unexpected(error_of(verdict.error()));
+  for (std::string& note : notes_on_inputs(task.bar, task.plan, config.machine))
+    verdict->notes.push_back(std::move(note));
 
   MfbCandidate candidate{*std::move(found), *std::move(verdict), {}};
   if (!task.monte_carlo) return candidate;

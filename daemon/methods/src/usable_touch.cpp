@@ -29,12 +29,16 @@ std::string_view touch_fault(const protocol::Snapshot& touch) {
   return {};
 }
 
-bool zero_is_lost_by_restart(const Config& config) {
+TouchRules touch_rules(const Config& config) {
+  TouchRules rules{.longest_pause = config.evemu.longest_pause};
   const auto touches = touch_source(config);
+  if (touches) rules.device = touches->device;
   const auto counted = counted_axes(config);
-  return touches && !touches->reports_positions && counted &&
-         std::ranges::any_of(counted->axes(),
-                             [&config](const auto& axis) { return !has_marks(config, axis.name); });
+  rules.zero_is_lost_by_restart = touches && !touches->reports_positions && counted &&
+                                  std::ranges::any_of(counted->axes(), [&config](const auto& axis) {
+                                    return !has_marks(config, axis.name);
+                                  });
+  return rules;
 }
 
 }  // namespace abbe::daemon

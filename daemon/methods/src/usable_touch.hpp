@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "abbe/config/config.hpp"
+#include "abbe/methods/touch_intake.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -11,9 +12,8 @@ namespace abbe::daemon {
 /// Why the touch cannot be used; empty if it can be used.
 [[nodiscard]] std::string_view touch_fault(const protocol::Snapshot& touch);
 
-/// True if a restart of the touching device gives an axis another zero. Reference marks give an axis
-/// the same zero again after the counters restarted. A zero that the operator states again is only
-/// approximately the same, so it counts as lost.
-[[nodiscard]] bool zero_is_lost_by_restart(const Config& config);
+/// Device, pause and loss of the zero from the configuration. A zero that the operator states again
+/// is only approximately the same as before, so it counts as lost.
+[[nodiscard]] TouchRules touch_rules(const Config& config);
 
 }  // namespace abbe::daemon

@@ -46,7 +46,8 @@ EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide
     : request_(std::move(request)),
       guide_(std::move(guide)),
       thermometer_(options.artefact),
-      options_(std::move(options)) {
+      options_(std::move(options)),
+      intake_(options_.touches) {
   report_next_step();
 }
 
@@ -68,18 +69,9 @@ std::optional<RequestedTouch> EvemuAcquisition::next() const {
 }
 
 void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
-  if (!snapshot.has_trigger || snapshot.head.time < from_) return;
-  if (phase_ == Phase::Complete || phase_ == Phase::Failed) return;
-  last_touch_ = snapshot.head.time;
-
-  if (phase_ == Phase::Running && options_.zero_is_lost_by_restart &&
-      has(snapshot.head.flags, protocol::SampleFlag::Restarted)) {
-    phase_ = Phase::Failed;
-    reason_ = fmt::format(
-        "{} touch {}: its device restarted, and the axes have another zero; calibrate again",
-        options_.device, snapshot.trigger.touch);
-    return;
-  }
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed || !intake_.is_of_run(snapshot)) return;
+  if (auto lost = intake_.lost_zero(snapshot); phase_ == Phase::Running && !lost.empty())
+    return end(std::move(lost));
 
   if (const auto fault = touch_fault(snapshot); !fault.empty()) return refuse(snapshot, fault);
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
@@ -91,13 +83,12 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
                                         options_.artefact_sensor));
   }
 
-  refused_in_a_row_ = 0;
-  for (const std::string& text : guide_.take(reading_m).notes) note(snapshot, text);
+  intake_.usable();
+  for (const std::string& text : guide_.take(reading_m).notes) intake_.note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
 
   if (const auto& failure = guide_.failure()) {
-    phase_ = Phase::Failed;
-    reason_ = failure->text;
+    end(failure->text);
   } else if (guide_.complete()) {
     phase_ = Phase::Complete;
     reason_ =
@@ -108,16 +99,13 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
 }
 
 void EvemuAcquisition::refuse(const protocol::Snapshot& touch, std::string_view fault) {
-  const auto next = guide_.next();
-  note(touch, fmt::format("not used: {}; expected: {}", fault, evemu::name(next.on)));
-  if (++refused_in_a_row_ < options_.most_refused || phase_ != Phase::WaitingAtStart) return;
-  phase_ = Phase::Failed;
-  reason_ = fmt::format("{} successive touches could not be used; the last one: {}",
-                        refused_in_a_row_, fault);
+  auto too_many = intake_.refuse(touch, fault, evemu::name(guide_.next().on));
+  if (!too_many.empty() && phase_ == Phase::WaitingAtStart) end(std::move(too_many));
 }
 
-void EvemuAcquisition::note(const protocol::Snapshot& touch, const std::string& what) {
-  notes_.push_back(fmt::format("{} touch {}: {}", options_.device, touch.trigger.touch, what));
+void EvemuAcquisition::end(std::string reason) {
+  phase_ = Phase::Failed;
+  reason_ = std::move(reason);
 }
 
 void EvemuAcquisition::report_next_step() {
@@ -128,16 +116,9 @@ void EvemuAcquisition::report_next_step() {
 }
 
 void EvemuAcquisition::tick(HostTime now) {
-  if (phase_ == Phase::Complete || phase_ == Phase::Failed ||
-      now - last_touch_ <= options_.longest_pause)
-    return;
-  phase_ = Phase::Failed;
-  reason_ = fmt::format("no touch for {:.0f} s; {}",
-                        std::chrono::duration<double>(now - last_touch_).count(), reason_);
-}
-
-std::vector<std::string> EvemuAcquisition::take_notes() {
-  return std::exchange(notes_, {});
+  const std::string pause = intake_.pause(now);
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed || pause.empty()) return;
+  end(fmt::format("{}; {}", pause, reason_));
 }
 
 EvemuRun EvemuAcquisition::release() {

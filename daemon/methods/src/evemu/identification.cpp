@@ -49,14 +49,11 @@ evemu::TouchPlan touch_plan(const EvemuConfig& config) {
 }
 
 EvemuAcquisitionOptions evemu_acquisition_options(const Config& config) {
-  EvemuAcquisitionOptions options{.longest_pause = config.evemu.longest_pause};
+  EvemuAcquisitionOptions options{.touches = touch_rules(config)};
   if (const auto machine = otf_machine(config.machine)) options.travel = machine->nodes;
-  const auto touches = touch_source(config);
-  if (touches) options.device = touches->device;
   options.artefact = config.evemu.artefact;
   if (options.artefact && options.artefact->sensor)
     options.artefact_sensor = config.temperatures[*options.artefact->sensor];
-  options.zero_is_lost_by_restart = zero_is_lost_by_restart(config);
   return options;
 }
 

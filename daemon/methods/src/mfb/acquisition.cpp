@@ -43,16 +43,18 @@ Result<MfbAcquisition> MfbAcquisition::create(const MfbRequest& request,
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", request.plan.name, guide.error().text));
   if (const auto taken = take_earlier(*guide, request.earlier_m); !taken)
     return tl::unexpected(taken.error());
-  return MfbAcquisition{
-      std::move(bar->bar), {bar->source, plan->source}, *std::move(guide), std::move(options)};
+  return MfbAcquisition{std::move(bar->bar),
+                        {bar->source, plan->source},
+                        *std::move(guide),
+                        std::move(options.touches)};
 }
 
 MfbAcquisition::MfbAcquisition(mfb::Bar bar, std::vector<InputFile> sources, mfb::TouchGuide guide,
-                               MfbAcquisitionOptions options)
+                               TouchRules rules)
     : bar_(std::move(bar)),
       sources_(std::move(sources)),
       guide_(std::move(guide)),
-      options_(std::move(options)) {
+      intake_(std::move(rules)) {
   follow_guide();
 }
 
@@ -73,24 +75,15 @@ std::optional<RequestedTouch> MfbAcquisition::next() const {
 }
 
 void MfbAcquisition::take(const protocol::Snapshot& snapshot) {
-  if (!snapshot.has_trigger || snapshot.head.time < from_) return;
-  if (phase_ == Phase::Complete || phase_ == Phase::Failed) return;
-  last_touch_ = snapshot.head.time;
-
-  if (phase_ == Phase::Running && options_.zero_is_lost_by_restart &&
-      has(snapshot.head.flags, protocol::SampleFlag::Restarted)) {
-    phase_ = Phase::Failed;
-    reason_ = fmt::format(
-        "{} touch {}: its device restarted, and the axes have another zero; calibrate again",
-        options_.device, snapshot.trigger.touch);
-    return;
-  }
-
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed || !intake_.is_of_run(snapshot)) return;
+  if (auto lost = intake_.lost_zero(snapshot); phase_ == Phase::Running && !lost.empty())
+    return end(std::move(lost));
   if (const auto fault = touch_fault(snapshot); !fault.empty()) return refuse(snapshot, fault);
-  refused_in_a_row_ = 0;
+
+  intake_.usable();
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   const mfb::GuidedTouch taken = guide_.take(reading_m);
-  for (const std::string& text : taken.notes) note(snapshot, text);
+  for (const std::string& text : taken.notes) intake_.note(snapshot, text);
   if (taken.fate == mfb::TouchFate::Taken) phase_ = Phase::Running;
   follow_guide();
 }
@@ -99,8 +92,7 @@ void MfbAcquisition::take(const protocol::Snapshot& snapshot) {
 void MfbAcquisition::follow_guide() {
   const auto& plan = guide_.plan();
   if (const auto& failure = guide_.failure()) {
-    phase_ = Phase::Failed;
-    reason_ = failure->text;
+    end(failure->text);
   } else if (guide_.complete()) {
     phase_ = Phase::Complete;
     reason_ =
@@ -116,30 +108,20 @@ void MfbAcquisition::follow_guide() {
 }
 
 void MfbAcquisition::refuse(const protocol::Snapshot& touch, std::string_view fault) {
-  note(touch, fmt::format("not used: {}; expected: {}", fault, guide_.next_text()));
-  if (++refused_in_a_row_ < options_.most_refused || phase_ != Phase::WaitingAtStart) return;
-  phase_ = Phase::Failed;
-  reason_ = fmt::format("{} successive touches could not be used; the last one: {}",
-                        refused_in_a_row_, fault);
+  auto too_many = intake_.refuse(touch, fault, guide_.next_text());
+  if (!too_many.empty() && phase_ == Phase::WaitingAtStart) end(std::move(too_many));
 }
 
-void MfbAcquisition::note(const protocol::Snapshot& touch, const std::string& what) {
-  notes_.push_back(fmt::format("{} touch {}: {}", options_.device, touch.trigger.touch, what));
+void MfbAcquisition::end(std::string reason) {
+  phase_ = Phase::Failed;
+  reason_ = std::move(reason);
 }
 
 void MfbAcquisition::tick(HostTime now) {
-  if (phase_ == Phase::Complete || phase_ == Phase::Failed ||
-      now - last_touch_ <= options_.longest_pause)
-    return;
-  phase_ = Phase::Failed;
-  reason_ = fmt::format(
-      "no touch for {:.0f} s; {}; abbe calibrate mfb --continue uses the touches "
-      "of the recording",
-      std::chrono::duration<double>(now - last_touch_).count(), reason_);
-}
-
-std::vector<std::string> MfbAcquisition::take_notes() {
-  return std::exchange(notes_, {});
+  const std::string pause = intake_.pause(now);
+  if (phase_ == Phase::Complete || phase_ == Phase::Failed || pause.empty()) return;
+  end(fmt::format("{}; {}; abbe calibrate mfb --continue uses the touches of the recording", pause,
+                  reason_));
 }
 
 std::vector<calib::Vector3> MfbAcquisition::readings_m() const {

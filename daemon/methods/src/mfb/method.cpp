@@ -101,11 +101,7 @@ MethodNeeds MfbMethod::needs(const Config& config) {
 }
 
 MfbMethod::Options MfbMethod::options(const Config& config) {
-  MfbAcquisitionOptions options{.zero_is_lost_by_restart = zero_is_lost_by_restart(config),
-                                .longest_pause = config.evemu.longest_pause,
-                                .machine = mfb_machine(config.machine)};
-  if (const auto touches = touch_source(config)) options.device = touches->device;
-  return options;
+  return {.touches = touch_rules(config), .machine = mfb_machine(config.machine)};
 }
 
 json MfbMethod::to_json(const Request& request) {

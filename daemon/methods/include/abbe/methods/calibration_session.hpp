@@ -18,7 +18,7 @@
 ///          +-----gate failed--> refused
 ///
 /// The states are the same for every method; only the acquisition differs (OtfAcquisition,
-/// EvemuAcquisition). If the method guides the operator from touch to touch, each new instruction
+/// EvemuAcquisition, MfbAcquisition). If the method guides the operator from touch to touch, each new instruction
 /// is also an event. Not for the RT path; not thread-safe.
 
 #include <cstdint>

@@ -5,7 +5,6 @@
 /// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
-#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "abbe/calib/axis_table.hpp"
 #include "abbe/calib/evemu/touch_guide.hpp"
 #include "abbe/methods/evemu/artefact_thermometer.hpp"
+#include "abbe/methods/touch_intake.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/session_status.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -44,19 +44,10 @@ struct EvemuRun {
 };
 
 struct EvemuAcquisitionOptions {
-  std::string device = "probe";  ///< name of the probing device, for messages
-  /// True: a restart of the device during the run fails the run, because the counters of a counter
-  /// card then start again at 0 at the current position. False if all axes have reference marks,
-  /// which give the same zero as before.
-  bool zero_is_lost_by_restart = true;
-  /// The run fails if no touch arrives for longer than this host time. The time is long because the
-  /// operator turns and clamps the artefact by hand between positions.
-  std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
+  TouchRules touches{};
   /// Travel of the axes. Touches more than 1 mm outside the travel are not used; thermal correction
   /// changes a reading by less. nullopt: no limit.
   std::optional<calib::MachineNodes> travel{};
-  /// A run that has no usable touch yet fails after this many unusable ones.
-  std::size_t most_refused = 20;
   /// Source of the temperature of the array. A touch is not used if the sensor has no valid value
   /// at its instant, because the identification needs the temperature.
   std::optional<ArtefactTemperatureConfig> artefact{};
@@ -72,7 +63,7 @@ class EvemuAcquisition {
                                                        EvemuAcquisitionOptions options = {});
 
   /// To be called before the first take(). Touches before `from` are ignored.
-  void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
+  void begin(protocol::HostTime from) noexcept { intake_.begin(from); }
 
   void take(const protocol::Snapshot& snapshot);
   void tick(protocol::HostTime now);
@@ -85,26 +76,23 @@ class EvemuAcquisition {
   /// The next touch that the operator must make; nullopt once the run is complete or failed.
   [[nodiscard]] std::optional<RequestedTouch> next() const;
   /// Remarks on touches since the last call, one sentence each.
-  [[nodiscard]] std::vector<std::string> take_notes();
+  [[nodiscard]] std::vector<std::string> take_notes() { return intake_.take_notes(); }
   [[nodiscard]] EvemuRun release();
 
  private:
   EvemuAcquisition(EvemuRequest request, calib::evemu::TouchGuide guide,
                    EvemuAcquisitionOptions options);
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
-  void note(const protocol::Snapshot& touch, const std::string& what);
+  void end(std::string reason);
   void report_next_step();
 
   EvemuRequest request_;
   calib::evemu::TouchGuide guide_;
   ArtefactThermometer thermometer_;
-  protocol::HostTime from_{};
   EvemuAcquisitionOptions options_;
+  TouchIntake intake_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
-  std::vector<std::string> notes_;
-  protocol::HostTime last_touch_{};
-  std::size_t refused_in_a_row_ = 0;
 };
 
 }  // namespace abbe::daemon

@@ -5,7 +5,6 @@
 /// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
-#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -14,6 +13,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/mfb/touch_guide.hpp"
+#include "abbe/methods/touch_intake.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/session_status.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -41,14 +41,7 @@ struct MfbRun {
 };
 
 struct MfbAcquisitionOptions {
-  std::string device = "probe";  ///< name of the probing device, for messages
-  /// True: a restart of the device during the run fails the run (EvemuAcquisitionOptions).
-  bool zero_is_lost_by_restart = true;
-  /// The run fails if no touch arrives for longer than this host time: the operator clamps the bar
-  /// by hand between positions.
-  std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
-  /// A run that has no usable touch yet fails after this many unusable ones.
-  std::size_t most_refused = 20;
+  TouchRules touches{};
   /// Error: the configuration describes no machine that can be calibrated with a bar.
   Result<calib::mfb::MfbMachine> machine = fail(ErrorCode::Refused, "no machine is configured");
 };
@@ -63,7 +56,7 @@ class MfbAcquisition {
                                                      MfbAcquisitionOptions options);
 
   /// To be called before the first take(). Touches before `from` are ignored.
-  void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
+  void begin(protocol::HostTime from) noexcept { intake_.begin(from); }
 
   void take(const protocol::Snapshot& snapshot);
   void tick(protocol::HostTime now);
@@ -76,28 +69,24 @@ class MfbAcquisition {
   /// The next touch that the operator must make; nullopt once the run is complete or failed.
   [[nodiscard]] std::optional<RequestedTouch> next() const;
   /// Remarks on touches since the last call, one sentence each.
-  [[nodiscard]] std::vector<std::string> take_notes();
+  [[nodiscard]] std::vector<std::string> take_notes() { return intake_.take_notes(); }
   /// Readings of all touches taken so far, in their order.
   [[nodiscard]] std::vector<calib::Vector3> readings_m() const;
   [[nodiscard]] MfbRun release();
 
  private:
   MfbAcquisition(calib::mfb::Bar bar, std::vector<InputFile> sources, calib::mfb::TouchGuide guide,
-                 MfbAcquisitionOptions options);
+                 TouchRules rules);
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
-  void note(const protocol::Snapshot& touch, const std::string& what);
+  void end(std::string reason);
   void follow_guide();
 
   calib::mfb::Bar bar_;
   std::vector<InputFile> sources_;
   calib::mfb::TouchGuide guide_;
-  MfbAcquisitionOptions options_;
-  protocol::HostTime from_{};
+  TouchIntake intake_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
-  std::vector<std::string> notes_;
-  protocol::HostTime last_touch_{};
-  std::size_t refused_in_a_row_ = 0;
 };
 
 }  // namespace abbe::daemon

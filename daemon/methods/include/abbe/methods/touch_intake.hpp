@@ -1,0 +1,58 @@
+#pragma once
+/// What the guided acquisitions of all methods with a touch probe have in common: the touches of the
+/// run, notes on them, and the ends of a run that do not depend on the method. Decisions depend on
+/// snapshots only; only pause() is given the time. Not for the RT path; not thread-safe.
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "abbe/protocol/samples.hpp"
+
+namespace abbe::daemon {
+
+struct TouchRules {
+  std::string device = "probe";  ///< name of the probing device, for messages
+  /// True: a restart of the device during the run ends the run, because the counters of a counter
+  /// card then start again at 0 at the current position. False if all axes have reference marks,
+  /// which give the same zero as before.
+  bool zero_is_lost_by_restart = true;
+  /// The run ends if no touch arrives for longer than this host time. The time is long because the
+  /// operator turns and clamps the artefact by hand between positions.
+  std::chrono::nanoseconds longest_pause = std::chrono::hours{1};
+  /// A run that has no usable touch yet ends after this many unusable ones.
+  std::size_t most_refused = 20;
+};
+
+class TouchIntake {
+ public:
+  explicit TouchIntake(TouchRules rules = {}) : rules_(std::move(rules)) {}
+
+  /// Touches before `from` are not of the run.
+  void begin(protocol::HostTime from) noexcept { from_ = last_touch_ = from; }
+  /// True for a touch of the run.
+  [[nodiscard]] bool is_of_run(const protocol::Snapshot& snapshot) noexcept;
+
+  /// Why the run ends with this touch: its device restarted. Empty: it does not.
+  [[nodiscard]] std::string lost_zero(const protocol::Snapshot& touch) const;
+  /// Notes an unusable touch. Returns why a run without a usable touch ends; empty: it does not.
+  [[nodiscard]] std::string refuse(const protocol::Snapshot& touch, std::string_view fault,
+                                   std::string_view expected);
+  void usable() noexcept { refused_in_a_row_ = 0; }
+  /// Why the run ends at `now`: no touch for too long; empty: it does not.
+  [[nodiscard]] std::string pause(protocol::HostTime now) const;
+
+  void note(const protocol::Snapshot& touch, std::string_view what);
+  /// Notes since the last call.
+  [[nodiscard]] std::vector<std::string> take_notes();
+
+ private:
+  TouchRules rules_;
+  protocol::HostTime from_{}, last_touch_{};
+  std::size_t refused_in_a_row_ = 0;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace abbe::daemon

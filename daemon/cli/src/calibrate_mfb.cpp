@@ -6,6 +6,7 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -34,15 +35,15 @@ Result<MfbRequest::File> file_with_text(const std::string& file) {
 
 /// Bar and plan are checked here, too, so that the message names the files as they were given.
 Result<MfbRequest> request_of_files(const CalibrateMfbArguments& arguments) {
-  const auto bar = read_bar_toml(arguments.bar);
+  auto bar_file = file_with_text(arguments.bar);
+  if (!bar_file) return tl::make_unexpected(bar_file.error());
+  const auto bar = parse_bar_toml(bar_file->text, arguments.bar);
   if (!bar) return tl::make_unexpected(bar.error());
-  if (const auto plan = read_bar_plan_toml(arguments.plan, bar->bar); !plan)
+  auto plan_file = file_with_text(arguments.plan);
+  if (!plan_file) return tl::make_unexpected(plan_file.error());
+  if (const auto plan = parse_bar_plan_toml(plan_file->text, arguments.plan, bar->bar); !plan)
     return tl::make_unexpected(plan.error());
-  auto bar_text = file_with_text(arguments.bar);
-  if (!bar_text) return tl::make_unexpected(bar_text.error());
-  auto plan_text = file_with_text(arguments.plan);
-  if (!plan_text) return tl::make_unexpected(plan_text.error());
-  return MfbRequest{std::move(*bar_text), std::move(*plan_text), {}};
+  return MfbRequest{std::move(*bar_file), std::move(*plan_file), {}};
 }
 
 /// The touches of an interrupted session, with its bar and plan.
@@ -81,14 +82,16 @@ void add_calibrate_mfb(CLI::App& parent, int& exit) {
   auto* bar = command->add_option("--bar", arguments->bar, "bar.toml: the calibrated bar");
   auto* plan = command->add_option(
       "--plan", arguments->plan, "plan.toml, as abbe plan mfb writes it: positions, tools, passes");
-  command
-      ->add_option(
-          "--continue", arguments->recording,
-          "recording of an interrupted session (.mcap): its bar, its plan and the touches\n"
-          "made in it are used; the session goes on at the next touch")
-      ->excludes(bar)
-      ->excludes(plan);
+  auto* recording =
+      command
+          ->add_option(
+              "--continue", arguments->recording,
+              "recording of an interrupted session (.mcap): its bar, its plan and the touches\n"
+              "made in it are used; the session goes on at the next touch")
+          ->excludes(bar)
+          ->excludes(plan);
   add_follow_options(*command, arguments->follow, bar);
+  command->get_option("--cancel")->excludes(plan)->excludes(recording);
   command->callback([arguments, &exit] { exit = calibrate(*arguments); });
 }
 

@@ -357,6 +357,7 @@ class Replay : private PipelineObserver {
     }
   }
   void take(const v1::CalibrationEvent& event) {
+    if (options_.events) options_.events(event);
     auto& ids = report_.live_model_ids;
     if (event.model_id().empty() || (!ids.empty() && ids.back() == event.model_id())) return;
     ids.push_back(event.model_id());

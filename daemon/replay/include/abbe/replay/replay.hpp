@@ -34,6 +34,8 @@ struct ReplayOptions {
   std::function<void(const Batch& batch, protocol::HostTime begin)> samples;
   /// Called for every snapshot, in order.
   std::function<void(const protocol::Snapshot&)> snapshots;
+  /// Called for every calibration event of the live run.
+  std::function<void(const v1::CalibrationEvent&)> events;
   /// Called with every complete run; if set, replay() itself identifies no run.
   std::function<void(CalibrationRun)> runs;
 };

@@ -36,7 +36,8 @@ MfbRequest::File file_of(const json& object) {
 /// Limits the size of a request, because every touch is compared with every place of the bar in the
 /// hub's cycle, and the request is written into the recording.
 Result<void> check_size(const MfbRequest& request) {
-  constexpr std::size_t kMostText = 1 << 20, kMostEarlier = 200'000;
+  // Together below the largest request of the control socket, 4 MiB, with 60 bytes for a touch.
+  constexpr std::size_t kMostText = 1 << 18, kMostEarlier = 50'000;
   if (request.bar.text.size() <= kMostText && request.plan.text.size() <= kMostText &&
       request.earlier_m.size() <= kMostEarlier)
     return {};

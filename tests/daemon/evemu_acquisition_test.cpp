@@ -79,8 +79,10 @@ TEST_F(EvemuAcquisitionTest, ATouchOutsideTheTravelIsNamedAndNotUsed) {
   for (std::size_t a = 0; a < 3; ++a) travel[a].nodes_m = {-2.0, 2.0};
   const double x_m = points_m[0].x();
   travel[0].nodes_m = {x_m - 0.3, x_m - 0.1};
-  auto narrow =
-      *EvemuAcquisition::create(request(), {.touches = {.device = "probe 1"}, .travel = travel});
+  EvemuAcquisitionOptions options;
+  options.touches.device = "probe 1";
+  options.travel = travel;
+  auto narrow = *EvemuAcquisition::create(request(), options);
   narrow.begin(kFrom);
   narrow.take(touch_at(points_m[0], kFrom + 1s, 7));
 
@@ -89,8 +91,8 @@ TEST_F(EvemuAcquisitionTest, ATouchOutsideTheTravelIsNamedAndNotUsed) {
                                        testing::StartsWith("probe 1 touch 7: not used: X "),
                                        HasSubstr("outside its travel"), HasSubstr("[axes.X]"))));
   travel[0].nodes_m = {x_m - 0.3, x_m + 0.1};
-  auto wide =
-      *EvemuAcquisition::create(request(), {.touches = {.device = "probe 1"}, .travel = travel});
+  options.travel = travel;
+  auto wide = *EvemuAcquisition::create(request(), options);
   wide.begin(kFrom);
   wide.take(touch_at(points_m[0], kFrom + 1s, 7));
   EXPECT_EQ(wide.points(), 1u);

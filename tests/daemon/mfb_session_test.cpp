@@ -73,7 +73,8 @@ class MfbSession : public ::testing::Test {
   Config config = parsed(probed_machine());
 
   [[nodiscard]] MfbAcquisition acquisition(const MfbRequest& request = reference_request()) const {
-    auto made = MfbAcquisition::create(request, MfbMethod::options(config));
+    const MfbAcquisitionOptions options = MfbMethod::options(config);
+    auto made = MfbAcquisition::create(request, options);
     EXPECT_TRUE(made) << made.error().text;
     made->begin(kMfbFrom);
     return *std::move(made);
@@ -135,7 +136,8 @@ TEST_F(MfbSession, EarlierTouchesOfAnotherBarAreRefused) {
   MfbRequest request = reference_request();
   request.earlier_m = planned_readings_m(5);
   request.earlier_m[3] += Vector3(0.0, 0.03, 0.0);
-  const auto made = MfbAcquisition::create(request, MfbMethod::options(config));
+  const MfbAcquisitionOptions options = MfbMethod::options(config);
+  const auto made = MfbAcquisition::create(request, options);
   ASSERT_FALSE(made);
   EXPECT_THAT(made.error().text, HasSubstr("touch 4 of the earlier recording"));
 }

@@ -3,6 +3,9 @@
 ///
 ///     {"do": "status"}
 ///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}
+///     {"do": "calibrate", "method": "evemu", "calibrator": {..}, "sources": [..], ...}
+///     {"do": "calibrate", "method": "mfb", "bar": {"file": NAME, "text": TOML},
+///      "plan": {"file": NAME, "text": TOML}, "earlier_m": [[x, y, z], ...]}
 ///     {"do": "cancel", "who": REMARK}
 ///     {"do": "touch", "where": true}
 ///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z],

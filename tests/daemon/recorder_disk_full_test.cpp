@@ -160,6 +160,29 @@ TEST_F(DiskFull, TheNextFileStatesHowManyMessagesAreMissing) {
   EXPECT_EQ(lost_before, (std::vector<std::uint32_t>{static_cast<std::uint32_t>(before.lost), 0}));
 }
 
+TEST_F(DiskFull, LossesThatALostMessageReportedAreAmongTheMissing) {
+  FileSizeLimit limit{kFewChunks};
+  Recorder recorder = open(WallTime{100s});
+  while (recorder.status().state != State::DiskFull) recorder.record(example_axes(1), "encoder");
+  const auto before = recorder.status().lost;
+
+  protocol::AxisSample after_a_loss = example_axes(2);
+  after_a_loss.head.lost_before = 7;
+  recorder.record(after_a_loss, "encoder");
+  limit.set(RLIM_INFINITY);
+  recorder.tick(WallTime{105s});
+  recorder.record(example_axes(3), "encoder");
+  ASSERT_TRUE(recorder.close());
+
+  std::vector<std::uint64_t> lost_before;
+  RecordingSink sink;
+  sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
+    lost_before.push_back(a.head.lost_before);
+  };
+  EXPECT_EQ(RecordingReader::open(folder_.path() / "run-2.mcap")->read(sink), 0u);
+  EXPECT_EQ(lost_before, std::vector<std::uint64_t>{before + 1 + 7});
+}
+
 TEST_F(DiskFull, WhileItStaysFullNoPartialFilesAccumulate) {
   FileSizeLimit limit{kFewChunks};
   Recorder recorder = open(WallTime{100s});

@@ -202,5 +202,31 @@ TEST_F(RecorderThreadTest, TheNextMessageOfEveryStreamStatesHowManyAreMissing) {
   EXPECT_EQ(environment, (std::vector<bool>{false, false, true, false}));
 }
 
+TEST_F(RecorderThreadTest, LossesThatADroppedSampleReportedAreAmongTheMissing) {
+  start(10'000);
+  Batch too_much = batch(0, 100);
+  too_much.axes[40].head.lost_before = 7;
+  too_much.raw.back().block.lost_before = 3;  // of the encoder
+  thread_->hand_over(too_much);
+  EXPECT_EQ(thread_->dropped(), 500u) << "losses before the recorder are not its own";
+  wait_until_written();
+  thread_->hand_over(batch(100, 1));
+
+  std::vector<std::uint32_t> axes, encoder_raw;
+  RecordingSink sink;
+
+  sink.axis_sample = [&](const protocol::AxisSample& a, std::string_view) {
+    axes.push_back(a.head.lost_before);
+  };
+
+  sink.raw_block = [&](const protocol::RawBlock& b, std::string_view device) {
+    if (device == "encoder") encoder_raw.push_back(b.lost_before);
+  };
+
+  EXPECT_EQ(finish().read(sink), 0u);
+  EXPECT_EQ(axes, std::vector<std::uint32_t>{100 + 7});
+  EXPECT_EQ(encoder_raw, std::vector<std::uint32_t>{100 + 3});
+}
+
 }  // namespace
 }  // namespace abbe::daemon

@@ -77,7 +77,8 @@ void Recorder::State::add_marked(Stream stream, Dates dates, std::string_view de
   if (missing > 0) recording::mark_gap(message, missing);
   const bool encoded = encode(message, payload).has_value();
   if (!encoded) ++status.refused;
-  account(stream, device, missing, encoded && add(stream, dates, payload));
+  account(stream, device, recording::lost_before(message, missing),
+          encoded && add(stream, dates, payload));
 }
 
 void Recorder::State::account(Stream stream, std::string_view device, std::uint32_t lost_before,
@@ -150,13 +151,12 @@ void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample
 }
 
 void Recorder::record(protocol::RawBytes bytes, Taken taken) {
-  const std::uint32_t missing = state_->lost.take(Stream::RawBytes, bytes.device);
-  bytes.lost_before += missing;
+  bytes.lost_before += state_->lost.take(Stream::RawBytes, bytes.device);
   const auto size = encode_cdr(bytes, state_->raw_payload);
   if (!size) ++state_->status.refused;
   const bool added = size && state_->add(Stream::RawBytes, State::dates_of(bytes.time, taken),
                                          std::span{state_->raw_payload}.first(*size));
-  state_->account(Stream::RawBytes, bytes.device, missing, added);
+  state_->account(Stream::RawBytes, bytes.device, bytes.lost_before, added);
 }
 
 void Recorder::record(const v1::CalibrationEvent& event, Taken taken) {

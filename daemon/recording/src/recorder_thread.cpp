@@ -237,21 +237,25 @@ struct RecorderThread::State {
   }
 
   void drop(const Batch& batch) {
-    const auto lose = [this](std::uint32_t& unreported_of, std::size_t messages) {
-      unreported_of += static_cast<std::uint32_t>(messages);
-      dropped.fetch_add(messages, std::memory_order_relaxed);  // only a counter: no ordering needed
-    };
+    for (const auto& point : batch.points) lose(unreported.points, point.head.lost_before);
+    for (const auto& sample : batch.axes) lose(unreported.axes, sample.head.lost_before);
+    for (const auto& e : batch.environment) lose(unreported.environment, e.head.lost_before);
 
-    lose(unreported.points, batch.points.size());
-    lose(unreported.axes, batch.axes.size());
-    lose(unreported.environment, batch.environment.size());
+    for (const auto& e : batch.measured_environment)
+      lose(entry_of(unreported.measured, e.device), e.sample.head.lost_before);
 
-    for (const auto& sample : batch.measured_environment)
-      lose(entry_of(unreported.measured, sample.device), 1);
-    lose(unreported.touches, batch.touches.size());
-    lose(unreported.touch_scans, batch.touch_scans.size());
+    for (const auto& touch : batch.touches) lose(unreported.touches, touch.head.lost_before);
+    for (const auto& scan : batch.touch_scans) lose(unreported.touch_scans, scan.head.lost_before);
+
     if (!options.raw) return;
-    for (const auto& raw : batch.raw) lose(entry_of(unreported.raw, raw.device), 1);
+    for (const auto& raw : batch.raw)
+      lose(entry_of(unreported.raw, raw.device), raw.block.lost_before);
+  }
+
+  /// Counts a message that is dropped, and the messages whose loss before it the message reports.
+  void lose(std::uint32_t& unreported_of, std::uint32_t lost_before) {
+    unreported_of += 1 + lost_before;
+    dropped.fetch_add(1, std::memory_order_relaxed);  // only a counter: no ordering needed
   }
 
   void write(Waiting& data) {

@@ -30,4 +30,14 @@ void mark_gap(Message& message, std::uint32_t lost) {
     message.lost_before(message.lost_before() + lost);
 }
 
+/// Messages that are missing before `message`; `marked` is what mark_gap() has added. It counts
+/// alone for the kinds of messages that have no field lost_before.
+template <class Message>
+[[nodiscard]] std::uint32_t lost_before(const Message& message, std::uint32_t marked) {
+  if constexpr (requires { message.lost_before(); })
+    return message.lost_before();
+  else
+    return marked;
+}
+
 }  // namespace abbe::daemon::recording

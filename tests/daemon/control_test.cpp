@@ -95,6 +95,30 @@ TEST_F(Control, AMemberOfTheWrongTypeIsAnAnswerNotACrash) {
   EXPECT_TRUE(ask_daemon(socket(), {{"do", "count"}, {"n", 3}}));
 }
 
+TEST_F(Control, AFaultInTheDaemonIsNotReportedAsAWrongRequest) {
+  const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) -> json {
+    throw std::runtime_error{"no space left on device"};
+  });
+  ASSERT_TRUE(server);
+  const auto answer = ask_daemon(socket(), {{"do", "status"}});
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::Io);
+  EXPECT_NE(answer.error().text.find("failed in the daemon: no space left"), std::string::npos)
+      << answer.error().text;
+}
+
+TEST_F(Control, ARequestLongerThanTheLimitIsRefusedWithTheLimit) {
+  const auto server = ControlServer::open(socket(), echo);
+  ASSERT_TRUE(server);
+  const std::string too_long(kRequestBounds.bytes + 1, 'x');
+  const auto answer = ask_daemon(socket(), {{"do", "status"}, {"x", too_long}});
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::Refused);
+  EXPECT_NE(answer.error().text.find("longer than 4194304 bytes"), std::string::npos)
+      << answer.error().text;
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
+}
+
 TEST_F(Control, BytesThatAreNoTextAreReplacedAndTheSocketStaysOpen) {
   const auto server = ControlServer::open(socket(), [](const json&, const ControlPeer&) {
     return json{{"ok", true}, {"fault", "tracker says \xff\xc3"}};

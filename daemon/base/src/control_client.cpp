@@ -19,6 +19,7 @@
 namespace abbe::daemon {
 namespace {
 
+using namespace std::chrono_literals;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
@@ -76,10 +77,10 @@ Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& re
   if (!fd) return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
 
   set_send_time_out(fd->get(), time_out);
-  if (auto sent = send_line(fd->get(), line_of(request), socket_path); !sent)
-    return tl::unexpected(sent.error());
-  const auto line = receive_line(fd->get(), time_out, socket_path);
-  if (!line) return tl::unexpected(line.error());
+  const auto sent = send_line(fd->get(), line_of(request), socket_path);
+  // A daemon that closes the connection before the end of the request has sent the reason.
+  const auto line = receive_line(fd->get(), sent ? time_out : 0ms, socket_path);
+  if (!line) return tl::unexpected(sent ? line.error() : sent.error());
 
   auto parsed = parse_json(*line, "answer", {.bytes = kLongestAnswer, .values = kLongestAnswer});
   if (!parsed) return tl::unexpected(no_answer(socket_path, parsed.error().text));

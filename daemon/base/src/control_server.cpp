@@ -232,13 +232,18 @@ class Server final : public ControlServer {
     return flush(c);
   }
 
+  /// False if the client disconnected or its request is longer than the limit.
   static bool read(Client& c) {
     std::array<char, 65536> buffer;  // NOLINT: read() fills what is used
     const ssize_t n = ::read(c.fd.get(), buffer.data(), buffer.size());
     if (n < 0) return errno == EAGAIN || errno == EINTR;
     c.inbox.append(buffer.data(), static_cast<std::size_t>(n));
     c.active = Clock::now();
-    return n > 0 && c.inbox.size() <= kRequestBounds.bytes;
+    if (c.inbox.size() <= kRequestBounds.bytes) return n > 0;
+
+    send_closing_line(c, fmt::format("closed: the request is longer than {} bytes, the limit",
+                                     kRequestBounds.bytes));
+    return false;
   }
 
   static bool flush(Client& c) {
@@ -266,9 +271,9 @@ class Server final : public ControlServer {
       return refusal(
           {ErrorCode::Usage,
            fmt::format("request \"{}\": {}", request["do"].get<std::string>(), cause_of(e))});
-    } catch (const std::exception& e) {
-      return refusal({ErrorCode::Usage, fmt::format("request \"{}\": {}",
-                                                    request["do"].get<std::string>(), e.what())});
+    } catch (const std::exception& e) {  // the fault is not in the request
+      return refusal({ErrorCode::Io, fmt::format("request \"{}\" failed in the daemon: {}",
+                                                 request["do"].get<std::string>(), e.what())});
     }
   }
 

@@ -297,7 +297,7 @@ struct Abbed::State {
     hub_may_run.set_value();
 
     closing_left =
-        run_in_background([dir = config.recording.dir, running = recording, stop = stop_closing] {
+        run_abandonable([dir = config.recording.dir, running = recording, stop = stop_closing] {
           return close_left_recordings(dir, running, *stop);
         });
 
@@ -383,14 +383,13 @@ struct Abbed::State {
     if (!tidies || tidying.valid() || now < next_tidying) return;
     next_tidying = now + kTidyPeriod;
 
-    tidying =
-        run_in_background([dir = config.recording.dir, models = config.daemon.models_dir(),
-                           rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
-                                           .keep = config.recording.keep,
-                                           .running = recording,
-                                           .lasted = now - running_since}] {
-          return remove_old_recordings(dir, models, rule);
-        });
+    tidying = run_abandonable([dir = config.recording.dir, models = config.daemon.models_dir(),
+                               rule = KeepRule{.now = std::filesystem::file_time_type::clock::now(),
+                                               .keep = config.recording.keep,
+                                               .running = recording,
+                                               .lasted = now - running_since}] {
+      return remove_old_recordings(dir, models, rule);
+    });
   }
 
   void report_left_recordings() {

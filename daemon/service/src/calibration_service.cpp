@@ -66,8 +66,8 @@ CalibrationService::~CalibrationService() {
   const auto stored = store_before_end(until);
   if (stored || !to_keep_) return;
   fmt::print(stderr,
-             "abbed: model {} is lost: {}; identify it again with `abbe identify {} "
-             "--recording`\n",
+             "abbed: model {} is lost: {}; identify it again from the recording of this run: "
+             "`abbe identify {} --recording RUN.mcap -o MODEL.json`\n",
              to_keep_->id, stored.error().text, to_keep_->document.method);
 }
 

@@ -145,7 +145,8 @@ ObservedPart part_of_hub(bool answers) {
   return {.key = "hub",
           .state = answers ? "answers" : "hangs",
           .message = answers ? "hub: running"
-                             : "hub: has not answered for a second; systemd restarts abbed",
+                             : "hub: has not answered for a second; systemd restarts abbed "
+                               "if the unit has WatchdogSec=",
           .message_id = kHubId,
           .urgency = answers ? Urgency::Info : Urgency::Error,
           .fields = {{"ABBE_STATE", answers ? "answers" : "hangs"}}};

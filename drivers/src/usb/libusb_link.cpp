@@ -327,7 +327,9 @@ struct LibusbLink::State {
   void poll(std::chrono::nanoseconds wall) {
     const auto us = std::chrono::duration_cast<std::chrono::microseconds>(wall);
     timeval timeout{us.count() / 1'000'000, us.count() % 1'000'000};
-    libusb_handle_events_timeout_completed(context, &timeout, nullptr);
+    const int error = libusb_handle_events_timeout_completed(context, &timeout, nullptr);
+    if (error != LIBUSB_SUCCESS && error != LIBUSB_ERROR_INTERRUPTED)
+      lose(ErrorCode::SystemRefused, "libusb: " + usb_error_text(error));
     if (lost) close();
   }
 

@@ -156,6 +156,27 @@ Vector3 miss_halfway(const VolumetricModel& model, const Vector3& q, Eigen::Inde
   return model.V_at(0.5 * (q + beside), t) - 0.5 * (model.V_at(q, t) + model.V_at(beside, t));
 }
 
+/// Interpolation errors halfway to the two neighbour nodes along an axis. At an end of the axis both
+/// are that of the one neighbour.
+struct Misses {
+  Vector3 before, after;
+};
+
+std::array<Misses, 3> misses_halfway(const VolumetricModel& model, const InterpolationGrid& grid,
+                                     const std::array<std::size_t, 3>& node) {
+  const GridAxes& axes = grid.axes_m;
+  const Vector3 q(axes[0][node[0]], axes[1][node[1]], axes[2][node[2]]);
+  std::array<Misses, 3> all;
+
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto k = static_cast<Eigen::Index>(a);
+    const std::size_t i = node[a], last = axes[a].size() - 1;
+    all[a].before = miss_halfway(model, q, k, axes[a][i > 0 ? i - 1 : i + 1]);
+    all[a].after = i == 0 || i == last ? all[a].before : miss_halfway(model, q, k, axes[a][i + 1]);
+  }
+  return all;
+}
+
 }  // namespace
 
 InterpolationGrid interpolation_grid(const VolumetricModel& model, std::size_t most_nodes) {
@@ -166,33 +187,32 @@ InterpolationGrid interpolation_grid(const VolumetricModel& model, std::size_t m
                                    : of_polynomials(model, most_nodes);
 }
 
-Matrix3 interpolation_moment(const VolumetricModel& model, const InterpolationGrid& grid,
-                             const std::array<std::size_t, 3>& node) {
+InterpolationError interpolation_error(const VolumetricModel& model, const InterpolationGrid& grid,
+                                       const std::array<std::size_t, 3>& node) {
   if (grid.every_node) {
-    return Matrix3::Zero();
+    return {};
   }
 
-  const GridAxes& axes = grid.axes_m;
-  const Vector3 q(axes[0][node[0]], axes[1][node[1]], axes[2][node[2]]);
-  Matrix3 squares = Matrix3::Zero();
-  Vector3 sum = Vector3::Zero();
+  constexpr double kMean = 2.0 / 3.0, kSquare = 8.0 / 15.0;
+  const bool curved = !model.linear_between_nodes();
+  InterpolationError out;
+  Vector3 larger_of_all = Vector3::Zero();
 
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto k = static_cast<Eigen::Index>(a);
-    Vector3 miss = Vector3::Zero();
-    if (node[a] > 0) {
-      miss = miss_halfway(model, q, k, axes[a][node[a] - 1]);
+  for (const Misses& miss : misses_halfway(model, grid, node)) {
+    const Vector3 larger = miss.before.norm() > miss.after.norm() ? miss.before : miss.after;
+    out.moment_m2 += (kSquare - kMean * kMean) * larger * larger.transpose();
+    larger_of_all += larger;
+    if (curved) {
+      const Vector3 half = 0.5 * (miss.after - miss.before);
+      out.mean_m += kMean * 0.5 * (miss.before + miss.after);
+      out.moment_m2 += kMean * kMean * half * half.transpose();
     }
-    if (node[a] + 1 < axes[a].size()) {
-      const Vector3 other = miss_halfway(model, q, k, axes[a][node[a] + 1]);
-      miss = other.norm() > miss.norm() ? other : miss;
-    }
-    squares += miss * miss.transpose();
-    sum += miss;
   }
 
-  constexpr double kSquare = 8.0 / 15.0, kProduct = 4.0 / 9.0;
-  return (kSquare - kProduct) * squares + kProduct * sum * sum.transpose();
+  if (!curved) {
+    out.moment_m2 += kMean * kMean * larger_of_all * larger_of_all.transpose();
+  }
+  return out;
 }
 
 }  // namespace abbe::calib

@@ -1,6 +1,7 @@
 // A model of cubic tables from the configuration to store and subscribers.
 #include <gmock/gmock.h>
 
+#include "abbe/calib/interpolation_grid.hpp"
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "config_fixture.hpp"
@@ -81,13 +82,17 @@ TEST(CubicModelMessages, StateTheErrorOfLinearInterpolation) {
                              .recording_sha256 = {},
                              .model = document_of(Interpolation::NaturalCubic).model};
   EXPECT_EQ(model_message(model, {}).basis(), "cubic");
+  const auto grid = calib::interpolation_grid(model.model, 4096);
   std::size_t nodes = 0, wider = 0;
   for (const auto& slice : grid_messages(model, {})) {
     EXPECT_FALSE(slice.every_node());
     for (const auto& node : slice.nodes()) {
       const auto& q = node.position_m();
       const auto e = model.model.error_at({q[0], q[1], q[2]}, model.model.tool_offsets_m().front());
-      EXPECT_EQ(node.error_m()[0], e.V_m.x());
+      const std::size_t of_z = grid.axes_m[2].size(), of_y = grid.axes_m[1].size();
+      const auto missed = calib::interpolation_error(
+          model.model, grid, {nodes / (of_y * of_z), nodes / of_z % of_y, nodes % of_z});
+      EXPECT_EQ(node.error_m()[0], e.V_m.x() + missed.mean_m.x());
       wider += node.cov_m2()[0] > e.cov_V_m2(0, 0) ? 1 : 0;
       ++nodes;
     }

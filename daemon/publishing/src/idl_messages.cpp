@@ -62,10 +62,11 @@ v1::GridNode grid_node(const PublishedModel& m, const calib::InterpolationGrid& 
                        const std::array<std::size_t, 3>& at, const calib::Vector3& tool_m) {
   const calib::Vector3 q_m(grid.axes_m[0][at[0]], grid.axes_m[1][at[1]], grid.axes_m[2][at[2]]);
   const auto e = error_in_either_direction(m.model, q_m, tool_m);
+  const auto missed = calib::interpolation_error(m.model, grid, at);
   v1::GridNode node;
   node.position_m(array(q_m));
-  node.error_m(array(e.V_m));
-  node.cov_m2(upper_triangle(e.cov_V_m2 + calib::interpolation_moment(m.model, grid, at)));
+  node.error_m(array(e.V_m + missed.mean_m));
+  node.cov_m2(upper_triangle(e.cov_V_m2 + missed.moment_m2));
   node.inside(e.inside);
   return node;
 }

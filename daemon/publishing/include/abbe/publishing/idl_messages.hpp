@@ -38,9 +38,9 @@ struct Stamp {
                                             const Stamp&);
 [[nodiscard]] v1::ErrorModel model_message(const PublishedModel&, const Stamp&);
 /// The volumetric error V at the nodes of calib::interpolation_grid(), of which there are at most
-/// 4096, in slices of the size that the IDL allows. If the grid has fewer nodes than the model
-/// (every_node is false), cov_m2 includes the error of the linear interpolation. Of a model with
-/// backlash V and cov_m2 are those of compensation_message().
+/// 4096, in slices of the size that the IDL allows. If every_node is false, V and cov_m2 include
+/// calib::interpolation_error(). Of a model with backlash V and cov_m2 are those of
+/// compensation_message().
 [[nodiscard]] std::vector<v1::ErrorGrid> grid_messages(const PublishedModel&, const Stamp&);
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
                                            const PublishedModel*, std::chrono::nanoseconds validity,

@@ -4,17 +4,23 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <memory>
+#include <utility>
 
 #include "abbe/sim/mfb/reversal.hpp"
 #include "bar_options.hpp"
+#include "clamping_loop.hpp"
 #include "commands.hpp"
+#include "setup_file.hpp"
 #include "toml_section.hpp"
 
 namespace abbe::sim {
 namespace {
 
 struct ReversalCommandOptions : BarOptions {
+  SetupChoices choices;  ///< with a [sim] table the measuring machine is simulated, too
+  std::string ports_file;
   std::size_t repeats = 5;
   double shape_scatter_um = 0.3;
   std::vector<double> gauge_beside_mm{0.0, 0.0};
@@ -34,34 +40,136 @@ void without_errors(mfb::StepGauge& gauge) {
   gauge.u_m = gauge.u_per_m = gauge.u_alpha_per_K = gauge.u_temperature_K = 0.0;
 }
 
-int run(const ReversalCommandOptions& options) {
-  auto stated = probing_of(options);
-  if (!stated) return report(stated.error());
-  stated->shape_scatter_m = options.shape_scatter_um * kMicro;
-  const mfb::TrueBar bar = bar_of(options);
-  const TruthMachine machine =
-      mfb::measuring_machine(options.mean_error_um * kMicro, options.length_m(), options.seed);
-  const mfb::StepGauge gauge = gauge_of(options);
-  mfb::ReversalOptions applied{options.repeats, simulated(*stated, options), gauge};
-  if (options.exact) without_errors(applied.gauge);
-  const auto found = mfb::run_reversal(machine, bar, applied);
-  if (!found) return report(as_usage(found.error()));
+/// The bar and the machine that calibrates it.
+struct Reversal {
+  mfb::ProbingOptions stated;
+  mfb::TrueBar bar;
+  TruthMachine machine;
+  mfb::StepGauge gauge;          ///< as gauge.toml states it
+  mfb::ReversalOptions applied;  ///< as it is simulated
+};
 
+Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
+  auto stated = probing_of(options);
+  if (!stated) return tl::unexpected(stated.error());
+  stated->shape_scatter_m = options.shape_scatter_um * kMicro;
+  Reversal out{
+      *stated,
+      bar_of(options),
+      mfb::measuring_machine(options.mean_error_um * kMicro, options.length_m(), options.seed),
+      gauge_of(options),
+      {.repeats = options.repeats, .probing = simulated(*stated, options)}};
+  out.applied.gauge = out.gauge;
+  if (options.exact) without_errors(out.applied.gauge);
+  return out;
+}
+
+/// The files of `abbe identify bar` and `abbe calibrate bar`. `points`: a file more, or none.
+Result<void> write_files(const ReversalCommandOptions& options, const Reversal& reversal,
+                         const mfb::ReversalRun& run, std::vector<NamedText> points) {
   constexpr double kTolerance_um = 50.0;  // of the maker
+  const mfb::TrueBar& bar = reversal.bar;
   mfb::StatedBar nominal =
       mfb::nominal_bar(bar.pattern, Eigen::Vector3d::Constant(kTolerance_um * kMicro));
-  set_properties(nominal, *stated);
-  const auto written = write_folder(
-      options.folder,
-      {{"nominal.toml", mfb::format_bar_toml(nominal)},
-       {"plan.toml", mfb::format_plan_toml(found->plan, found->probed, *stated)},
-       {"points.csv", mfb::format_points_csv(found->plan, found->probed)},
-       {"gauge.toml", mfb::format_gauge_toml(*found, gauge)},
-       {"truebar.csv", mfb::format_points_of_interest_csv(mfb::points_of_interest_m(bar))}});
+  set_properties(nominal, reversal.stated);
+  std::vector<NamedText> files = std::move(points);
+  files.push_back({"nominal.toml", mfb::format_bar_toml(nominal)});
+  files.push_back({"plan.toml", mfb::format_plan_toml(run.plan, run.probed, reversal.stated)});
+  files.push_back(
+      {"gauge.toml", mfb::format_gauge_toml(run, reversal.gauge, reversal.applied.tool_offset_m)});
+  files.push_back(
+      {"truebar.csv", mfb::format_points_of_interest_csv(mfb::points_of_interest_m(bar))});
+  return write_folder(options.folder, files);
+}
+
+int run_offline(const ReversalCommandOptions& options, const Reversal& reversal) {
+  const auto found = mfb::run_reversal(reversal.machine, reversal.bar, reversal.applied);
+  if (!found) return report(as_usage(found.error()));
+  const auto written =
+      write_files(options, reversal, *found,
+                  {{"points.csv", mfb::format_points_csv(found->plan, found->probed)}});
   if (!written) return report(written.error());
   fmt::print("{} touches in {} normal and {} reversed passes; files in {}\n",
              found->probed.touches.size(), options.repeats, options.repeats, options.folder);
   return kDone;
+}
+
+/// Faces of the gauge that are touched in the direction of X.
+std::vector<Face> faces_of_gauge(const Reversal& reversal) {
+  constexpr double kHalfSize_m = 4e-3;
+  std::vector<Face> faces;
+  for (const Eigen::Vector3d& tip_m :
+       mfb::gauge_faces_m(reversal.machine, reversal.bar.pattern.length_m(), reversal.applied)) {
+    const double radius_m = reversal.applied.probing.probe.tip_radius_m;
+    faces.push_back(
+        {tip_m + radius_m * Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitX(), kHalfSize_m});
+  }
+  return faces;
+}
+
+/// The measuring machine over I++ DME: one clamping of the bar after the other, then the gauge.
+int run_live(const ReversalCommandOptions& options, Reversal reversal) {
+  auto setup = load_setup(options.choices);
+  if (!setup) return report(setup.error());
+  SimulationSetup& simulation = setup->simulation;
+  if (!simulation.measuring_machine)
+    return report({ErrorCode::BadInput,
+                   "the machine file has no [cmm], the measuring machine over I++ DME: add it"});
+
+  reversal.applied.tool_offset_m.setZero();  // the machine reports the centre of the tip
+  const mfb::ProbingOptions& probing = reversal.applied.probing;
+  MeasuringMachine machine = simulation.measuring_machine->machine;
+  machine.truth = reversal.machine;
+  machine.tip_radius_m = probing.probe.tip_radius_m;
+  machine.noise_m = std::hypot(probing.probe.noise_m, probing.machine_noise_m);
+  machine.seed = options.seed;
+
+  mfb::ReversalRun run;
+  run.plan = mfb::reversal_plan(reversal.machine, reversal.applied);
+  std::vector<OnTable> things;
+  for (std::size_t m = 0; m < run.plan.size(); ++m) {
+    machine.bar = mfb::clamped(reversal.bar, run.plan, m, probing);
+    run.probed.temperature_C.push_back(machine.bar->stated_C);
+    things.push_back({run.plan[m].name, machine});
+  }
+  machine.bar.reset();
+  machine.faces = faces_of_gauge(reversal);
+  things.push_back({"step gauge", machine});
+  run.distances_m = mfb::gauge_distances_m(reversal.bar.pattern.length_m(), reversal.applied.gauge);
+  run.gauge_origin_m = mfb::gauge_origin_m(reversal.machine, reversal.applied);
+
+  if (const auto written = write_files(options, reversal, run, {}); !written)
+    return report(written.error());
+  simulation.truth = reversal.machine;
+  simulation.path.vertices = {PathVertex{}};
+  simulation.held = true;
+  return run_clamping(std::move(simulation), things,
+                      {.ports_file = options.ports_file, .speed = setup->speed});
+}
+
+int run(const ReversalCommandOptions& options) {
+  const auto reversal = reversal_of(options);
+  if (!reversal) return report(reversal.error());
+  return options.choices.config_file.empty() ? run_offline(options, *reversal)
+                                             : run_live(options, *reversal);
+}
+
+void add_live(CLI::App& sub, ReversalCommandOptions& o) {
+  o.choices.needs_path = false;
+  auto* config = sub.add_option(
+      "--config", o.choices.config_file,
+      "TOML file with a [sim] table: after the files are written, a measuring machine with the\n"
+      "bar as clamped for the first pass, over I++ DME as its machine file states in [cmm], on\n"
+      "127.0.0.1 until SIGINT or SIGTERM; SIGUSR1 clamps it for the next pass, at last the step\n"
+      "gauge; then `abbe calibrate bar`. gauge.toml has no readings, and there is no points.csv");
+  config->type_name("FILE");
+  sub.add_option("--speed", o.choices.speed,
+                 "simulated seconds per second; the daemon must be given the same")
+      ->check(CLI::Range(1e-3, 1e4))
+      ->needs(config);
+  sub.add_option("--ports-file", o.ports_file, "written when the machine listens: cmm_port=N")
+      ->type_name("FILE")
+      ->needs(config);
 }
 
 void add_reversal(CLI::App& sub, ReversalCommandOptions& o) {
@@ -103,6 +211,7 @@ Subcommand add_bar(CLI::App& app) {
       "With the same --bar-seed it is the bar of `abbe-sim mfb`");
   add_bar_options(*sub, *options);
   add_reversal(*sub, *options);
+  add_live(*sub, *options);
 
   return {sub, [options] { return run(*options); }};
 }

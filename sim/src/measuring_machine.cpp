@@ -36,6 +36,8 @@ double clearance_m(const MeasuringMachine& machine, const Eigen::Vector3d& q_m) 
     nearest = std::min(nearest, (tip_m - s.centre_m).norm() - s.radius_m - machine.tip_radius_m);
   for (const Face& f : machine.faces)
     nearest = std::min(nearest, distance_m(f, tip_m) - machine.tip_radius_m);
+  if (machine.bar)
+    nearest = std::min(nearest, mfb::clearance_m(*machine.bar, tip_m, machine.tip_radius_m));
   return nearest;
 }
 

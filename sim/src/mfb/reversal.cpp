@@ -18,64 +18,43 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kBeside_m = 0.05;  // travel of the machine beyond the bar, at both ends
-const Vector3d kTool_m(0.0, 0.0, -0.15);
 // The bar and the gauge lie in the middle of the travel of Y and Z.
 constexpr double kMiddle = 0.5;
 
-Vector3d bar_origin_m(const TruthMachine& machine) {
+Vector3d bar_origin_m(const TruthMachine& machine, const ReversalOptions& options) {
   const auto middle = [&](Axis axis) {
     const AxisRange& r = machine.axis(axis).range;
     return r.min_m + kMiddle * (r.max_m - r.min_m);
   };
-  return Vector3d(kBeside_m, middle(Axis::Y), middle(Axis::Z)) + kTool_m;
+  return Vector3d(kBeside_m, middle(Axis::Y), middle(Axis::Z)) + options.tool_offset_m;
 }
 
-std::vector<Measurement> reversal_plan(const TruthMachine& machine, std::size_t repeats) {
-  std::vector<Measurement> plan;
-  for (std::size_t repeat = 1; repeat <= repeats; ++repeat) {
-    for (const bool reversed : {false, true}) {
-      const std::string name = fmt::format("{}{}", reversed ? 'R' : 'N', repeat);
-      plan.push_back({.name = name,
-                      .position = name,
-                      .origin_m = bar_origin_m(machine),
-                      .bar_x = Vector3d::UnitX(),
-                      .bar_z = (reversed ? -1.0 : 1.0) * Vector3d::UnitZ(),
-                      .tool_offset_m = kTool_m,
-                      .probed = reversed ? Probed::FromBelow : Probed::FromAbove});
-    }
+/// Random numbers of the gauge: of face i from i (runs + 1) on, of the whole gauge beyond.
+struct GaugeDraw {
+  const ReversalOptions& options;
+  [[nodiscard]] double number(std::uint64_t n) const {
+    return gaussian(options.probing.seed, NoiseStream::StepGauge, n);
   }
-  return plan;
-}
+  [[nodiscard]] std::uint64_t first_of(std::size_t face) const {
+    return face * (options.gauge.runs + 1);
+  }
+};
 
 /// Touches the faces of the gauge, run after run.
 void measure_gauge(TruthMachine machine, double length_m, const ReversalOptions& options,
                    ReversalRun& run) {
-  constexpr std::uint64_t kOfGauge = 1000000;  // numbers below: of the faces and runs
-  const StepGauge& gauge = options.gauge;
-  const auto draw = [&](std::uint64_t n) {
-    return gaussian(options.probing.seed, NoiseStream::StepGauge, n);
-  };
+  const GaugeDraw draw{options};
+  const double noise_m = std::hypot(options.probing.machine_noise_m, options.probing.probe.noise_m);
+  const std::vector<Vector3d> faces_m = gauge_faces_m(machine, length_m, options);
+  machine.target_offset_m = options.tool_offset_m;
+  run.gauge_origin_m = gauge_origin_m(machine, options);
+  run.distances_m = gauge_distances_m(length_m, options.gauge);
 
-  machine.target_offset_m = kTool_m;
-  run.gauge_origin_m =
-      bar_origin_m(machine) + gauge.beside_bar_m - gauge.step_m * Vector3d::UnitX();
-  const double slope = gauge.u_per_m * draw(kOfGauge);
-  const double alpha_per_K = gauge.alpha_per_K + gauge.u_alpha_per_K * draw(kOfGauge + 1);
-  const double true_C = gauge.temperature_C + gauge.u_temperature_K * draw(kOfGauge + 2);
-
-  const auto steps = static_cast<std::size_t>(std::lround(length_m / gauge.step_m)) + 2;
-  for (std::size_t i = 0; i <= steps; ++i) {
-    const double stated_m = static_cast<double>(i) * gauge.step_m;
-    const std::uint64_t first = i * (gauge.runs + 1);
-    const double off_m = i == 0 ? 0.0 : gauge.u_m * draw(first) + slope * stated_m;
-    const double true_m = (stated_m + off_m) * (1.0 + alpha_per_K * (true_C - kReference_C));
-    const Vector3d face_m = run.gauge_origin_m + true_m * Vector3d::UnitX();
-    run.distances_m.push_back(stated_m);
+  for (std::size_t i = 0; i < faces_m.size(); ++i) {
     auto& readings_m = run.readings_m.emplace_back();
-    const double noise_m =
-        std::hypot(options.probing.machine_noise_m, options.probing.probe.noise_m);
-    for (std::size_t r = 0; r < gauge.runs; ++r)
-      readings_m.push_back(reading_at_m(machine, face_m).x() + noise_m * draw(first + 1 + r));
+    for (std::size_t r = 0; r < options.gauge.runs; ++r)
+      readings_m.push_back(reading_at_m(machine, faces_m[i]).x() +
+                           noise_m * draw.number(draw.first_of(i) + 1 + r));
   }
 }
 
@@ -92,10 +71,61 @@ TruthMachine measuring_machine(double mean_error_m, double bar_length_m, std::ui
                                 .shape = Shape::Cubic});
 }
 
+std::vector<Measurement> reversal_plan(const TruthMachine& machine,
+                                       const ReversalOptions& options) {
+  std::vector<Measurement> plan;
+  for (std::size_t repeat = 1; repeat <= options.repeats; ++repeat) {
+    for (const bool reversed : {false, true}) {
+      const std::string name = fmt::format("{}{}", reversed ? 'R' : 'N', repeat);
+      plan.push_back({.name = name,
+                      .position = name,
+                      .origin_m = bar_origin_m(machine, options),
+                      .bar_x = Vector3d::UnitX(),
+                      .bar_z = (reversed ? -1.0 : 1.0) * Vector3d::UnitZ(),
+                      .tool_offset_m = options.tool_offset_m,
+                      .probed = reversed ? Probed::FromBelow : Probed::FromAbove});
+    }
+  }
+  return plan;
+}
+
+Vector3d gauge_origin_m(const TruthMachine& machine, const ReversalOptions& options) {
+  return bar_origin_m(machine, options) + options.gauge.beside_bar_m -
+         options.gauge.step_m * Vector3d::UnitX();
+}
+
+std::vector<double> gauge_distances_m(double bar_length_m, const StepGauge& gauge) {
+  const auto steps = static_cast<std::size_t>(std::lround(bar_length_m / gauge.step_m)) + 2;
+  std::vector<double> distances_m;
+  for (std::size_t i = 0; i <= steps; ++i)
+    distances_m.push_back(static_cast<double>(i) * gauge.step_m);
+  return distances_m;
+}
+
+std::vector<Vector3d> gauge_faces_m(const TruthMachine& machine, double bar_length_m,
+                                    const ReversalOptions& options) {
+  constexpr std::uint64_t kOfGauge = 1000000;
+  const StepGauge& gauge = options.gauge;
+  const GaugeDraw draw{options};
+  const double slope = gauge.u_per_m * draw.number(kOfGauge);
+  const double alpha_per_K = gauge.alpha_per_K + gauge.u_alpha_per_K * draw.number(kOfGauge + 1);
+  const double true_C = gauge.temperature_C + gauge.u_temperature_K * draw.number(kOfGauge + 2);
+
+  std::vector<Vector3d> faces_m;
+  for (const double stated_m : gauge_distances_m(bar_length_m, gauge)) {
+    const std::size_t i = faces_m.size();
+    const double off_m =
+        i == 0 ? 0.0 : gauge.u_m * draw.number(draw.first_of(i)) + slope * stated_m;
+    const double true_m = (stated_m + off_m) * (1.0 + alpha_per_K * (true_C - kReference_C));
+    faces_m.emplace_back(gauge_origin_m(machine, options) + true_m * Vector3d::UnitX());
+  }
+  return faces_m;
+}
+
 Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar,
                                  const ReversalOptions& options) {
   ReversalRun run;
-  run.plan = reversal_plan(machine, options.repeats);
+  run.plan = reversal_plan(machine, options);
   auto probed = probe_bar(machine, bar, run.plan, options.probing);
   if (!probed) return tl::unexpected(probed.error());
   run.probed = *std::move(probed);
@@ -103,7 +133,8 @@ Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar
   return run;
 }
 
-std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge) {
+std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge,
+                              const Vector3d& tool_offset_m) {
   const auto vector_mm = [](const Vector3d& v_m) {
     return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", kMmPerM * v_m.x(), kMmPerM * v_m.y(),
                        kMmPerM * v_m.z());
@@ -115,14 +146,16 @@ std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge) {
       "origin_mm = {}\ntool_offset_mm = {}\nu_rotation_urad = {:.17g}\n",
       gauge.name, kUmPerM * gauge.u_m, kUmPerM * gauge.u_per_m, kUmPerM * gauge.alpha_per_K,
       kUmPerM * gauge.u_alpha_per_K, gauge.temperature_C, gauge.u_temperature_K,
-      vector_mm(run.gauge_origin_m), vector_mm(kTool_m), kUmPerM * gauge.u_rotation_rad);
+      vector_mm(run.gauge_origin_m), vector_mm(tool_offset_m), kUmPerM * gauge.u_rotation_rad);
 
   for (std::size_t i = 0; i < run.distances_m.size(); ++i) {
+    fmt::format_to(std::back_inserter(text), "\n[[step]]\ndistance_mm = {:.17g}\n",
+                   kMmPerM * run.distances_m[i]);
+    if (run.readings_m.empty()) continue;
     std::vector<double> readings_mm;
     for (const double r_m : run.readings_m[i]) readings_mm.push_back(kMmPerM * r_m);
-    fmt::format_to(std::back_inserter(text),
-                   "\n[[step]]\ndistance_mm = {:.17g}\nreadings_mm = [{:.17g}]\n",
-                   kMmPerM * run.distances_m[i], fmt::join(readings_mm, ", "));
+    fmt::format_to(std::back_inserter(text), "readings_mm = [{:.17g}]\n",
+                   fmt::join(readings_mm, ", "));
   }
   return text;
 }

@@ -62,6 +62,8 @@ class IppDmeDevice {
   [[nodiscard]] bool accepts() const { return true; }
 
   void inject(const Fault& fault, HostTime now);
+  /// The operator puts something else on the table.
+  void put_on_table(const MeasuringMachine& machine) { options_.machine = machine; }
 
   /// Presses the emergency stop: the motion ends and an unsolicited error is sent. Errors cannot be
   /// cleared before the button is released at `pulled_out_at`.

@@ -1,5 +1,5 @@
 #pragma once
-/// A measuring machine with known geometric errors, and the spheres and block faces on its table:
+/// A measuring machine with known geometric errors, and the spheres, block faces and the bar on its table:
 /// computes the scale reading of a touch. The tip contacts the true surface; the machine reports
 /// its scale readings at contact. SI, machine coordinates. Pure functions over plain options; safe
 /// to call from any thread.
@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "abbe/sim/mfb/clamped_bar.hpp"
 #include "abbe/sim/truth_machine.hpp"
 
 namespace abbe::sim {
@@ -29,6 +30,7 @@ struct MeasuringMachine {
   TruthMachine truth;
   std::vector<Sphere> spheres;
   std::vector<Face> faces;
+  std::optional<mfb::ClampedBar> bar;
   double tip_radius_m = 2e-3;
   double approach_m = 2e-3;  ///< probing begins this far before the nominal point
   double search_m = 5e-3;    ///< probing ends this far behind the nominal point

@@ -77,6 +77,7 @@ class Simulation {
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
   [[nodiscard]] std::deque<UsbipServer>& counter_cards() { return counter_cards_; }
+  [[nodiscard]] std::optional<IppDmeServer>& measuring_machine() { return measuring_machine_; }
   [[nodiscard]] const std::optional<IppDmeServer>& measuring_machine() const {
     return measuring_machine_;
   }

@@ -22,6 +22,7 @@ struct StepGauge {
 
 struct ReversalOptions {
   std::size_t repeats = 5;  ///< normal and reversed passes, each with a clamping of its own
+  Eigen::Vector3d tool_offset_m{0.0, 0.0, -0.15};  ///< tool reference point to tip
   ProbingOptions probing;
   StepGauge gauge;
 };
@@ -38,9 +39,25 @@ struct ReversalRun {
 [[nodiscard]] TruthMachine measuring_machine(double mean_error_m, double bar_length_m,
                                              std::uint64_t seed);
 
+/// The passes without their touches: the bar in the middle of the travel of Y and Z.
+[[nodiscard]] std::vector<Measurement> reversal_plan(const TruthMachine& machine,
+                                                     const ReversalOptions& options);
+
+/// Distances of the faces from the first one, as the certificate states them.
+[[nodiscard]] std::vector<double> gauge_distances_m(double bar_length_m, const StepGauge& gauge);
+/// Centre of the tip at the first face.
+[[nodiscard]] Eigen::Vector3d gauge_origin_m(const TruthMachine& machine,
+                                             const ReversalOptions& options);
+/// Centre of the tip at each face of the gauge as it is.
+[[nodiscard]] std::vector<Eigen::Vector3d> gauge_faces_m(const TruthMachine& machine,
+                                                         double bar_length_m,
+                                                         const ReversalOptions& options);
+
 [[nodiscard]] Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar,
                                                const ReversalOptions& options);
 
-[[nodiscard]] std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge);
+/// Without readings in `run` the text has none.
+[[nodiscard]] std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge,
+                                            const Eigen::Vector3d& tool_offset_m);
 
 }  // namespace abbe::sim::mfb

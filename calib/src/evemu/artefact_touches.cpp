@@ -110,7 +110,7 @@ class Planner {
       }
 
       planned_.push_back(
-          {Feature::Ball, ball.number, std::move(way), ball.centre_m + reach(ball) * n, n});
+          {{std::move(way), ball.centre_m + reach(ball) * n, n}, Feature::Ball, ball.number});
       before = n;
       here_ = outer;
     }
@@ -123,7 +123,7 @@ class Planner {
       const Vector3 at = place + nominal_.tip_radius_m * n;
       const Vector3 outer = at + options_.clearance_m * n;
       auto way = std::exchange(first, false) ? over_to(outer) : std::vector<Vector3>{here_, outer};
-      planned_.push_back({Feature::Block, block.number, std::move(way), at, n});
+      planned_.push_back({{std::move(way), at, n}, Feature::Block, block.number});
       here_ = outer;
     }
   }

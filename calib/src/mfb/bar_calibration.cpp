@@ -322,4 +322,20 @@ Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
   return found;
 }
 
+Result<void> check_pass(const Bar& nominal, const Plan& plan, std::size_t measurement,
+                        const PassTouches& touches, const ObserveLimits& limits) {
+  const Result<MfbMachine> machine = machine_without_limits();
+  if (!machine) {
+    return tl::unexpected(machine.error());
+  }
+  Plan alone = plan;
+  alone.measurements = {plan.measurements[measurement]};
+  const Result<Observations> observed =
+      observe(nominal, alone, std::span(&touches, 1), *machine, limits);
+  if (!observed) {
+    return tl::unexpected(observed.error());
+  }
+  return {};
+}
+
 }  // namespace abbe::calib::mfb

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "abbe/calib/evemu/artefact.hpp"
+#include "abbe/calib/machine_touches.hpp"
 
 namespace abbe::calib::evemu {
 
@@ -26,12 +27,9 @@ struct ArtefactTouchOptions {
   double clearance_m = 5e-3;  ///< from a face before contact, and above all features in travel
 };
 
-struct PlannedTouch {
+struct PlannedTouch : MachineTouch {
   Feature feature = Feature::Ball;
   int number = 0;
-  std::vector<Vector3> way_m;      ///< path of the tip's centre, as corner points
-  Vector3 at_m = Vector3::Zero();  ///< centre of the tip in contact
-  Vector3 normal = Vector3::UnitZ();
 };
 
 struct ArtefactPlan {

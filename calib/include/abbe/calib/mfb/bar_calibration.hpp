@@ -71,4 +71,10 @@ struct BarCalibration {
                                                    const StepGauge& gauge,
                                                    const ObserveLimits& limits = {});
 
+/// Whether the touches of one pass show the bar as planned: the errors of observe(), for a bar that
+/// lies turned, another bar, a wrong feature or too few touches. `touches`: of that measurement.
+[[nodiscard]] Result<void> check_pass(const Bar& nominal, const Plan& plan, std::size_t measurement,
+                                      const PassTouches& touches,
+                                      const ObserveLimits& limits = {});
+
 }  // namespace abbe::calib::mfb

@@ -65,6 +65,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "calibrate evemu",
                                     "calibrate probe",
                                     "calibrate artefact",
+                                    "calibrate bar",
                                     "plan",
                                     "plan otf",
                                     "plan mfb",

@@ -18,9 +18,9 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/tables/evemu_files.hpp"
-#include "artefact_touching.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
+#include "machine_touching.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -66,6 +66,27 @@ Result<Placed> placed(const CalibrateArtefactArguments& arguments) {
                     file->faces[i]->half_size_m};
   }
 
+  return out;
+}
+
+/// The touches that were made; `reason` is empty if the whole plan was executed.
+struct Touched {
+  std::vector<evemu::Touch> touches;
+  double u_position_m = 0.0;
+  std::string reason;
+};
+
+Result<Touched> touch_artefact(const std::filesystem::path& socket,
+                               const evemu::ArtefactPlan& plan) {
+  const auto made =
+      make_touches(socket, {{plan.touches.begin(), plan.touches.end()}, plan.leave_m});
+  if (!made) return tl::unexpected(made.error());
+  Touched out{{}, made->u_position_m, made->reason};
+  for (std::size_t i = 0; i < made->places_m.size(); ++i)
+    out.touches.push_back({.position = 1,
+                           .feature = plan.touches[i].feature,
+                           .number = plan.touches[i].number,
+                           .p_m = made->places_m[i]});
   return out;
 }
 

@@ -25,6 +25,7 @@ void add_machine(CLI::App& parent, int& exit);
 void add_tracker(CLI::App& parent, int& exit);
 void add_calibrate_probe(CLI::App& parent, int& exit);
 void add_calibrate_artefact(CLI::App& parent, int& exit);
+void add_calibrate_bar(CLI::App& parent, int& exit);
 void add_replay(CLI::App& parent, int& exit);
 void add_verify(CLI::App& parent, int& exit);
 void add_example(CLI::App& parent, int& exit);

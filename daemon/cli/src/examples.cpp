@@ -23,6 +23,7 @@ constexpr std::array kExamples{
     Example{"calibrate evemu", "--calibrator calibrator.toml"},
     Example{"calibrate probe", "--recording run.mcap"},
     Example{"calibrate artefact", "--calibrator nominal.toml --at 100,50,20 -o calibrator.toml"},
+    Example{"calibrate bar", "--bar nominal.toml --plan plan.toml --gauge gauge.toml -o bar.toml"},
     Example{"plan", "otf --machine machine.toml --tracker-at=-750,-620,-350 -o plan"},
     Example{"plan otf",
             "-c abbed.toml --tracker-at=-750,-620,-350 --tracker-at=900,-600,-300\n"

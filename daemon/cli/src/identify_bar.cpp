@@ -15,15 +15,11 @@
 #include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
+#include "identify_bar.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-struct IdentifyBarArguments {
-  std::string bar, plan, points, gauge, out;
-  bool json = false;
-};
 
 struct BarOnMachine {
   calib::mfb::BarCalibration calibration;
@@ -132,7 +128,9 @@ void print_summary(const BarOnMachine& found, const std::string& out) {
   fmt::print("written {}\n", out);
 }
 
-int run(const IdentifyBarArguments& arguments) {
+}  // namespace
+
+int identify_bar(const IdentifyBarArguments& arguments) {
   const auto found = calibrated_bar(arguments);
   if (!found) return report(found.error());
   if (const auto written =
@@ -145,8 +143,6 @@ int run(const IdentifyBarArguments& arguments) {
     print_summary(*found, arguments.out);
   return 0;
 }
-
-}  // namespace
 
 void add_identify_bar(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<IdentifyBarArguments>();
@@ -176,7 +172,7 @@ void add_identify_bar(CLI::App& parent, int& exit) {
       ->required();
   command->add_flag("--json", arguments->json, "print the summary as one JSON object");
   command->add_option("-o,--out", arguments->out, "file to write: bar.toml")->required();
-  command->callback([arguments, &exit] { exit = run(*arguments); });
+  command->callback([arguments, &exit] { exit = identify_bar(*arguments); });
 }
 
 }  // namespace abbe::daemon

@@ -75,6 +75,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_calibrate_mfb(*calibrate, exit);
   add_calibrate_probe(*calibrate, exit);
   add_calibrate_artefact(*calibrate, exit);
+  add_calibrate_bar(*calibrate, exit);
   auto* plan = app.add_subcommand("plan", "Plan a calibration before the machine moves");
   plan->require_subcommand(1);
   add_plan_otf(*plan, exit);

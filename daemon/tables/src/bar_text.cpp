@@ -1,4 +1,4 @@
-// Writes bar.toml.
+// Writes bar.toml and gauge.toml.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -72,6 +72,26 @@ std::string bar_toml(const calib::mfb::Bar& bar, std::string_view comment) {
     fmt::format_to(out, "\n[[point]]\nhole = {}\nx_mm = {:.17g}\ny_mm = {:.17g}\nz_mm = {:.17g}\n",
                    i + 1, mm.x(), mm.y(), mm.z());
   }
+  return text;
+}
+
+std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comment) {
+  std::string text = fmt::format(
+      "{}[gauge]\nname = {}\norigin_mm = {}\ntool_offset_mm = {}\nu_um = {:.15g}\n"
+      "u_um_per_m = {:.15g}\ntemperature_C = {:.15g}\nu_temperature_K = {:.15g}\n",
+      comment, nlohmann::json(gauge.name).dump(), toml_list(gauge.origin_m, kMmPerM),
+      toml_list(gauge.tool_offset_m, kMmPerM), kUmPerM * gauge.u_m, kUmPerM * gauge.u_per_m,
+      gauge.temperature_K - kZeroCelsius_K, gauge.u_temperature_K);
+  const auto out = std::back_inserter(text);
+  if (gauge.expansion)
+    fmt::format_to(out, "alpha_um_per_m_K = {:.15g}\nu_alpha_um_per_m_K = {:.15g}\n",
+                   kUmPerM * gauge.expansion->alpha_per_K,
+                   kUmPerM * gauge.expansion->u_alpha_per_K);
+  if (gauge.u_rotation_rad)
+    fmt::format_to(out, "u_rotation_urad = {:.15g}\n", kUmPerM * *gauge.u_rotation_rad);
+  for (const calib::mfb::GaugeFace& face : gauge.faces)
+    fmt::format_to(out, "\n[[step]]\ndistance_mm = {:.15g}\nreadings_mm = {}\n",
+                   kMmPerM * face.distance_m, toml_list(face.readings_m, kMmPerM));
   return text;
 }
 

@@ -15,6 +15,8 @@ namespace {
 using calib::mfb::GaugeFace;
 using calib::mfb::StepGauge;
 
+enum class GaugeReadings { Required, AllOrNone };
+
 void read_gauge_head(Section head, StepGauge& out) {
   if (!head.present()) return;
   head.get("name", out.name, Need::Required);
@@ -36,15 +38,20 @@ void read_gauge_head(Section head, StepGauge& out) {
 }
 
 /// Distances ascend from 0; every face has the same number of readings.
-void read_faces(Section& root, StepGauge& out) {
+void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
+  const bool required = readings == GaugeReadings::Required;
   for (Section& step : root.children("step")) {
     GaugeFace face;
     const bool placed =
         step.get("distance_mm", face.distance_m, kMilli, kNotNegative, Need::Required);
-    const bool measured = step.get("readings_mm", face.readings_m, kMilli, Need::Required);
+    const bool measured = step.get("readings_mm", face.readings_m, kMilli,
+                                   required ? Need::Required : Need::Optional);
+    const bool first = out.faces.empty();
+    if (!required && !first && measured == out.faces.front().readings_m.empty())
+      step.fault("readings_mm", measured ? "the first [[step]] has none: all have them or none"
+                                         : "is missing: all have them or none");
     step.close();
 
-    const bool first = out.faces.empty();
     if (placed && first && face.distance_m != 0.0)
       step.fault("distance_mm",
                  fmt::format("{:g}: distances are from the first face, which is at 0",
@@ -55,7 +62,8 @@ void read_faces(Section& root, StepGauge& out) {
                              kMmPerM * out.faces.back().distance_m));
     if (measured && face.readings_m.empty())
       step.fault("readings_mm", "is empty: needs the reading of one or more runs");
-    if (measured && !first && face.readings_m.size() != out.faces.front().readings_m.size())
+    if (measured && !first && !out.faces.front().readings_m.empty() &&
+        face.readings_m.size() != out.faces.front().readings_m.size())
       step.fault("readings_mm",
                  fmt::format("{} readings, the first face has {}: one per run",
                              face.readings_m.size(), out.faces.front().readings_m.size()));
@@ -64,19 +72,27 @@ void read_faces(Section& root, StepGauge& out) {
   if (out.faces.size() < 2) root.fault("step", "needs at least two [[step]]");
 }
 
-}  // namespace
-
-Result<GaugeFile> read_gauge_toml(const std::filesystem::path& file) {
+Result<GaugeFile> read_gauge(const std::filesystem::path& file, GaugeReadings readings) {
   const auto parsed = parse_toml_file(file);
   if (!parsed) return tl::make_unexpected(parsed.error());
   Faults faults(file.string());
   Section root(&parsed->table, "", {1, 1}, faults);
   GaugeFile out{parsed->source, {}};
   read_gauge_head(root.child("gauge", Need::Required), out.gauge);
-  read_faces(root, out.gauge);
+  read_faces(root, readings, out.gauge);
   root.close();
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return out;
+}
+
+}  // namespace
+
+Result<GaugeFile> read_gauge_toml(const std::filesystem::path& file) {
+  return read_gauge(file, GaugeReadings::Required);
+}
+
+Result<GaugeFile> read_gauge_to_measure(const std::filesystem::path& file) {
+  return read_gauge(file, GaugeReadings::AllOrNone);
 }
 
 }  // namespace abbe::daemon

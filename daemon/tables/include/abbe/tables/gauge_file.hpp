@@ -23,6 +23,12 @@ struct GaugeFile {
   calib::mfb::StepGauge gauge;
 };
 [[nodiscard]] Result<GaugeFile> read_gauge_toml(const std::filesystem::path& file);
+/// The same of a gauge that is perhaps not yet measured: all [[step]] have readings_mm, or none.
+[[nodiscard]] Result<GaugeFile> read_gauge_to_measure(const std::filesystem::path& file);
+
+/// The text of a gauge.toml with the readings of `gauge`. It begins with `comment`, each line of
+/// which begins with #.
+[[nodiscard]] std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comment);
 
 /// The text of a bar.toml with the covariance of all points. It begins with `comment`, each line of
 /// which begins with #.

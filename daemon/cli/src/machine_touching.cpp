@@ -1,4 +1,4 @@
-#include "artefact_touching.hpp"
+#include "machine_touching.hpp"
 
 #include <array>
 #include <chrono>
@@ -14,7 +14,6 @@
 namespace abbe::daemon {
 namespace {
 
-namespace evemu = calib::evemu;
 using namespace std::chrono_literals;
 using nlohmann::json;
 using std::chrono::steady_clock;
@@ -27,7 +26,7 @@ json as_json(const std::vector<calib::Vector3>& path) {
   return positions;
 }
 
-json as_json(const evemu::ArtefactPlan& plan) {
+json as_json(const calib::MachineTouches& plan) {
   json points = json::array();
   for (const auto& touch : plan.touches) {
     points.push_back({{"way", as_json(touch.way_m)},
@@ -37,16 +36,12 @@ json as_json(const evemu::ArtefactPlan& plan) {
   return {{"do", "touch"}, {"points", std::move(points)}, {"leave", as_json(plan.leave_m)}};
 }
 
-Touched touched(const json& answer, const evemu::ArtefactPlan& plan) {
-  Touched out{{}, 0.0, answer["reason"]};
+TouchesMade made_of(const json& answer, std::size_t asked) {
+  TouchesMade out{{}, 0.0, answer["reason"]};
   for (const json& t : answer["touches"]) {
-    if (out.touches.size() == plan.touches.size()) break;
-    const auto& planned = plan.touches[out.touches.size()];
+    if (out.places_m.size() == asked) break;
     const auto p = t["at_m"].get<std::array<double, 3>>();
-    out.touches.push_back({.position = 1,
-                           .feature = planned.feature,
-                           .number = planned.number,
-                           .p_m = {p[0], p[1], p[2]}});
+    out.places_m.emplace_back(p[0], p[1], p[2]);
     out.u_position_m = t["u_m"];
   }
   return out;
@@ -59,9 +54,9 @@ bool cancel(const std::filesystem::path& socket) {
   return answer || answer.error().code == ErrorCode::Refused;
 }
 
-Touched follow_touches(const std::filesystem::path& socket, const evemu::ArtefactPlan& plan) {
+TouchesMade follow_touches(const std::filesystem::path& socket, std::size_t asked) {
   ProgressBar bar;
-  Touched so_far;
+  TouchesMade so_far;
   bool cancelled = false;
 
   for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kTouchPollPeriod)) {
@@ -75,11 +70,11 @@ Touched follow_touches(const std::filesystem::path& socket, const evemu::Artefac
     }
 
     answered = steady_clock::now();
-    Touched now = touched(*answer, plan);
+    TouchesMade now = made_of(*answer, asked);
     const bool running = (*answer)["running"].get<bool>();
-    const bool other_plan =
-        (*answer)["asked"] != plan.touches.size() || now.touches.size() < so_far.touches.size() ||
-        (!running && now.reason.empty() && now.touches.size() < plan.touches.size());
+    const bool other_plan = (*answer)["asked"] != asked ||
+                            now.places_m.size() < so_far.places_m.size() ||
+                            (!running && now.reason.empty() && now.places_m.size() < asked);
     if (other_plan) {
       so_far.reason =
           "the touches are lost: the daemon restarted, or another client has begun a touching; run "
@@ -89,8 +84,7 @@ Touched follow_touches(const std::filesystem::path& socket, const evemu::Artefac
 
     so_far = std::move(now);
     if (!running) return so_far;
-    bar.show("touching",
-             static_cast<double>(so_far.touches.size()) / static_cast<double>(plan.touches.size()));
+    bar.show("touching", static_cast<double>(so_far.places_m.size()) / static_cast<double>(asked));
   }
 }
 
@@ -103,16 +97,16 @@ Result<calib::Vector3> machine_position(const std::filesystem::path& socket) {
   return calib::Vector3{p[0], p[1], p[2]};
 }
 
-Result<Touched> touch_artefact(const std::filesystem::path& socket,
-                               const evemu::ArtefactPlan& plan) {
+Result<TouchesMade> make_touches(const std::filesystem::path& socket,
+                                 const calib::MachineTouches& touches) {
   mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
-  const auto started = ask_daemon(socket, as_json(plan));
+  const auto started = ask_daemon(socket, as_json(touches));
   if (!started) {
     // Io: no answer arrived, but the daemon may have started the touching.
     if (started.error().code == ErrorCode::Io) (void)cancel(socket);
     return tl::unexpected(started.error());
   }
-  return follow_touches(socket, plan);
+  return follow_touches(socket, touches.touches.size());
 }
 
 }  // namespace abbe::daemon

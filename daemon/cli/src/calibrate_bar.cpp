@@ -1,0 +1,372 @@
+/// `abbe calibrate bar`: calibrates a Multi-Feature Bar by reversal on the measuring machine of the
+/// running daemon. It touches the bar in every clamping of the plan, and a step gauge, and writes
+/// bar.toml as `abbe identify bar` does from the same files.
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <csignal>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/calib/mfb/pass_on_machine.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "abbe/config/capabilities.hpp"
+#include "abbe/tables/gauge_file.hpp"
+#include "abbe/tables/mfb_files.hpp"
+#include "commands.hpp"
+#include "daemon_socket.hpp"
+#include "identify_bar.hpp"
+#include "interruption.hpp"
+#include "machine_touching.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+namespace mfb = calib::mfb;
+
+constexpr std::string_view kPointsHead = "measurement,feature,index,side,k,x_mm,y_mm,z_mm\n";
+
+struct CalibrateBarArguments {
+  DaemonSocket where;
+  IdentifyBarArguments files;  ///< gauge: as given; the readings are written to another file
+  std::size_t gauge_runs = 3, at_most = 0;
+  double clearance_mm = 4.0, travel_height_mm = 40.0;
+  bool continues = false, yes = false;
+};
+
+struct BarToCalibrate {
+  BarFile bar;
+  BarPlanFile plan;
+  GaugeFile gauge;
+};
+
+Result<BarToCalibrate> read_files(const IdentifyBarArguments& files) {
+  auto bar = read_bar_toml(files.bar);
+  if (!bar) return tl::unexpected(bar.error());
+  auto plan = read_bar_plan_toml(files.plan, bar->bar);
+  if (!plan) return tl::unexpected(plan.error());
+  auto gauge = read_gauge_to_measure(files.gauge);
+  if (!gauge) return tl::unexpected(gauge.error());
+  return BarToCalibrate{*std::move(bar), *std::move(plan), *std::move(gauge)};
+}
+
+fs::path beside_output(const CalibrateBarArguments& arguments, std::string_view extension) {
+  return fs::path(arguments.files.out).replace_extension(extension);
+}
+
+std::string_view feature_word(mfb::Feature feature) {
+  switch (feature) {
+    case mfb::Feature::Hole:
+      return "hole";
+    case mfb::Feature::Rod:
+      return "rod";
+    case mfb::Feature::Plane:
+      return "plane";
+  }
+  return {};
+}
+
+std::string rows_of(const mfb::Measurement& m, const mfb::PassTouches& touches) {
+  std::string text;
+  for (const mfb::Touch& touch : touches) {
+    const bool plane = touch.target.feature == mfb::Feature::Plane;
+    const std::string_view side = touch.target.side == mfb::Side::Left ? "L" : "R";
+    const calib::Vector3 q_mm = kMmPerM * touch.reading_m;
+    text += fmt::format("{},{},{},{},{},{:.17g},{:.17g},{:.17g}\n", m.name,
+                        feature_word(touch.target.feature), touch.target.index + 1,
+                        plane ? side : "", touch.target.k, q_mm.x(), q_mm.y(), q_mm.z());
+  }
+  return text;
+}
+
+/// The passes of an earlier run.
+class PointsFile {
+ public:
+  [[nodiscard]] static Result<PointsFile> open(fs::path file, const BarToCalibrate& what,
+                                               bool continues) {
+    PointsFile points(std::move(file));
+    if (!fs::exists(points.file_)) return points;
+    if (!continues)
+      return fail(ErrorCode::Usage,
+                  fmt::format("{}: exists: --continue uses its passes; else remove it, or choose "
+                              "another -o",
+                              points.file_.string()));
+    auto text = read_regular_file(points.file_);
+    if (!text) return tl::unexpected(text.error());
+    points.text_ = *std::move(text);
+    if (auto whole = points.count_rows(what); !whole) return tl::unexpected(whole.error());
+    return points;
+  }
+
+  [[nodiscard]] bool has(const std::string& measurement) const {
+    return rows_.contains(measurement);
+  }
+  [[nodiscard]] Result<void> add(const std::string& rows) {
+    text_ += rows;
+    return replace_file(file_, text_);
+  }
+  [[nodiscard]] const fs::path& file() const { return file_; }
+
+ private:
+  explicit PointsFile(fs::path file) : file_(std::move(file)), text_(kPointsHead) {}
+
+  /// The file holds whole passes of this plan; its values are checked when all are there.
+  [[nodiscard]] Result<void> count_rows(const BarToCalibrate& what) {
+    for (std::size_t begin = text_.find('\n') + 1; begin != 0 && begin < text_.size();
+         begin = text_.find('\n', begin) + 1) {
+      ++rows_[text_.substr(begin, text_.find(',', begin) - begin)];
+      if (text_.find('\n', begin) == std::string::npos) break;
+    }
+    const std::size_t whole = what.bar.bar.pattern.count();
+    for (const auto& [measurement, rows] : rows_)
+      if (rows != whole)
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: measurement \"{}\" has {} rows, a pass has {} touches: remove "
+                                "its rows, then --continue touches it again",
+                                file_.string(), measurement, rows, whole));
+    return {};
+  }
+
+  fs::path file_;
+  std::string text_;
+  std::map<std::string, std::size_t, std::less<>> rows_;
+};
+
+std::string text_of(const calib::Vector3& v) {
+  return fmt::format("{:g}, {:g}, {:g}", v.x(), v.y(), v.z());
+}
+
+/// Waits for Enter. Refused after Ctrl-C or at the end of the standard input.
+Result<void> wait_for_operator(const std::string& instruction, bool yes) {
+  fmt::print(stderr, "{}\n", instruction);
+  if (yes) return {};
+  fmt::print(stderr, "The machine moves when you press Enter; Ctrl-C ends the command.\n");
+  constexpr int kPoll_ms = 200;
+  while (!interrupted()) {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    if (::poll(&input, 1, kPoll_ms) <= 0) continue;
+    char c = 0;
+    if (::read(STDIN_FILENO, &c, 1) <= 0)
+      return fail(ErrorCode::Refused,
+                  "the standard input ended before Enter was pressed: run the command in a "
+                  "terminal, or use --yes");
+    if (c == '\n') return {};
+  }
+  return fail(ErrorCode::Refused, "ended by a signal; --continue goes on at this pass");
+}
+
+class BarCalibration {
+ public:
+  BarCalibration(const CalibrateBarArguments& arguments, BarToCalibrate what, PointsFile points,
+                 fs::path socket)
+      : arguments_(arguments),
+        what_(std::move(what)),
+        points_(std::move(points)),
+        socket_(std::move(socket)) {}
+
+  /// Touches what is still to be touched. False: --at-most ended the run before.
+  [[nodiscard]] Result<bool> touch_all() {
+    const auto& measurements = what_.plan.plan.measurements;
+    std::size_t done = 0;
+    for (std::size_t m = 0; m < measurements.size(); ++m) {
+      if (points_.has(measurements[m].name)) continue;
+      if (arguments_.at_most != 0 && done++ == arguments_.at_most) return false;
+      if (auto made = touch_pass(m); !made) return tl::unexpected(made.error());
+    }
+    if (!what_.gauge.gauge.faces.front().readings_m.empty() || fs::exists(gauge_file()))
+      return true;
+    if (arguments_.at_most != 0 && done == arguments_.at_most) return false;
+    if (auto made = touch_gauge(); !made) return tl::unexpected(made.error());
+    return true;
+  }
+
+  /// gauge.toml with readings.
+  [[nodiscard]] fs::path gauge_file() const {
+    return what_.gauge.gauge.faces.front().readings_m.empty()
+               ? beside_output(arguments_, ".gauge.toml")
+               : fs::path(arguments_.files.gauge);
+  }
+  [[nodiscard]] const fs::path& points_file() const { return points_.file(); }
+
+ private:
+  [[nodiscard]] mfb::MachineTouchOptions touch_options() const {
+    return {1e-3 * arguments_.clearance_mm, 1e-3 * arguments_.travel_height_mm};
+  }
+
+  [[nodiscard]] Result<void> touch_pass(std::size_t index) {
+    const mfb::Plan& plan = what_.plan.plan;
+    const mfb::Measurement& m = plan.measurements[index];
+    const auto ready = wait_for_operator(
+        fmt::format("{} ({} of {}): clamp the bar with x along ({}) and z along ({}), O_1 at ({}) "
+                    "mm, within 1 mm.",
+                    m.name, index + 1, plan.measurements.size(), text_of(m.bar_x), text_of(m.bar_z),
+                    text_of(kMmPerM * m.origin_m)),
+        arguments_.yes);
+    if (!ready) return ready;
+
+    const auto tip_m = machine_position(socket_);
+    if (!tip_m) return tl::unexpected(tip_m.error());
+    const auto pass = mfb::pass_on_machine(what_.bar.bar, plan, index, *tip_m, touch_options());
+    if (!pass) return tl::unexpected(error_of(pass.error()));
+    const auto made = make_touches(socket_, pass->made);
+    if (!made) return tl::unexpected(made.error());
+
+    mfb::PassTouches touches;
+    for (std::size_t i = 0; i < made->places_m.size(); ++i)
+      touches.push_back({pass->targets[i], made->places_m[i] - m.tool_offset_m});
+    if (!made->reason.empty())
+      return tl::unexpected(
+          with_kept({ErrorCode::DataInsufficient,
+                     fmt::format("{}: {}", m.name, made->reason),
+                     {"the tip may be low: raise it above the bar before --continue"}},
+                    rows_of(m, touches)));
+    if (const auto shown = mfb::check_pass(what_.bar.bar, plan, index, touches); !shown)
+      return tl::unexpected(with_kept(error_of(shown.error()), rows_of(m, touches)));
+    return points_.add(rows_of(m, touches));
+  }
+
+  [[nodiscard]] Result<void> touch_gauge() {
+    mfb::StepGauge gauge = what_.gauge.gauge;
+    const mfb::Measurement& normal = what_.plan.plan.measurements.front();
+    const auto ready = wait_for_operator(
+        fmt::format("step gauge {}: put it where the bar was, along ({}), the centre of the tip on "
+                    "its first face at ({}) mm, within 1 mm.",
+                    gauge.name, text_of(normal.bar_x), text_of(kMmPerM * gauge.origin_m)),
+        arguments_.yes);
+    if (!ready) return ready;
+
+    const auto tip_m = machine_position(socket_);
+    if (!tip_m) return tl::unexpected(tip_m.error());
+    const auto touches =
+        mfb::gauge_on_machine(gauge, normal, arguments_.gauge_runs, *tip_m, touch_options());
+    if (!touches) return tl::unexpected(error_of(touches.error()));
+    const auto made = make_touches(socket_, *touches);
+    if (!made) return tl::unexpected(made.error());
+    if (!made->reason.empty())
+      return fail(ErrorCode::DataInsufficient,
+                  fmt::format("step gauge: {}; --continue touches it again", made->reason));
+
+    Eigen::Index axis = 0;
+    normal.bar_x.cwiseAbs().maxCoeff(&axis);
+    for (std::size_t i = 0; i < made->places_m.size(); ++i) {
+      const std::size_t run = i / gauge.faces.size(), n = i % gauge.faces.size();
+      auto& face = gauge.faces[run % 2 == 0 ? n : gauge.faces.size() - 1 - n];
+      face.readings_m.push_back(made->places_m[i](axis) - gauge.tool_offset_m(axis));
+    }
+    return replace_file(gauge_file(), gauge_toml(gauge, fmt::format("# measured with {} touches\n",
+                                                                    made->places_m.size())));
+  }
+
+  /// Writes the touches of a pass that is not used to a file of their own.
+  [[nodiscard]] Error with_kept(Error error, const std::string& rows) const {
+    const fs::path file = beside_output(arguments_, ".partial.csv");
+    const auto kept = replace_file(file, std::string(kPointsHead) + rows);
+    error.details.push_back(kept ? fmt::format("the touches of this pass are kept in {}; "
+                                               "--continue makes the pass again",
+                                               file.string())
+                                 : kept.error().text);
+    return error;
+  }
+
+  const CalibrateBarArguments& arguments_;
+  BarToCalibrate what_;
+  PointsFile points_;
+  fs::path socket_;
+};
+
+int run(const CalibrateBarArguments& arguments) {
+  auto what = read_files(arguments.files);
+  if (!what) return report(what.error());
+  auto points =
+      PointsFile::open(beside_output(arguments, ".points.csv"), *what, arguments.continues);
+  if (!points) return report(points.error());
+  auto socket = socket_path(arguments.where);
+  if (!socket) return report(socket.error());
+
+  mark_interruptions({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+  BarCalibration calibration(arguments, *std::move(what), *std::move(points), *std::move(socket));
+  const auto complete = calibration.touch_all();
+  if (!complete) return report(complete.error());
+  if (!*complete) {
+    fmt::print(stderr, "{} passes made; --continue makes the next ones\n", arguments.at_most);
+    return 0;
+  }
+
+  IdentifyBarArguments files = arguments.files;
+  files.points = calibration.points_file().string();
+  files.gauge = calibration.gauge_file().string();
+  return identify_bar(files);
+}
+
+void add_files(CLI::App& command, CalibrateBarArguments& arguments) {
+  command
+      .add_option("--bar", arguments.files.bar,
+                  "bar.toml with the nominal points, or those of an earlier calibration")
+      ->required();
+  command
+      .add_option("--plan", arguments.files.plan,
+                  "plan.toml: one [[measurement]] and position per pass, half of them with the\n"
+                  "opposite bar_z; tool_offset_mm = [0, 0, 0] if the machine reports the tip")
+      ->required();
+  command
+      .add_option("--gauge", arguments.files.gauge,
+                  "gauge.toml: the step gauge; without readings_mm it is touched after the passes, "
+                  "in the direction of bar_x")
+      ->required();
+  command
+      .add_option("-o,--out", arguments.files.out,
+                  "file to write: bar.toml; touches and readings go to .points.csv and\n"
+                  ".gauge.toml beside it")
+      ->required();
+}
+
+}  // namespace
+
+void add_calibrate_bar(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<CalibrateBarArguments>();
+  auto* command = parent.add_subcommand(
+      "bar",
+      "Calibrate a Multi-Feature Bar by reversal on the measuring machine of the running\n"
+      "daemon (" +
+          tables_with(Capability::Motion) +
+          "): before every pass it says how to clamp the bar, and waits for\n"
+          "Enter. THE MACHINE MOVES: straight up to the travel height, across, and down to each\n"
+          "feature; it avoids no other obstacle. Every pass is checked and kept; a bar that lies\n"
+          "turned, another bar or a missed touch ends the command, and --continue makes the pass\n"
+          "again. Ctrl-C, a closed terminal, or 2 s without contact between this command and the\n"
+          "daemon end the run after the current touch; the tip may then be low.");
+  add_files(*command, *arguments);
+  command->add_option("--gauge-runs", arguments->gauge_runs, "times that each face is touched")
+      ->check(CLI::Range(1, 50))
+      ->capture_default_str();
+  command
+      ->add_option("--clearance", arguments->clearance_mm,
+                   "distance between tip and surface before a touch, mm")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--travel-height", arguments->travel_height_mm,
+                   "height of the paths above the axis of the bar and the faces of the gauge, mm")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--continue", arguments->continues,
+                    "use the passes that are in .points.csv, and make the others");
+  command->add_option("--at-most", arguments->at_most, "end after this number of passes");
+  command->add_flag("-y,--yes", arguments->yes, "do not wait for Enter: the bar is clamped");
+  add_socket_options(*command, arguments->where);
+  command->add_flag("--json", arguments->files.json, "print the summary as one JSON object");
+  command->callback([arguments, &exit] { exit = run(*arguments); });
+}
+
+}  // namespace abbe::daemon

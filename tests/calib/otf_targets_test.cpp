@@ -6,10 +6,13 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/calib/model_comparison.hpp"
+#include "nest_run.hpp"
+#include "normalised_error.hpp"
 #include "otf_run.hpp"
 
 namespace {
@@ -29,7 +32,21 @@ struct MadeTargetsOptions {
   std::string chain = "[w X' b Y Z (C1) t]";
   Interpolation interpolation = Interpolation::Linear;
   std::vector<Vector3> targets_m = kThreeRunTargets;
+  /// Runs of some 1000 s from one place of the tracker, which drifts to the other side in the second
+  /// of them; two nests.
+  std::optional<NestRunOptions> nests{};
 };
+
+/// Drift and visits in one run.
+NestRunOptions nests_of_run(const MadeTargetsOptions& wanted, std::size_t run) {
+  NestRunOptions of_run = *wanted.nests;
+  of_run.nests_m.resize(2);
+  of_run.seed = 10 * wanted.seed + static_cast<unsigned>(run);
+  if (run == 1) {
+    of_run.drift_m = -of_run.drift_m;
+  }
+  return of_run;
+}
 
 /// Runs of one machine with 18 random tables; the tracker stands elsewhere in each.
 struct MadeTargets {
@@ -71,19 +88,25 @@ MadeTargets make_targets(const MadeTargetsOptions& wanted) {
   U.head(n) = random_tables(basis.layout(), wanted.error_scale_m, random);
   made.truth = to_gauge(Gauge::G1, basis.layout(), kThreeRunTargets, U)->head(n);
 
-  constexpr double kSamplesPerSecond = 250.0, kSpeed_m_s = 0.4;
+  const double slower = wanted.nests ? 10.0 : 1.0;
+  const double samples_per_second = 250.0 / slower, speed_m_s = 0.4 / slower;
   for (std::size_t k = 0; k < wanted.targets_m.size(); ++k) {
-    const RigidTransform T = turned_tracker(k);
+    const RigidTransform T = turned_tracker(wanted.nests ? 0 : k);
     const Vector3& t = wanted.targets_m[k];
     std::vector<TrackerObservation>& samples = made.samples.emplace_back();
-    for (const Vector3& q : drive(case_a_path(), kSpeed_m_s, kSamplesPerSecond)) {
+    for (const Vector3& q : drive(case_a_path(), speed_m_s, samples_per_second)) {
       const Vector3 V =
           basis.V_m({.q_m = q, .tool_offset_m = t}, {made.truth.data(), basis.size()});
       const Vector3 p = T.R.transpose() * (q + t + V - T.t_m);
-      samples.push_back({static_cast<double>(samples.size()) / kSamplesPerSecond,
+      samples.push_back({static_cast<double>(samples.size()) / samples_per_second,
                          with_noise(p * (1.0 + wanted.range_offset_m / p.norm()), made.noise,
                                     wanted.noise_factor, random),
                          true});
+    }
+    if (wanted.nests) {
+      const NestRunOptions of_run = nests_of_run(wanted, k);
+      samples = with_drift_and_visits(samples, of_run, made.noise, T);
+      made.options.nests = nest_options(of_run, T);
     }
   }
   for (std::size_t k = 0; k < wanted.targets_m.size(); ++k) {
@@ -172,6 +195,68 @@ TEST(SeveralTargets, HaveTheErrorsThatTheyState) {
   // chi-square of n combinations: mean 1 after division by n, standard deviation sqrt(2 / n)
   EXPECT_GT(all.combinations, 150.0);
   EXPECT_NEAR(all.squares / all.combinations, 1.0, 3.0 * std::sqrt(2.0 / all.combinations));
+}
+
+/// Mean error of V for the three targets on the grid of the nodes, rigid motions removed.
+double mean_error_of_targets_m(const MadeTargets& made, const VolumetricModel& model) {
+  double sum_m = 0.0;
+  for (const Vector3& t : kThreeRunTargets) {
+    std::vector<Vector3> points, left;
+    for (const Vector3& q : tensor_grid(model.nodes())) {
+      points.push_back(q + t);
+      left.push_back(model.V_at(q, t) - made.V_m(q, t));
+    }
+    sum_m += rigid_free(points, left)->rigid_free.mean_m / 3.0;
+  }
+  return sum_m;
+}
+
+/// The drift of each run, from its visits and the rows of all runs.
+TEST(SeveralTargets, DriftOfEachRunIsEstimatedFromItsNests) {
+  const NestRunOptions drift{.drift_m = {16e-6, -16e-6, 16e-6}};
+  double with_m = 0.0, without_drift_m = 0.0;
+  ChiSquareOfErrors all;
+  for (const unsigned seed : {1u, 2u}) {
+    const MadeTargets still =
+        make_targets({.seed = seed, .nests = NestRunOptions{.visits = false}});
+    const MadeTargets drifting = make_targets({.seed = seed, .nests = drift});
+    const auto of_still = identified_targets(still), found = identified_targets(drifting);
+    ASSERT_TRUE(of_still && found) << found.error().text;
+    for (const Solution& solution : found->solutions) {
+      ASSERT_TRUE(solution.drift);
+      EXPECT_GT(solution.drift->visits, 8u);
+    }
+    const auto end_m = [&](std::size_t run) {
+      return found->solutions[run].drift->points.back().value_m;
+    };
+    EXPECT_LT((end_m(0) + end_m(1)).norm(), 10e-6) << "to opposite sides";
+    EXPECT_GT(end_m(0).norm(), 15e-6);
+    with_m += mean_error_of_targets_m(drifting, found->model());
+    without_drift_m += mean_error_of_targets_m(still, of_still->model());
+    all.add(found->model(), drifting.truth);
+    RecordProperty("with_um", std::to_string(1e6 * with_m));
+    RecordProperty("without_um", std::to_string(1e6 * without_drift_m));
+  }
+  EXPECT_LE(with_m, 1.2 * without_drift_m);
+  RecordProperty("normalised", std::to_string(all.squares / all.combinations));
+  EXPECT_NEAR(all.squares / all.combinations, 1.0, 4.0 * std::sqrt(2.0 / all.combinations));
+}
+
+TEST(SeveralTargets, WithNestsInOneRunOnlyTheOthersHaveNoDrift) {
+  const NestRunOptions drift{.drift_m = {16e-6, -16e-6, 16e-6}};
+  MadeTargets made = make_targets({.seed = 1, .nests = drift});
+  const MadeTargets still = make_targets({.seed = 1, .nests = NestRunOptions{.visits = false}});
+  made.samples[1] = still.samples[1];
+  made.samples[2] = still.samples[2];
+  made.runs[1].samples = made.samples[1];
+  made.runs[2].samples = made.samples[2];
+  const auto found = identified_targets(made);
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_TRUE(found->solutions[0].drift);
+  EXPECT_FALSE(found->solutions[1].drift);
+  const auto verdict = judge(found->observations, found->solutions, nullptr, {}, made.options);
+  ASSERT_TRUE(verdict) << verdict.error().text;
+  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
 }
 
 TEST(SeveralTargets, OnALineAreRefused) {

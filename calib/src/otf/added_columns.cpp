@@ -40,6 +40,13 @@ void AddedColumns::add(const Observation& o, std::span<const SparseRows::Entry> 
   }
 }
 
+void AddedColumns::add(const AddedColumns& part, const std::vector<std::size_t>& columns,
+                       const std::vector<std::size_t>& unknowns) {
+  CWC_(columns, columns) += part.CWC_;
+  CWA_(columns, unknowns) += part.CWA_;
+  CWr_(columns) += part.CWr_;
+}
+
 AddedColumns& AddedColumns::operator+=(const AddedColumns& other) {
   CWC_ += other.CWC_;
   CWA_ += other.CWA_;

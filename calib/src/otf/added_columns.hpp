@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "abbe/calib/otf/solve.hpp"
 
@@ -21,6 +22,9 @@ class AddedColumns {
   /// The same for a row in which few columns have a value: entries with the index of the column.
   void add(const Observation&, std::span<const SparseRows::Entry> row, double residual_m,
            std::span<const SparseRows::Entry> values);
+  /// Adds sums of some of the columns and unknowns; `columns`, `unknowns`: their places here.
+  void add(const AddedColumns& part, const std::vector<std::size_t>& columns,
+           const std::vector<std::size_t>& unknowns);
   AddedColumns& operator+=(const AddedColumns&);
   AddedColumns& operator-=(const AddedColumns&);
 

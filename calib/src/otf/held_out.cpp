@@ -65,7 +65,8 @@ struct FittedFold {
   Eigen::VectorXd change_of_drift{};
 };
 
-/// `first`: the first run; only a single run has a drift. `training`: information of the rows for
+/// `first`: the first run. Only a single run has its drift estimated again without the held-out legs;
+/// with several runs the drift that was removed is that of all legs. `training`: information of the rows for
 /// which `take` returns true.
 Result<FittedFold> fit_fold(const RunByFold& first, const estimation::Information& training,
                             std::size_t unknowns,

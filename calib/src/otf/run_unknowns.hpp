@@ -22,9 +22,7 @@ class RunUnknowns {
 
   [[nodiscard]] std::size_t model() const { return model_; }
   [[nodiscard]] std::size_t size() const { return model_ + per_run_ * runs_; }
-  [[nodiscard]] std::size_t rigid_offset(std::size_t run) const {
-    return model_ + per_run_ * run;
-  }
+  [[nodiscard]] std::size_t rigid_offset(std::size_t run) const { return model_ + per_run_ * run; }
 
   /// For each unknown of the observations of a run, its place among the unknowns of all runs.
   [[nodiscard]] std::vector<std::size_t> of_run(std::size_t run) const {

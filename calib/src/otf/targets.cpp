@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "abbe/calib/otf/aligned_blocks.hpp"
@@ -10,12 +11,14 @@
 #include "message.hpp"
 #include "otf/added_columns.hpp"
 #include "otf/change_in_u.hpp"
+#include "otf/drift_of_runs.hpp"
 #include "otf/observe_aligned.hpp"
 #include "otf/priors.hpp"
 #include "otf/row_residuals.hpp"
 #include "otf/run_statistics.hpp"
 #include "otf/run_unknowns.hpp"
 #include "otf/systematic_effects.hpp"
+#include "otf/with_drift.hpp"
 #include "tool_span.hpp"
 
 namespace abbe::calib::otf {
@@ -67,17 +70,8 @@ Result<Observations> observe_run(const TargetRun& run, Machine machine, const No
   }
   return aligned_blocks(run.samples, machine, run.path, noise, options)
       .and_then([&](AlignedBlocks blocks) {
-        series.push_back(std::move(blocks.series));
-        return observe_aligned(series.back(), std::move(blocks.alignment), machine, run.path, noise,
-                               options)
-            .map([&](Observations o) {
-              if (!blocks.nests.found.empty()) {
-                o.notes.emplace_back(
-                    "reference nests are not used in a run with several targets: the drift of the "
-                    "tracker is not estimated");
-              }
-              return o;
-            });
+        series.push_back(blocks.series);
+        return observe_with_nests(blocks, machine, run.path, noise, options);
       });
 }
 
@@ -324,20 +318,42 @@ Result<Adjustment> adjust_runs(std::span<const Observations> runs, const Options
   return a;
 }
 
-/// What an adjustment of the rows states, with the offset of the ranges as one more unknown.
+/// What an adjustment of the rows states, with the offset of the ranges and the drift of the tracker
+/// as further unknowns.
 struct FitOfRuns {
   Eigen::VectorXd U;
   RangeOffset offset;
-  Eigen::MatrixXd root_of_offset;    ///< what the offset adds to the covariance: root root^T
-  std::vector<Residuals> residuals;  ///< without the offset, as all figures
+  std::vector<std::optional<TrackerDrift>> drift;  ///< by run
+  Eigen::MatrixXd added_covariance;  ///< what range offset and drifts add to that of U
+  std::vector<Residuals> residuals;  ///< without offset and drift, as all figures
   std::vector<Statistics> of_runs;
   Statistics all;
 };
 
-FitOfRuns fit_of_runs(std::span<const Observations> runs, const Adjustment& a) {
+void add_drift(FitOfRuns& fit, DriftOfRuns found) {
+  fit.offset = found.offset;
+  fit.drift = std::move(found.drift);
+  fit.U = std::move(found.U);
+  fit.added_covariance = std::move(found.added_covariance);
+  for (std::size_t k = 0; k < fit.residuals.size(); ++k) {
+    fit.residuals[k].after_m = std::move(found.residual_m[k]);
+  }
+}
+
+void add_offset(FitOfRuns& fit, std::span<const Observations> runs, const Adjustment& a) {
+  const AddedColumns::Estimate e = estimate_offset(runs, a, fit.residuals, fit.all.variance_factor);
+  fit.offset = {e.d(0), e.u(0)};
+  fit.U -= e.dU;
+  fit.added_covariance = e.root_cov_dU * e.root_cov_dU.transpose();
+  subtract_offset(fit.residuals, runs, fit.U, fit.offset.value_m);
+}
+
+Result<FitOfRuns> fit_of_runs(std::span<const Observations> runs, const Adjustment& a,
+                              const Options& options) {
   const std::size_t unknowns = RunUnknowns(runs).size();
   FitOfRuns fit{.U = a.U,
-                .root_of_offset = Eigen::MatrixXd::Zero(a.U.size(), 1),
+                .drift = std::vector<std::optional<TrackerDrift>>(runs.size()),
+                .added_covariance = Eigen::MatrixXd::Zero(a.U.size(), a.U.size()),
                 .residuals = residuals_of_runs(runs, a.U)};
   const auto set_figures = [&] {
     fit.of_runs = statistics_of_runs(runs, a, fit.residuals);
@@ -345,42 +361,64 @@ FitOfRuns fit_of_runs(std::span<const Observations> runs, const Adjustment& a) {
   };
   set_figures();
 
-  if (runs.front().u_range_offset_m > 0.0) {
-    const AddedColumns::Estimate e =
-        estimate_offset(runs, a, fit.residuals, fit.all.variance_factor);
-    fit.offset = {e.d(0), e.u(0)};
-    fit.U -= e.dU;
-    fit.root_of_offset = e.root_cov_dU;
-    subtract_offset(fit.residuals, runs, fit.U, fit.offset.value_m);
+  if (any_drift(runs)) {
+    std::vector<std::vector<double>> residual_m;
+    for (const Residuals& r : fit.residuals) {
+      residual_m.push_back(r.after_m);
+    }
+    const auto variance = [&](const std::vector<std::vector<double>>& without_m) {
+      std::vector<Residuals> residuals = fit.residuals;
+      for (std::size_t k = 0; k < residuals.size(); ++k) {
+        residuals[k].after_m = without_m[k];
+      }
+      return statistics_of_all(statistics_of_runs(runs, a, residuals), a, unknowns).variance_factor;
+    };
+    Result<DriftOfRuns> found = drift_of_runs(runs, a, residual_m, variance, options.stopped);
+    if (!found) {
+      return tl::unexpected(found.error());
+    }
+    add_drift(fit, *std::move(found));
+    set_figures();
+  } else if (runs.front().u_range_offset_m > 0.0) {
+    add_offset(fit, runs, a);
     set_figures();
   }
   return fit;
 }
 
 /// adjust_runs(), with the prior for smooth tables that the rows of all runs permit, if there is
-/// one. The bends are judged without the range offset that the fit without a prior shows.
+/// one. The bends are judged without the range offset and the drift that the fit without a prior
+/// shows.
 Result<Adjustment> adjust_smooth(std::vector<Observations>& runs, const Options& options) {
   Result<Adjustment> a = adjust_runs(runs, options);
   if (!a || !runs.front().smoothness) {
     return a;
   }
 
-  const FitOfRuns first = fit_of_runs(runs, *a);
-  std::vector<Observations> judged = runs;
-  for (Observations& o : judged) {
-    o = without_range_offset(std::move(o), first.offset.value_m);
+  const Result<FitOfRuns> first = fit_of_runs(runs, *a, options);
+  if (!first) {
+    return tl::unexpected(first.error());
   }
-  const Result<Smoothness> chosen =
-      permitted_smoothness(rows_information(judged), runs.front().basis, *options.smoothness,
-                           first.all.variance_factor, [&](const Smoothness& s) {
-                             for (Observations& o : runs) {
-                               o.smoothness = s;
-                             }
-                             a = adjust_runs(runs, options);
-                             return a.map([&](const Adjustment& with) {
-                               return fit_of_runs(runs, with).all.variance_factor;
-                             });
-                           });
+  std::vector<Observations> judged = runs;
+  for (std::size_t k = 0; k < judged.size(); ++k) {
+    judged[k] = without_range_offset(std::move(judged[k]), first->offset.value_m);
+    if (first->drift[k]) {
+      judged[k] = without_drift(std::move(judged[k]), *first->drift[k]);
+    }
+  }
+  const Result<Smoothness> chosen = permitted_smoothness(
+      rows_information(judged), runs.front().basis, *options.smoothness, first->all.variance_factor,
+      [&](const Smoothness& s) {
+        for (Observations& o : runs) {
+          o.smoothness = s;
+        }
+        a = adjust_runs(runs, options);
+        return a.and_then([&](const Adjustment& with) {
+          return fit_of_runs(runs, with, options).map([](const FitOfRuns& fit) {
+            return fit.all.variance_factor;
+          });
+        });
+      });
   if (!chosen) {
     return tl::unexpected(chosen.error());
   }
@@ -405,10 +443,14 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
   }
 
   const Adjustment of_rows = *a;
-  FitOfRuns fit = fit_of_runs(runs, *a);
+  Result<FitOfRuns> found_fit = fit_of_runs(runs, *a, options);
+  if (!found_fit) {
+    return tl::unexpected(found_fit.error());
+  }
+  FitOfRuns& fit = *found_fit;
   a->U = std::move(fit.U);
   a->covariance *= fit.all.variance_factor;
-  a->covariance += fit.root_of_offset * fit.root_of_offset.transpose();
+  a->covariance += fit.added_covariance;
   add_scales_of_runs(a->covariance, runs, a->cofactor_Q);
   fit.all.iterations = adjustments;
 
@@ -432,6 +474,7 @@ Result<TargetsIdentification> solve_runs(std::vector<Observations> runs, int adj
                                .residuals = std::move(fit.residuals[k]),
                                .range_offset = fit.offset,
                                .backlash = backlash_of(runs[k], a->U, a->covariance),
+                               .drift = std::move(fit.drift[k]),
                                .smoothness = runs[k].smoothness});
   }
   found.observations = std::move(runs);

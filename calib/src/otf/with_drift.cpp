@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "otf/drift_columns.hpp"
-#include "otf/drift_estimate.hpp"
 #include "otf/row_residuals.hpp"
 
 namespace abbe::calib::otf {
@@ -59,6 +58,23 @@ Eigen::MatrixXd covariance_between_knots(const Observations& o, const WhitenedRo
 }
 
 }  // namespace
+
+TrackerDrift tracker_drift(const Observations& o, const DriftEstimate& estimate,
+                           Eigen::VectorXd coefficients) {
+  TrackerDrift drift;
+  drift.points = drift_points(o, DriftBasis(*o.drift), coefficients);
+  drift.coefficients = std::move(coefficients);
+  drift.visits = estimate.visits;
+  drift.u_repeatability_m = estimate.u_repeatability_m;
+  drift.walk_m = estimate.walk_m;
+  drift.notes = estimate.notes;
+  return drift;
+}
+
+bool notable_walk(const DriftEstimate& estimate) {
+  constexpr double kNegligibleWalk_m = 50e-9;
+  return estimate.walk_m > kNegligibleWalk_m;
+}
 
 Observations without_drift(Observations o, const TrackerDrift& drift) {
   if (!o.drift) {
@@ -117,15 +133,9 @@ Result<WithDrift> with_drift(const Observations& o, const WhitenedRows& rows, co
   if (offsets > 0) {
     with.offset = {estimate.d(0), std::sqrt(std::max(0.0, estimate.covariance(0, 0)))};
   }
-  with.drift.coefficients = estimate.d.tail(estimate.d.size() - offsets);
-  with.drift.points = drift_points(o, columns.basis(), with.drift.coefficients);
-  with.drift.visits = estimate.visits;
-  with.drift.u_repeatability_m = estimate.u_repeatability_m;
-  with.drift.walk_m = estimate.walk_m;
-  with.drift.notes = std::move(estimate.notes);
+  with.drift = tracker_drift(o, estimate, estimate.d.tail(estimate.d.size() - offsets));
   Eigen::MatrixXd added = reduced.dU_dd * estimate.covariance * reduced.dU_dd.transpose();
-  constexpr double kNegligibleWalk_m = 50e-9;
-  if (estimate.walk_m > kNegligibleWalk_m) {
+  if (notable_walk(estimate)) {
     added += covariance_between_knots(o, rows, a.cofactor_Q, residual_m, estimate, factor_used,
                                       static_cast<std::size_t>(offsets));
   }

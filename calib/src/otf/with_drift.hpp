@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/calib/otf/solve.hpp"
+#include "otf/drift_estimate.hpp"
 #include "otf/whitened_rows.hpp"
 
 namespace abbe::calib::otf {
@@ -26,6 +27,12 @@ using RowVariance = std::function<double(std::span<const double> residual_m)>;
 [[nodiscard]] Result<WithDrift> with_drift(const Observations&, const WhitenedRows& rows,
                                            const Adjustment& a, std::span<const double> residual_m,
                                            const RowVariance& variance, const Stopped& stopped);
+
+/// The estimate of a run as part of its solution. `coefficients`: without the range offset.
+[[nodiscard]] TrackerDrift tracker_drift(const Observations&, const DriftEstimate&,
+                                         Eigen::VectorXd coefficients);
+/// Whether the random walk is so large that its course between the knots counts.
+[[nodiscard]] bool notable_walk(const DriftEstimate&);
 
 /// The observations without a drift.
 [[nodiscard]] Observations without_drift(Observations, const TrackerDrift&);

@@ -9,6 +9,10 @@
 /// is added (estimation/information.hpp) and solved with the 24 conditions of gauge G1 for 18
 /// tables. With Estimator::Joint each run is linearised again at the common solution (joint.hpp).
 ///
+/// With Options::nests each run has a drift of the tracker of its own, from its visits and the rows of
+/// all runs (tracker_drift.hpp). The nests are at the same places in the tracker frame in all runs: the
+/// tracker is not set up again between runs with visits.
+///
 /// An offset of the ranges, their scale and the scales of the axes are those of Noise, common to
 /// all runs. The noise of the residuals is treated as in solve(): correlated noise widens the
 /// covariance (it is not prewhitened). The factor of the covariance is that of all residuals

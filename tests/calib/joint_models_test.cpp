@@ -30,10 +30,10 @@ const Vector3 kModelTool_m(0.02, -0.015, -0.12);
 
 /// Models of one machine: equal truth, independent noise of `u_m` per coordinate of the gauge.
 struct ModelsOfOneMachine {
+  std::mt19937_64 random{7};  // before truth, which is drawn from it
   TableBasis basis;
   Eigen::MatrixXd N;
   Eigen::VectorXd truth;
-  std::mt19937_64 random{7};
 
   explicit ModelsOfOneMachine(Interpolation kind)
       : basis(*TableBasis::of(

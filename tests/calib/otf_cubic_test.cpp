@@ -32,15 +32,16 @@ double largest_cubic_error_m(const MadeRun& run, const VolumetricModel& model) {
 }
 
 TEST(CubicTables, AreIdentifiedExactlyFromExactSamples) {
-  for (const char* chain : {"[w X' b Y Z (C1) t]", "[w b Z X Y (C1) t]"}) {
-    MadeRun run = make_run({.noise_factor = 0.0,
-                            .in_gauge = true,
-                            .chain = chain,
-                            .interpolation = Interpolation::NaturalCubic});
+  for (const auto& [chain, kind] :
+       {std::pair{"[w X' b Y Z (C1) t]", Interpolation::NaturalCubic},
+        std::pair{"[w b Z X Y (C1) t]", Interpolation::NaturalCubic},
+        std::pair{"[w X' b Y Z (C1) t]", Interpolation::NotAKnotCubic}}) {
+    MadeRun run =
+        make_run({.noise_factor = 0.0, .in_gauge = true, .chain = chain, .interpolation = kind});
     run.options.estimator = Estimator::Joint;
     const auto found = identified_cubic(run);
     ASSERT_TRUE(found) << found.error().text;
-    EXPECT_EQ(found->solution.model.interpolation(), Interpolation::NaturalCubic);
+    EXPECT_EQ(found->solution.model.interpolation(), kind);
     EXPECT_EQ(found->solution.statistics.unknowns - found->solution.statistics.rank, 20u);
     EXPECT_LT(largest_cubic_error_m(run, found->solution.model), 1e-9);
   }
@@ -57,14 +58,16 @@ TEST(CubicTables, OfASmoothMachineAreBetterThanLinearOnes) {
 }
 
 TEST(CubicTables, AreAcceptedByTheGate) {
-  const MadeRun run = make_run({.seed = 3, .interpolation = Interpolation::NaturalCubic});
-  const auto found = identified_cubic(run);
-  ASSERT_TRUE(found) << found.error().text;
-  const auto verdict = judge(found->observations, found->solution, nullptr, {}, run.options);
-  ASSERT_TRUE(verdict) << verdict.error().text;
-  EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
-  EXPECT_LT(verdict->held_out.candidate, 1.1);
-  EXPECT_GT(verdict->held_out.observations, verdict->held_out.not_held_out);
+  for (const auto kind : {Interpolation::NaturalCubic, Interpolation::NotAKnotCubic}) {
+    const MadeRun run = make_run({.seed = 3, .interpolation = kind});
+    const auto found = identified_cubic(run);
+    ASSERT_TRUE(found) << found.error().text;
+    const auto verdict = judge(found->observations, found->solution, nullptr, {}, run.options);
+    ASSERT_TRUE(verdict) << verdict.error().text;
+    EXPECT_TRUE(verdict->accepted) << testing::PrintToString(verdict->reasons);
+    EXPECT_LT(verdict->held_out.candidate, 1.1);
+    EXPECT_GT(verdict->held_out.observations, verdict->held_out.not_held_out);
+  }
 }
 
 /// Linear tables leave a part of smooth errors between the nodes: the held-out test prefers cubic.

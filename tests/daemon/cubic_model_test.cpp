@@ -107,6 +107,9 @@ TEST(CubicModelConfig, IsChosenByTheBasisOfTheModel) {
   const auto cubic = parse_config(kMachine + "basis = \"cubic\"\n", "abbed.toml");
   ASSERT_TRUE(cubic) << cubic.error().details.front();
   EXPECT_EQ(otf_machine(cubic->machine)->interpolation, Interpolation::NaturalCubic);
+  const auto free_ends = parse_config(kMachine + "basis = \"not-a-knot-cubic\"\n", "abbed.toml");
+  ASSERT_TRUE(free_ends) << free_ends.error().details.front();
+  EXPECT_EQ(otf_machine(free_ends->machine)->interpolation, Interpolation::NotAKnotCubic);
   const auto usual = parse_config(kMachine, "abbed.toml");
   ASSERT_TRUE(usual);
   EXPECT_EQ(otf_machine(usual->machine)->interpolation, Interpolation::Linear);

@@ -369,9 +369,9 @@ void add_identify_otf(CLI::App& parent, int& exit) {
       ->check(CLI::IsMember({"two-step", "joint"}));
   command
       ->add_option("--tables", arguments->tables,
-                   "interpolation of the tables between their nodes: linear, or cubic (natural,\n"
-                   "for smooth errors); default: [model] basis, or linear")
-      ->check(CLI::IsMember({calib::kLinearBasis, calib::kCubicBasis}));
+                   "interpolation of the tables between their nodes: linear, or for smooth errors\n"
+                   "cubic (natural) or not-a-knot-cubic; default: [model] basis, or linear")
+      ->check(CLI::IsMember({calib::kLinearBasis, calib::kCubicBasis, calib::kNotAKnotCubicBasis}));
   command
       ->add_flag("--backlash{per-table}", arguments->backlash,
                  "also estimate the backlash of every table; --backlash=forward-backward: the\n"

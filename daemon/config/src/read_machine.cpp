@@ -117,7 +117,8 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
   using calib::estimation::Interpolation;
   model.get_word<Interpolation>("basis", out.interpolation,
                                 {{calib::kLinearBasis, Interpolation::Linear},
-                                 {calib::kCubicBasis, Interpolation::NaturalCubic}});
+                                 {calib::kCubicBasis, Interpolation::NaturalCubic},
+                                 {calib::kNotAKnotCubicBasis, Interpolation::NotAKnotCubic}});
   Section nodes = model.child("nodes_mm");
   std::optional<Section> spacing;
   if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");

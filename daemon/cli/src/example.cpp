@@ -37,6 +37,7 @@ constexpr std::array kPurposes{
     Purpose{"points.csv", "positions for abbe model eval"},
     Purpose{"verification.csv", "readings and independent measurements for abbe verify"},
     Purpose{"measured.csv", "directly measured error motions for abbe model compare"},
+    Purpose{"foxglove.json", "a layout for recordings in Foxglove or Lichtblick"},
     Purpose{"truth.csv", "the errors of a simulated machine"},
 };
 

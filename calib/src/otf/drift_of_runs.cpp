@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -22,15 +21,15 @@ using Columns = std::vector<std::size_t>;
 class DriftUnknowns {
  public:
   explicit DriftUnknowns(std::span<const Observations> runs) {
-    const std::size_t offsets = runs.front().u_range_offset_m > 0.0 ? 1 : 0;
-    size_ = offsets;
+    offsets_ = runs.front().u_range_offset_m > 0.0 ? 1 : 0;
+    size_ = offsets_;
     for (const Observations& o : runs) {
       Columns& own = of_run_.emplace_back();
       for (std::size_t i = 0; o.drift && i < DriftBasis(*o.drift).size(); ++i) {
         own.push_back(size_++);
       }
       Columns& seen = seen_by_.emplace_back();
-      for (std::size_t i = 0; i < offsets; ++i) {
+      for (std::size_t i = 0; i < offsets_; ++i) {
         seen.push_back(i);
       }
       seen.insert(seen.end(), own.begin(), own.end());
@@ -38,7 +37,7 @@ class DriftUnknowns {
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::size_t offsets() const { return size_ > 0 && has_offset() ? 1 : 0; }
+  [[nodiscard]] std::size_t offsets() const { return offsets_; }
   [[nodiscard]] const Columns& of_run(std::size_t run) const { return of_run_[run]; }
   /// The range offset and the drift of a run: the columns of its rows.
   [[nodiscard]] const Columns& seen_by(std::size_t run) const { return seen_by_[run]; }
@@ -53,9 +52,7 @@ class DriftUnknowns {
   }
 
  private:
-  [[nodiscard]] bool has_offset() const { return seen_by_.front().size() > of_run_.front().size(); }
-
-  std::size_t size_ = 0;
+  std::size_t offsets_ = 0, size_ = 0;
   std::vector<Columns> of_run_, seen_by_;
 };
 
@@ -71,18 +68,6 @@ AddedColumns sums_of_run(const Observations& o, std::span<const double> residual
     sums.add(o.rows[i], o.A.row(i), residual_m[i], std::span(&c, 1));
   }
   return sums;
-}
-
-AddedColumns sums_of_runs(std::span<const Observations> runs, const DriftUnknowns& added,
-                          const std::vector<std::vector<double>>& residual_m) {
-  const RunUnknowns unknowns(runs);
-  AddedColumns all(added.size(), unknowns.size());
-  for (std::size_t k = 0; k < runs.size(); ++k) {
-    all.add(
-        sums_of_run(runs[k], residual_m[k], added.offsets(), DriftColumns::BetweenKnots::Straight),
-        added.seen_by(k), unknowns.of_run(k));
-  }
-  return all;
 }
 
 /// What visits and priors tell about the added unknowns.
@@ -168,69 +153,82 @@ Result<AllDrifts> estimate_all(std::span<const Observations> runs, const DriftUn
   return all;
 }
 
-/// What the course of the drift of a run between its knots adds to the covariance of U
-/// (with_drift.cpp), with the drifts of all runs.
-Eigen::MatrixXd covariance_between_knots_of(std::span<const Observations> runs, std::size_t run,
-                                            const DriftUnknowns& added, const Adjustment& a,
-                                            const AddedColumns::Reduced& reduced,
-                                            const AddedColumns& sums_of_all,
-                                            const std::vector<std::vector<double>>& residual_m,
-                                            const AllDrifts& all, double factor) {
-  const RunUnknowns unknowns(runs);
-  const Observations& o = runs[run];
-  const std::size_t between = DriftBasis(*o.drift).between_knots();
-  Columns at = added.seen_by(run);
-  for (std::size_t i = 0; i < between; ++i) {
-    at.push_back(added.size() + i);
-  }
+/// The adjustment of all runs with the added unknowns.
+class AddedToRuns {
+ public:
+  AddedToRuns(std::span<const Observations> runs, const Adjustment& a,
+              const std::vector<std::vector<double>>& residual_m)
+      : runs_(runs),
+        unknowns_(runs),
+        added_(runs),
+        a_(a),
+        residual_m_(residual_m),
+        sums_(sums_with(added_.size())),
+        reduced_(sums_.reduced(a.cofactor_Q)) {}
 
-  AddedColumns with(added.size() + between, unknowns.size());
-  Columns straight;
-  for (std::size_t i = 0; i < added.size(); ++i) {
-    straight.push_back(i);
-  }
-  Columns every_unknown;
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    every_unknown.push_back(i);
-  }
-  with.add(sums_of_all, straight, every_unknown);
-  const AddedColumns own =
-      sums_of_run(o, residual_m[run], added.offsets(), DriftColumns::BetweenKnots::Walk);
-  const AddedColumns own_straight =
-      sums_of_run(o, residual_m[run], added.offsets(), DriftColumns::BetweenKnots::Straight);
-  with.add(own, at, unknowns.of_run(run));
-  AddedColumns twice(added.size() + between, unknowns.size());
-  twice.add(own_straight, added.seen_by(run), unknowns.of_run(run));
-  with -= twice;
+  [[nodiscard]] const DriftUnknowns& added() const { return added_; }
+  [[nodiscard]] const AddedColumns::Reduced& reduced() const { return reduced_; }
 
-  const AddedColumns::Reduced both = with.reduced(a.cofactor_Q);
-  const auto d = static_cast<Eigen::Index>(added.size()), b = static_cast<Eigen::Index>(between);
-  const Eigen::MatrixXd dd_db = all.covariance * both.S.topRightCorner(d, b) / factor;
-  const Eigen::MatrixXd dU_db = both.dU_dd.rightCols(b) - reduced.dU_dd * dd_db;
-  const double walk_m = all.of_run[run]->walk_m;
-  return walk_m * walk_m * (dU_db * dU_db.transpose());
-}
-
-std::vector<std::vector<double>> residuals_without_m(std::span<const Observations> runs,
-                                                     const DriftUnknowns& added,
-                                                     const Eigen::VectorXd& U,
-                                                     const Eigen::VectorXd& d) {
-  const RunUnknowns unknowns(runs);
-  std::vector<std::vector<double>> residual_m;
-  for (std::size_t k = 0; k < runs.size(); ++k) {
-    const Observations& o = runs[k];
-    std::vector<double>& r = residual_m.emplace_back(residuals_m(o, unknowns.part(U, k)));
-    const Eigen::VectorXd own = d(added.seen_by(k));
-    for (std::size_t i = 0; i < r.size(); ++i) {
-      if (o.drift) {
-        r[i] -= DriftColumns(o, added.offsets()).effect_m(o.rows[i], own);
-      } else if (added.offsets() > 0) {
-        r[i] -= drow_drange_offset(o, o.rows[i]) * own(0);
+  /// By run: y - A U without the added unknowns d.
+  [[nodiscard]] std::vector<std::vector<double>> residuals_without_m(
+      const Eigen::VectorXd& U, const Eigen::VectorXd& d) const {
+    std::vector<std::vector<double>> all;
+    for (std::size_t k = 0; k < runs_.size(); ++k) {
+      const Observations& o = runs_[k];
+      std::vector<double>& r = all.emplace_back(residuals_m(o, unknowns_.part(U, k)));
+      const Eigen::VectorXd own = d(added_.seen_by(k));
+      for (std::size_t i = 0; i < r.size(); ++i) {
+        if (o.drift) {
+          r[i] -= DriftColumns(o, added_.offsets()).effect_m(o.rows[i], own);
+        } else if (added_.offsets() > 0) {
+          r[i] -= drow_drange_offset(o, o.rows[i]) * own(0);
+        }
       }
     }
+    return all;
   }
-  return residual_m;
-}
+
+  /// What the course of the drift of a run between its knots adds to the covariance of U
+  /// (with_drift.cpp). `covariance`: of the added unknowns, `factor`: of the variance of the rows.
+  [[nodiscard]] Eigen::MatrixXd covariance_between_knots(std::size_t run, double walk_m,
+                                                         const Eigen::MatrixXd& covariance,
+                                                         double factor) const {
+    const std::size_t between = DriftBasis(*runs_[run].drift).between_knots();
+    AddedColumns sums = sums_with(added_.size() + between, run);
+    const AddedColumns::Reduced all = sums.reduced(a_.cofactor_Q);
+    const auto d = static_cast<Eigen::Index>(added_.size()), b = static_cast<Eigen::Index>(between);
+    const Eigen::MatrixXd dd_db = covariance * all.S.topRightCorner(d, b) / factor;
+    const Eigen::MatrixXd dU_db = all.dU_dd.rightCols(b) - all.dU_dd.leftCols(d) * dd_db;
+    return walk_m * walk_m * (dU_db * dU_db.transpose());
+  }
+
+ private:
+  /// Sums of all runs; with the columns between the knots of one of them behind the others.
+  [[nodiscard]] AddedColumns sums_with(std::size_t columns,
+                                       std::optional<std::size_t> between = {}) const {
+    AddedColumns all(columns, unknowns_.size());
+    for (std::size_t k = 0; k < runs_.size(); ++k) {
+      const bool walks = between == k;
+      Columns at = added_.seen_by(k);
+      for (std::size_t i = added_.size(); walks && i < columns; ++i) {
+        at.push_back(i);
+      }
+      all.add(sums_of_run(
+                  runs_[k], residual_m_[k], added_.offsets(),
+                  walks ? DriftColumns::BetweenKnots::Walk : DriftColumns::BetweenKnots::Straight),
+              at, unknowns_.of_run(k));
+    }
+    return all;
+  }
+
+  std::span<const Observations> runs_;
+  RunUnknowns unknowns_;
+  DriftUnknowns added_;
+  const Adjustment& a_;
+  const std::vector<std::vector<double>>& residual_m_;
+  AddedColumns sums_;
+  AddedColumns::Reduced reduced_;
+};
 
 }  // namespace
 
@@ -238,9 +236,9 @@ Result<DriftOfRuns> drift_of_runs(std::span<const Observations> runs, const Adju
                                   const std::vector<std::vector<double>>& residual_m,
                                   const VarianceOfRuns& variance, const Stopped& stopped) {
   constexpr int kRounds = 3;
-  const DriftUnknowns added(runs);
-  const AddedColumns sums = sums_of_runs(runs, added, residual_m);
-  const AddedColumns::Reduced reduced = sums.reduced(a.cofactor_Q);
+  const AddedToRuns with(runs, a, residual_m);
+  const DriftUnknowns& added = with.added();
+  const AddedColumns::Reduced& reduced = with.reduced();
 
   DriftOfRuns out;
   AllDrifts all;
@@ -254,7 +252,7 @@ Result<DriftOfRuns> drift_of_runs(std::span<const Observations> runs, const Adju
     }
     all = *std::move(found);
     out.U = a.U - reduced.dU_dd * all.d;
-    out.residual_m = residuals_without_m(runs, added, out.U, all.d);
+    out.residual_m = with.residuals_without_m(out.U, all.d);
     factor = std::max(1.0, variance(out.residual_m));
   }
 
@@ -264,13 +262,13 @@ Result<DriftOfRuns> drift_of_runs(std::span<const Observations> runs, const Adju
   Eigen::MatrixXd covariance = reduced.dU_dd * all.covariance * reduced.dU_dd.transpose();
   for (std::size_t k = 0; k < runs.size(); ++k) {
     std::optional<TrackerDrift>& drift = out.drift.emplace_back();
-    if (!all.of_run[k]) {
+    const std::optional<DriftEstimate>& estimate = all.of_run[k];
+    if (!estimate) {
       continue;
     }
-    drift = tracker_drift(runs[k], *all.of_run[k], all.d(added.of_run(k)));
-    if (notable_walk(*all.of_run[k])) {
-      covariance += covariance_between_knots_of(runs, k, added, a, reduced, sums, residual_m, all,
-                                                factor_used);
+    drift = tracker_drift(runs[k], *estimate, all.d(added.of_run(k)));
+    if (notable_walk(*estimate)) {
+      covariance += with.covariance_between_knots(k, estimate->walk_m, all.covariance, factor_used);
     }
   }
   out.added_covariance = 0.5 * (covariance + covariance.transpose());

@@ -11,7 +11,6 @@
 #include <CLI/Formatter.hpp>
 #include <csignal>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <utility>
 
@@ -22,6 +21,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/tables/gauge_file.hpp"
 #include "abbe/tables/mfb_files.hpp"
+#include "bar_passes_file.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "identify_bar.hpp"
@@ -34,8 +34,6 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace mfb = calib::mfb;
-
-constexpr std::string_view kPointsHead = "measurement,feature,index,side,k,x_mm,y_mm,z_mm\n";
 
 struct CalibrateBarArguments {
   DaemonSocket where;
@@ -65,84 +63,6 @@ fs::path beside_output(const CalibrateBarArguments& arguments, std::string_view 
   return fs::path(arguments.files.out).replace_extension(extension);
 }
 
-std::string_view feature_word(mfb::Feature feature) {
-  switch (feature) {
-    case mfb::Feature::Hole:
-      return "hole";
-    case mfb::Feature::Rod:
-      return "rod";
-    case mfb::Feature::Plane:
-      return "plane";
-  }
-  return {};
-}
-
-std::string rows_of(const mfb::Measurement& m, const mfb::PassTouches& touches) {
-  std::string text;
-  for (const mfb::Touch& touch : touches) {
-    const bool plane = touch.target.feature == mfb::Feature::Plane;
-    const std::string_view side = touch.target.side == mfb::Side::Left ? "L" : "R";
-    const calib::Vector3 q_mm = kMmPerM * touch.reading_m;
-    text += fmt::format("{},{},{},{},{},{:.17g},{:.17g},{:.17g}\n", m.name,
-                        feature_word(touch.target.feature), touch.target.index + 1,
-                        plane ? side : "", touch.target.k, q_mm.x(), q_mm.y(), q_mm.z());
-  }
-  return text;
-}
-
-/// The passes of an earlier run.
-class PointsFile {
- public:
-  [[nodiscard]] static Result<PointsFile> open(fs::path file, const BarToCalibrate& what,
-                                               bool continues) {
-    PointsFile points(std::move(file));
-    if (!fs::exists(points.file_)) return points;
-    if (!continues)
-      return fail(ErrorCode::Usage,
-                  fmt::format("{}: exists: --continue uses its passes; else remove it, or choose "
-                              "another -o",
-                              points.file_.string()));
-    auto text = read_regular_file(points.file_);
-    if (!text) return tl::unexpected(text.error());
-    points.text_ = *std::move(text);
-    if (auto whole = points.count_rows(what); !whole) return tl::unexpected(whole.error());
-    return points;
-  }
-
-  [[nodiscard]] bool has(const std::string& measurement) const {
-    return rows_.contains(measurement);
-  }
-  [[nodiscard]] Result<void> add(const std::string& rows) {
-    text_ += rows;
-    return replace_file(file_, text_);
-  }
-  [[nodiscard]] const fs::path& file() const { return file_; }
-
- private:
-  explicit PointsFile(fs::path file) : file_(std::move(file)), text_(kPointsHead) {}
-
-  /// The file holds whole passes of this plan; its values are checked when all are there.
-  [[nodiscard]] Result<void> count_rows(const BarToCalibrate& what) {
-    for (std::size_t begin = text_.find('\n') + 1; begin != 0 && begin < text_.size();
-         begin = text_.find('\n', begin) + 1) {
-      ++rows_[text_.substr(begin, text_.find(',', begin) - begin)];
-      if (text_.find('\n', begin) == std::string::npos) break;
-    }
-    const std::size_t whole = what.bar.bar.pattern.count();
-    for (const auto& [measurement, rows] : rows_)
-      if (rows != whole)
-        return fail(ErrorCode::BadInput,
-                    fmt::format("{}: measurement \"{}\" has {} rows, a pass has {} touches: remove "
-                                "its rows, then --continue touches it again",
-                                file_.string(), measurement, rows, whole));
-    return {};
-  }
-
-  fs::path file_;
-  std::string text_;
-  std::map<std::string, std::size_t, std::less<>> rows_;
-};
-
 std::string text_of(const calib::Vector3& v) {
   return fmt::format("{:g}, {:g}, {:g}", v.x(), v.y(), v.z());
 }
@@ -168,7 +88,7 @@ Result<void> wait_for_operator(const std::string& instruction, bool yes) {
 
 class BarCalibration {
  public:
-  BarCalibration(const CalibrateBarArguments& arguments, BarToCalibrate what, PointsFile points,
+  BarCalibration(const CalibrateBarArguments& arguments, BarToCalibrate what, BarPassesFile points,
                  fs::path socket)
       : arguments_(arguments),
         what_(std::move(what)),
@@ -271,7 +191,7 @@ class BarCalibration {
   /// Writes the touches of a pass that is not used to a file of their own.
   [[nodiscard]] Error with_kept(Error error, const std::string& rows) const {
     const fs::path file = beside_output(arguments_, ".partial.csv");
-    const auto kept = replace_file(file, std::string(kPointsHead) + rows);
+    const auto kept = replace_file(file, points_csv(rows));
     error.details.push_back(kept ? fmt::format("the touches of this pass are kept in {}; "
                                                "--continue makes the pass again",
                                                file.string())
@@ -281,15 +201,15 @@ class BarCalibration {
 
   const CalibrateBarArguments& arguments_;
   BarToCalibrate what_;
-  PointsFile points_;
+  BarPassesFile points_;
   fs::path socket_;
 };
 
 int run(const CalibrateBarArguments& arguments) {
   auto what = read_files(arguments.files);
   if (!what) return report(what.error());
-  auto points =
-      PointsFile::open(beside_output(arguments, ".points.csv"), *what, arguments.continues);
+  auto points = BarPassesFile::open(beside_output(arguments, ".points.csv"), what->bar.bar,
+                                    arguments.continues);
   if (!points) return report(points.error());
   auto socket = socket_path(arguments.where);
   if (!socket) return report(socket.error());

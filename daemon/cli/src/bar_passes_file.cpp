@@ -63,6 +63,7 @@ Result<BarPassesFile> BarPassesFile::open(std::filesystem::path file, const mfb:
 }
 
 Result<void> BarPassesFile::add(const std::string& rows) {
+  if (!text_.ends_with('\n')) text_ += '\n';
   text_ += rows;
   return replace_file(file_, text_);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "message.hpp"
 #include "otf/drift_columns.hpp"
 #include "otf/drift_estimate.hpp"
 #include "otf/row_residuals.hpp"
@@ -147,6 +148,11 @@ Result<AllDrifts> estimate_all(std::span<const Observations> runs, const DriftUn
   }
 
   const Eigen::LDLT<Eigen::MatrixXd> known(S + own.P);
+  if (known.info() != Eigen::Success || !(known.vectorD().array() > 0.0).all()) {
+    return failure(ErrorCode::NotConverged,
+                   "drift of the tracker in several runs: what the visits of the runs tell "
+                   "contradicts itself; identify without [[tracker.nest]], or leave out a run");
+  }
   all.d = known.solve(g + own.Pc);
   const Eigen::MatrixXd covariance = known.solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
   all.covariance = 0.5 * (covariance + covariance.transpose());

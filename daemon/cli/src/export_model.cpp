@@ -1,0 +1,316 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/config/calib_error.hpp"
+#include "commands.hpp"
+#include "direction_option.hpp"
+#include "export_options.hpp"
+#include "export_report.hpp"
+#include "terminal.hpp"
+#include "vector_option.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A request whose options are checked.
+struct ExportRequest {
+  const FormatFacts* facts = nullptr;
+  ModelDocument document;
+  calib::Vector3 tool_m = calib::Vector3::Zero();
+  calib::ExportBox box;
+  calib::GridAxes nodes_m;
+  /// --direction; nullopt: not given
+  std::optional<calib::estimation::AxisTravel> travel;
+  WriteOptions options;
+};
+
+std::string volume_text(const calib::ExportBox& box) {
+  const calib::Vector3 low = kMmPerM * box.min_m, high = kMmPerM * box.max_m;
+  return fmt::format("X {:.6g} to {:.6g}, Y {:.6g} to {:.6g}, Z {:.6g} to {:.6g} mm", low[0],
+                     high[0], low[1], high[1], low[2], high[2]);
+}
+
+Result<void> add_direction(ExportRequest& request, const ExportArguments& arguments) {
+  if (arguments.direction.empty()) return {};
+  if (request.facts->holds != HeldPart::Grid)
+    return fail(ErrorCode::Usage,
+                fmt::format("--direction: {} is not a grid; its tables contain the directions that "
+                            "it can hold",
+                            request.facts->name));
+  const auto travel = parse_direction(arguments.direction);
+  if (!travel) return tl::make_unexpected(travel.error());
+  if (auto known = require_travel(request.document.model, arguments.model); !known) return known;
+  request.travel = *travel;
+  request.options.origin.direction = arguments.direction;
+  return {};
+}
+
+Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments) {
+  const auto part = volume_of(arguments.volume);
+  if (!part) return tl::make_unexpected(part.error());
+  const auto& model = request.document.model;
+  const auto box = calib::export_box(model, *part);
+  if (!box) return fail(ErrorCode::Usage, "--volume: " + box.error().text);
+  request.box = *box;
+
+  calib::NodeOptions options{.equidistant = request.facts->equidistant};
+  if (arguments.step_mm != 0.0) options.step_m = arguments.step_mm / kMmPerM;
+  const auto nodes = calib::export_nodes(model, *box, options);
+  if (!nodes) return fail(ErrorCode::Usage, "--step: " + nodes.error().text);
+  request.nodes_m = *nodes;
+  constexpr std::size_t kMostGridNodes = 1'000'000;
+  const std::size_t count = (*nodes)[0].size() * (*nodes)[1].size() * (*nodes)[2].size();
+  if (request.facts->holds == HeldPart::Grid && count > kMostGridNodes)
+    return fail(ErrorCode::Usage,
+                fmt::format("--step: {} nodes of the grid; at most {}", count, kMostGridNodes));
+  return {};
+}
+
+/// The options that need no model come first: a wrong one is reported at once.
+Result<ExportRequest> request_of(const ExportArguments& arguments) {
+  const auto facts = format_of(arguments.to);
+  if (!facts) return tl::make_unexpected(facts.error());
+  const auto names = axis_names_of(arguments.axis_map, **facts);
+  if (!names) return tl::make_unexpected(names.error());
+  const auto positive = positive_moves_of(arguments.positive, **facts);
+  if (!positive) return tl::make_unexpected(positive.error());
+
+  auto document = model_named(arguments.model, arguments.store);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto tool_m = tool_of(arguments.tool, document->model);
+  if (!tool_m) return tl::make_unexpected(tool_m.error());
+  ExportRequest request{*facts, *std::move(document), *tool_m, {}, {}, {}, {*names, *positive, {}}};
+  if (auto added = add_direction(request, arguments); !added)
+    return tl::make_unexpected(added.error());
+  if (auto added = add_nodes(request, arguments); !added) return tl::make_unexpected(added.error());
+
+  auto& origin = request.options.origin;
+  origin.model_hash = model_hash(request.document);
+  origin.machine = request.document.machine;
+  origin.volume = volume_text(request.box);
+  const calib::Vector3 tool_mm = kMmPerM * *tool_m;
+  origin.tool = fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", tool_mm[0], tool_mm[1], tool_mm[2]);
+  return request;
+}
+
+std::vector<calib::ErrorMotion> motions_of(HeldPart part) {
+  return part == HeldPart::Positioning ? calib::positioning_motions()
+                                       : calib::translation_motions();
+}
+
+calib::Result<HeldCorrection> held_by(const ExportRequest& request) {
+  const auto& model = request.document.model;
+  const auto& facts = *request.facts;
+  if (facts.holds == HeldPart::Grid)
+    return calib::grid_of_model(model, request.tool_m, request.nodes_m,
+                                request.travel.value_or(calib::estimation::AxisTravel{}))
+        .map([](auto grid) { return HeldCorrection(std::move(grid)); });
+  if (facts.holds == HeldPart::Errors)
+    return calib::tables_of_model(model, request.tool_m, request.nodes_m).map([](auto tables) {
+      return HeldCorrection(std::move(tables));
+    });
+  return calib::fit_tables(model, request.tool_m, motions_of(facts.holds), request.nodes_m,
+                           facts.per_direction)
+      .map([](auto tables) { return HeldCorrection(std::move(tables)); });
+}
+
+calib::CorrectionFunction correction_function(const HeldCorrection& held) {
+  return [&held](const calib::ExportPlace& place) -> calib::Vector3 {
+    if (const auto* grid = std::get_if<calib::HeldGrid>(&held); grid != nullptr)
+      return grid->c_m(place.commanded_m);
+    return std::get<calib::HeldTables>(held).c_m(place.commanded_m, place.travel);
+  };
+}
+
+/// DataInsufficient if the machine would not become better.
+Result<void> require_use(const ExportRequest& request, const calib::ExportLoss& loss) {
+  constexpr double kNothing_m = 1e-9, kUseful = 0.99;
+  const double without_m = loss.rms_without_m.norm(), lost_m = loss.rms_lost_m.norm();
+  if (without_m < kNothing_m || lost_m < kUseful * without_m) return {};
+  Error error{ErrorCode::DataInsufficient,
+              fmt::format("{} cannot hold this model: of a correction of {:.3f} um rms it loses "
+                          "{:.3f} um",
+                          request.facts->name, without_m * kUmPerM, lost_m * kUmPerM)};
+  error.details = {"isg-csv, etalon and csv-grid hold rotations and levers"};
+  return tl::make_unexpected(error);
+}
+
+ControlSettings settings_of(const ExportRequest& request) {
+  ControlSettings settings{request.options.axis_names, request.options.positive_moves, "", {}};
+  for (const calib::Axis axis : request.document.model.chain().order_w_to_t())
+    settings.order_w_to_t += calib::letter(axis);
+  for (std::size_t k = 0; k < 3; ++k)
+    settings.tool_m[k] = request.tool_m[static_cast<Eigen::Index>(k)];
+  return settings;
+}
+
+Result<ExportReport> computed_report(const ExportRequest& request,
+                                     std::span<const calib::ExportPlace> places) {
+  auto held = held_by(request);
+  if (!held) return tl::make_unexpected(error_of(held.error()));
+  ExportReport report;
+  report.facts = request.facts;
+  report.written = request.options;
+  report.held = *std::move(held);
+
+  const auto& model = request.document.model;
+  const auto loss = calib::export_loss(model, request.tool_m, places, request.travel,
+                                       correction_function(report.held));
+  if (!loss) return tl::make_unexpected(error_of(loss.error()));
+  report.loss = *loss;
+  if (auto useful = require_use(request, *loss); !useful)
+    return tl::make_unexpected(useful.error());
+
+  const auto part = request.facts->holds;
+  if (part == HeldPart::Positioning || part == HeldPart::Translations) {
+    auto by_error = calib::losses_by_error(model, request.tool_m, motions_of(part), request.box);
+    if (!by_error) return tl::make_unexpected(error_of(by_error.error()));
+    report.by_error = *std::move(by_error);
+  }
+  report.not_held = not_held_by(*request.facts, model, request.travel.has_value());
+  return report;
+}
+
+/// A file under a temporary name beside its place, until it is proven.
+struct PendingFile {
+  fs::path temporary, final;
+};
+
+void remove_pending(std::span<const PendingFile> pending) {
+  std::error_code ignored;
+  for (const auto& file : pending) fs::remove(file.temporary, ignored);
+}
+
+/// Writes the files and returns their texts as they are on the disk.
+Result<std::vector<ExportFile>> written_and_read(std::span<const ExportFile> files,
+                                                 std::span<const PendingFile> pending) {
+  std::vector<ExportFile> read;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (auto written = replace_file(pending[i].temporary, files[i].text); !written)
+      return tl::make_unexpected(written.error());
+    auto text = read_regular_file(pending[i].temporary);
+    if (!text) return tl::make_unexpected(text.error());
+    read.push_back({files[i].name, *std::move(text)});
+  }
+  return read;
+}
+
+Result<void> rename_pending(std::span<const PendingFile> pending) {
+  for (const auto& file : pending) {
+    std::error_code fault;
+    fs::rename(file.temporary, file.final, fault);
+    if (fault)
+      return fail(ErrorCode::Io,
+                  fmt::format("rename to {}: {}", file.final.string(), fault.message()));
+  }
+  return {};
+}
+
+Result<void> write_proven(const ExportRequest& request, const fs::path& out, ExportReport& report,
+                          std::span<const calib::ExportPlace> places) {
+  const auto files = write_export(request.facts->format, report.held, request.options);
+  if (!files) return tl::make_unexpected(files.error());
+  if (request.facts->folder) {
+    if (auto created = create_folder(out, NewFolder::OfTheCaller); !created) return created;
+  }
+
+  std::vector<PendingFile> pending;
+  for (const auto& file : *files) {
+    const fs::path final = request.facts->folder ? out / file.name : out;
+    pending.push_back({final.string() + fmt::format(".{}.new", ::getpid()), final});
+    report.files.push_back(final.string());
+  }
+  const auto finish = [&]() -> Result<void> {
+    const auto read = written_and_read(*files, pending);
+    if (!read) return tl::make_unexpected(read.error());
+    const auto proof = prove_export(request.facts->format, *read, settings_of(request), places,
+                                    correction_function(report.held));
+    if (!proof) return tl::make_unexpected(proof.error());
+    report.proof = *proof;
+    return rename_pending(pending);
+  };
+  auto done = finish();
+  if (!done) remove_pending(pending);
+  return done;
+}
+
+Result<ExportReport> exported(const ExportArguments& arguments) {
+  const auto request = request_of(arguments);
+  if (!request) return tl::make_unexpected(request.error());
+  constexpr std::uint32_t kSeed = 1;
+  const auto places =
+      calib::random_places(request->document.model, request->box, kExportPlaces, kSeed);
+  if (!places) return tl::make_unexpected(error_of(places.error()));
+
+  auto report = computed_report(*request, *places);
+  if (!report) return report;
+  const fs::path out = arguments.out;
+  if (auto written = write_proven(*request, out, *report, *places); !written)
+    return tl::make_unexpected(written.error());
+  if (request->facts->folder) {
+    if (auto written = replace_file(out / "export.txt", report_text(*report)); !written)
+      return tl::make_unexpected(written.error());
+  }
+  return report;
+}
+
+int run_export(const ExportArguments& arguments) {
+  const auto done = exported(arguments);
+  if (!done) return report(done.error());
+  const auto text = arguments.json ? report_json(*done) : report_text(*done);
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+    return report({ErrorCode::Io, "write the report to stdout: it is closed or full"});
+  return 0;
+}
+
+}  // namespace
+
+void add_export(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ExportArguments>();
+  auto* command = parent.add_subcommand(
+      "export",
+      "Write a model as compensation file of a control.\n"
+      "The file is read back as the control reads it, and compared at 1000 places of the volume\n"
+      "with what the format can hold; only then it gets its name. The report states the sign, and\n"
+      "in um what the format loses.");
+  command
+      ->add_option("MODEL", arguments->model,
+                   "model.json; or a model of the store: its id, the beginning of its id, or "
+                   "\"active\"")
+      ->required();
+  add_store_options(*command, arguments->store);
+  command->add_option("--to", arguments->to, "format: " + format_names())->required();
+  command
+      ->add_option("-o,--output", arguments->out,
+                   "file; for linuxcnc-comp and heidenhain-com a folder, with the report in "
+                   "export.txt")
+      ->required();
+  command->add_option("--tool", arguments->tool,
+                      "x,y,z: tool offset in mm; default: that of the calibration");
+  command->add_option("--step", arguments->step_mm,
+                      "largest distance of nodes in mm; default: the nodes of linear tables, 32 "
+                      "equal steps of other models");
+  command->add_option("--volume", arguments->volume,
+                      "xmin,xmax,ymin,ymax,zmin,zmax in mm: a part of the volume; default: the box "
+                      "around the validity volume");
+  command->add_option("--axis-map", arguments->axis_map,
+                      "names of X, Y and Z on the control, such as X=AX1,Y=AX2,Z=AX3");
+  command->add_option("--positive", arguments->positive,
+                      "plus or minus: the direction in which a positive value moves the axis of "
+                      "this control; siemens-cec and heidenhain-com need it");
+  command->add_option("--direction", arguments->direction,
+                      "of csv-grid: direction in which X, Y and Z last moved, such as +,-,0, for a "
+                      "model with backlash; default: the mean of both directions");
+  command->add_flag("--json", arguments->json, "print the report as JSON");
+  command->callback([arguments, &exit] { exit = run_export(*arguments); });
+}
+
+}  // namespace abbe::daemon

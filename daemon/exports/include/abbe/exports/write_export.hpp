@@ -1,0 +1,31 @@
+#pragma once
+/// The text of the files of a control. Values are in mm (rotations: rad), positions in mm.
+
+#include <variant>
+
+#include "abbe/base/error.hpp"
+#include "abbe/calib/export/held_correction.hpp"
+#include "abbe/exports/export_format.hpp"
+
+namespace abbe::daemon {
+
+/// What a file states about its origin, where the format has comments.
+struct ExportOrigin {
+  std::string model_hash, machine, volume, tool, direction;
+};
+
+struct WriteOptions {
+  std::array<std::string, 3> axis_names{"X", "Y", "Z"};
+  int positive_moves = 1;  ///< FormatFacts::positive_moves, or as the user gives it
+  ExportOrigin origin;
+};
+
+using HeldCorrection = std::variant<calib::HeldTables, calib::HeldGrid>;
+
+/// Usage if the format limits the number of nodes and an axis has more. `held` must be of the kind
+/// that the format holds. Line breaks and characters outside printable ASCII in `origin` become
+/// "?". Pure.
+[[nodiscard]] Result<std::vector<ExportFile>> write_export(ExportFormat, const HeldCorrection& held,
+                                                           const WriteOptions&);
+
+}  // namespace abbe::daemon

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "commands.hpp"
 #include "direction_option.hpp"
+#include "export_files.hpp"
 #include "export_options.hpp"
 #include "export_report.hpp"
 #include "terminal.hpp"
@@ -31,6 +31,14 @@ struct ExportRequest {
   std::optional<calib::estimation::AxisTravel> travel;
   WriteOptions options;
 };
+
+/// A name from a file, for a terminal and a comment: no control characters.
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+  }
+  return text;
+}
 
 std::string volume_text(const calib::ExportBox& box) {
   const calib::Vector3 low = kMmPerM * box.min_m, high = kMmPerM * box.max_m;
@@ -62,7 +70,7 @@ Result<void> add_nodes(ExportRequest& request, const ExportArguments& arguments)
   request.box = *box;
 
   calib::NodeOptions options{.equidistant = request.facts->equidistant};
-  if (arguments.step_mm != 0.0) options.step_m = arguments.step_mm / kMmPerM;
+  if (arguments.step_mm) options.step_m = *arguments.step_mm / kMmPerM;
   const auto nodes = calib::export_nodes(model, *box, options);
   if (!nodes) return fail(ErrorCode::Usage, "--step: " + nodes.error().text);
   request.nodes_m = *nodes;
@@ -94,7 +102,7 @@ Result<ExportRequest> request_of(const ExportArguments& arguments) {
 
   auto& origin = request.options.origin;
   origin.model_hash = model_hash(request.document);
-  origin.machine = request.document.machine;
+  origin.machine = one_line(request.document.machine);
   origin.volume = volume_text(request.box);
   const calib::Vector3 tool_mm = kMmPerM * *tool_m;
   origin.tool = fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", tool_mm[0], tool_mm[1], tool_mm[2]);
@@ -179,72 +187,29 @@ Result<ExportReport> computed_report(const ExportRequest& request,
   return report;
 }
 
-/// A file under a temporary name beside its place, until it is proven.
-struct PendingFile {
-  fs::path temporary, final;
-};
-
-void remove_pending(std::span<const PendingFile> pending) {
-  std::error_code ignored;
-  for (const auto& file : pending) fs::remove(file.temporary, ignored);
-}
-
-/// Writes the files and returns their texts as they are on the disk.
-Result<std::vector<ExportFile>> written_and_read(std::span<const ExportFile> files,
-                                                 std::span<const PendingFile> pending) {
-  std::vector<ExportFile> read;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (auto written = replace_file(pending[i].temporary, files[i].text); !written)
-      return tl::make_unexpected(written.error());
-    auto text = read_regular_file(pending[i].temporary);
-    if (!text) return tl::make_unexpected(text.error());
-    read.push_back({files[i].name, *std::move(text)});
-  }
-  return read;
-}
-
-Result<void> rename_pending(std::span<const PendingFile> pending) {
-  for (const auto& file : pending) {
-    std::error_code fault;
-    fs::rename(file.temporary, file.final, fault);
-    if (fault)
-      return fail(ErrorCode::Io,
-                  fmt::format("rename to {}: {}", file.final.string(), fault.message()));
-  }
-  return {};
-}
-
-Result<void> write_proven(const ExportRequest& request, const fs::path& out, ExportReport& report,
-                          std::span<const calib::ExportPlace> places) {
+Result<void> write_files(const ExportRequest& request, const fs::path& out, ExportReport& report,
+                         std::span<const calib::ExportPlace> places) {
   const auto files = write_export(request.facts->format, report.held, request.options);
   if (!files) return tl::make_unexpected(files.error());
-  if (request.facts->folder) {
-    if (auto created = create_folder(out, NewFolder::OfTheCaller); !created) return created;
-  }
+  const auto proof = write_when_proven(
+      *files, final_paths(*request.facts, out, *files), [&](std::span<const ExportFile> read) {
+        return prove_export(request.facts->format, read, settings_of(request), places,
+                            correction_function(report.held));
+      });
+  if (!proof) return tl::make_unexpected(proof.error());
 
-  std::vector<PendingFile> pending;
-  for (const auto& file : *files) {
-    const fs::path final = request.facts->folder ? out / file.name : out;
-    pending.push_back({final.string() + fmt::format(".{}.new", ::getpid()), final});
-    report.files.push_back(final.string());
-  }
-  const auto finish = [&]() -> Result<void> {
-    const auto read = written_and_read(*files, pending);
-    if (!read) return tl::make_unexpected(read.error());
-    const auto proof = prove_export(request.facts->format, *read, settings_of(request), places,
-                                    correction_function(report.held));
-    if (!proof) return tl::make_unexpected(proof.error());
-    report.proof = *proof;
-    return rename_pending(pending);
-  };
-  auto done = finish();
-  if (!done) remove_pending(pending);
-  return done;
+  report.proof = *proof;
+  for (const auto& path : final_paths(*request.facts, out, *files))
+    report.files.push_back(path.string());
+  return {};
 }
 
 Result<ExportReport> exported(const ExportArguments& arguments) {
   const auto request = request_of(arguments);
   if (!request) return tl::make_unexpected(request.error());
+  const fs::path out = arguments.out;
+  if (auto place = require_place(*request->facts, out); !place)
+    return tl::make_unexpected(place.error());
   constexpr std::uint32_t kSeed = 1;
   const auto places =
       calib::random_places(request->document.model, request->box, kExportPlaces, kSeed);
@@ -252,8 +217,7 @@ Result<ExportReport> exported(const ExportArguments& arguments) {
 
   auto report = computed_report(*request, *places);
   if (!report) return report;
-  const fs::path out = arguments.out;
-  if (auto written = write_proven(*request, out, *report, *places); !written)
+  if (auto written = write_files(*request, out, *report, *places); !written)
     return tl::make_unexpected(written.error());
   if (request->facts->folder) {
     if (auto written = replace_file(out / "export.txt", report_text(*report)); !written)

@@ -14,7 +14,7 @@ namespace abbe::daemon {
 struct ExportArguments {
   std::string model, to, out, tool, volume, axis_map, positive, direction;
   StoreOption store;
-  double step_mm = 0.0;  ///< 0: not given
+  std::optional<double> step_mm;
   bool json = false;
 };
 

@@ -98,7 +98,8 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "model activate",
                                     "model rollback",
                                     "dds",
-                                    "dds keys"}) {
+                                    "dds keys",
+                                    "export"}) {
     EXPECT_THAT(abbe(command + " --help").out,
                 AllOf(HasSubstr("Example: abbe " + command), HasSubstr("Exit codes: 0 done")));
   }

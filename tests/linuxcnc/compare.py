@@ -15,6 +15,7 @@ import time
 import hal
 import linuxcnc
 
+REACHED_MM = 1e-8
 SETTLED_MM = 1e-9  # LinuxCNC approaches the trim at a limited speed
 ALLOWED_UM = 1e-3  # difference from the file
 
@@ -53,12 +54,19 @@ def start(command, status):
     sys.exit("compare: the machine is not homed after 20 s")
 
 
-def move(command, x, y, z):
+def move(command, place):
+    """Ends when all joints are commanded to the place: LinuxCNC may report an earlier end."""
     command.mode(linuxcnc.MODE_MDI)
     command.wait_complete()
-    command.mdi("G21 G90 G1 X%.9f Y%.9f Z%.9f F20000" % (x, y, z))
-    if command.wait_complete(60) != 1:
-        sys.exit("compare: LinuxCNC did not reach %g %g %g" % (x, y, z))
+    command.mdi("G21 G90 G1 X%.9f Y%.9f Z%.9f F20000" % tuple(place))
+    command.wait_complete(60)
+    end = time.time() + 60
+    while time.time() < end:
+        now = [hal.get_value("joint.%d.pos-cmd" % j) for j in range(3)]
+        if all(abs(a - b) < REACHED_MM for a, b in zip(now, place)):
+            return
+        time.sleep(0.01)
+    sys.exit("compare: LinuxCNC did not reach %g %g %g" % tuple(place))
 
 
 def trims():
@@ -88,8 +96,8 @@ def main():
     for point, correction in zip(points, corrections):
         place, direction = point[:3], point[3:6]
         approach = [p - 2.0 * d for p, d in zip(place, direction)]
-        move(command, *approach)
-        move(command, *place)
+        move(command, approach)
+        move(command, place)
         trim_um = [1e3 * t for t in trims()]
         off = [t - file_um(*of) for t, of in zip(trim_um, zip(tables, place, direction))]
         file_off_um = max([file_off_um] + [abs(v) for v in off])

@@ -1,0 +1,138 @@
+/// `abbe export`, from a model to the files of a control.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "abbe_command.hpp"
+#include "recording_fixture.hpp"
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using test::Ran;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class CliExport : public ::testing::Test {
+ protected:
+  CliExport() {
+    auto document = test::synthetic_document(3);
+    test::write_text(folder_.path() / "model.json", to_json(document));
+    document.model = test::synthetic_travel_model(3);
+    test::write_text(folder_.path() / "travel.json", to_json(document));
+  }
+  [[nodiscard]] Ran abbe(const std::string& arguments) const {
+    return test::run_abbe(folder_.path(), "export " + arguments);
+  }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return test::text_of(folder_.path() / name);
+  }
+  [[nodiscard]] bool leaves_temporary_files() const {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
+      if (entry.path().extension() == ".new") return true;
+    }
+    return false;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(CliExport, StatesSignHashAndLoss) {
+  const auto ran = abbe("model.json --to siemens-lec -o comp.mpf");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto hash = model_hash(test::synthetic_document(3));
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("moves the axis in the negative direction"), HasSubstr(hash),
+                             HasSubstr("1000 places"), HasSubstr("EAX"), HasSubstr("lost")));
+  EXPECT_THAT(file("comp.mpf"), AllOf(HasSubstr("; abbe export of model " + hash),
+                                      HasSubstr("$AA_ENC_COMP[0,0,X1]=")));
+  EXPECT_FALSE(leaves_temporary_files());
+}
+
+TEST_F(CliExport, WritesTheReportBesideFilesWithoutComments) {
+  const auto ran = abbe("travel.json --to linuxcnc-comp -o compensation");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(file("compensation/export.txt"), ran.out);
+  EXPECT_THAT(file("compensation/z.comp"), AllOf(Not(IsEmpty()), Not(HasSubstr("#"))));
+}
+
+TEST_F(CliExport, ReportsAsJson) {
+  const auto ran = abbe("travel.json --to csv-grid --direction +,-,+ -o grid.csv --json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  const auto report = nlohmann::json::parse(ran.out);
+  EXPECT_EQ(report["positive_moves"], 1);
+  EXPECT_LE(report["largest_difference_nm"], 1.0);
+  EXPECT_LT(report["rms_lost_um"][0], report["rms_without_um"][0]);
+}
+
+TEST_F(CliExport, AsksForASignThatIsNotDocumented) {
+  const auto ran = abbe("model.json --to siemens-cec -o cec.mpf");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err,
+              AllOf(HasSubstr("--positive plus or --positive minus"), HasSubstr("dial gauge")));
+  const auto minus = abbe("model.json --to siemens-cec --positive minus -o minus.mpf");
+  ASSERT_EQ(minus.exit, 0) << minus.err;
+  ASSERT_EQ(abbe("model.json --to siemens-cec --positive plus -o plus.mpf").exit, 0);
+  EXPECT_NE(file("minus.mpf"), file("plus.mpf"));
+}
+
+TEST_F(CliExport, RefusesWrongOptionsByName) {
+  const auto message = [&](const std::string& options) {
+    const auto ran = abbe("model.json -o out " + options);
+    EXPECT_EQ(ran.exit, 2) << options;
+    return ran.err;
+  };
+  EXPECT_THAT(message("--to fanuc"), HasSubstr("known: isg-csv, etalon"));
+  EXPECT_THAT(message("--to siemens-lec --axis-map 'X=X1];M30'"), HasSubstr("--axis-map"));
+  EXPECT_THAT(message("--to siemens-lec --axis-map X=Y1"), HasSubstr("must be different"));
+  EXPECT_THAT(message("--to csv-grid --axis-map X=A"), HasSubstr("no names of axes"));
+  EXPECT_THAT(message("--to linuxcnc-comp --positive plus"), HasSubstr("is fixed"));
+  EXPECT_THAT(message("--to linuxcnc-comp --step 1"), HasSubstr("601 nodes on axis X"));
+  EXPECT_THAT(message("--to csv-grid --step 0"), HasSubstr("must be positive"));
+  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be positive"));
+  EXPECT_THAT(message("--to csv-grid --step 0.5"), HasSubstr("nodes of the grid"));
+  EXPECT_THAT(message("--to csv-grid --volume=-300,300,-300,300,-400,0"),
+              HasSubstr("Z -400 to 0 mm; the model is valid from -400 to -100 mm"));
+  EXPECT_THAT(message("--to csv-grid --volume 1,2,3"), HasSubstr("xmin,xmax,ymin"));
+  EXPECT_THAT(message("--to isg-csv --direction +,+,+"), HasSubstr("is not a grid"));
+}
+
+TEST_F(CliExport, RefusesAModelOfWhichTheFormatHoldsNothing) {
+  auto document = test::synthetic_document(3);
+  auto description = document.model.description();
+  for (auto& parameter : description.parameters) {
+    // The straightness of X as a function of Z does not move X with X.
+    if (parameter.name != "EXZ") parameter.value = 0.0;
+    if (parameter.name == "EXZ") parameter.value = *parameter.position_m < -0.25 ? -5e-6 : 5e-6;
+  }
+  document.model = calib::VolumetricModel::from_description(std::move(description)).value();
+  test::write_text(folder_.path() / "roll.json", to_json(document));
+  const auto ran = abbe("roll.json --to linuxcnc-comp -o out");
+  EXPECT_EQ(ran.exit, 1) << ran.out;
+  EXPECT_THAT(ran.err, HasSubstr("linuxcnc-comp cannot hold this model"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out"));
+}
+
+TEST_F(CliExport, ReplacesNoDeviceAndNoFolder) {
+  std::filesystem::create_directory(folder_.path() / "there");
+  const auto ran = abbe("model.json --to siemens-lec -o there");
+  EXPECT_EQ(ran.exit, 4);
+  EXPECT_THAT(ran.err, HasSubstr("it exists and is not a file"));
+  EXPECT_EQ(abbe("model.json --to siemens-lec -o /dev/null").exit, 4);
+  EXPECT_THAT(abbe("model.json --to siemens-lec -o nowhere/x").err,
+              HasSubstr("there is no folder nowhere"));
+  EXPECT_THAT(abbe("model.json --to linuxcnc-comp -o model.json").err, HasSubstr("needs a folder"));
+}
+
+TEST_F(CliExport, RefusesAToolOfAnotherModel) {
+  const auto ran = abbe("model.json --to siemens-lec --tool 0,0,0 -o out");
+  EXPECT_EQ(ran.exit, 1);
+  EXPECT_THAT(ran.err, HasSubstr("tool offset (0, 0, 0) mm"));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -10,8 +10,8 @@
 
 namespace abbe::daemon {
 
-/// Io unless the files can be placed at `out`: a file in an existing folder, or a folder, which need
-/// not exist. A device or pipe is never replaced.
+/// Io unless the files can be placed at `out`: a file in an existing folder, or a folder, which may
+/// be missing. A device or pipe is never replaced.
 [[nodiscard]] Result<void> require_place(const FormatFacts&, const std::filesystem::path& out);
 
 /// `out` itself, or the files in the folder `out`.
@@ -22,8 +22,8 @@ namespace abbe::daemon {
 using ProofOfFiles = std::function<Result<ExportProof>(std::span<const ExportFile>)>;
 
 /// Writes the files under temporary names beside `paths`, reads them, and renames them if `prove`
-/// accepts the texts that were read. Removes the temporary files otherwise; earlier files at `paths`
-/// are then unchanged. Creates the folder of the files.
+/// accepts the texts that were read. Removes the temporary files otherwise; earlier files at
+/// `paths` are then unchanged. Creates the folder of the files.
 [[nodiscard]] Result<ExportProof> write_when_proven(std::span<const ExportFile>,
                                                     std::span<const std::filesystem::path> paths,
                                                     const ProofOfFiles& prove);

@@ -88,8 +88,8 @@ Result<int> positive_moves_of(const std::string& text, const FormatFacts& facts)
                 fmt::format("--to {}: give --positive plus or --positive minus", facts.name)};
     error.details = {
         "public documents do not state in which direction a positive value moves the axis",
-        "enter a table of the constant value 0.05 mm, activate it, and read a dial gauge: the "
-        "table moved in the positive direction: plus; in the negative direction: minus"};
+        "enter a table of the constant value 0.05 mm, activate it, and read a dial gauge: the axis "
+        "moved as in a positive jog: plus; as in a negative jog: minus"};
     return tl::make_unexpected(error);
   }
   if (facts.positive_fixed)

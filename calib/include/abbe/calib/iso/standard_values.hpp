@@ -1,0 +1,127 @@
+#pragma once
+/// Values of the standards for machine tools, computed from a model: what a certificate states.
+/// All values follow from V (volumetric_model.hpp) of the functional point, for the first tool
+/// offset of the model, along straight lines inside the validity volume. They do not change with a
+/// rigid motion of the whole volume; they are therefore the same in every gauge.
+///
+/// Uncertainty: each value f is a linear function of the parameters, f = a U, u^2 = a cov(U) a^T
+/// ([GUM] 5.2.2 eq. (13)). A range max - min is evaluated as the difference at the two positions at
+/// which it occurs. Where U exceeds the variation of the curve, noise makes a range too large.
+/// Not contained: the scatter of repeated approaches (a model has no repetitions, so the A, R and
+/// s of ISO 230-2 cannot be computed), errors between the nodes, and changes after the measurement.
+///
+/// Pure; any thread. Lengths in m, angles in rad, u: standard uncertainty (k = 1).
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/volumetric_model.hpp"
+
+namespace abbe::calib::iso {
+
+struct Value {
+  double value = 0.0;
+  double u = 0.0;
+};
+
+/// The box inside the validity volume in which the lines are: the bounding box of the volume, or,
+/// if its corners are not in the volume, the largest smaller box of the same shape about its centre
+/// (about the mean of the vertices, if the centre is not in the volume).
+struct LineBox {
+  Vector3 low_m = Vector3::Zero(), high_m = Vector3::Zero();
+  bool whole = true;  ///< the corners of the bounding box are in the validity volume
+  [[nodiscard]] Vector3 centre_m() const { return 0.5 * (low_m + high_m); }
+};
+/// DegenerateGeometry without a validity volume.
+[[nodiscard]] Result<LineBox> line_box(const ValidityVolume&);
+
+/// Positioning along one axis on the line through the centre of the box ([ISO 230-2]; terms there
+/// refer to mean deviations x_i of repeated approaches; here x_i is the component of V along the
+/// axis). Targets p_i: the nodes of the model inside the box and its ends, at least 5.
+///     x_i up, x_i down: V for approaches forward and backward;  x_i: their mean;
+///     B_i = x_i up - x_i down
+///     M = max x_i - min x_i                        mean bidirectional positional deviation
+///     B = the B_i with the largest |B_i|           reversal error, with its sign
+///     E = max(x_i up, x_i down) - min(x_i up, x_i down)   bidirectional systematic deviation
+/// Without differences between the directions in the model, B is absent and E = M.
+struct Positioning {
+  Axis axis = Axis::X;
+  std::vector<double> targets_m;
+  std::vector<Value> mean;  ///< x_i relative to that at the first target; u of the difference
+  Value M, E;
+  std::optional<Value> B, mean_B;  ///< mean_B: mean of all B_i
+  /// ISO 230-1: range of the linear positioning error (EXX), the same as M.
+  [[nodiscard]] const Value& range() const { return M; }
+};
+
+/// Straightness of the functional point on the line of Positioning: range of the component of V
+/// after subtraction of the least-squares straight line over the targets ([ISO 230-1]).
+struct Straightness {
+  ErrorMotion motion;
+  std::vector<Value> deviation;  ///< from the reference line, at the targets of the axis
+  Value range;
+};
+
+/// Angle between the least-squares lines of two axes minus 90 degrees, as rotation of `axis`
+/// relative to `reference` about the third direction. With the slopes s of V on the two lines:
+///     EC0Y = -s_y(V_x) - s_x(V_y)     Y relative to X
+///     EB0Z = +s_z(V_x) + s_x(V_z)     Z relative to X
+///     EA0Z = -s_z(V_y) - s_y(V_z)     Z relative to Y
+/// In gauge G1 the squareness parameters of a model refer to the lines between the end points of
+/// the straightness tables; they differ from these values by the slopes of these tables.
+struct Squareness {
+  std::string name;
+  Axis axis = Axis::Y, reference = Axis::X;
+  Value angle;
+};
+
+/// Range of one angular error over the box: max - min of its table. Only models with tables have
+/// them; those of a model with one tool have no rotations that this tool does not show.
+struct Angular {
+  ErrorMotion motion;
+  Value range;
+};
+
+/// Diagonal displacement [ISO 230-6]: component of V along a body diagonal of the box, relative to
+/// its beginning. Name: direction of travel along X, Y, Z, P positive, N negative.
+struct Diagonal {
+  std::string name;  ///< "PPP", "NPP", "PNP" or "NNP"
+  Vector3 from_m = Vector3::Zero(), to_m = Vector3::Zero();
+  std::vector<double> along_m;  ///< distance from the beginning
+  std::vector<Value> mean;      ///< mean of both directions of travel, relative to the beginning
+  Value M;                      ///< range of the mean
+  Value E;  ///< bidirectional systematic deviation: range over both directions; M without backlash
+  std::optional<Value> B;  ///< reversal error of the largest size, with its sign
+};
+
+struct StandardValues {
+  LineBox box;
+  Vector3 tool_offset_m = Vector3::Zero();
+  std::array<Positioning, 3> positioning;
+  std::vector<Straightness> straightness;  ///< EYX EZX EXY EZY EXZ EYZ
+  std::array<Squareness, 3> squareness;    ///< EC0Y EB0Z EA0Z
+  std::vector<Angular> angular;            ///< EAX .. ECZ, those in the model
+  std::array<Diagonal, 4> diagonals;
+  /// The largest E of the diagonals: E_d, diagonal systematic deviation.
+  [[nodiscard]] const Diagonal& worst_diagonal() const;
+};
+
+/// DegenerateGeometry if the model has no validity volume.
+[[nodiscard]] Result<StandardValues> standard_values(const VolumetricModel&);
+
+/// |V| over a regular lattice of points of the box, in the gauge of the model.
+struct VolumeError {
+  std::size_t points = 0;
+  double mean_m = 0.0, rms_m = 0.0;  ///< |V| before compensation
+  Value largest;                     ///< the largest |V|, u of V in its direction
+  /// The same without the rigid motion that fits best to the lattice.
+  double rigid_free_mean_m = 0.0, rigid_free_rms_m = 0.0, rigid_free_max_m = 0.0;
+  /// U(V) = 2 sqrt(trace cov V): what remains at least is to be expected after compensation.
+  double mean_U_m = 0.0, max_U_m = 0.0;
+};
+[[nodiscard]] Result<VolumeError> volume_error(const VolumetricModel&);
+
+}  // namespace abbe::calib::iso

@@ -1,0 +1,63 @@
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/calib/iso/standard_values.hpp"
+#include "abbe/calib/model_comparison.hpp"
+
+namespace abbe::calib::iso {
+namespace {
+
+constexpr int kPerSide = 11;
+
+std::vector<Vector3> lattice_of(const LineBox& box) {
+  std::vector<Vector3> points_m;
+  const Vector3 step_m = (box.high_m - box.low_m) / (kPerSide - 1.0);
+  for (int x = 0; x < kPerSide; ++x) {
+    for (int y = 0; y < kPerSide; ++y) {
+      for (int z = 0; z < kPerSide; ++z) {
+        points_m.push_back(box.low_m + step_m.cwiseProduct(Vector3(x, y, z)));
+      }
+    }
+  }
+  return points_m;
+}
+
+}  // namespace
+
+Result<VolumeError> volume_error(const VolumetricModel& model) {
+  const Result<LineBox> box = line_box(model.validity());
+  if (!box) {
+    return tl::unexpected(box.error());
+  }
+
+  const Vector3 tool_m = model.tool_offsets_m().front();
+  const std::vector<Vector3> lattice_m = lattice_of(*box);
+  VolumeError e{.points = lattice_m.size()};
+  std::vector<Vector3> points_m, V_m;
+  for (const Vector3& q_m : lattice_m) {
+    const VolumetricError at = model.error_at(q_m, tool_m);
+    points_m.push_back(q_m + tool_m);
+    V_m.push_back(at.V_m);
+    const double U_m = 2.0 * std::sqrt(std::max(0.0, at.cov_V_m2.trace()));
+    e.mean_U_m += U_m / static_cast<double>(lattice_m.size());
+    e.max_U_m = std::max(e.max_U_m, U_m);
+    const double size_m = at.V_m.norm();
+    if (size_m > e.largest.value) {
+      const Vector3 along = at.V_m / size_m;
+      e.largest = {size_m, std::sqrt(std::max(0.0, along.dot(at.cov_V_m2 * along)))};
+    }
+  }
+
+  const Result<ModelDifference> statistics = rigid_free(points_m, V_m);
+  if (!statistics) {
+    return tl::unexpected(statistics.error());
+  }
+  e.mean_m = statistics->as_stated.mean_m;
+  e.rms_m = statistics->as_stated.rms_m;
+  e.rigid_free_mean_m = statistics->rigid_free.mean_m;
+  e.rigid_free_rms_m = statistics->rigid_free.rms_m;
+  e.rigid_free_max_m = statistics->rigid_free.max_m;
+  return e;
+}
+
+}  // namespace abbe::calib::iso

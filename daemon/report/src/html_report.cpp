@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 
+#include "abbe/report/line_plot.hpp"
 #include "chart_configuration.hpp"
 #include "chart_js.hpp"
 #include "markup.hpp"
@@ -28,6 +30,17 @@ constexpr std::string_view kStyle =
     ".maps{width:190mm;display:block;margin:.6rem 0;break-inside:avoid;font-size:11px;fill:#444}"
     ".maps rect{shape-rendering:crispEdges}"
     ".maps .title{font-weight:bold;font-size:12px}.maps .frame{fill:none;stroke:#57606a}"
+    ".plots{display:flex;flex-wrap:wrap;gap:2mm}.plot{width:94mm;display:block;break-inside:avoid;"
+    "font-size:11px;fill:#444}.plot.wide{width:190mm}.plot .title{font-weight:bold;font-size:12px}"
+    ".plot .frame{fill:none;stroke:#57606a}.plot .grid{stroke:#e1e5ea;fill:none}"
+    ".plot .band{fill-opacity:.22;stroke:none}.page{break-before:page}"
+    ".columns{column-count:2;column-gap:6mm;font-size:11.5px;line-height:1.3}.columns "
+    "h2{margin-top:"
+    "0}.columns table{break-inside:avoid;margin:.3rem 0 .8rem}.columns td,.columns "
+    "th{padding-right:"
+    ".5rem}.columns p{break-after:avoid}"
+    ".signal{display:flex;align-items:center;gap:4mm;font-size:1.1rem;font-weight:600}"
+    ".signal svg{width:9mm;height:24mm;flex:none}ul{margin:.3rem 0;padding-left:1.2rem}"
     "@media print{body{margin:0;print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
 
 /// The value as JSON text for a script element. "<" is escaped: "</" would end the element, "<!--"
@@ -91,6 +104,50 @@ void HtmlReport::chart(const VectorChart& chart) {
   canvas(for_script(chart_configuration(chart)));
 }
 
+void HtmlReport::plot(const LineChart& chart) {
+  // Consecutive plots share a row.
+  constexpr std::string_view kEnd = "</div><!-- plots -->\n";
+  if (body_.ends_with(kEnd)) {
+    body_.resize(body_.size() - kEnd.size());
+  } else {
+    body_ += "<div class=\"plots\">\n";
+  }
+  body_ += svg(chart);
+  body_ += kEnd;
+}
+
+void HtmlReport::signal(Signal signal, std::string_view text) {
+  constexpr std::array<std::string_view, 3> kLit{"#c1121f", "#e6a700", "#1a7f37"};
+  std::string lamps;
+  for (std::size_t i = 0; i < kLit.size(); ++i)
+    lamps += fmt::format("<circle cx=\"15\" cy=\"{}\" r=\"10\" fill=\"{}\" stroke=\"#1b1f24\"/>",
+                         15 + 25 * i, i == static_cast<std::size_t>(signal) ? kLit[i] : "#fff");
+  body_ += fmt::format(
+      "<div class=\"signal\"><svg viewBox=\"0 0 30 80\" role=\"img\"><title>{0}</title>"
+      "<rect width=\"30\" height=\"80\" rx=\"6\" fill=\"#57606a\"/>{1}</svg>"
+      "<span>{0}</span></div>\n",
+      escaped(text), lamps);
+}
+
+void HtmlReport::list(const std::vector<std::string>& items) {
+  if (items.empty()) return;
+  body_ += "<ul>\n";
+  for (const auto& item : items) body_ += fmt::format("<li>{}</li>\n", escaped(item));
+  body_ += "</ul>\n";
+}
+
+void HtmlReport::begin_columns() {
+  body_ += "<div class=\"columns\">\n";
+}
+
+void HtmlReport::end_columns() {
+  body_ += "</div>\n";
+}
+
+void HtmlReport::page_break() {
+  body_ += "<div class=\"page\"></div>\n";
+}
+
 void HtmlReport::maps(const ValueMaps& maps) {
   body_ += svg(maps);
 }
@@ -123,12 +180,14 @@ std::string HtmlReport::text() const {
       "function show(id,c){c.options.plugins.legend={labels:{filter:l=>l.text!=='',"
       "usePointStyle:false,boxWidth:22,boxHeight:2}};"
       "new Chart(document.getElementById(id),c)}";
+  const std::string scripts =
+      charts_ > 0 ? fmt::format("<script>{}</script>\n<script>{}</script>\n", chart_js(), kShow)
+                  : std::string{};
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
       "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}</style>\n"
-      "<script>{2}</script>\n<script>{3}</script>\n</head>\n<body>\n<h1>{0}</h1>\n{4}</body>\n</"
-      "html>\n",
-      title_, kStyle, charts_ > 0 ? chart_js() : std::string_view{}, kShow, body_);
+      "{2}</head>\n<body>\n<h1>{0}</h1>\n{3}</body>\n</html>\n",
+      title_, kStyle, scripts, body_);
 }
 
 }  // namespace abbe::daemon

@@ -131,11 +131,13 @@ std::string svg(const SpaceDrawing& drawing) {
   for (std::size_t i = 0; i < drawing.lines.size(); ++i) {
     const SpaceLine& line = drawing.lines[i];
     const PlanePoint from = view.at(line.from_mm), to = view.at(line.to_mm);
-    const auto colour = line_colour(i);
-    out += line_between(from, to, fmt::format("stroke=\"{}\" stroke-width=\"2.5\"", colour));
-    out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", from.x,
-                       from.y, colour);
-    labels.add(to, line.label);
+    const auto colour = line_colour(drawing.one_colour ? 0 : i);
+    out += line_between(
+        from, to,
+        fmt::format("stroke=\"{}\" stroke-width=\"{}\"", colour, drawing.one_colour ? 1.5 : 2.5));
+    out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\"/>\n", from.x,
+                       from.y, drawing.one_colour ? 2 : 4, colour);
+    if (!line.label.empty()) labels.add(to, line.label);
   }
   return out + labels.text() + "</svg>\n";
 }

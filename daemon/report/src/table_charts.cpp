@@ -79,14 +79,20 @@ LineChart table_chart(const VolumetricModel& model, Axis axis, bool angles) {
 
 }  // namespace
 
-void add_table_charts(HtmlReport& page, const VolumetricModel& model) {
-  if (model.tables() == nullptr) return;
+std::vector<LineChart> table_line_charts(const VolumetricModel& model) {
+  std::vector<LineChart> charts;
+  if (model.tables() == nullptr) return charts;
   for (const Axis axis : calib::kAllAxes) {
     for (const bool angles : {false, true}) {
-      const LineChart chart = table_chart(model, axis, angles);
-      if (!chart.curves.empty()) page.chart(chart);
+      LineChart chart = table_chart(model, axis, angles);
+      if (!chart.curves.empty()) charts.push_back(std::move(chart));
     }
   }
+  return charts;
+}
+
+void add_table_charts(HtmlReport& page, const VolumetricModel& model) {
+  for (const LineChart& chart : table_line_charts(model)) page.chart(chart);
 }
 
 }  // namespace abbe::daemon

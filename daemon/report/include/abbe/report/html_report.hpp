@@ -1,6 +1,6 @@
 #pragma once
 /// Builds an HTML page that explains a result: text, tables and charts. The page is one file and
-/// needs no network, because it contains Chart.js. One thread.
+/// needs no network: it contains Chart.js if it has a chart(). One thread.
 
 #include <cstddef>
 #include <optional>
@@ -57,6 +57,9 @@ struct VectorChart {
   double magnification = 1.0;
 };
 
+/// The lit lamp of a traffic light. Unlit: there is no verdict.
+enum class Signal { Red = 0, Yellow = 1, Green = 2, Unlit = 3 };
+
 /// Any text may be given: it is escaped. The page has the width of a printed A4 page.
 class HtmlReport {
  public:
@@ -71,6 +74,15 @@ class HtmlReport {
   void chart(const LineChart&);
   void chart(const Histogram&);
   void chart(const VectorChart&);
+  /// The chart as SVG (line_plot.hpp). A page with such plots only has no JavaScript.
+  void plot(const LineChart&);
+  /// A traffic light with a text, which also says what the light means.
+  void signal(Signal signal, std::string_view text);
+  void list(const std::vector<std::string>& items);
+  void page_break();
+  /// What is added in between is set in two columns and small print, so that it fits on one page.
+  void begin_columns();
+  void end_columns();
   void maps(const ValueMaps&);
   void drawing(const SpaceDrawing&);
 

@@ -20,6 +20,10 @@ struct LeftError {
   double sigma_m = 0.0;   ///< standard uncertainty of the observation
 };
 
+/// Charts of all tables along their axes with bands of 2 u, as the model interpolates them. Empty
+/// for a model of polynomials.
+[[nodiscard]] std::vector<LineChart> table_line_charts(const calib::VolumetricModel& model);
+
 /// Adds charts of all tables along their axes with bands of 2 u, as the model interpolates them.
 /// Nothing for a model of polynomials.
 void add_table_charts(HtmlReport& page, const calib::VolumetricModel& model);

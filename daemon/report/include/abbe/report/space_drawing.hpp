@@ -22,6 +22,7 @@ struct SpaceDrawing {
   /// Opposite corners of a box that is drawn as a frame with the names of its axes.
   std::array<calib::Vector3, 2> box_mm{};
   std::vector<SpaceLine> lines;
+  bool one_colour = false;  ///< of thin lines: many vectors of one field
 };
 
 /// An SVG element. X is drawn to the right, Z upwards, and Y to the back.

@@ -1,0 +1,38 @@
+#pragma once
+/// What a report and a certificate state beside the model: people and firms, serial numbers,
+/// conditions. Everything may be absent (empty); a certificate has required entries.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace abbe::daemon {
+
+struct Contact {
+  std::string name, street, city, post_code, email;
+  std::string country{};  ///< ISO 3166-1, two capital letters
+};
+
+struct EquipmentDetails {
+  std::string name, manufacturer, model, serial, certificate;
+};
+
+struct CertificateDetails {
+  /// Dates as in ISO 8601, "2026-11-26". location: one of laboratory, customer, laboratoryBranch,
+  /// customerBranch, other.
+  std::string number, begin_date, end_date, issue_date, location, remark;
+  Contact laboratory, customer;
+  std::string laboratory_code;  ///< accreditation
+  std::string person, role;     ///< who is responsible and signs
+  std::string machine_manufacturer, machine_model, machine_serial;
+  std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
+  std::vector<EquipmentDetails> equipment;
+};
+
+/// True for an existing day as in ISO 8601, "2026-11-26".
+[[nodiscard]] bool is_date(std::string_view text);
+/// True for two capital letters.
+[[nodiscard]] bool is_country_code(std::string_view text);
+
+}  // namespace abbe::daemon

@@ -1,0 +1,33 @@
+#pragma once
+/// Reports made from a stored model, the same for every method: one page per model, two models side
+/// by side, all models of a machine. HTML without JavaScript that prints on A4. Pure: the same input
+/// gives the same bytes; no date is contained that is not in the input.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/model/model_store.hpp"
+#include "abbe/report/certificate_details.hpp"
+#include "abbe/report/certified_values.hpp"
+
+namespace abbe::daemon {
+
+/// A model and what the store knows of it.
+struct ReportSubject {
+  ModelDocument document;
+  std::optional<StoreEntry> entry{};  ///< nullopt: a file, not in a store; no verdict is known
+  std::vector<StoreEvent> events{};   ///< of this model, oldest first
+  CertificateDetails details{};
+};
+
+/// DataInsufficient if the model has no validity volume.
+[[nodiscard]] Result<std::string> model_report(const ReportSubject& subject);
+
+/// Two models side by side. DataInsufficient if they are not valid for a common tool and volume.
+[[nodiscard]] Result<std::string> comparison_report(const ReportSubject& a, const ReportSubject& b);
+
+/// Trend over models of one machine, in the order of their dates.
+[[nodiscard]] Result<std::string> trend_report(const std::vector<ReportSubject>& models);
+
+}  // namespace abbe::daemon

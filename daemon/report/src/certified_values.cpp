@@ -1,0 +1,189 @@
+#include "abbe/report/certified_values.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "abbe/base/units.hpp"
+#include "abbe/calib/otf/backlash.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::Axis;
+using calib::iso::Value;
+
+constexpr std::string_view kNoTravel =
+    "the model has no differences between the directions of travel";
+
+/// Decimals with which a number has two significant digits, 0 to 4; 3 for 0.
+int decimals_of(double number) {
+  if (!(number > 0.0)) return 3;
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(number))), 0, 4);
+}
+
+std::string decimal_text(double number, int decimals) {
+  std::string text = fmt::format("{:.{}f}", number, decimals);
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && text.front() == '-' ? text.substr(1) : text;
+}
+
+CertifiedValue certified(std::string key, std::string name, const Value& value, bool is_angle) {
+  const double scale = is_angle ? kUradPerRad : kUmPerM;
+  const double U = 2.0 * scale * value.u;
+  const int decimals = decimals_of(U);
+  return {.key = std::move(key),
+          .name = std::move(name),
+          .value = decimal_text(scale * value.value, decimals),
+          .U = decimal_text(U, decimals),
+          .is_angle = is_angle,
+          .value_si = value.value,
+          .u_si = value.u};
+}
+
+/// `U_m`: determines the number of decimals.
+CertifiedValue without_u(std::string key, std::string name, double length_m, double U_m) {
+  return {.key = std::move(key),
+          .name = std::move(name),
+          .value = decimal_text(kUmPerM * length_m, decimals_of(kUmPerM * U_m)),
+          .value_si = length_m};
+}
+
+CertifiedValue reversal(std::string key, std::string name, const std::optional<Value>& value) {
+  if (value) return certified(std::move(key), std::move(name), *value, false);
+  return {.key = std::move(key), .name = std::move(name), .why = std::string(kNoTravel)};
+}
+
+ValueGroup volume_group(const calib::iso::VolumeError& e) {
+  return {"Volumetric error",
+          fmt::format("|V| of the functional point at {} points of the box, in the gauge of the "
+                      "model, and without the rigid motion that fits best. U(V): expanded "
+                      "uncertainty of V, k = 2; after compensation with the model at least this "
+                      "is to be expected.",
+                      e.points),
+          {without_u("V.mean", "before: |V|, mean", e.mean_m, e.max_U_m),
+           certified("V.max", "before: |V|, largest", e.largest, false),
+           without_u("V.rigid-free.mean", "before, without rigid motion: mean", e.rigid_free_mean_m,
+                     e.max_U_m),
+           without_u("V.rigid-free.max", "before, without rigid motion: largest",
+                     e.rigid_free_max_m, e.max_U_m),
+           without_u("U.mean", "after: U(V), mean", e.mean_U_m, e.max_U_m),
+           without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m)}};
+}
+
+ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
+  ValueGroup group{
+      "Positioning (ISO 230-1, ISO 230-2)",
+      "V along the axis on the line through the centre of the box. M: range of the mean of both "
+      "directions, which is the range of EXX, EYY, EZZ. E: range over both directions. B: largest "
+      "reversal error, forward minus backward. A, R and s of ISO 230-2 need repeated approaches, "
+      "which a model does not contain.",
+      {}};
+  for (const calib::iso::Positioning& p : standard.positioning) {
+    const char axis = letter(p.axis);
+    group.values.push_back(certified(fmt::format("{}.M", axis),
+                                     fmt::format("{0}: M, range of E{0}{0}", axis), p.M, false));
+    group.values.push_back(certified(fmt::format("{}.E", axis),
+                                     fmt::format("{}: E, systematic deviation", axis), p.E, false));
+    group.values.push_back(
+        reversal(fmt::format("{}.B", axis), fmt::format("{}: B, reversal error", axis), p.B));
+  }
+  return group;
+}
+
+ValueGroup straightness_group(const calib::iso::StandardValues& standard) {
+  ValueGroup group{"Straightness (ISO 230-1)",
+                   "Range of V across the axis, on the same lines, relative to the least-squares "
+                   "straight line.",
+                   {}};
+  for (const calib::iso::Straightness& s : standard.straightness) {
+    const std::string name = calib::name(s.motion);
+    group.values.push_back(certified(
+        name, fmt::format("{}: straightness of {} in {}", name, letter(s.motion.axis), name[1]),
+        s.range, false));
+  }
+  return group;
+}
+
+ValueGroup squareness_group(const calib::iso::StandardValues& standard) {
+  ValueGroup group{"Squareness (ISO 230-1)",
+                   "Angle between the least-squares lines of both axes minus 90 degrees, positive "
+                   "as a rotation of the first axis about the third direction.",
+                   {}};
+  for (const calib::iso::Squareness& s : standard.squareness)
+    group.values.push_back(
+        certified(s.name,
+                  fmt::format("{}: {} to {} (reference axis {})", s.name, letter(s.axis),
+                              letter(s.reference), letter(s.reference)),
+                  s.angle, true));
+  return group;
+}
+
+ValueGroup angular_group(const calib::iso::StandardValues& standard) {
+  ValueGroup group{"Angular errors (ISO 230-1)",
+                   "Range over the box. Missing ones cannot be distinguished from other errors "
+                   "with the tools of this measurement.",
+                   {}};
+  for (const calib::iso::Angular& a : standard.angular) {
+    const std::string name = calib::name(a.motion);
+    const char about = static_cast<char>('X' + (name[1] - 'A'));
+    const bool roll = about == letter(a.motion.axis);
+    group.values.push_back(
+        certified(name,
+                  fmt::format("{}: rotation of {} about {}{}", name, letter(a.motion.axis), about,
+                              roll ? " (roll)" : ""),
+                  a.range, true));
+  }
+  return group;
+}
+
+ValueGroup backlash_group(const calib::VolumetricModel& model) {
+  ValueGroup group{
+      "Backlash of the tables", "Forward minus backward, the largest of each table.", {}};
+  for (const auto& b : calib::otf::largest_of_tables(calib::otf::backlash_of(model)))
+    group.values.push_back(certified(calib::name(b.motion) + ".backlash", calib::name(b.motion),
+                                     {b.value, b.u}, is_rotation(b.motion.motion)));
+  return group;
+}
+
+ValueGroup diagonal_group(const calib::iso::StandardValues& standard) {
+  ValueGroup group{"Diagonals (ISO 230-6)",
+                   "V along the body diagonals of the box. P: travel in positive direction of X, "
+                   "Y, Z, N: in negative direction. E: range over both directions. E_d: the "
+                   "largest E.",
+                   {}};
+  const calib::iso::Diagonal& worst = standard.worst_diagonal();
+  group.values.push_back(
+      certified("E_d", fmt::format("E_d, of diagonal {}", worst.name), worst.E, false));
+  for (const calib::iso::Diagonal& d : standard.diagonals) {
+    group.values.push_back(
+        certified(d.name + ".E", fmt::format("{}: E, systematic deviation", d.name), d.E, false));
+    group.values.push_back(
+        reversal(d.name + ".B", fmt::format("{}: B, reversal error", d.name), d.B));
+  }
+  return group;
+}
+
+}  // namespace
+
+Result<CertifiedValues> certified_values(const ModelDocument& document) {
+  const auto standard = calib::iso::standard_values(document.model);
+  const auto volume = calib::iso::volume_error(document.model);
+  if (!standard || !volume)
+    return fail(ErrorCode::DataInsufficient,
+                fmt::format("model {}: {}", model_id(document),
+                            standard ? volume.error().text : standard.error().text));
+
+  CertifiedValues all{.standard = *standard, .volume = *volume, .groups = {}};
+  all.groups = {volume_group(*volume), positioning_group(*standard), straightness_group(*standard),
+                squareness_group(*standard)};
+  if (!standard->angular.empty()) all.groups.push_back(angular_group(*standard));
+  all.groups.push_back(diagonal_group(*standard));
+  if (document.model.travel() != nullptr) all.groups.push_back(backlash_group(document.model));
+  return all;
+}
+
+}  // namespace abbe::daemon

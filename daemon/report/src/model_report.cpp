@@ -1,0 +1,80 @@
+#include "abbe/report/model_report.hpp"
+
+#include <fmt/format.h>
+
+#include "abbe/report/model_figures.hpp"
+#include "abbe/report/sections.hpp"
+#include "report_sections.hpp"
+#include "report_words.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+void add_fit(HtmlReport& page, const ModelStatistics& s) {
+  page.heading("Residuals of the fit");
+  const auto row = [](const char* what, const ResidualFigures& f) {
+    return std::vector<std::string>{what, um_text(f.mean_abs_m, 3), um_text(f.rms_m, 3),
+                                    um_text(f.max_abs_m, 3)};
+  };
+  page.table({"", "mean", "rms", "largest"},
+             {row("before the fit", s.before), row("after", s.after)});
+}
+
+void add_passes(HtmlReport& page, const BarFigures& bar) {
+  page.heading("Residuals of the measurements with the bar");
+  std::vector<std::vector<std::string>> rows;
+  for (const BarFigures::Pass& pass : bar.passes)
+    rows.push_back({pass.measurement, fmt::format("{:.3f}", pass.chi2_per_dof)});
+  page.table({"measurement", "chi-square per degree of freedom"}, rows);
+  if (bar.set_aside.empty()) return;
+  rows.clear();
+  for (const BarFigures::SetAside& t : bar.set_aside)
+    rows.push_back(
+        {fmt::format("{}, {} {} {} k {}", t.measurement, t.feature, t.index, t.side, t.k),
+         um_text(t.residual_m)});
+  page.table({"excluded touch", "residual"}, rows);
+}
+
+void add_words(HtmlReport& page, const ModelDocument& document) {
+  page.heading("What the uncertainty does not contain");
+  page.list(not_in_the_uncertainty(document));
+  page.heading("What cannot be estimated, and why");
+  page.list(not_estimable(document));
+  page.heading("Gauge and signs");
+  page.paragraph(gauge_in_words(document.model));
+  page.list(signs_in_words());
+}
+
+}  // namespace
+
+Result<std::string> model_report(const ReportSubject& subject) {
+  const ModelDocument& document = subject.document;
+  const auto values = certified_values(document);
+  if (!values) return tl::make_unexpected(values.error());
+
+  HtmlReport page(fmt::format("{}: geometric calibration", document.machine));
+  page.paragraph(fmt::format("Model {}, {}.", model_id(document), method_in_words(document)));
+  add_verdict_of(page, subject);
+  add_values(page, *values, 0, 1);
+  page.paragraph(box_in_words(values->standard));
+  add_fit(page, document.statistics);
+  if (document.bar) add_passes(page, *document.bar);
+
+  page.page_break();
+  page.begin_columns();
+  add_values(page, *values, 1, values->groups.size());
+  page.end_columns();
+  page.page_break();
+  add_value_curves(page, *values);
+  add_field(page, document.model, values->standard.box);
+  if (document.model.tables() != nullptr) {
+    page.heading("Tables of the model");
+    for (const LineChart& chart : table_line_charts(document.model)) page.plot(chart);
+  }
+  add_volume_maps(page, document.model);
+  add_words(page, document);
+  add_origin_of(page, subject);
+  return page.text();
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,115 @@
+#include <fmt/format.h>
+
+#include "abbe/base/units.hpp"
+#include "abbe/base/utc_text.hpp"
+#include "report_sections.hpp"
+#include "report_words.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+void add_if(Facts& facts, std::string what, const std::string& text) {
+  if (!text.empty()) facts.emplace_back(std::move(what), text);
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts)
+    if (!part.empty()) text += (text.empty() ? "" : ", ") + part;
+  return text;
+}
+
+std::string contact_text(const Contact& contact) {
+  return joined({contact.name, contact.street, contact.post_code, contact.city, contact.country,
+                 contact.email});
+}
+
+/// Who added the model to the store; empty for a file.
+std::string operator_of(const ReportSubject& subject) {
+  for (const StoreEvent& event : subject.events)
+    if (event.action == StoreAction::Added)
+      return fmt::format("{}, {} (UTC)", event.actor.who, to_text(event.actor.when));
+  return {};
+}
+
+std::string temperature_text(const CertificateDetails& details) {
+  if (!details.temperature_C) return {};
+  return details.u_temperature_K
+             ? fmt::format("{:.2f} \u00b1 {:.2f} C (k = 2)", *details.temperature_C,
+                           2.0 * *details.u_temperature_K)
+             : fmt::format("{:.2f} C", *details.temperature_C);
+}
+
+void add_conditions(Facts& facts, const ReportSubject& subject) {
+  const CertificateDetails& d = subject.details;
+  const ModelDocument& document = subject.document;
+  facts.emplace_back("temperature",
+                     d.temperature_C ? temperature_text(d) : std::string("not stated"));
+  if (document.artefact)
+    facts.emplace_back("temperature of the ball array",
+                       fmt::format("{:.2f} C, corrected with {:.2f} um/(m K)",
+                                   document.artefact->temperature_K - kZeroCelsius_K,
+                                   kUmPerM * document.artefact->alpha_per_K));
+  if (d.humidity_percent) facts.emplace_back("humidity", fmt::format("{} %", *d.humidity_percent));
+  facts.emplace_back("feed", d.feed_mm_per_min ? fmt::format("{} mm/min", *d.feed_mm_per_min)
+                                               : std::string("not stated"));
+  facts.emplace_back("tool offsets", tools_in_words(document.model));
+}
+
+Facts facts_of(const ReportSubject& subject) {
+  const CertificateDetails& d = subject.details;
+  const ModelDocument& document = subject.document;
+  Facts facts;
+  add_if(facts, "certificate", d.number);
+  facts.emplace_back("machine", document.machine);
+  add_if(facts, "manufacturer, model, serial number",
+         joined({d.machine_manufacturer, d.machine_model, d.machine_serial}));
+  facts.emplace_back("kinematic chain (ISO 10791-6)", document.model.chain().text());
+  facts.emplace_back("model", fmt::format("{}, hash {}", model_id(document), model_hash(document)));
+  facts.emplace_back("hash of the machine configuration", document.machine_hash);
+  facts.emplace_back("method", method_in_words(document));
+  facts.emplace_back("measured (UTC)", to_text(document.created));
+  add_if(facts, "measurement from, to", joined({d.begin_date, d.end_date}));
+  add_if(facts, "operator", operator_of(subject));
+  add_if(facts, "laboratory", joined({contact_text(d.laboratory), d.laboratory_code}));
+  add_if(facts, "customer", contact_text(d.customer));
+  for (const EquipmentDetails& e : d.equipment)
+    facts.emplace_back("equipment",
+                       joined({e.name, e.manufacturer, e.model, e.serial, e.certificate}));
+  add_conditions(facts, subject);
+  add_if(facts, "remark", d.remark);
+  facts.emplace_back("software", std::string("abbe ") + ABBE_VERSION);
+  return facts;
+}
+
+Facts statistics_of(const ModelDocument& document) {
+  const ModelStatistics& s = document.statistics;
+  return {
+      {"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
+      {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
+                                   s.unknowns, s.rank, s.condition)},
+      {"sigma0, chi-square per degree of freedom",
+       fmt::format("{:.3f}, {:.3f}", s.sigma0, s.chi2_per_dof)},
+      {"variance factor (multiplies the covariance)", fmt::format("{:.3f}", s.variance_factor)}};
+}
+
+}  // namespace
+
+void add_origin_of(HtmlReport& page, const ReportSubject& subject) {
+  page.heading("Origin and conditions");
+  page.facts(facts_of(subject));
+  page.facts(statistics_of(subject.document));
+  std::vector<std::vector<std::string>> rows;
+  for (const InputFile& input : subject.document.inputs) rows.push_back({input.name, input.sha256});
+  if (!rows.empty()) page.table({"input", "SHA-256"}, rows);
+
+  page.heading("Signature");
+  const CertificateDetails& d = subject.details;
+  page.facts({{"name", d.person.empty() ? std::string(40, '_') : joined({d.person, d.role})},
+              {"date", d.issue_date.empty() ? std::string(40, '_') : d.issue_date},
+              {"signature", std::string(40, '_')}});
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include "abbe/base/utc_text.hpp"
+#include "report_sections.hpp"
+#include "report_words.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+std::string who_and_when(const StoreEvent& event) {
+  return fmt::format("{}, {} (UTC){}{}", event.actor.who, to_text(event.actor.when),
+                     event.actor.why.empty() ? "" : ": ", event.actor.why);
+}
+
+/// What happened to the model in the store, apart from its verdict.
+std::vector<std::string> notes_of(const ReportSubject& subject) {
+  std::vector<std::string> notes;
+  for (const StoreEvent& event : subject.events) {
+    switch (event.action) {
+      case StoreAction::Added:
+        break;
+      case StoreAction::Activated:
+        notes.push_back("activated by " + who_and_when(event));
+        break;
+      case StoreAction::Forced:
+        notes.push_back("activated against the verdict by " + who_and_when(event));
+        break;
+      case StoreAction::RolledBack:
+        notes.push_back("activated again by " + who_and_when(event));
+        break;
+      case StoreAction::Drifted:
+        notes.push_back("a later run found drift: " + who_and_when(event));
+        break;
+    }
+  }
+  if (!subject.document.recording_gap.empty())
+    notes.push_back(cannot_be_checked(subject.document.recording_gap));
+  return notes;
+}
+
+bool has_drifted(const ReportSubject& subject) {
+  return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
+}
+
+}  // namespace
+
+VerdictInWords verdict_in_words(const ReportSubject& subject) {
+  VerdictInWords verdict{.text = {}, .reasons = {}, .notes = notes_of(subject)};
+  if (!subject.entry) {
+    verdict.text = "No verdict: this model is a file; only a store knows the verdict of the gate.";
+    return verdict;
+  }
+
+  const StoreEntry& entry = *subject.entry;
+  const std::string_view state = entry.active ? "It is the active model." : "It is not active.";
+  if (!entry.accepted) {
+    verdict.signal = Signal::Red;
+    verdict.text = fmt::format("Red: the gate refused the model. {}", state);
+    verdict.reasons = entry.reasons;
+  } else if (has_drifted(subject)) {
+    verdict.signal = Signal::Yellow;
+    verdict.text = fmt::format("Yellow: accepted, but the machine has changed since. {}", state);
+  } else {
+    verdict.signal = Signal::Green;
+    verdict.text = fmt::format("Green: the gate accepted the model. {}", state);
+  }
+  return verdict;
+}
+
+void add_verdict_of(HtmlReport& page, const ReportSubject& subject) {
+  const VerdictInWords verdict = verdict_in_words(subject);
+  page.heading("Verdict");
+  page.signal(verdict.signal, verdict.text);
+  if (!verdict.reasons.empty()) {
+    page.paragraph("Reasons:");
+    page.list(verdict.reasons);
+  }
+  if (!verdict.notes.empty()) {
+    page.paragraph("Notes, no reasons against the model:");
+    page.list(verdict.notes);
+  }
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,195 @@
+// Reports from a stored model: the same bytes, the numbers of the model, hostile names.
+#include "abbe/report/model_report.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "abbe/base/units.hpp"
+#include "abbe/report/line_plot.hpp"
+#include "synthetic_model.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::size_t times(const std::string& text, std::string_view what) {
+  std::size_t n = 0;
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += what.size()) ++n;
+  return n;
+}
+
+ReportSubject reported(unsigned seed, bool accepted = true) {
+  ReportSubject subject{.document = test::synthetic_document(seed)};
+  subject.entry = StoreEntry{
+      .id = model_id(subject.document), .active = accepted, .accepted = accepted, .reasons = {}};
+  if (!accepted) subject.entry->reasons = {"held out: no better than no compensation"};
+  subject.events.push_back({.action = StoreAction::Added,
+                            .id = subject.entry->id,
+                            .actor = {"turner", "", subject.document.created},
+                            .accepted = accepted});
+  return subject;
+}
+
+const CertifiedValue& certified_value(const CertifiedValues& values, std::string_view key) {
+  for (const ValueGroup& group : values.groups)
+    for (const CertifiedValue& value : group.values)
+      if (value.key == key) return value;
+  ADD_FAILURE() << "no value " << key;
+  return values.groups.front().values.front();
+}
+
+TEST(CertifiedValues, AreTheRoundedValuesOfTheModel) {
+  const ModelDocument document = test::synthetic_document(3);
+  const auto values = certified_values(document).value();
+  const auto standard = calib::iso::standard_values(document.model).value();
+  const CertifiedValue& M = certified_value(values, "X.M");
+  // Half a unit of the last decimal, with two significant digits of U.
+  const double U_um = 2.0 * kUmPerM * standard.positioning[0].M.u;
+  const double last = std::pow(10.0, std::floor(std::log10(U_um)) - 1.0);
+  EXPECT_NEAR(std::stod(M.value), kUmPerM * standard.positioning[0].M.value, 0.501 * last);
+  EXPECT_NEAR(std::stod(M.U), U_um, 0.501 * last);
+  EXPECT_EQ(M.value.size() - M.value.find('.'), M.U.size() - M.U.find('.')) << M.value << M.U;
+  EXPECT_TRUE(certified_value(values, "EC0Y").is_angle);
+  EXPECT_TRUE(certified_value(values, "X.B").value.empty());
+  EXPECT_THAT(certified_value(values, "X.B").why, HasSubstr("directions of travel"));
+}
+
+TEST(CertifiedValues, OfAModelWithTravelContainTheReversalError) {
+  ModelDocument document = test::synthetic_document(3);
+  document.model = test::synthetic_travel_model(3);
+  const auto values = certified_values(document).value();
+  EXPECT_FALSE(certified_value(values, "X.B").value.empty());
+  EXPECT_FALSE(certified_value(values, "PPP.B").value.empty());
+  EXPECT_NEAR(std::stod(certified_value(values, "EXX.backlash").value), 7.0 / 3.0, 0.01);
+}
+
+TEST(ModelReport, IsTheSameForTheSameModelAndNeedsNoScript) {
+  const std::string page = model_report(reported(3)).value();
+  const auto again = parse_model(to_json(test::synthetic_document(3)), "model.json").value();
+  ReportSubject read = reported(3);
+  read.document = again;
+  EXPECT_EQ(page, model_report(read).value());
+  EXPECT_NE(page, model_report(reported(4)).value());
+  EXPECT_THAT(page, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("<canvas"))));
+}
+
+TEST(ModelReport, HasTheVerdictFirstAndEverythingThatIsSigned) {
+  const ReportSubject subject = reported(3);
+  const std::string page = model_report(subject).value();
+  const auto values = certified_values(subject.document).value();
+  EXPECT_LT(page.find("Green: the gate accepted"), page.find("Volumetric error"));
+  for (const ValueGroup& group : values.groups)
+    for (const CertifiedValue& v : group.values)
+      EXPECT_THAT(page, HasSubstr("<td>" + (v.value.empty() ? "not estimable" : v.value) + "</td>"))
+          << v.key;
+  EXPECT_THAT(page,
+              AllOf(HasSubstr("reference axis X"), HasSubstr("What the uncertainty does not"),
+                    HasSubstr("ECY, EAZ, EBZ, ECZ: with one tool offset"), HasSubstr("turner"),
+                    HasSubstr("20.0, -15.0, -120.0 mm"), HasSubstr("11ee"), HasSubstr("Signature"),
+                    HasSubstr(model_hash(subject.document))));
+}
+
+TEST(ModelReport, StatesReasonsAndNotesApart) {
+  ReportSubject refused = reported(3, false);
+  refused.document.recording_gap = "the disk was full";
+  refused.events.push_back({.action = StoreAction::Forced,
+                            .id = refused.entry->id,
+                            .actor = {"foreman", "parts are waiting", {}}});
+  const std::string page = model_report(refused).value();
+  EXPECT_THAT(page, HasSubstr("Red: the gate refused"));
+  const auto reasons = page.find("Reasons:"), notes = page.find("Notes, no reasons");
+  EXPECT_LT(reasons, page.find("held out: no better"));
+  EXPECT_LT(page.find("held out: no better"), notes);
+  EXPECT_LT(notes, page.find("against the verdict by foreman"));
+  EXPECT_LT(notes, page.find("no replay can check this model: the disk was full"));
+
+  ReportSubject drifted = reported(3);
+  drifted.events.push_back({.action = StoreAction::Drifted,
+                            .id = drifted.entry->id,
+                            .actor = {"abbed", "EXX changed", {}}});
+  EXPECT_THAT(model_report(drifted).value(), HasSubstr("Yellow: accepted, but"));
+  drifted.entry.reset();
+  EXPECT_THAT(model_report(drifted).value(), HasSubstr("No verdict"));
+}
+
+TEST(ModelReport, EscapesNamesOfMachinePeopleAndFiles) {
+  const std::string name = "</td><script>alert(1)</script>\"'&\xff";
+  ReportSubject subject = reported(3, false);
+  subject.document.machine = subject.document.estimator = subject.document.mode = name;
+  subject.document.recording_gap = name;
+  subject.document.inputs = {{name, name}};
+  subject.entry->reasons = {name};
+  subject.events.front().actor = {name, name, {}};
+  CertificateDetails& d = subject.details;
+  d.number = d.remark = d.person = d.role = d.machine_serial = d.laboratory.name = name;
+  d.customer.street = name;
+  d.equipment = {{name, name, name, name, name}};
+  for (const auto& page :
+       {model_report(subject).value(), comparison_report(subject, subject).value(),
+        trend_report({subject, subject}).value()})
+    EXPECT_EQ(times(page, "<script"), 0u);
+}
+
+TEST(ComparisonReport, HasBothModelsAndTheirDifference) {
+  const ReportSubject a = reported(3), b = reported(4);
+  const std::string page = comparison_report(a, b).value();
+  const auto values_a = certified_values(a.document).value(),
+             values_b = certified_values(b.document).value();
+  const CertifiedValue& A = certified_value(values_a, "EC0Y");
+  const CertifiedValue& B = certified_value(values_b, "EC0Y");
+  EXPECT_THAT(page, AllOf(HasSubstr(A.value + " \u00b1 " + A.U + " urad"),
+                          HasSubstr(B.value + " \u00b1 " + B.U + " urad"),
+                          HasSubstr(model_id(a.document)), HasSubstr(model_id(b.document))));
+  EXPECT_NE(page, comparison_report(b, a).value());
+
+  ReportSubject other = b;  // valid for another tool only
+  auto description = b.document.model.description();
+  description.tool_offsets_m = {{0.3, 0.0, 0.0}};
+  other.document.model = calib::VolumetricModel::from_description(description).value();
+  const auto refused = comparison_report(a, other);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("not valid for it"));
+}
+
+TEST(TrendReport, IsInTheOrderOfTimeAndLeavesRefusedModelsOutOfTheCharts) {
+  std::vector<ReportSubject> models{reported(3), reported(4, false), reported(5)};
+  models[0].document.created += std::chrono::hours(48);
+  models[1].document.created += std::chrono::hours(24);
+  const std::string page = trend_report(models).value();
+  EXPECT_LT(page.find(model_id(models[2].document)), page.find(model_id(models[1].document)));
+  EXPECT_LT(page.find(model_id(models[1].document)), page.find(model_id(models[0].document)));
+  EXPECT_THAT(page, AllOf(HasSubstr("3 models"), HasSubstr("<td>red</td>")));
+  const auto plots = page.substr(page.find("class=\"plots\""));
+  EXPECT_EQ(times(plots, "<circle"), 2u * (3 + 3 + 4)) << "two models in ten curves";
+  EXPECT_FALSE(trend_report({}));
+}
+
+TEST(LinePlot, HasASecondPanelWhereTheBandsAreNarrow) {
+  LineChart chart{.title = "t", .x_label = "x", .y_label = "y"};
+  chart.curves = {{.name = "a", .x = {0, 1, 2}, .y = {0, 50, 100}, .u = {0.1, 0.2, 0.1}}};
+  const std::string narrow = svg(chart);
+  EXPECT_THAT(narrow, HasSubstr("U = 2 u of these curves"));
+  chart.curves[0].u = {5, 6, 5};
+  EXPECT_THAT(svg(chart), Not(HasSubstr("U = 2 u of these curves")));
+  EXPECT_EQ(times(narrow, "class=\"band\""), 1u);
+}
+
+TEST(LinePlot, DrawsOnlyFinitePoints) {
+  LineChart chart{.title = "<t>", .x_label = "x", .y_label = "y"};
+  const double nan = std::nan("");
+  chart.curves = {{.name = "a", .x = {0, 1, 2, 3, 4}, .y = {1, 2, nan, 2, 1}}};
+  const std::string text = svg(chart);
+  EXPECT_THAT(text, AllOf(Not(HasSubstr("nan")), Not(HasSubstr("inf")), HasSubstr("&lt;t&gt;")));
+  const auto path = text.substr(text.rfind("<path d=\"M"));
+  EXPECT_EQ(times(path.substr(0, path.find("/>")), "M"), 2u) << "two pieces";
+  EXPECT_THAT(svg(LineChart{.title = "empty", .x_label = "x", .y_label = "y"}),
+              Not(HasSubstr("nan")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

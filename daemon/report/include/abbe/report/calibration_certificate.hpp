@@ -1,0 +1,20 @@
+#pragma once
+/// Digital Calibration Certificate: XML after the schema of PTB, DCC 3.2.1 with D-SI 2.1.0
+/// (https://ptb.de/dcc/v3.2.1/dcc.xsd). As found: the errors of one model. As left: those of another
+/// model, measured after the adjustment. Values and uncertainties are the texts of
+/// certified_values.hpp, which the report prints, too. The certificate is not signed: signing is
+/// left to the laboratory. Pure.
+
+#include <optional>
+#include <string>
+
+#include "abbe/report/model_report.hpp"
+
+namespace abbe::daemon {
+
+/// The details are those of `as_found`. BadInput with all entries that are missing or invalid;
+/// DataInsufficient as model_report().
+[[nodiscard]] Result<std::string> calibration_certificate(
+    const ReportSubject& as_found, const std::optional<ReportSubject>& as_left = {});
+
+}  // namespace abbe::daemon

@@ -89,6 +89,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "identify joint",
                                     "identify artefact",
                                     "verify",
+                                    "report",
                                     "model",
                                     "model eval",
                                     "model compare",

@@ -28,6 +28,7 @@ void add_calibrate_artefact(CLI::App& parent, int& exit);
 void add_calibrate_bar(CLI::App& parent, int& exit);
 void add_replay(CLI::App& parent, int& exit);
 void add_verify(CLI::App& parent, int& exit);
+void add_report(CLI::App& parent, int& exit);
 void add_example(CLI::App& parent, int& exit);
 void add_status(CLI::App& parent, int& exit);
 void add_model_compare(CLI::App& parent, int& exit);

@@ -38,6 +38,7 @@ constexpr std::array kPurposes{
     Purpose{"verification.csv", "readings and independent measurements for abbe verify"},
     Purpose{"measured.csv", "directly measured error motions for abbe model compare"},
     Purpose{"foxglove.json", "a layout for recordings in Foxglove or Lichtblick"},
+    Purpose{"certificate.toml", "people, serial numbers and conditions for abbe report"},
     Purpose{"truth.csv", "the errors of a simulated machine"},
 };
 

@@ -61,6 +61,10 @@ constexpr std::array kExamples{
     Example{"identify artefact",
             "--touches touches.csv --name array-1 --tip-radius-mm 2.5 -o calibrator.toml"},
     Example{"verify", "active --recording run.mcap -o result"},
+    Example{"report",
+            "active -o report.html\n"
+            "         abbe report 6ad1 --details certificate.toml --dcc certificate.xml "
+            "--as-left active"},
     Example{"model", "list"},
     Example{"model eval", "active --points points.csv"},
     Example{"model compare", "active model.json"},

@@ -94,6 +94,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_identify_joint(*identify, exit);
   add_identify_artefact(*identify, exit);
   add_verify(app, exit);
+  add_report(app, exit);
   auto* model =
       app.add_subcommand("model", "Evaluate models, and manage the model store of a machine");
   model->require_subcommand(1);

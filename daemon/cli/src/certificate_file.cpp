@@ -1,0 +1,103 @@
+#include "certificate_file.hpp"
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/config/bounded_toml.hpp"
+#include "abbe/config/section.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// A date, "2026-11-26".
+void read_date(Section& section, std::string_view key, std::string& out) {
+  if (section.get(key, out) && !is_date(out))
+    section.fault(key, "must be a date such as \"2026-11-26\"");
+}
+
+void read_contact(Section contact, Contact& out) {
+  contact.get("name", out.name);
+  contact.get("street", out.street);
+  contact.get("post_code", out.post_code);
+  contact.get("city", out.city);
+  contact.get("email", out.email);
+  if (contact.get("country", out.country) && !is_country_code(out.country))
+    contact.fault("country", "must be two capital letters (ISO 3166-1), such as \"DE\"");
+  contact.close();
+}
+
+void read_number(Section& section, std::string_view key, std::optional<double>& out,
+                 Bounds bounds) {
+  double value = 0.0;
+  if (section.get(key, value, kPlain, bounds)) out = value;
+}
+
+void read_certificate(Section section, CertificateDetails& out) {
+  section.get("number", out.number);
+  read_date(section, "begin_date", out.begin_date);
+  read_date(section, "end_date", out.end_date);
+  read_date(section, "issue_date", out.issue_date);
+  section.get_word("location", out.location,
+                   std::vector<std::pair<std::string_view, std::string>>{
+                       {"laboratory", "laboratory"},
+                       {"customer", "customer"},
+                       {"laboratoryBranch", "laboratoryBranch"},
+                       {"customerBranch", "customerBranch"},
+                       {"other", "other"}});
+  section.get("remark", out.remark);
+  section.close();
+}
+
+void read_conditions(Section section, CertificateDetails& out) {
+  read_number(section, "temperature_C", out.temperature_C, {-50.0, 100.0});
+  read_number(section, "u_temperature_K", out.u_temperature_K, {0.0, 50.0});
+  if (out.u_temperature_K && !out.temperature_C)
+    section.fault("u_temperature_K", "needs temperature_C");
+  read_number(section, "humidity_percent", out.humidity_percent, {0.0, 100.0});
+  read_number(section, "feed_mm_per_min", out.feed_mm_per_min, {0.0, 1e6});
+  section.close();
+}
+
+void read_equipment(Section& root, CertificateDetails& out) {
+  for (Section& section : root.children("equipment")) {
+    EquipmentDetails& e = out.equipment.emplace_back();
+    section.get("name", e.name, Need::Required);
+    section.get("manufacturer", e.manufacturer);
+    section.get("model", e.model);
+    section.get("serial", e.serial);
+    section.get("certificate", e.certificate);
+    section.close();
+  }
+}
+
+}  // namespace
+
+Result<CertificateDetails> read_certificate_toml(const std::filesystem::path& file) {
+  const auto text = read_regular_file(file);
+  if (!text) return tl::make_unexpected(text.error());
+  const auto table = parse_toml(*text, file.string());
+  if (!table) return tl::make_unexpected(table.error());
+
+  Faults faults(file.string());
+  Section root(&*table, "", {1, 1}, faults);
+  CertificateDetails details;
+  read_certificate(root.child("certificate"), details);
+  Section laboratory = root.child("laboratory");
+  laboratory.get("code", details.laboratory_code);
+  read_contact(std::move(laboratory), details.laboratory);
+  read_contact(root.child("customer"), details.customer);
+  Section person = root.child("person"), machine = root.child("machine");
+  person.get("name", details.person);
+  person.get("role", details.role);
+  person.close();
+  machine.get("manufacturer", details.machine_manufacturer);
+  machine.get("model", details.machine_model);
+  machine.get("serial", details.machine_serial);
+  machine.close();
+  read_conditions(root.child("conditions"), details);
+  read_equipment(root, details);
+  root.close();
+
+  if (faults.any()) return tl::make_unexpected(faults.to_error());
+  return details;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,196 @@
+/// `abbe report MODEL`: makes the report of a stored model again; compares two models; shows the
+/// trend of a machine; writes a Digital Calibration Certificate.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/report/calibration_certificate.hpp"
+#include "abbe/report/model_report.hpp"
+#include "certificate_file.hpp"
+#include "commands.hpp"
+#include "pdf_converter.hpp"
+#include "store_option.hpp"
+#include "terminal.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+struct ReportArguments {
+  std::string model, compare, as_left, details;
+  std::string out, pdf, dcc;
+  bool trend = false;
+  StoreOption store;
+};
+
+Result<ReportSubject> subject_of_store(const ModelStore& store, const std::string& id) {
+  auto document = store.load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto entries = store.list();
+  if (!entries) return tl::make_unexpected(entries.error());
+  const auto history = store.history();
+  if (!history) return tl::make_unexpected(history.error());
+
+  ReportSubject subject{.document = *std::move(document)};
+  for (const StoreEntry& entry : *entries)
+    if (entry.id == id) subject.entry = entry;
+  for (const StoreEvent& event : *history)
+    if (event.id == id) subject.events.push_back(event);
+  return subject;
+}
+
+/// A model with its verdict, from the store, or a file without one.
+Result<ReportSubject> subject_named(const std::string& name, const ReportArguments& arguments,
+                                    const CertificateDetails& details) {
+  Result<ReportSubject> subject = [&]() -> Result<ReportSubject> {
+    if (names_a_file(name)) {
+      auto document = read_model(name);
+      if (!document) return tl::make_unexpected(document.error());
+      return ReportSubject{.document = *std::move(document)};
+    }
+    const auto store = open_store(arguments.store);
+    if (!store) return tl::make_unexpected(store.error());
+    const auto id = id_named(*store, name);
+    if (!id) return tl::make_unexpected(id.error());
+    return subject_of_store(*store, *id);
+  }();
+  if (subject) subject->details = details;
+  return subject;
+}
+
+/// All models of the machine in the store; one that cannot be read is reported and left out.
+Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subject,
+                                                     const ReportArguments& arguments) {
+  const auto store = open_store(arguments.store);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto entries = store->list();
+  if (!entries) return tl::make_unexpected(entries.error());
+  std::vector<ReportSubject> models;
+  for (const StoreEntry& entry : *entries) {
+    if (!entry.fault.empty()) {
+      fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, entry.fault);
+      continue;
+    }
+    if (entry.machine != subject.document.machine) continue;
+    auto model = subject_of_store(*store, entry.id);
+    if (!model) return tl::make_unexpected(model.error());
+    models.push_back(*std::move(model));
+  }
+  return models;
+}
+
+Result<std::string> page_of(const ReportSubject& subject, const ReportArguments& arguments) {
+  if (!arguments.compare.empty()) {
+    const auto other = subject_named(arguments.compare, arguments, {});
+    if (!other) return tl::make_unexpected(other.error());
+    return comparison_report(subject, *other);
+  }
+  if (arguments.trend) {
+    const auto models = models_of_machine(subject, arguments);
+    if (!models) return tl::make_unexpected(models.error());
+    return trend_report(*models);
+  }
+  return model_report(subject);
+}
+
+Result<std::string> certificate_of(const ReportSubject& subject, const ReportArguments& arguments) {
+  std::optional<ReportSubject> as_left;
+  if (!arguments.as_left.empty()) {
+    auto other = subject_named(arguments.as_left, arguments, {});
+    if (!other) return tl::make_unexpected(other.error());
+    if (other->document.machine != subject.document.machine)
+      return fail(ErrorCode::Usage,
+                  fmt::format("--as-left: model {} is of machine \"{}\", model {} of \"{}\"",
+                              model_id(other->document), other->document.machine,
+                              model_id(subject.document), subject.document.machine));
+    as_left = *std::move(other);
+  }
+  return calibration_certificate(subject, as_left);
+}
+
+Result<void> write_file(const std::string& file, std::string_view text) {
+  if (auto done = replace_file(file, text); !done) return done;
+  fmt::print("written     {}\n", file);
+  return {};
+}
+
+/// The default name of the HTML file.
+std::string file_name(const ReportSubject& subject, const ReportArguments& arguments) {
+  const std::string id = model_id(subject.document);
+  if (!arguments.compare.empty()) return fmt::format("compare-{}.html", id);
+  return fmt::format("{}-{}.html", arguments.trend ? "trend" : "report", id);
+}
+
+Result<void> write_report(const ReportArguments& arguments) {
+  CertificateDetails details;
+  if (!arguments.details.empty()) {
+    auto read = read_certificate_toml(arguments.details);
+    if (!read) return tl::make_unexpected(read.error());
+    details = *std::move(read);
+  }
+  const auto subject = subject_named(arguments.model, arguments, details);
+  if (!subject) return tl::make_unexpected(subject.error());
+
+  // Everything is made before the first file is written.
+  const auto page = page_of(*subject, arguments);
+  if (!page) return tl::make_unexpected(page.error());
+  Result<std::string> certificate{std::string{}};
+  if (!arguments.dcc.empty()) certificate = certificate_of(*subject, arguments);
+  if (!certificate) return tl::make_unexpected(certificate.error());
+
+  const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
+  if (auto done = write_file(out, *page); !done) return done;
+  if (!arguments.dcc.empty())
+    if (auto done = write_file(arguments.dcc, *certificate); !done) return done;
+  if (arguments.pdf.empty()) return {};
+  if (auto done = write_pdf(*page, arguments.pdf); !done) return done;
+  fmt::print("written     {}\n", arguments.pdf);
+  return {};
+}
+
+}  // namespace
+
+void add_report(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ReportArguments>();
+  auto* command = parent.add_subcommand(
+      "report",
+      "Write the report of a model as HTML that prints on A4: verdict, volumetric error, values "
+      "of\n"
+      "ISO 230-1, 230-2 and 230-6 with uncertainty, what is not known, origin. The same model\n"
+      "gives the same bytes at any time.");
+  command
+      ->add_option("MODEL", arguments->model,
+                   "model id, the beginning of an id (at least 4 characters), \"active\", or the "
+                   "path of a model.json")
+      ->required();
+  auto* compare = command->add_option("--compare", arguments->compare,
+                                      "another model, given like MODEL: both side by side");
+  command
+      ->add_flag("--trend", arguments->trend,
+                 "all models in the store of the machine of MODEL, over time")
+      ->excludes(compare);
+  add_store_options(*command, arguments->store);
+  command->add_option("-o,--out", arguments->out,
+                      "HTML file; default: report-ID.html, compare-ID.html or trend-ID.html");
+  command->add_option("--pdf", arguments->pdf,
+                      "also write this PDF file; needs weasyprint or chromium");
+  command->add_option("--details", arguments->details,
+                      "certificate.toml: people, serial numbers, conditions (abbe example "
+                      "certificate.toml)");
+  auto* dcc = command->add_option(
+      "--dcc", arguments->dcc,
+      "also write this XML file: Digital Calibration Certificate (PTB DCC 3.2.1), not signed;\n"
+      "needs --details");
+  command
+      ->add_option("--as-left", arguments->as_left,
+                   "model measured after the adjustment, for --dcc; MODEL is then as found")
+      ->needs(dcc);
+  command->callback([arguments, &exit] {
+    const auto done = write_report(*arguments);
+    exit = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace abbe::daemon

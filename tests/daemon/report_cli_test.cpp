@@ -1,0 +1,113 @@
+/// `abbe report`: the built program on a store, its files, output and exit codes.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+
+#include "abbe/model/model_store.hpp"
+#include "abbe_command.hpp"
+#include "recording_fixture.hpp"
+#include "synthetic_model.hpp"
+#include "text_files.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class ReportCli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto store = ModelStore::open(folder_ / "store").value();
+    const StoreActor actor{"turner", "spring", {}};
+    first_ = store.add(test::synthetic_document(1), true, {}, actor).value();
+    second_ = store.add(test::synthetic_document(2), false, {"no better"}, actor).value();
+    ASSERT_TRUE(store.activate(first_, {"foreman", "", {}}));
+  }
+  [[nodiscard]] test::Ran report(const std::string& arguments) const {
+    return test::run_abbe(folder_, "report " + arguments + " --store store");
+  }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return test::text_of(folder_ / name);
+  }
+
+  TemporaryFolder temporary_;
+  const fs::path& folder_ = temporary_.path();
+  std::string first_, second_;
+};
+
+TEST_F(ReportCli, WritesTheReportOfAStoredModelAgain) {
+  const auto ran = report("active");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  const std::string name = fmt::format("report-{}.html", first_);
+  EXPECT_THAT(ran.out, HasSubstr(name));
+  EXPECT_THAT(file(name), AllOf(HasSubstr("Green: the gate accepted"), HasSubstr("turner"),
+                                HasSubstr("activated by foreman")));
+  EXPECT_EQ(report(first_.substr(0, 6) + " -o again.html").exit, 0);
+  EXPECT_EQ(file(name), file("again.html"));
+  EXPECT_EQ(report(second_ + " -o refused.html").exit, 0);
+  EXPECT_THAT(file("refused.html"),
+              AllOf(HasSubstr("Red: the gate refused"), HasSubstr("no better")));
+}
+
+TEST_F(ReportCli, ComparesTwoModelsAndShowsTheTrend) {
+  EXPECT_EQ(report(first_ + " --compare " + second_ + " -o c.html").exit, 0);
+  EXPECT_THAT(file("c.html"), AllOf(HasSubstr(first_), HasSubstr(second_), HasSubstr("B - A")));
+  EXPECT_EQ(report(first_ + " --trend -o t.html").exit, 0);
+  EXPECT_THAT(file("t.html"), HasSubstr("2 models"));
+  EXPECT_EQ(report(first_ + " --trend --compare " + second_).exit, 2);
+}
+
+TEST_F(ReportCli, TheTrendLeavesADamagedModelOutAndSaysSo) {
+  test::write_text(folder_ / "store" / "models" / (second_ + ".json"), "{");
+  const auto ran = report(first_ + " --trend -o t.html");
+  EXPECT_EQ(ran.exit, 0);
+  EXPECT_THAT(ran.err, HasSubstr("model " + second_ + " is left out"));
+  EXPECT_THAT(file("t.html"), HasSubstr("1 models"));
+}
+
+TEST_F(ReportCli, WritesACertificateWithTheDetailsOfTheExample) {
+  test::write_text(folder_ / "details.toml",
+                   test::run_abbe(folder_, "example certificate.toml").out);
+  const auto ran =
+      report(first_ + " --details details.toml --dcc c.xml --as-left " + second_ + " -o r.html");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(file("c.xml"), AllOf(HasSubstr("schemaVersion=\"3.2.1\""), HasSubstr(">As left<"),
+                                   HasSubstr("600-0815")));
+  EXPECT_THAT(file("r.html"), AllOf(HasSubstr("600-0815"), HasSubstr("2500 mm/min"),
+                                    HasSubstr("20.40 \u00b1 0.60 C")));
+}
+
+TEST_F(ReportCli, WritesNothingIfAnythingIsWrong) {
+  const auto without = report(first_ + " --dcc c.xml -o r.html");
+  EXPECT_EQ(without.exit, 3);
+  EXPECT_THAT(without.err, AllOf(HasSubstr("--details"), HasSubstr("machine.serial")));
+  test::write_text(folder_ / "bad.toml",
+                   "[certificate]\nlocation = \"moon\"\nissue_date = \"2026-13-01\"\n[machne]\n");
+  const auto bad = report(first_ + " --details bad.toml -o r.html");
+  EXPECT_EQ(bad.exit, 3);
+  EXPECT_THAT(bad.err,
+              AllOf(HasSubstr("bad.toml:2"), HasSubstr("bad.toml:3"), HasSubstr("machne")));
+  EXPECT_EQ(report("ffff1234 -o r.html").exit, 2);
+  EXPECT_EQ(report("missing.json -o r.html").exit, 4);
+  EXPECT_EQ(report(first_ + " --as-left " + second_).exit, 2) << "needs --dcc";
+  EXPECT_FALSE(fs::exists(folder_ / "r.html"));
+}
+
+TEST_F(ReportCli, SaysThatNoPdfConverterIsInstalled) {
+  const std::string command = fmt::format("report {} -o r.html --pdf r.pdf --store store", first_);
+  const int status = std::system(fmt::format("cd '{}' && PATH=/nowhere '{}' {} 2>err >/dev/null",
+                                             folder_.string(), ABBE_PROGRAM, command)
+                                     .c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 4);
+  EXPECT_THAT(file("err"), HasSubstr("install weasyprint or chromium"));
+  EXPECT_THAT(file("err"), Not(HasSubstr("terminate")));
+}
+
+}  // namespace
+}  // namespace abbe::daemon

@@ -29,6 +29,33 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text.replace(at, what.size(), with);
 }
 
+TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
+  auto document = synthetic_document(1);
+  const auto hash = model_hash(document);
+  document.run = RunFigures{.held_out = "legs",
+                            .held_out_before_m = 1e-5 / 3,
+                            .held_out_after_m = 1e-7 / 3,
+                            .notes = {"a \"note\"", "another"},
+                            .residuals = {{0.1 / 3, 1e-5 / 3, 1e-7 / 7}, {0.2, 2e-5, 3e-7}}};
+  const auto text = to_json(document);
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text << read.error().details.front();
+  EXPECT_EQ(read->run, document.run);
+  EXPECT_EQ(model_hash(*read), hash);
+  EXPECT_EQ(to_json(*read), text);
+  EXPECT_FALSE(parse_model(to_json(synthetic_document(1)), "model.json")->run);
+
+  for (const auto& [what, with] :
+       {std::pair{"\"notes\": [", "\"notes\": [1,"},
+        std::pair{"\"held_out\": \"legs\"", "\"held_out\": 3"},
+        std::pair{"before_um_after_um\": [", "before_um_after_um\": [[1],"},
+        std::pair{"\"notes\": [", "\"notes\": {}, \"more\": ["}}) {
+    const auto refused = parse_model(replaced(text, what, with), "model.json");
+    ASSERT_FALSE(refused) << with;
+    EXPECT_THAT(refused.error().details.front(), HasSubstr("run.")) << with;
+  }
+}
+
 TEST(ModelDocument, ReadsBackToTheSameBits) {
   const auto written = synthetic_document(1);
   const auto read = parse_model(to_json(written), "model.json");

@@ -27,6 +27,7 @@
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/methods/evemu/report.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/run_figures.hpp"
 #include "abbe/model/model_document.hpp"
 #include "commands.hpp"
 #include "evemu_input.hpp"
@@ -235,6 +236,7 @@ int run(const IdentifyEvemuArguments& arguments) {
   const auto now =
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
+  document.run = run_figures(outcome->verdict, "positions");
   document.recording_gap = outcome->recording_gap;
   if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
     return report(written.error());

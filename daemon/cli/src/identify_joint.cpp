@@ -13,6 +13,7 @@
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/inputs.hpp"
+#include "abbe/methods/run_figures.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -84,6 +85,7 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const Joint
   if (!contributions) return tl::make_unexpected(error_of(contributions.error()));
 
   auto document = joint_document(input, *identified.joint, *verdict);
+  document.run = run_figures(*verdict, "legs");
   return JointOutcome{input,
                       std::move(identified.pairs),
                       *std::move(identified.joint),

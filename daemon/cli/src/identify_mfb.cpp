@@ -20,6 +20,7 @@
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/methods/mfb/report.hpp"
+#include "abbe/methods/run_figures.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
@@ -161,8 +162,9 @@ int run(const IdentifyMfbArguments& arguments) {
 
   const auto now =
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  const auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
-                                     input->sources, now);
+  auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
+                               input->sources, now);
+  document.run = run_figures(candidate->verdict, "points");
   if (const auto written = write_results(arguments.out, document,
                                          {{"tables.csv", to_tables_csv(document.model)},
                                           {"report.html", mfb_report(document, *candidate)}});

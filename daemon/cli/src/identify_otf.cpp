@@ -58,8 +58,7 @@ std::string_view words(otf::Stage stage) {
 
 OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
                       std::vector<InputFile> sources) {
-  auto document =
-      otf_document(candidate.solution, candidate.mode, config, std::move(sources), now());
+  auto document = otf_document(candidate, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
           std::move(candidate.residuals),

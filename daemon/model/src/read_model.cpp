@@ -10,6 +10,7 @@
 #include "abbe/model/model_document.hpp"
 #include "model_reader.hpp"
 #include "read_bar_figures.hpp"
+#include "read_run_figures.hpp"
 #include "read_travel.hpp"
 
 namespace abbe::daemon {
@@ -245,15 +246,16 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto backlash = read_backlash(in);
   const auto tracker_drift = read_tracker_drift(in);
   const auto bar = read_bar_figures(in);
+  const auto run = read_run_figures(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{
-      std::move(*model), method, estimator, machine,       machine_hash, *created,
-      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
-      tracker_drift,     bar};
+  ModelDocument document{std::move(*model), method,        estimator,  machine,
+                         machine_hash,      *created,      statistics, inputs,
+                         artefact,          recording_gap, mode,       backlash,
+                         tracker_drift,     bar,           run};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

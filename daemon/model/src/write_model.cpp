@@ -195,6 +195,20 @@ void write_statistics(JsonText& out, const ModelStatistics& s,
       bar ? bar_figures(*bar) : ""));
 }
 
+void write_run(JsonText& out, const RunFigures& run) {
+  const auto notes = array_of(run.notes, [](const auto& note) { return JsonText::quoted(note); });
+  const auto residuals = array_of(run.residuals, [](const RunFigures::Interval& i) {
+    return fmt::format("[{}, {}, {}]", to_decimal(i.at_m, kMm), to_decimal(i.before_m, kMicroUnit),
+                       to_decimal(i.after_m, kMicroUnit));
+  });
+  out.key("run");
+  out.raw(fmt::format(
+      "{{\"held_out\": {}, \"held_out_before_um\": {}, \"held_out_after_um\": {},\n    \"notes\": "
+      "{},\n    \"path_mm_before_um_after_um\": {}}}",
+      JsonText::quoted(run.held_out), to_decimal(run.held_out_before_m, kMicroUnit),
+      to_decimal(run.held_out_after_m, kMicroUnit), notes, residuals));
+}
+
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
   out.key("tracker_drift");
   out.raw(fmt::format("{{\"largest_um\": {}, \"nest_repeatability_um\": {}, \"visits\": {}}}",
@@ -251,6 +265,7 @@ std::string to_json(const ModelDocument& document) {
   else
     write_axes(out, model);
   write_statistics(out, document.statistics, document.bar);
+  if (document.run) write_run(out, *document.run);
   if (document.tracker_drift) write_tracker_drift(out, *document.tracker_drift);
   if (document.artefact) write_artefact(out, *document.artefact);
   write_inputs(out, document.inputs);

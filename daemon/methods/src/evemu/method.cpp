@@ -8,6 +8,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/evemu/document.hpp"
+#include "abbe/methods/run_figures.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -145,7 +146,9 @@ std::vector<InputFile> EvemuMethod::inputs_of(const Run& run) {
 
 ModelDocument EvemuMethod::document_of(const Candidate& candidate, const Config& config,
                                        std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return evemu_document(candidate.solution, config, std::move(inputs), created);
+  auto document = evemu_document(candidate.solution, config, std::move(inputs), created);
+  document.run = run_figures(candidate.verdict, "positions");
+  return document;
 }
 
 }  // namespace abbe::daemon

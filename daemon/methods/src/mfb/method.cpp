@@ -14,6 +14,7 @@
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
+#include "abbe/methods/run_figures.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "usable_touch.hpp"
 
@@ -155,8 +156,10 @@ std::vector<InputFile> MfbMethod::inputs_of(const Run& run) {
 
 ModelDocument MfbMethod::document_of(const Candidate& candidate, const Config& config,
                                      std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return mfb_document(candidate, mfb::Options{}.solve.estimator, config, std::move(inputs),
-                      created);
+  auto document =
+      mfb_document(candidate, mfb::Options{}.solve.estimator, config, std::move(inputs), created);
+  document.run = run_figures(candidate.verdict, "points");
+  return document;
 }
 
 }  // namespace abbe::daemon

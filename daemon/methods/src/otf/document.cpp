@@ -1,10 +1,15 @@
 #include "abbe/methods/otf/document.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "abbe/methods/run_figures.hpp"
 
 namespace abbe::daemon {
 
@@ -36,6 +41,49 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
           .stop_reason = std::string{calib::otf::stop_reason(solution.estimator)}};
 }
 
+/// rms before and after in equal intervals of the paths of all runs, one after the other.
+class RmsAlongPath {
+ public:
+  explicit RmsAlongPath(std::span<const RunResiduals> runs) {
+    double length_m = 0.0;
+    for (const RunResiduals& run : runs) {
+      begins_m_.push_back(length_m);
+      double of_run_m = 0.0;
+      for (const auto& r : run) of_run_m = std::max(of_run_m, r.way_m);
+      length_m += of_run_m;
+    }
+    width_m_ = length_m / static_cast<double>(kIntervals);
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      for (const auto& r : runs[i]) add(begins_m_[i] + r.way_m, r.before_m, r.after_m);
+  }
+
+  /// Intervals without residuals are left out.
+  [[nodiscard]] std::vector<RunFigures::Interval> intervals() const {
+    std::vector<RunFigures::Interval> all;
+    for (std::size_t k = 0; k < kIntervals; ++k)
+      if (counts_[k] > 0.0)
+        all.push_back({(static_cast<double>(k) + 0.5) * width_m_,
+                       std::sqrt(before_[k] / counts_[k]), std::sqrt(after_[k] / counts_[k])});
+    return all;
+  }
+
+ private:
+  static constexpr std::size_t kIntervals = 100;
+
+  void add(double way_m, double before_m, double after_m) {
+    if (!std::isfinite(before_m) || !std::isfinite(after_m)) return;
+    const double at = width_m_ > 0.0 ? std::floor(way_m / width_m_) : 0.0;
+    const auto k = static_cast<std::size_t>(std::clamp(at, 0.0, kIntervals - 1.0));
+    before_[k] += before_m * before_m;
+    after_[k] += after_m * after_m;
+    counts_[k] += 1.0;
+  }
+
+  std::vector<double> begins_m_;
+  double width_m_ = 0.0;
+  std::array<double, kIntervals> before_{}, after_{}, counts_{};
+};
+
 TrackerDriftFigures drift_figures(const calib::otf::TrackerDrift& drift) {
   return {.largest_m = drift.largest_m(),
           .u_repeatability_m = drift.u_repeatability_m,
@@ -59,6 +107,16 @@ ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mod
   std::copy_if(solution.backlash.begin(), solution.backlash.end(),
                std::back_inserter(document.backlash), [](const auto& b) { return b.determined; });
   if (solution.drift) document.tracker_drift = drift_figures(*solution.drift);
+  return document;
+}
+
+ModelDocument otf_document(const OtfCandidate& candidate, const Config& config,
+                           std::vector<InputFile> inputs, protocol::UtcTime created) {
+  ModelDocument document =
+      otf_document(candidate.solution, candidate.mode, config, std::move(inputs), created);
+  const bool stands = candidate.mode == calib::otf::Mode::Standstill;
+  document.run = run_figures(candidate.verdict, stands ? "positions" : "legs");
+  document.run->residuals = RmsAlongPath(candidate.residuals).intervals();
   return document;
 }
 

@@ -84,7 +84,7 @@ std::vector<InputFile> OtfMethod::inputs_of(const Run& run) {
 
 ModelDocument OtfMethod::document_of(const Candidate& candidate, const Config& config,
                                      std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return otf_document(candidate.solution, candidate.mode, config, std::move(inputs), created);
+  return otf_document(candidate, config, std::move(inputs), created);
 }
 
 }  // namespace abbe::daemon

@@ -75,6 +75,21 @@ struct BarFigures {
   friend bool operator==(const BarFigures&, const BarFigures&) = default;
 };
 
+/// What a run left when its model was judged, for people.
+struct RunFigures {
+  /// rms of the residuals in one interval of the run, in its order.
+  struct Interval {
+    double at_m = 0.0;  ///< middle of the interval, length of the path from its beginning
+    double before_m = 0.0, after_m = 0.0;
+    friend bool operator==(const Interval&, const Interval&) = default;
+  };
+  std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
+  double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
+  std::vector<std::string> notes;                          ///< of the verdict
+  std::vector<Interval> residuals;                         ///< of a run along a path, else empty
+  friend bool operator==(const RunFigures&, const RunFigures&) = default;
+};
+
 /// A model and its origin.
 struct ModelDocument {
   calib::VolumetricModel model;
@@ -103,6 +118,8 @@ struct ModelDocument {
   std::optional<TrackerDriftFigures> tracker_drift{};
   /// Of method mfb. Not in the hash, as other statistics.
   std::optional<BarFigures> bar{};
+  /// Not in the hash, as other statistics. Absent in models of earlier versions.
+  std::optional<RunFigures> run{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);

@@ -6,12 +6,17 @@
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/otf/solve.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/methods/otf/identification.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
 
 [[nodiscard]] ModelDocument otf_document(const calib::otf::Solution& solution,
                                          calib::otf::Mode mode, const Config& config,
+                                         std::vector<InputFile> inputs, protocol::UtcTime created);
+
+/// The same with what the run left: verdict and residuals along the path (RunFigures).
+[[nodiscard]] ModelDocument otf_document(const OtfCandidate& candidate, const Config& config,
                                          std::vector<InputFile> inputs, protocol::UtcTime created);
 
 }  // namespace abbe::daemon

@@ -117,6 +117,20 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("No verdict"));
 }
 
+TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(), Not(HasSubstr("along the path")));
+  subject.document.run = RunFigures{.held_out = "legs",
+                                    .held_out_before_m = 12.5e-6,
+                                    .held_out_after_m = 0.25e-6,
+                                    .notes = {"the air was not measured"},
+                                    .residuals = {{0.5, 1e-5, 1e-7}, {1.5, 2e-5, 2e-7}}};
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("12.500 um rms"), HasSubstr("0.250 um rms"), HasSubstr("at legs"),
+                    HasSubstr("Residuals of the fit along the path, rms, after"),
+                    HasSubstr("<li>the air was not measured</li>")));
+}
+
 TEST(ModelReport, EscapesNamesOfMachinePeopleAndFiles) {
   const std::string name = "</td><script>alert(1)</script>\"'&\xff";
   ReportSubject subject = reported(3, false);
@@ -163,7 +177,7 @@ TEST(TrendReport, IsInTheOrderOfTimeAndLeavesRefusedModelsOutOfTheCharts) {
   const std::string page = trend_report(models).value();
   EXPECT_LT(page.find(model_id(models[2].document)), page.find(model_id(models[1].document)));
   EXPECT_LT(page.find(model_id(models[1].document)), page.find(model_id(models[0].document)));
-  EXPECT_THAT(page, AllOf(HasSubstr("3 models"), HasSubstr("<td>red</td>")));
+  EXPECT_THAT(page, AllOf(HasSubstr("Models: 3."), HasSubstr("<td>red</td>")));
   const auto plots = page.substr(page.find("class=\"plots\""));
   EXPECT_EQ(times(plots, "<circle"), 2u * (3 + 3 + 4)) << "two models in ten curves";
   EXPECT_FALSE(trend_report({}));

@@ -59,7 +59,7 @@ TEST_F(ReportCli, ComparesTwoModelsAndShowsTheTrend) {
   EXPECT_EQ(report(first_ + " --compare " + second_ + " -o c.html").exit, 0);
   EXPECT_THAT(file("c.html"), AllOf(HasSubstr(first_), HasSubstr(second_), HasSubstr("B - A")));
   EXPECT_EQ(report(first_ + " --trend -o t.html").exit, 0);
-  EXPECT_THAT(file("t.html"), HasSubstr("2 models"));
+  EXPECT_THAT(file("t.html"), HasSubstr("Models: 2."));
   EXPECT_EQ(report(first_ + " --trend --compare " + second_).exit, 2);
 }
 
@@ -68,7 +68,7 @@ TEST_F(ReportCli, TheTrendLeavesADamagedModelOutAndSaysSo) {
   const auto ran = report(first_ + " --trend -o t.html");
   EXPECT_EQ(ran.exit, 0);
   EXPECT_THAT(ran.err, HasSubstr("model " + second_ + " is left out"));
-  EXPECT_THAT(file("t.html"), HasSubstr("1 models"));
+  EXPECT_THAT(file("t.html"), HasSubstr("Models: 1."));
 }
 
 TEST_F(ReportCli, WritesACertificateWithTheDetailsOfTheExample) {

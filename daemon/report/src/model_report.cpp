@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "abbe/base/units.hpp"
 #include "abbe/report/model_figures.hpp"
 #include "abbe/report/sections.hpp"
 #include "report_sections.hpp"
@@ -18,6 +19,30 @@ void add_fit(HtmlReport& page, const ModelStatistics& s) {
   };
   page.table({"", "mean", "rms", "largest"},
              {row("before the fit", s.before), row("after", s.after)});
+}
+
+/// What was not used in the fit, before and after, and the residuals in the order of the run.
+void add_run(HtmlReport& page, const RunFigures& run) {
+  page.heading("The run");
+  if (run.held_out_before_m > 0.0)
+    page.facts(
+        {{fmt::format("error at {} excluded from the fit, without compensation", run.held_out),
+          um_text(run.held_out_before_m, 3) + " rms"},
+         {"with the model", um_text(run.held_out_after_m, 3) + " rms"}});
+  if (run.residuals.empty()) return;
+  Curve before{.name = "before", .x = {}, .y = {}, .dot_every = 0};
+  Curve after{.name = "after", .x = {}, .y = {}, .dot_every = 0};
+  for (const RunFigures::Interval& i : run.residuals) {
+    before.x.push_back(i.at_m);
+    after.x.push_back(i.at_m);
+    before.y.push_back(kUmPerM * i.before_m);
+    after.y.push_back(kUmPerM * i.after_m);
+  }
+  for (const Curve& curve : {before, after})
+    page.plot({.title = fmt::format("Residuals of the fit along the path, rms, {}", curve.name),
+               .x_label = "length of the path, m",
+               .y_label = "um",
+               .curves = {curve}});
 }
 
 void add_passes(HtmlReport& page, const BarFigures& bar) {
@@ -58,6 +83,7 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_values(page, *values, 0, 1);
   page.paragraph(box_in_words(values->standard));
   add_fit(page, document.statistics);
+  if (document.run) add_run(page, *document.run);
   if (document.bar) add_passes(page, *document.bar);
 
   page.page_break();

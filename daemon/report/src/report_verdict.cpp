@@ -15,6 +15,7 @@ std::string who_and_when(const StoreEvent& event) {
 /// What happened to the model in the store, apart from its verdict.
 std::vector<std::string> notes_of(const ReportSubject& subject) {
   std::vector<std::string> notes;
+  if (subject.document.run) notes = subject.document.run->notes;
   for (const StoreEvent& event : subject.events) {
     switch (event.action) {
       case StoreAction::Added:

@@ -103,7 +103,7 @@ Result<std::string> trend_report(const std::vector<ReportSubject>& models) {
 
   HtmlReport page(fmt::format("{}: trend", points.front().subject->document.machine));
   page.paragraph(
-      fmt::format("{} models. Models that the gate refused are in the table, not in the charts. "
+      fmt::format("Models: {}. Those that the gate refused are in the table, not in the charts. "
                   "Bands and \u00b1: U (k = 2). Values of models with different boxes or methods "
                   "are comparable only with care.",
                   points.size()));

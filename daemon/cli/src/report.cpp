@@ -78,6 +78,10 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
     if (!model) return tl::make_unexpected(model.error());
     models.push_back(*std::move(model));
   }
+  if (models.empty())
+    return fail(ErrorCode::DataInsufficient,
+                fmt::format("--trend: the store has no models of machine \"{}\"",
+                            subject.document.machine));
   return models;
 }
 

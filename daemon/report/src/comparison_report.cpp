@@ -29,6 +29,14 @@ std::vector<calib::Vector3> nodes_of_both(const calib::VolumetricModel& a,
   return points_m;
 }
 
+/// The first tool of A for which B is valid, or the first of B; that of A if there is no common one.
+calib::Vector3 common_tool_m(const calib::VolumetricModel& a, const calib::VolumetricModel& b) {
+  for (const auto* model : {&a, &b})
+    for (const calib::Vector3& tool_m : model->tool_offsets_m())
+      if (a.holds_for_tool(tool_m) && b.holds_for_tool(tool_m)) return tool_m;
+  return a.tool_offsets_m().front();
+}
+
 const CertifiedValue* value_named(const CertifiedValues& values, const std::string& key) {
   for (const ValueGroup& group : values.groups)
     for (const CertifiedValue& value : group.values)
@@ -102,8 +110,9 @@ void add_curves_of_both(HtmlReport& page, const Sides& sides) {
 
 Result<std::string> comparison_report(const ReportSubject& a, const ReportSubject& b) {
   const auto points_m = nodes_of_both(a.document.model, b.document.model);
-  const auto difference = calib::rigid_free_difference(
-      a.document.model, b.document.model, a.document.model.tool_offsets_m().front(), points_m);
+  const calib::Vector3 tool_m = common_tool_m(a.document.model, b.document.model);
+  const auto difference =
+      calib::rigid_free_difference(a.document.model, b.document.model, tool_m, points_m);
   if (!difference)
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("compare {} and {}: {}", model_id(a.document), model_id(b.document),
@@ -117,8 +126,11 @@ Result<std::string> comparison_report(const ReportSubject& a, const ReportSubjec
   HtmlReport page(fmt::format("{}: two models side by side", a.document.machine));
   add_states(page, sides);
   page.heading("Difference of V");
-  page.paragraph(
-      fmt::format("At {} nodes where both models are valid, for the tool of A.", points_m.size()));
+  const calib::Vector3 tool_mm = kMmPerM * tool_m;
+  page.paragraph(fmt::format(
+      "At {} nodes where both models are valid, for the tool offset {:.1f}, {:.1f}, {:.1f} mm. The "
+      "values below are each for the first tool of its model.",
+      points_m.size(), tool_mm.x(), tool_mm.y(), tool_mm.z()));
   const auto row = [](const char* what, const calib::VectorStatistics& s) {
     return std::vector<std::string>{what, um_text(s.mean_m), um_text(s.rms_m), um_text(s.max_m)};
   };

@@ -21,15 +21,19 @@ void add_fit(HtmlReport& page, const ModelStatistics& s) {
              {row("before the fit", s.before), row("after", s.after)});
 }
 
-/// What was not used in the fit, before and after, and the residuals in the order of the run.
-void add_run(HtmlReport& page, const RunFigures& run) {
-  page.heading("The run");
+/// What was not used in the fit, before and after.
+void add_held_out(HtmlReport& page, const RunFigures& run) {
   if (run.held_out_before_m > 0.0)
     page.facts(
         {{fmt::format("error at {} excluded from the fit, without compensation", run.held_out),
           um_text(run.held_out_before_m, 3) + " rms"},
          {"with the model", um_text(run.held_out_after_m, 3) + " rms"}});
+}
+
+/// The residuals in the order of the run.
+void add_run_residuals(HtmlReport& page, const RunFigures& run) {
   if (run.residuals.empty()) return;
+  page.heading("Residuals along the path");
   Curve before{.name = "before", .x = {}, .y = {}, .dot_every = 0};
   Curve after{.name = "after", .x = {}, .y = {}, .dot_every = 0};
   for (const RunFigures::Interval& i : run.residuals) {
@@ -83,7 +87,7 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_values(page, *values, 0, 1);
   page.paragraph(box_in_words(values->standard));
   add_fit(page, document.statistics);
-  if (document.run) add_run(page, *document.run);
+  if (document.run) add_held_out(page, *document.run);
   if (document.bar) add_passes(page, *document.bar);
 
   page.page_break();
@@ -92,6 +96,7 @@ Result<std::string> model_report(const ReportSubject& subject) {
   page.end_columns();
   page.page_break();
   add_value_curves(page, *values);
+  if (document.run) add_run_residuals(page, *document.run);
   add_field(page, document.model, values->standard.box);
   if (document.model.tables() != nullptr) {
     page.heading("Tables of the model");

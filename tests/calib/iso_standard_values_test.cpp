@@ -12,10 +12,10 @@ using namespace abbe::calib;
 using estimation::AxisTravel;
 using estimation::Travel;
 
-constexpr double kU_m = 0.1e-6;
+constexpr double kIsoU_m = 0.1e-6;
 const Vector3 kIsoTool(0.02, -0.015, -0.12);
 
-std::vector<Vector3> corners(const Vector3& low_m, const Vector3& high_m) {
+std::vector<Vector3> iso_corners(const Vector3& low_m, const Vector3& high_m) {
   std::vector<Vector3> all;
   for (int i = 0; i < 8; ++i) {
     all.emplace_back((i & 1) != 0 ? high_m.x() : low_m.x(), (i & 2) != 0 ? high_m.y() : low_m.y(),
@@ -26,13 +26,13 @@ std::vector<Vector3> corners(const Vector3& low_m, const Vector3& high_m) {
 
 /// Nodes -0.3, -0.15 .. 0.3 m in X and Y, -0.4 .. -0.1 m in Z. All tables are 0; translations and
 /// squareness have independent standard uncertainties of 0.1 um or urad, rotations none.
-ModelDescription zero_model() {
+ModelDescription iso_zero_model() {
   const auto x = equidistant_nodes(-0.3, 0.3, 0.15).value();
   const auto z = equidistant_nodes(-0.4, -0.1, 0.075).value();
   const auto layout = ParameterLayout::observable_with_one_target({}, {x, x, z}).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   const std::vector<Vector3> tools{kIsoTool};
-  Eigen::MatrixXd covariance = kU_m * kU_m * Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd covariance = kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n);
   for (const Table& table : layout.tables()) {
     if (is_rotation(table.motion.motion)) {
       covariance.diagonal().segment(static_cast<Eigen::Index>(table.offset), 5).setZero();
@@ -40,14 +40,14 @@ ModelDescription zero_model() {
   }
   return VolumetricModel::from_vector(
              layout, Gauge::G1, tools, Eigen::VectorXd::Zero(n), covariance,
-             ValidityVolume::hull_of(corners({-0.3, -0.3, -0.4}, {0.3, 0.3, -0.1})).value())
+             ValidityVolume::hull_of(iso_corners({-0.3, -0.3, -0.4}, {0.3, 0.3, -0.1})).value())
       .value()
       .description();
 }
 
 /// Sets a table, or a squareness error, to f(position).
 template <class Function>
-void set(ModelDescription& model, std::string_view name, Function f) {
+void set_table(ModelDescription& model, std::string_view name, Function f) {
   for (Parameter& p : model.parameters) {
     if (p.name == name) {
       p.value = f(p.position_m.value_or(0.0));
@@ -59,7 +59,8 @@ iso::StandardValues values_of(const ModelDescription& description) {
   return iso::standard_values(VolumetricModel::from_description(description).value()).value();
 }
 
-const iso::Straightness& straightness(const iso::StandardValues& values, std::string_view motion) {
+const iso::Straightness& straightness_named(const iso::StandardValues& values,
+                                            std::string_view motion) {
   for (const iso::Straightness& s : values.straightness) {
     if (name(s.motion) == motion) {
       return s;
@@ -69,39 +70,39 @@ const iso::Straightness& straightness(const iso::StandardValues& values, std::st
 }
 
 TEST(StandardValues, PositioningIsTheRangeOfTheMeanDeviations) {
-  ModelDescription model = zero_model();
-  set(model, "EXX", [](double x) {
+  ModelDescription model = iso_zero_model();
+  set_table(model, "EXX", [](double x) {
     return x < -0.2 ? 1e-6 : x < -0.1 ? 4e-6 : x < 0.1 ? 0.0 : x < 0.2 ? -2e-6 : 3e-6;
   });
   const iso::Positioning x = values_of(model).positioning[0];
   ASSERT_EQ(x.targets_m.size(), 5u);
-  EXPECT_NEAR(x.M.value, 6e-6, 1e-15);               // 4 - (-2)
-  EXPECT_NEAR(x.M.u, std::sqrt(2.0) * kU_m, 1e-15);  // of two independent nodes
-  EXPECT_NEAR(x.mean.back().value, 2e-6, 1e-15);     // 3 - 1
-  EXPECT_NEAR(x.mean.back().u, std::sqrt(2.0) * kU_m, 1e-15);
+  EXPECT_NEAR(x.M.value, 6e-6, 1e-15);                  // 4 - (-2)
+  EXPECT_NEAR(x.M.u, std::sqrt(2.0) * kIsoU_m, 1e-15);  // of two independent nodes
+  EXPECT_NEAR(x.mean.back().value, 2e-6, 1e-15);        // 3 - 1
+  EXPECT_NEAR(x.mean.back().u, std::sqrt(2.0) * kIsoU_m, 1e-15);
   EXPECT_FALSE(x.B) << "the model has no differences between the directions";
   EXPECT_EQ(x.E.value, x.M.value);
 }
 
 TEST(StandardValues, StraightnessIsRelativeToTheLeastSquaresLine) {
-  ModelDescription model = zero_model();
+  ModelDescription model = iso_zero_model();
   // At -0.3 .. 0.3 m: 4, 1, 0, 1, 4 um plus a line. Mean 2: deviations 2, -1, -2, -1, 2.
-  set(model, "EYX", [](double x) { return 4e-6 * x * x / 0.09 + 7e-6 * x + 5e-6; });
-  const iso::Straightness s = straightness(values_of(model), "EYX");
+  set_table(model, "EYX", [](double x) { return 4e-6 * x * x / 0.09 + 7e-6 * x + 5e-6; });
+  const iso::Straightness s = straightness_named(values_of(model), "EYX");
   EXPECT_NEAR(s.range.value, 4e-6, 1e-15);
   EXPECT_NEAR(s.deviation[1].value, -1e-6, 1e-15);
-  EXPECT_NEAR(straightness(values_of(model), "EZX").range.value, 0.0, 1e-15);
+  EXPECT_NEAR(straightness_named(values_of(model), "EZX").range.value, 0.0, 1e-15);
   // Deviation 1 of five independent values: 1 - 1/5 - (p_1)^2 / sum p^2, p = -2 .. 2.
-  EXPECT_NEAR(s.deviation[1].u, kU_m * std::sqrt(1.0 - 0.2 - 0.1), 1e-12);
+  EXPECT_NEAR(s.deviation[1].u, kIsoU_m * std::sqrt(1.0 - 0.2 - 0.1), 1e-12);
 }
 
 TEST(StandardValues, SquarenessIsTheAngleBetweenTheLinesOfTwoAxes) {
-  ModelDescription model = zero_model();
-  set(model, "EC0Y", [](double) { return 5e-6; });
-  set(model, "EB0Z", [](double) { return -2e-6; });
-  set(model, "EA0Z", [](double) { return 3e-6; });
-  set(model, "EYX", [](double x) { return 1e-6 * x; });   // rotates the line of X by 1 urad
-  set(model, "EXY", [](double y) { return -4e-6 * y; });  // rotates the line of Y by 4 urad
+  ModelDescription model = iso_zero_model();
+  set_table(model, "EC0Y", [](double) { return 5e-6; });
+  set_table(model, "EB0Z", [](double) { return -2e-6; });
+  set_table(model, "EA0Z", [](double) { return 3e-6; });
+  set_table(model, "EYX", [](double x) { return 1e-6 * x; });   // rotates the line of X by 1 urad
+  set_table(model, "EXY", [](double y) { return -4e-6 * y; });  // rotates the line of Y by 4 urad
   const auto values = values_of(model);
   EXPECT_EQ(values.squareness[0].name, "EC0Y");
   EXPECT_NEAR(values.squareness[0].angle.value, 5e-6 + 4e-6 - 1e-6, 1e-12);
@@ -112,14 +113,14 @@ TEST(StandardValues, SquarenessIsTheAngleBetweenTheLinesOfTwoAxes) {
 
 /// V = omega x q: -omega_z y in x, omega_z x in y, and so on.
 TEST(StandardValues, ARotationOfTheWholeVolumeChangesNothing) {
-  ModelDescription model = zero_model();
+  ModelDescription model = iso_zero_model();
   const Vector3 w(3e-6, -2e-6, 5e-6);
-  set(model, "EXY", [&](double y) { return -w.z() * y; });
-  set(model, "EXZ", [&](double z) { return w.y() * z; });
-  set(model, "EYX", [&](double x) { return w.z() * x; });
-  set(model, "EYZ", [&](double z) { return -w.x() * z; });
-  set(model, "EZX", [&](double x) { return -w.y() * x; });
-  set(model, "EZY", [&](double y) { return w.x() * y; });
+  set_table(model, "EXY", [&](double y) { return -w.z() * y; });
+  set_table(model, "EXZ", [&](double z) { return w.y() * z; });
+  set_table(model, "EYX", [&](double x) { return w.z() * x; });
+  set_table(model, "EYZ", [&](double z) { return -w.x() * z; });
+  set_table(model, "EZX", [&](double x) { return -w.y() * x; });
+  set_table(model, "EZY", [&](double y) { return w.x() * y; });
   const auto values = values_of(model);
   for (const auto& s : values.straightness) {
     EXPECT_NEAR(s.range.value, 0.0, 1e-15) << name(s.motion);
@@ -133,9 +134,9 @@ TEST(StandardValues, ARotationOfTheWholeVolumeChangesNothing) {
 }
 
 TEST(StandardValues, ADiagonalOfAScaledMachineIsTooLongByTheScale) {
-  ModelDescription model = zero_model();
+  ModelDescription model = iso_zero_model();
   for (const char* const table : {"EXX", "EYY", "EZZ"}) {
-    set(model, table, [](double q) { return 20e-6 * q; });
+    set_table(model, table, [](double q) { return 20e-6 * q; });
   }
   const auto values = values_of(model);
   const double length_m = std::sqrt(0.6 * 0.6 + 0.6 * 0.6 + 0.3 * 0.3);
@@ -150,21 +151,21 @@ TEST(StandardValues, ADiagonalOfAScaledMachineIsTooLongByTheScale) {
 /// A squareness error c makes two diagonals longer and two shorter: V_x = -c y, so the diagonal
 /// direction (a, b, h) / L sees c a b / L over its length.
 TEST(StandardValues, DiagonalsShowASquarenessError) {
-  ModelDescription model = zero_model();
-  set(model, "EC0Y", [](double) { return 10e-6; });
+  ModelDescription model = iso_zero_model();
+  set_table(model, "EC0Y", [](double) { return 10e-6; });
   const auto values = values_of(model);
   const double length_m = std::sqrt(0.81);
   EXPECT_NEAR(values.diagonals[0].mean.back().value, -10e-6 * 0.36 / length_m, 1e-12);
   EXPECT_NEAR(values.diagonals[1].mean.back().value, 10e-6 * 0.36 / length_m, 1e-12);
   EXPECT_NEAR(values.diagonals[2].mean.back().value, 10e-6 * 0.36 / length_m, 1e-12);
   EXPECT_NEAR(values.diagonals[3].mean.back().value, -10e-6 * 0.36 / length_m, 1e-12);
-  EXPECT_NEAR(values.diagonals[0].E.u, values.worst_diagonal().E.u, 0.1 * kU_m);
+  EXPECT_NEAR(values.diagonals[0].E.u, values.worst_diagonal().E.u, 0.1 * kIsoU_m);
 }
 
 /// The same with one difference for each table.
 VolumetricModel with_backlash(double D, double u_D) {
-  ModelDescription d = zero_model();
-  set(d, "EXX", [](double x) { return 10e-6 * x * x; });
+  ModelDescription d = iso_zero_model();
+  set_table(d, "EXX", [](double x) { return 10e-6 * x * x; });
   const auto layout = ParameterLayout::observable_with_one_target(d.chain, d.nodes).value();
   const auto kind = estimation::TravelDependence::Backlash;
   const auto basis = estimation::TableBasis::of(layout, {.travel = kind}).value();
@@ -188,7 +189,7 @@ TEST(StandardValues, BacklashIsTheReversalError) {
   EXPECT_NEAR(x.mean_B->value, -3e-6, 1e-15);
   EXPECT_NEAR(x.M.value, 0.9e-6, 1e-15);         // 10 um/m^2 (0.3 m)^2
   EXPECT_NEAR(x.E.value, 0.9e-6 + 3e-6, 1e-15);  // the largest backward, the smallest forward
-  EXPECT_NEAR(x.M.u, std::sqrt(2.0) * kU_m, 1e-12) << "without half the backlash";
+  EXPECT_NEAR(x.M.u, std::sqrt(2.0) * kIsoU_m, 1e-12) << "without half the backlash";
   ASSERT_TRUE(values.positioning[1].B);
   EXPECT_NEAR(values.positioning[1].B->value, 0.0, 1e-15);
   const double along_x = 0.6 / 0.9;
@@ -223,7 +224,7 @@ void expect_values_of_V(const VolumetricModel& model) {
 TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
-  ModelDescription tables = zero_model();
+  ModelDescription tables = iso_zero_model();
   for (Parameter& p : tables.parameters) {
     p.value = 1e-5 * normal(random);
   }
@@ -232,16 +233,17 @@ TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
   expect_values_of_V(VolumetricModel::from_description(tables).value());
 
   const auto volume =
-      ValidityVolume::hull_of(corners({-0.3, -0.2, -0.4}, {0.3, 0.2, -0.1})).value();
+      ValidityVolume::hull_of(iso_corners({-0.3, -0.2, -0.4}, {0.3, 0.2, -0.1})).value();
   const auto design = evemu::ScaledDesign::of({}, 3, {{0.0, 0.0, -0.25}, {0.3, 0.2, 0.15}}).value();
   const auto n = static_cast<Eigen::Index>(design.size());
   Eigen::VectorXd c(n);
   for (double& value : c) {
     value = 1e-5 * normal(random);
   }
-  const auto polynomials = evemu::EvemuModel::of(design, Vector3::Zero(), c,
-                                                 kU_m * kU_m * Eigen::MatrixXd::Identity(n, n))
-                               .value();
+  const auto polynomials =
+      evemu::EvemuModel::of(design, Vector3::Zero(), c,
+                            kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n))
+          .value();
   const auto model =
       VolumetricModel::from_polynomials(polynomials, Gauge::Ball1, kIsoTool, volume).value();
   expect_values_of_V(model);
@@ -250,9 +252,9 @@ TEST(StandardValues, AreThoseOfVForTablesAndPolynomials) {
 
 /// The uncertainty of a range is the scatter of the range over models drawn from the covariance.
 TEST(StandardValues, TheUncertaintyIsTheScatterOverTheCovariance) {
-  ModelDescription truth = zero_model();
-  set(truth, "EXX", [](double x) { return 30e-6 * x; });
-  set(truth, "EC0Y", [](double) { return 20e-6; });
+  ModelDescription truth = iso_zero_model();
+  set_table(truth, "EXX", [](double x) { return 30e-6 * x; });
+  set_table(truth, "EC0Y", [](double) { return 20e-6; });
   const auto stated = values_of(truth);
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
@@ -280,7 +282,7 @@ TEST(StandardValues, TheUncertaintyIsTheScatterOverTheCovariance) {
 }
 
 TEST(StandardValues, TheBoxIsInsideTheValidityVolume) {
-  const auto whole = ValidityVolume::hull_of(corners({0, 0, 0}, {1, 2, 3})).value();
+  const auto whole = ValidityVolume::hull_of(iso_corners({0, 0, 0}, {1, 2, 3})).value();
   EXPECT_TRUE(iso::line_box(whole)->whole);
   EXPECT_EQ(iso::line_box(whole)->high_m, Vector3(1, 2, 3));
 
@@ -293,14 +295,14 @@ TEST(StandardValues, TheBoxIsInsideTheValidityVolume) {
 }
 
 TEST(VolumeErrorOfAModel, IsTheStatisticsOfV) {
-  ModelDescription model = zero_model();
-  set(model, "EXX", [](double) { return 3e-6; });  // a translation
+  ModelDescription model = iso_zero_model();
+  set_table(model, "EXX", [](double) { return 3e-6; });  // a translation
   const auto volume = iso::volume_error(VolumetricModel::from_description(model).value()).value();
   EXPECT_EQ(volume.points, 1331u);
   EXPECT_NEAR(volume.mean_m, 3e-6, 1e-15);
   EXPECT_NEAR(volume.largest.value, 3e-6, 1e-15);
   EXPECT_NEAR(volume.rigid_free_max_m, 0.0, 1e-15);
-  EXPECT_GT(volume.mean_U_m, 2.0 * kU_m);
+  EXPECT_GT(volume.mean_U_m, 2.0 * kIsoU_m);
   EXPECT_GE(volume.max_U_m, volume.mean_U_m);
 }
 

@@ -29,7 +29,7 @@ std::vector<calib::Vector3> nodes_of_both(const calib::VolumetricModel& a,
   return points_m;
 }
 
-/// The first tool of A for which B is valid, or the first of B; that of A if there is no common one.
+/// A tool for which both are valid, preferably of A; the first tool of A if there is none.
 calib::Vector3 common_tool_m(const calib::VolumetricModel& a, const calib::VolumetricModel& b) {
   for (const auto* model : {&a, &b})
     for (const calib::Vector3& tool_m : model->tool_offsets_m())

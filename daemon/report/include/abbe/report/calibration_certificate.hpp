@@ -1,7 +1,7 @@
 #pragma once
 /// Digital Calibration Certificate: XML after the schema of PTB, DCC 3.2.1 with D-SI 2.1.0
-/// (https://ptb.de/dcc/v3.2.1/dcc.xsd). As found: the errors of one model. As left: those of another
-/// model, measured after the adjustment. Values and uncertainties are the texts of
+/// (https://ptb.de/dcc/v3.2.1/dcc.xsd). As found: the errors of one model. As left: those of
+/// another model, measured after the adjustment. Values and uncertainties are the texts of
 /// certified_values.hpp, which the report prints, too. The certificate is not signed: signing is
 /// left to the laboratory. Pure.
 

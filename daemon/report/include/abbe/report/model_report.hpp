@@ -1,7 +1,7 @@
 #pragma once
-/// Reports made from a stored model, the same for every method: one page per model, two models side
-/// by side, all models of a machine. HTML without JavaScript that prints on A4. Pure: the same input
-/// gives the same bytes; no date is contained that is not in the input.
+/// Reports made from stored models, the same for every method: one model, two models side by side,
+/// all models of a machine. HTML without JavaScript that prints on A4. Pure: the same input gives
+/// the same bytes; no date is contained that is not in the input.
 
 #include <optional>
 #include <string>

@@ -26,7 +26,8 @@ namespace abbe::daemon {
 namespace {
 
 std::string footer() {
-  return "Separate programs: `abbe sim ...` runs abbe-sim, `abbe watch ...` runs abbe-watch.\n" +
+  return "Separate programs: `abbe demo`, `abbe sim ...` and `abbe watch ...` run abbe-demo, "
+         "abbe-sim\nand abbe-watch.\n" +
          exit_codes_text(
              {{ExitCode::Done},
               {ExitCode::DataInsufficient,
@@ -44,7 +45,7 @@ std::string footer() {
 }
 
 /// Subcommands that are separate programs, as with git.
-constexpr std::array<std::string_view, 2> kPrograms{"sim", "watch"};
+constexpr std::array<std::string_view, 3> kPrograms{"demo", "sim", "watch"};
 
 std::filesystem::path own_folder() {
   std::error_code ignored;

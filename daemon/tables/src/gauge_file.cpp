@@ -62,7 +62,7 @@ void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
                              kMmPerM * out.faces.back().distance_m));
     if (measured && face.readings_m.empty())
       step.fault("readings_mm", "is empty: needs the reading of one or more runs");
-    if (measured && !first && !out.faces.front().readings_m.empty() &&
+    if (measured && !first && (required || !out.faces.front().readings_m.empty()) &&
         face.readings_m.size() != out.faces.front().readings_m.size())
       step.fault("readings_mm",
                  fmt::format("{} readings, the first face has {}: one per run",

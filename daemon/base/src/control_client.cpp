@@ -9,8 +9,10 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/control_connection.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/unix_socket.hpp"
@@ -73,24 +75,40 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
 
 Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& request,
                         std::chrono::milliseconds time_out) {
-  auto fd = connect_unix(socket_path, time_out);
-  if (!fd) return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
+  return ControlConnection{socket_path}.ask(request, time_out);
+}
 
-  set_send_time_out(fd->get(), time_out);
-  const auto sent = send_line(fd->get(), line_of(request), socket_path);
+Result<json> ControlConnection::ask(const json& request, std::chrono::milliseconds time_out) {
+  auto answer = exchange(request, time_out);
+  if (!answer) {  // a late answer to this request would be taken for that to the next one
+    fd_ = FileDescriptor{};
+    return answer;
+  }
+
+  const auto ok = answer->find("ok");
+  if (ok == answer->end() || *ok != true) return tl::unexpected(error_of_refusal(*answer));
+  return answer;
+}
+
+Result<json> ControlConnection::exchange(const json& request, std::chrono::milliseconds time_out) {
+  if (!fd_) {
+    auto fd = connect_unix(path_, time_out);
+    if (!fd)
+      return tl::unexpected(Error{fd.error().code, fd.error().text + " (is abbed running?)"});
+    fd_ = std::move(*fd);
+    set_send_time_out(fd_.get(), time_out);
+  }
+
+  const auto sent = send_line(fd_.get(), line_of(request), path_);
   // A daemon that closes the connection before the end of the request has sent the reason.
-  const auto line = receive_line(fd->get(), sent ? time_out : 0ms, socket_path);
+  const auto line = receive_line(fd_.get(), sent ? time_out : 0ms, path_);
   if (!line) return tl::unexpected(sent ? line.error() : sent.error());
 
   auto parsed = parse_json(*line, "answer", {.bytes = kLongestAnswer, .values = kLongestAnswer});
-  if (!parsed) return tl::unexpected(no_answer(socket_path, parsed.error().text));
-  json& answer = *parsed;
-  if (!answer.is_object())
-    return tl::unexpected(no_answer(socket_path, "the answer is not a JSON object"));
-  const auto ok = answer.find("ok");
-  if (ok == answer.end() || *ok != true) return tl::unexpected(error_of_refusal(answer));
-
-  return answer;
+  if (!parsed) return tl::unexpected(no_answer(path_, parsed.error().text));
+  if (!parsed->is_object())
+    return tl::unexpected(no_answer(path_, "the answer is not a JSON object"));
+  return std::move(*parsed);
 }
 
 }  // namespace abbe::daemon

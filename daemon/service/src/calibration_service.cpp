@@ -109,11 +109,12 @@ Result<void> CalibrationService::check(const CalibrationTask& task) const {
 Result<PreparedCalibration> CalibrationService::prepare(CalibrationTask task) const {
   if (auto valid = check(task); !valid) return tl::unexpected(valid.error());
   RecordingAttachment attachment = to_attachment(task);
+  auto text = std::make_shared<const std::string>(attachment.content);
   const MethodNeeds needs =
       Methods::visit(task, [this](auto method, const auto&) { return method.needs(config_); });
   auto session = session_.prepare(std::move(task));
   if (!session) return tl::unexpected(session.error());
-  return PreparedCalibration{std::move(*session), std::move(attachment), needs};
+  return PreparedCalibration{std::move(*session), std::move(attachment), needs, std::move(text)};
 }
 
 Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
@@ -128,6 +129,7 @@ Result<std::uint64_t> CalibrationService::start(PreparedCalibration&& prepared,
   if (before.id != 0) ended_.push_back(std::move(before));
   if (ended_.size() > kEndedKept) ended_.pop_front();
   who_ = who;
+  std::swap(request_text_, prepared.request_text);  // the caller destroys the previous text
   set_from(prepared.attachment, now);
   if (recorder_ != nullptr) recorder_->attach(std::move(prepared.attachment), now);
 

@@ -16,6 +16,7 @@
 #include "abbe/config/linear_axes.hpp"
 #include "motion_requests.hpp"
 #include "status_reply.hpp"
+#include "store_requests.hpp"
 #include "tracker_requests.hpp"
 
 namespace abbe::daemon {
@@ -27,12 +28,34 @@ Result<OnHub> status(const HubParts&, const json&) {
   return status_reply;
 }
 
-/// The remark of a client, at most 64 bytes and without control characters: it is shown on
+Result<OnHub> live(const HubParts&, const json&) {
+  return live_reply;
+}
+
+json request_json(std::uint64_t session, const std::shared_ptr<const std::string>& text) {
+  json out{{"ok", true}, {"session", session}};
+  if (text == nullptr) return out;
+  out["request"] = json::parse(*text);
+  return out;
+}
+
+/// What the present or last session was asked for: the path, or the artefact.
+Result<OnHub> calibration(const HubParts&, const json&) {
+  return [](const Hub& hub) -> Reply {
+    const CalibrationService& service = hub.parts().calibration;
+    return [session = service.status().id, text = service.request_text()] {
+      return request_json(session, text);
+    };
+  };
+}
+
+constexpr std::size_t kLongestName = 64, kLongestReason = 500;
+
+/// The remark of a client, at most `most` bytes and without control characters: it is shown on
 /// terminals, written to the journal and kept in the store.
-std::string remark_of(std::string who) {
-  constexpr std::size_t kMost = 64;
-  if (who.size() > kMost) {
-    std::size_t end = kMost;  // moved to the start of a UTF-8 character
+std::string remark_of(std::string who, std::size_t most = kLongestName) {
+  if (who.size() > most) {
+    std::size_t end = most;  // moved to the start of a UTF-8 character
     while (end > 0 && (static_cast<unsigned char>(who[end]) & 0xc0) == 0x80) --end;
     who.replace(end, std::string::npos, "...");
   }
@@ -99,6 +122,19 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
     const auto started = on.calibration.start(std::move(*shared), by, on.time.now());
     return started ? reply(json{{"ok", true}, {"session", *started}}) : reply(started.error());
   };
+}
+
+Result<OnHub> activate(const HubParts& parts, const json& request) {
+  return activate_model(parts.config.daemon.models_dir(),
+                        {.id = request.at("id").get<std::string>(),
+                         .who = who(request),
+                         .why = remark_of(request.value("why", std::string{}), kLongestReason),
+                         .force = request.value("force", false)});
+}
+
+Result<OnHub> rollback(const HubParts& parts, const json& request) {
+  return roll_back_model(parts.config.daemon.models_dir(), who(request),
+                         remark_of(request.value("why", std::string{}), kLongestReason));
 }
 
 Result<OnHub> cancel(const HubParts&, const json& request) {
@@ -229,11 +265,15 @@ struct Verb {
 // that matches it.
 constexpr std::array kVerbs{
     Verb{"status", "", Role::Look, status},
+    Verb{"live", "", Role::Look, live},
+    Verb{"calibration", "", Role::Look, calibration},
     Verb{"calibrate", "", Role::Change, calibrate},
     Verb{"cancel", "", Role::Change, cancel},
     Verb{"reference", "here", Role::Change, reference_here},
     Verb{"reference", "cancel", Role::Change, cancel_reference},
     Verb{"reference", "", Role::Change, reference},
+    Verb{"activate", "", Role::Change, activate},
+    Verb{"rollback", "", Role::Change, rollback},
     Verb{"verification", "", Role::Look, verification},
     Verb{"touch", "cancel", Role::Look, cancel_touching},  // the role Look is enough for a stop
     Verb{"touch", "where", Role::Look, where_it_stands},

@@ -276,23 +276,27 @@ struct SeenStatus {
   std::optional<SeenLink> dds;
 };
 
+bool positions_are_old(const Hub& hub) {
+  const auto axes_at = hub.live().axes_at();
+  const auto& time = hub.parts().time;
+  return !axes_at || time.now() - *axes_at > time.host(kAxesTimeout);
+}
+
 SeenStatus look_at_status(const Hub& hub) {
   const HubParts& parts = hub.parts();
-  const auto axes_at = hub.live().axes_at();
-  SeenStatus seen{
-      .streams = hub.health(),
-      .model = SeenModel{hub.model_state()},
-      .session = parts.calibration.status(),
-      .held_out = parts.calibration.held_out(),
-      .ended = parts.calibration.ended(),
-      .live = hub.live().view(),
-      .positions_are_old = !axes_at || parts.time.now() - *axes_at > parts.time.host(kAxesTimeout),
-      .reference = {},
-      .without_zero = {},
-      .release_awaited = parts.devices.release_awaited(),
-      .recording = {},
-      .tracker = look_at_tracker(parts),
-      .dds = {}};
+  SeenStatus seen{.streams = hub.health(),
+                  .model = SeenModel{hub.model_state()},
+                  .session = parts.calibration.status(),
+                  .held_out = parts.calibration.held_out(),
+                  .ended = parts.calibration.ended(),
+                  .live = hub.live().view(),
+                  .positions_are_old = positions_are_old(hub),
+                  .reference = {},
+                  .without_zero = {},
+                  .release_awaited = parts.devices.release_awaited(),
+                  .recording = {},
+                  .tracker = look_at_tracker(parts),
+                  .dds = {}};
 
   if (const auto* reference = parts.reference; reference != nullptr) {
     if (reference->configured())
@@ -338,6 +342,12 @@ json status_json(const SeenStatus& seen, const Config& config) {
 Reply status_reply(const Hub& hub) {
   return [seen = look_at_status(hub), &config = hub.parts().config] {
     return status_json(seen, config);
+  };
+}
+
+Reply live_reply(const Hub& hub) {
+  return [live = hub.live().view(), old = positions_are_old(hub)] {
+    return json{{"ok", true}, {"position_m", positions_json(live, old)}};
   };
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The answer to {"do": "status"}.
+/// The answers to {"do": "status"} and {"do": "live"}.
 
 #include "on_hub.hpp"
 
@@ -8,5 +8,7 @@ namespace abbe::daemon {
 /// Copies what the answer to "status" needs; to be called on the hub's thread. Positions older than
 /// half a second of wall time, and those of missing axes, are null in the answer.
 [[nodiscard]] Reply status_reply(const Hub& hub);
+/// The positions alone, for displays that ask often.
+[[nodiscard]] Reply live_reply(const Hub& hub);
 
 }  // namespace abbe::daemon

@@ -38,6 +38,8 @@ struct PreparedCalibration {
   PreparedSession session;
   RecordingAttachment attachment;  ///< the request, for the recording
   MethodNeeds needs;
+  /// The request as JSON, for clients that show it
+  std::shared_ptr<const std::string> request_text = {};
 };
 
 class CalibrationService {
@@ -83,6 +85,10 @@ class CalibrationService {
                                   protocol::HostTime now);
 
   [[nodiscard]] SessionStatus status() const;
+  /// The request of the present or last session as JSON; null before the first.
+  [[nodiscard]] const std::shared_ptr<const std::string>& request_text() const noexcept {
+    return request_text_;
+  }
   /// The last kEndedKept sessions before the present one, oldest first, so that a client can still
   /// read the verdict on its session.
   [[nodiscard]] const std::deque<SessionStatus>& ended() const noexcept { return ended_; }
@@ -115,6 +121,7 @@ class CalibrationService {
   CalibrationSession session_;
   LiveTablesWatch live_tables_;
   std::string who_;
+  std::shared_ptr<const std::string> request_text_;
   std::future<Result<KeptModel>> task_;         // identifies and stores, or stores again
   std::shared_ptr<IdentificationState> state_;  // of the last identification
   std::shared_ptr<JudgedModel> to_keep_;        // shared with the thread that stores it

@@ -2,11 +2,15 @@
 /// The requests of the control socket:
 ///
 ///     {"do": "status"}
+///     {"do": "live"}
+///     {"do": "calibration"}
 ///     {"do": "calibrate", "method": "otf", "path_m": [[x, y, z], ...], "who": REMARK}
 ///     {"do": "calibrate", "method": "evemu", "calibrator": {..}, "sources": [..], ...}
 ///     {"do": "calibrate", "method": "mfb", "bar": {"file": NAME, "text": TOML},
 ///      "plan": {"file": NAME, "text": TOML}, "earlier_m": [[x, y, z], ...]}
 ///     {"do": "cancel", "who": REMARK}
+///     {"do": "activate", "id": ID, "why": TEXT, "force": false, "who": REMARK}
+///     {"do": "rollback", "why": TEXT, "who": REMARK}
 ///     {"do": "touch", "where": true}
 ///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z],
 ///                                 "normal": [i, j, k]}, ...],
@@ -26,8 +30,9 @@
 /// or "failed" and its "text".
 ///
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
-/// differs from "user", are kept beside it. Lengths in m. Models are activated and rolled back in
-/// the model store; the daemon follows the store. The calling thread reads the request and writes
+/// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
+/// "status" alone; "calibration" the "request" of the present or last session. "activate" and
+/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. The calling thread reads the request and writes
 /// the answer. Hub::call() runs the part that needs the hub's thread; the duration of this part
 /// does not depend on the size of the request.
 

@@ -7,9 +7,9 @@
 #include <string_view>
 
 #include "abbe/base/utc_text.hpp"
+#include "abbe/report/model_words.hpp"
 #include "certificate_parts.hpp"
 #include "report_sections.hpp"
-#include "report_words.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include "abbe/base/utc_text.hpp"
+#include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
-#include "report_words.hpp"
 
 namespace abbe::daemon {
 namespace {

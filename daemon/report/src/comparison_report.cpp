@@ -6,9 +6,9 @@
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/calib/model_comparison.hpp"
+#include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
 #include "report_sections.hpp"
-#include "report_words.hpp"
 
 namespace abbe::daemon {
 namespace {

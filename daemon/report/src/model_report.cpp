@@ -4,9 +4,9 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/report/model_figures.hpp"
+#include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
 #include "report_sections.hpp"
-#include "report_words.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -2,8 +2,8 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
-#include "report_words.hpp"
 
 namespace abbe::daemon {
 namespace {

@@ -1,4 +1,4 @@
-#include "report_words.hpp"
+#include "abbe/report/model_words.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

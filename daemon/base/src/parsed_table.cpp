@@ -11,11 +11,16 @@ Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                 const std::vector<TableForm>& forms, const ReadProgress& progress) {
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
+  return parse_table(*text, file, forms, progress);
+}
+
+Result<ParsedTable> parse_table(std::string_view text, const std::filesystem::path& file,
+                                const std::vector<TableForm>& forms, const ReadProgress& progress) {
   Faults faults(file.string());
-  auto table = parse_numbers(*text, forms, faults, progress);
+  auto table = parse_numbers(text, forms, faults, progress);
   if (!table) return tl::make_unexpected(faults.to_error());
   return ParsedTable{
-      {file.filename().string(), sha256_hex(*text)}, std::move(*table), std::move(faults)};
+      {file.filename().string(), sha256_hex(text)}, std::move(*table), std::move(faults)};
 }
 
 void check_rows(ParsedTable& parsed, std::size_t least, std::string_view what) {

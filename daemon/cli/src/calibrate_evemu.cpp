@@ -5,10 +5,13 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "abbe/base/units.hpp"
-#include "abbe/methods/calibration_request.hpp"
+#include "abbe/methods/evemu/task_of_files.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "commands.hpp"
 #include "follow_calibration.hpp"
@@ -24,31 +27,20 @@ struct CalibrateEvemuArguments {
   std::size_t points_per_ball = 0, points_per_block = 0;  // 0: from the daemon's configuration
 };
 
-/// The request for the daemon. Parts of the plan that the arguments do not give are left out of the
-/// request; the daemon takes them from its configuration.
 Result<nlohmann::json> task_of(const CalibrateEvemuArguments& arguments) {
   const auto calibrator = read_calibrator_toml(arguments.calibrator);
   if (!calibrator) return tl::make_unexpected(calibrator.error());
-  EvemuRequest request;
-  request.calibrator = calibrator->calibrator;
-  request.sources = {calibrator->source};
-
+  std::optional<BallErrorsFile> reference;
   if (!arguments.reference.empty()) {
-    const auto points = read_errors_csv(arguments.reference);
-    if (!points) return tl::make_unexpected(points.error());
-    request.reference = {points->errors, arguments.u_reference_um / kUmPerM};
-    request.sources.push_back(points->source);
+    auto read = read_errors_csv(arguments.reference);
+    if (!read) return tl::make_unexpected(read.error());
+    reference = std::move(*read);
   }
 
-  nlohmann::json task = to_json(std::move(request));
-  task.erase("positions");
-  const auto keep = [&task](const char* key, std::size_t points) {
-    task.erase(key);
-    if (points > 0) task[key] = points;
-  };
-
-  keep("points_per_ball", arguments.points_per_ball);
-  keep("points_per_block", arguments.points_per_block);
+  nlohmann::json task = evemu_task(*calibrator, reference ? &*reference : nullptr,
+                                   arguments.u_reference_um / kUmPerM);
+  if (arguments.points_per_ball > 0) task["points_per_ball"] = arguments.points_per_ball;
+  if (arguments.points_per_block > 0) task["points_per_block"] = arguments.points_per_block;
   return task;
 }
 

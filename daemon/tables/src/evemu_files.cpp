@@ -115,8 +115,14 @@ Result<TouchesFile> read_touches_csv(const std::filesystem::path& file) {
 }
 
 Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_errors_csv(*text, file);
+}
+
+Result<BallErrorsFile> parse_errors_csv(std::string_view text, const std::filesystem::path& file) {
   auto parsed = parse_table(
-      file,
+      text, file,
       {{{"position"}, {"ball"}, {"x_mm"}, {"y_mm"}, {"z_mm"}, {"ex_um"}, {"ey_um"}, {"ez_um"}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 1, "errors");
@@ -138,7 +144,12 @@ Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file) {
 Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   const auto text = read_text(file);
   if (!text) return tl::make_unexpected(text.error());
-  const auto table = parse_toml(*text, file.string());
+  return parse_calibrator_toml(*text, file);
+}
+
+Result<CalibratorFile> parse_calibrator_toml(std::string_view text,
+                                             const std::filesystem::path& file) {
+  const auto table = parse_toml(text, file.string());
   if (!table) return tl::make_unexpected(table.error());
   Faults faults(file.string());
   Section root(&*table, "", {1, 1}, faults);
@@ -148,8 +159,7 @@ Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file) {
   if (const auto valid = calib::evemu::check(calibrator); !valid)
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", file.string(), valid.error().text));
 
-  return CalibratorFile{
-      {file.filename().string(), sha256_hex(*text)}, std::move(calibrator), faces};
+  return CalibratorFile{{file.filename().string(), sha256_hex(text)}, std::move(calibrator), faces};
 }
 
 std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "abbe/base/parsed_table.hpp"
+#include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/geometry.hpp"
 
@@ -96,11 +97,18 @@ calib::otf::TrackerObservation observation(const NumberTable& table, std::size_t
 }  // namespace
 
 Result<PathFile> read_path_csv(const std::filesystem::path& file) {
+  const auto text = read_text(file);
+  if (!text) return tl::make_unexpected(text.error());
+  return parse_path_csv(*text, file);
+}
+
+Result<PathFile> parse_path_csv(std::string_view text, const std::filesystem::path& file) {
   auto parsed =
-      parse_table(file, {{{"x_mm"},
-                          {"y_mm"},
-                          {"z_mm"},
-                          {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}});
+      parse_table(text, file,
+                  {{{"x_mm"},
+                    {"y_mm"},
+                    {"z_mm"},
+                    {.name = "feed_mm_per_min", .required = false, .may_be_empty = true}}});
   if (!parsed) return tl::make_unexpected(parsed.error());
   check_rows(*parsed, 2, "vertices");
   check_path(*parsed);

@@ -27,6 +27,11 @@ struct ParsedTable {
 [[nodiscard]] Result<ParsedTable> parse_table(const std::filesystem::path& file,
                                               const std::vector<TableForm>& forms,
                                               const ReadProgress& progress = {});
+/// The same for the content of a file that another process has read.
+[[nodiscard]] Result<ParsedTable> parse_table(std::string_view text,
+                                              const std::filesystem::path& file,
+                                              const std::vector<TableForm>& forms,
+                                              const ReadProgress& progress = {});
 
 /// Adds a fault if there are fewer than `least` rows. `what` is the name of the rows in the
 /// message: "vertices".

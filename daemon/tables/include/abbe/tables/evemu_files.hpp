@@ -35,6 +35,9 @@ struct BallErrorsFile {
   std::vector<std::size_t> lines;  ///< line in the file, one per error
 };
 [[nodiscard]] Result<BallErrorsFile> read_errors_csv(const std::filesystem::path& file);
+/// The same for the content of a file; `file` is its name in messages.
+[[nodiscard]] Result<BallErrorsFile> parse_errors_csv(std::string_view text,
+                                                      const std::filesystem::path& file);
 
 /// The square face of a gauge block that is touched, with this centre.
 struct BlockFace {
@@ -55,6 +58,9 @@ struct CalibratorFile {
   std::array<std::optional<BlockFace>, 2> faces;  ///< of blocks 1 and 2
 };
 [[nodiscard]] Result<CalibratorFile> read_calibrator_toml(const std::filesystem::path& file);
+/// The same for the content of a file; `file` is its name in messages.
+[[nodiscard]] Result<CalibratorFile> parse_calibrator_toml(std::string_view text,
+                                                           const std::filesystem::path& file);
 /// The text of a calibrator.toml. It begins with `comment`, each line of which begins with #.
 [[nodiscard]] std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
                                           const std::array<std::optional<BlockFace>, 2>& faces,

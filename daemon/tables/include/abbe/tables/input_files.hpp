@@ -34,6 +34,9 @@ struct PathFile {
   std::vector<std::size_t> lines;  ///< line in the file, one per vertex
 };
 [[nodiscard]] Result<PathFile> read_path_csv(const std::filesystem::path& file);
+/// The same for the content of a file; `file` is its name in messages.
+[[nodiscard]] Result<PathFile> parse_path_csv(std::string_view text,
+                                              const std::filesystem::path& file);
 
 /// tracker.csv: `time_s,range_mm,azimuth_rad,elevation_rad[,status]` or
 /// `time_s,x_mm,y_mm,z_mm[,status]`. Status of the device: 0 valid, 1 speed warning (valid); a

@@ -28,6 +28,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_drift(root, config);
   read_evemu(root, config);
   read_control(root, base, config);
+  (void)read_web(root, base);  // checked only: abbe-web uses it
   root.close();
 
   return config;

@@ -4,6 +4,7 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"
+#include "abbe/config/web_config.hpp"
 
 namespace abbe::daemon {
 
@@ -27,5 +28,6 @@ void read_otf(Section& root, OtfConfig& out);
 void read_drift(Section& root, Config& out);
 void read_evemu(Section& root, Config& out);
 void read_control(Section& root, const std::filesystem::path& base, Config& out);
+[[nodiscard]] WebConfig read_web(Section& root, const std::filesystem::path& base);
 
 }  // namespace abbe::daemon

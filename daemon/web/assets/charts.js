@@ -1,0 +1,76 @@
+// Line charts with bands of U = 2 u, drawn by Chart.js.
+
+import { h } from "./dom.js";
+
+let loading = null;
+
+/** Loads a classic script of the server once. */
+const scripts = new Map();
+export function script(name) {
+  if (!scripts.has(name)) {
+    scripts.set(name, new Promise((resolve, reject) => {
+      document.head.append(h("script", { src: name, onload: resolve,
+        onerror: () => reject(new Error(`${name} cannot be loaded`)) }));
+    }));
+  }
+  return scripts.get(name);
+}
+
+// Colours that people with colour vision deficiency can distinguish [Okabe, Ito 2008], lighter on
+// dark ground.
+const dark = ["#56b4e9", "#e69f00", "#2fd3a0", "#e29ac4", "#f0e442", "#ff8f5a"];
+const light = ["#0072b2", "#d55e00", "#00795a", "#a8457f", "#8a5a00", "#1b6fa8"];
+export const isDark = () => document.documentElement.dataset.theme === "dark";
+export const colour = (i) => (isDark() ? dark : light)[i % dark.length];
+
+function datasets(curves) {
+  return curves.flatMap((curve, i) => {
+    const points = (y) => curve.x.map((x, k) => ({ x, y: y(k) }));
+    const line = { label: curve.name, data: points((k) => curve.y[k]), borderColor: colour(i),
+      backgroundColor: colour(i), borderWidth: 2, pointRadius: curve.dots ? 4 : 0, pointHitRadius: 6 };
+    if (!curve.u) return [line];
+    const edge = { borderWidth: 0, pointRadius: 0, band: true, backgroundColor: `${colour(i)}40` };
+    return [line,
+      { ...edge, data: points((k) => curve.y[k] + 2 * curve.u[k]), fill: "+1" },
+      { ...edge, data: points((k) => curve.y[k] - 2 * curve.u[k]), fill: false }];
+  });
+}
+
+function options(chart) {
+  const text = getComputedStyle(document.documentElement).getPropertyValue("--text").trim();
+  const grid = isDark() ? "#2d333b" : "#d0d7de";
+  const axis = (label) => ({ type: "linear", ticks: { color: text }, grid: { color: grid },
+    title: { display: true, text: label, color: text } });
+  return {
+    animation: false, maintainAspectRatio: false, parsing: false,
+    plugins: {
+      title: { display: true, text: chart.title, color: text },
+      legend: { labels: { color: text, filter: (item, data) => !data.datasets[item.datasetIndex].band } },
+      tooltip: { filter: (item) => !item.dataset.band },
+    },
+    scales: { x: axis(chart.x_label), y: axis(chart.y_label) },
+  };
+}
+
+/** "EXX: -3.1 to 12.4": what a screen reader reads. */
+function inWords(chart) {
+  const range = (curve) => {
+    const known = curve.y.filter((y) => typeof y === "number");
+    return `${curve.name}: ${Math.min(...known).toFixed(1)} to ${Math.max(...known).toFixed(1)}`;
+  };
+  return `${chart.title}, ${chart.y_label} over ${chart.x_label}. ${chart.curves.map(range).join("; ")}`;
+}
+
+/** Draws `chart` ({title, x_label, y_label, curves: [{name, x, y, u}]}); returns what removes it. */
+export async function draw(place, chart) {
+  loading ??= script("chart.min.js");
+  await loading;
+  const canvas = h("canvas", { role: "img", "aria-label": inWords(chart) });
+  place.append(h("div", { class: "chart" }, canvas));
+  const make = () => new Chart(canvas,
+    { type: "line", data: { datasets: datasets(chart.curves) }, options: options(chart) });
+  let drawn = make();
+  const again = () => { drawn.destroy(); drawn = make(); };
+  addEventListener("theme", again);
+  return () => { removeEventListener("theme", again); drawn.destroy(); };
+}

@@ -1,0 +1,17 @@
+// The configuration as abbe understood it.
+
+import { facts, h, list } from "./dom.js";
+import { get } from "./server.js";
+
+export async function show(place) {
+  const { file, understood, warnings, faults } = await get("api/configuration");
+  place.append(h("h2", {}, `Configuration ${file}`));
+  if (faults) {
+    place.append(h("p", { class: "bad" }, "The file has faults:"), list(faults));
+    return;
+  }
+  // "axis X        -300 to 300 mm": the name of a fact has 13 characters.
+  place.append(facts("configuration", understood.map((line) => [line.slice(0, 13).trim(), line.slice(13).trim()])));
+  if (warnings.length)
+    place.append(h("h2", {}, "Warnings"), list(warnings.map((w) => h("span", { class: "warn" }, w))));
+}

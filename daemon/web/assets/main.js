@@ -1,0 +1,121 @@
+// The frame of the page: views by the part of the address behind "#", states, log in.
+
+import { h } from "./dom.js";
+import { connect, get, listen, post, state } from "./server.js";
+
+const views = {
+  live: () => import("./live.js"),
+  calibration: () => import("./calibration.js"),
+  model: () => import("./model.js"),
+  history: () => import("./history.js"),
+  recordings: () => import("./recordings.js"),
+  configuration: () => import("./configuration.js"),
+};
+const find = (id) => document.getElementById(id);
+let leave = () => {};
+let shown = 0;  // counts the calls of show()
+
+/** Shows the view of the address. A view has show(place), which returns what ends it. */
+async function show() {
+  const name = location.hash.slice(1).split("/")[0] || "live";
+  const load = views[name] ?? views.live;
+  const number = ++shown;
+  const place = h("div");
+  message("");
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.getAttribute("href") === `#${name}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  try {
+    const view = await load();
+    if (number !== shown) return;
+    leave();
+    leave = () => {};
+    find("view").replaceChildren(place);
+    document.title = `abbe: ${name}`;
+    if (!state.me.may_view) {
+      place.append(h("p", {}, "Log in to see this page."));
+      return;
+    }
+    const end = await view.show(place);
+    if (number === shown) leave = end ?? (() => {});
+    else end?.();
+  } catch (error) {
+    if (number === shown) place.append(h("p", { class: "bad" }, error.message));
+  }
+  find("view").dataset.ready = name;
+}
+
+export function message(text) {
+  find("message").textContent = text;
+}
+
+listen("lost", (reason) => {
+  document.body.classList.toggle("lost", reason !== null);
+  find("connection").hidden = reason === null;
+  find("connection").textContent = reason ?? "";
+});
+
+listen("status", (status) => {
+  find("machine").textContent = status.machine;
+  const model = status.model;
+  const good = model.state === "ACTIVE" ? "good" : model.state === "INVALID" ? "bad" : "warn";
+  find("model-state").replaceChildren("Model ", h("strong", { class: good }, model.state));
+  find("model-state").title = model.reason;
+  const session = status.session;
+  find("session-state").textContent = `Session ${session.state}` +
+    (session.state === "acquiring" ? ` ${Math.round(100 * session.progress)} %` : "");
+});
+
+function showUser() {
+  const button = find("log-in");
+  button.hidden = !state.me.log_in;
+  button.textContent = state.me.user ? `Log out ${state.me.user}` : "Log in";
+}
+
+async function changeUser(me) {
+  state.me = me;
+  showUser();
+  if (me.may_view) connect();
+  await show();
+}
+
+find("log-in").addEventListener("click", async () => {
+  if (!state.me.user) {
+    find("log-in-fault").textContent = "";
+    find("log-in-dialog").showModal();
+    return;
+  }
+  await post("api/logout").catch(() => {});
+  await changeUser(await get("api/me"));
+});
+find("log-in-cancel").addEventListener("click", () => find("log-in-dialog").close());
+find("log-in-form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const form = event.target;
+  try {
+    const me = await post("api/login", { user: form.user.value, password: form.password.value });
+    form.reset();
+    find("log-in-dialog").close();
+    await changeUser(me);
+  } catch (error) {
+    find("log-in-fault").textContent = error.message;
+  }
+});
+
+find("theme").addEventListener("click", () => setTheme(
+  document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  find("theme").textContent = theme === "dark" ? "Light" : "Dark";
+  localStorage.setItem("abbe-theme", theme);
+  dispatchEvent(new Event("theme"));
+}
+setTheme(localStorage.getItem("abbe-theme") ?? "dark");
+
+find("skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  find("view").focus();
+});
+addEventListener("hashchange", show);
+get("api/me").then(changeUser, (error) => message(error.message));

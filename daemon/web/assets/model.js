@@ -1,0 +1,170 @@
+// One model: error motions with bands, the field in space, residuals, what it does not know.
+
+import { draw } from "./charts.js";
+import { facts, fixed, h, list, table, when } from "./dom.js";
+import { get } from "./server.js";
+import { Space } from "./space.js";
+
+const kLongest = 0.12;  // of the diagonal of the box: the longest vector of the field
+
+function residuals(model) {
+  const row = (what, f) => [h("th", { scope: "row" }, what), fixed(f.mean_um, 3), fixed(f.rms_um, 3), fixed(f.max_um, 3)];
+  const r = model.residuals;
+  const number = (title) => ({ title, number: true });
+  const parts = [h("h2", {}, "Before and after"),
+    table("residuals of the fit", ["residuals of the fit, um", number("mean"), number("rms"), number("largest")],
+      [row("before", r.before), row("after", r.after)])];
+  if (r.held_out?.before_um > 0)
+    parts.push(h("p", {}, `Held-out ${r.held_out.what}, not used in the fit: ` +
+      `${fixed(r.held_out.before_um, 3)} um rms without compensation, ` +
+      `${fixed(r.held_out.after_um, 3)} um with the model.`));
+  return parts;
+}
+
+function alongPath(model) {
+  const run = model.residuals.along_path;
+  if (!run || run.at_m.length === 0) return [];
+  return [{ title: "Residuals along the path, rms", x_label: "length of the path, m", y_label: "um",
+    curves: [{ name: "before", x: run.at_m, y: run.before_um },
+             { name: "after", x: run.at_m, y: run.after_um }] }];
+}
+
+function unknowns(model) {
+  return h("div", { class: "columns" },
+    h("section", {}, h("h2", {}, "What it does not know"), list(model.not_estimable)),
+    h("section", {}, h("h2", {}, "What the uncertainty does not contain"),
+      list(model.not_in_the_uncertainty)));
+}
+
+function values(model) {
+  return model.values.map((group) => h("details", {},
+    h("summary", {}, group.name), h("p", { class: "weak" }, group.explanation),
+    table(group.name, ["", { title: "value", number: true }, { title: "U (k = 2)", number: true }, "unit"],
+      group.values.map((v) => [h("th", { scope: "row" }, v.name), v.value || "not estimable", v.U, v.value ? v.unit : v.why]))));
+}
+
+/** The chart with U = 2 u in place of the error. */
+function ofU(chart) {
+  return { ...chart, y_label: chart.y_label.replace("error", "U"),
+    curves: chart.curves.map((c) => ({ name: c.name, x: c.x, y: c.u.map((u) => 2 * u) })) };
+}
+
+/** Error motions with bands, or U alone, which a narrow band does not show. */
+async function motionView(place, model) {
+  const choice = h("select", { id: "motion-choice" },
+    h("option", { value: "error" }, "error with its band of U (k = 2)"),
+    h("option", { value: "U" }, "U (k = 2) alone"));
+  const charts = h("div", { class: "charts" });
+  place.append(model.charts.length > 0
+    ? h("div", { class: "tools" }, h("label", { for: "motion-choice" }, "Show"), choice)
+    : h("p", {}, "A model of polynomials has no tables of error motions."), charts);
+  let ends = [];
+  const show = async () => {
+    ends.forEach((end) => end());
+    ends = [];
+    charts.replaceChildren();
+    const motions = choice.value === "U" ? model.charts.map(ofU) : model.charts;
+    for (const chart of [...motions, ...alongPath(model)]) ends.push(await draw(charts, chart));
+  };
+  choice.addEventListener("change", show);
+  await show();
+  return () => ends.forEach((end) => end());
+}
+
+/** The largest |V|, and the factor from um to mm in the scene. */
+function scaleOf(field) {
+  const lengths = field.vectors.map((v) => Math.hypot(...v.V_um));
+  const diagonal = Math.hypot(...field.high_mm.map((x, i) => x - field.low_mm[i]));
+  const longest = Math.max(...lengths, 1e-9);
+  return { longest, factor: kLongest * diagonal / longest };
+}
+
+/** The field of V, or the spheres of U that remain after compensation, at the same scale. */
+async function fieldView(place, field) {
+  if (!field || field.vectors.length === 0) {
+    place.append(h("p", {}, "The model has no validity volume."));
+    return () => {};
+  }
+  const { longest, factor } = scaleOf(field);
+  const largestU = Math.max(...field.vectors.map((v) => v.U_um));
+  const choice = h("select", { id: "field-choice" },
+    h("option", { value: "before" }, "before: V, the error without compensation"),
+    h("option", { value: "after" }, "after: U (k = 2), what remains uncertain"),
+    h("option", { value: "both" }, "both, at the same scale"));
+  const hull = h("input", { type: "checkbox", id: "field-hull", checked: true });
+  place.append(h("div", { class: "tools" },
+    h("label", { for: "field-choice" }, "Show"), choice,
+    h("label", { for: "field-hull" }, hull, " validity volume")),
+    h("p", { class: "weak" }, `Longest V ${fixed(longest, 1)} um, largest U ${fixed(largestU, 2)} um; ` +
+      `drawn ${fixed(1000 * factor, 0)} times larger than in the machine.`));
+
+  const space = await Space.create(place, field.low_mm, field.high_mm, "Field of the error in the machine");
+  const at = (v, share) => v.at_mm.map((x, i) => x + share * factor * v.V_um[i]);
+  let drawn = [];
+  const show = () => {
+    drawn.forEach((object) => space.remove(object));
+    drawn = [];
+    if (hull.checked) drawn.push(space.hull(field.hull_mm, 0x6e8fb5));
+    if (choice.value !== "after") {
+      drawn.push(space.dots(field.vectors.map((v) => v.at_mm), 0x56b4e9));
+      drawn.push(space.segments(field.vectors.map((v) => [v.at_mm, at(v, 1)]), 0xe69f00));
+    }
+    if (choice.value !== "before")
+      for (const v of field.vectors)
+        drawn.push(space.ball(v.at_mm, Math.max(factor * v.U_um, 0.0012 * space.size), 0x2fd3a0));
+    space.draw();
+  };
+  choice.addEventListener("change", show);
+  hull.addEventListener("change", show);
+  show();
+  return () => space.end();
+}
+
+/** Options for the models of the store; the one that is shown is chosen. */
+async function chooser(id) {
+  const { models } = await get("api/history");
+  if (models.length === 0) return null;
+  const active = models.find((m) => m.active);
+  const shown = id === "active" ? (active ?? models[0]).id : id;
+  const select = h("select", { id: "model-choice" }, models.filter((m) => !m.fault).map((m) =>
+    h("option", { value: m.id, selected: m.id === shown },
+      `${m.id}, ${when(m.added)}, ${m.active ? "active" : m.accepted ? "accepted" : "refused"}`)));
+  select.addEventListener("change", () => { location.hash = `model/${select.value}`; });
+  return { select, shown };
+}
+
+function origin(model) {
+  return facts("model", [
+    ["model", model.id], ["measured (UTC)", when(model.created)], ["method", model.method],
+    ["machine", `${model.machine}, chain ${model.chain}`], ["tools", model.tools],
+    ["solution", `${model.observations} observations, ${model.unknowns} unknowns, rank ` +
+      `${model.rank}, condition ${model.condition.toPrecision(3)}, sigma0 ${fixed(model.sigma0, 3)}`],
+    ["gauge", model.gauge], ["recording", model.recording_gap],
+    ["inputs", model.inputs.map((i) => i.name).join(", ")]]);
+}
+
+export async function show(place) {
+  const choice = await chooser(location.hash.split("/")[1] ?? "active");
+  if (choice === null) {
+    place.append(h("p", {}, "The store has no models yet: run a calibration."));
+    return () => {};
+  }
+  const model = await get(`api/models/${choice.shown}`);
+  place.append(
+    h("div", { class: "tools" }, h("label", { for: "model-choice" }, "Model"), choice.select,
+      h("a", { href: `reports/${choice.shown}`, target: "_blank" }, "Report to print"),
+      h("a", { href: `models/${choice.shown}`, download: "model.json" }, "model.json")),
+    origin(model), ...residuals(model), h("h2", {}, "The error in space"));
+  const space = h("div");
+  const motions = h("div");
+  place.append(space, h("h2", {}, "Error motions"), motions, unknowns(model),
+    h("h2", {}, "Values of the standards"), ...values(model));
+
+  const ends = [await motionView(motions, model)];
+  try {
+    ends.push(await fieldView(space, model.field));
+  } catch (error) {
+    space.append(h("p", { class: "warn" }, `This browser draws no 3-D view: ${error.message}`));
+  }
+  return () => ends.forEach((end) => end());
+}

@@ -1,0 +1,23 @@
+#pragma once
+/// The TLS certificate of the page.
+
+#include <chrono>
+#include <filesystem>
+
+#include "abbe/base/error.hpp"
+
+namespace abbe::web {
+
+struct CertificateDates {
+  std::chrono::system_clock::time_point from, until;
+};
+
+/// The dates of the first certificate of a PEM file. Io or BadInput with the name of the file.
+[[nodiscard]] daemon::Result<CertificateDates> read_certificate(const std::filesystem::path& file);
+
+/// BadInput if the certificate has expired or is not yet valid: "certificate web.crt expired on
+/// 2026-11-01T00:00:00Z: make a new one (...)".
+[[nodiscard]] daemon::Result<void> check_certificate(const std::filesystem::path& file,
+                                                     std::chrono::system_clock::time_point now);
+
+}  // namespace abbe::web

@@ -1,0 +1,47 @@
+#pragma once
+/// The HTTP server of the page, and everything that it needs: the connection to abbed, the views of
+/// store and recordings, users and sessions. Limits, each reported with the address of the browser:
+///
+///   open pages                 [web] most_pages
+///   requests of one address    kRequestsPerSecond on average
+///   a page that does not read  closed after kWriteTimeOut
+///   a request                  kMostRequestBytes
+///
+/// Whatever a browser does, abbed gets the requests of one client: those of DaemonFeed, and one at
+/// a time of logged-in users.
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "abbe/base/error.hpp"
+#include "abbe/config/web_config.hpp"
+
+namespace abbe::web {
+
+inline constexpr double kRequestsPerSecond = 40.0, kRequestsAtOnce = 200.0;
+inline constexpr std::chrono::milliseconds kWriteTimeOut{5000}, kReadTimeOut{5000};
+inline constexpr std::size_t kMostRequestBytes = 1u << 20;
+
+struct PageOptions {
+  daemon::WebSettings settings;
+  std::filesystem::path config_file;            ///< shown as understood
+  std::filesystem::path abbe_program = "abbe";  ///< for replays
+  std::chrono::milliseconds write_time_out = kWriteTimeOut;
+  /// Receives one line per event: log in, change, refusal, limit. Any thread.
+  std::function<void(const std::string&)> report;
+};
+
+class PageServer {
+ public:
+  /// Listens and serves on threads of its own. Io if the address is in use or not of this computer;
+  /// BadInput for a certificate that cannot be used.
+  [[nodiscard]] static daemon::Result<std::unique_ptr<PageServer>> start(PageOptions options);
+  virtual ~PageServer() = default;
+  [[nodiscard]] virtual std::uint16_t port() const = 0;
+};
+
+}  // namespace abbe::web

@@ -1,0 +1,69 @@
+#pragma once
+/// Who is logged in, in memory only: a restart of abbe-web ends all sessions. Thread-safe.
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "abbe/base/error.hpp"
+#include "abbe/web/web_users.hpp"
+
+namespace abbe::web {
+
+struct WebSession {
+  std::string token;  ///< in the cookie
+  std::string csrf;   ///< in the header X-CSRF-Token of every change
+  std::string user;
+  WebRole role = WebRole::View;
+};
+
+struct SessionLimits {
+  std::chrono::seconds idle = std::chrono::hours{1};  ///< without a request
+  std::chrono::seconds total = std::chrono::hours{12};
+  std::size_t sessions = 64;  ///< at this limit the session that was idle longest ends
+  std::size_t failures = 5;   ///< wrong passwords of one address within `pause`
+  std::chrono::seconds pause = std::chrono::minutes{1};
+};
+
+class Sessions {
+ public:
+  using Clock = std::chrono::steady_clock;
+  explicit Sessions(std::filesystem::path users_file, SessionLimits limits = {})
+      : users_file_(std::move(users_file)), limits_(limits) {}
+
+  /// Refused for a wrong name or password, after too many failures of `address`, and if no file of
+  /// users is configured; as read_web_users() if the file cannot be used. One log-in at a time.
+  [[nodiscard]] daemon::Result<WebSession> log_in(const std::string& user,
+                                                  const std::string& password,
+                                                  const std::string& address,
+                                                  Clock::time_point now);
+  /// The session of a cookie, as long as its user has the same role in the file of users.
+  [[nodiscard]] std::optional<WebSession> find(const std::string& token, Clock::time_point now);
+  void log_out(const std::string& token);
+  [[nodiscard]] bool possible() const noexcept { return !users_file_.empty(); }
+
+ private:
+  struct Kept {
+    WebSession session;
+    Clock::time_point begun, used;
+  };
+  struct Failures {
+    std::size_t count = 0;
+    Clock::time_point last;
+  };
+  [[nodiscard]] daemon::Result<void> check_failures(const std::string& address,
+                                                    Clock::time_point now);
+  void remove_ended(Clock::time_point now);
+
+  std::filesystem::path users_file_;
+  SessionLimits limits_;
+  std::mutex checking_;  // a password takes 0.1 s of one processor
+  std::mutex mutex_;     // of the members below
+  std::map<std::string, Kept> kept_;
+  std::map<std::string, Failures> failures_;
+};
+
+}  // namespace abbe::web

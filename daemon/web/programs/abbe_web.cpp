@@ -1,0 +1,184 @@
+// abbe-web: the page of abbe. A separate process without privileges, so that no browser can stop
+// abbed.
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <utility>
+
+#include "abbe/base/exit_codes.hpp"
+#include "abbe/base/service_manager.hpp"
+#include "abbe/web/certificate.hpp"
+#include "abbe/web/page_server.hpp"
+#include "abbe/web/web_users.hpp"
+
+namespace {
+
+using abbe::daemon::Error;
+using abbe::daemon::ErrorCode;
+using abbe::daemon::ExitCode;
+
+constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
+              kInternal = number(ExitCode::Internal);
+constexpr int kNice = 10;  ///< below abbed, which must not wait for a page
+constexpr std::chrono::hours kCertificatePeriod{1};
+constexpr std::chrono::hours kCertificateNotice = std::chrono::days{14};
+
+std::string footer() {
+  return "Examples: abbe-web -c /etc/abbe/abbed.toml\n"
+         "          abbe-web --hash-password anna --role calibrate >>/etc/abbe/web-users\n" +
+         abbe::daemon::exit_codes_text(
+             {{ExitCode::Done, "stopped by SIGTERM or SIGINT"},
+              {ExitCode::Usage},
+              {ExitCode::BadInput,
+               "the configuration or the certificate cannot be used (an expired one is named)"},
+              {ExitCode::Io, "the address or port cannot be used"},
+              {ExitCode::Internal}});
+}
+
+/// A line to stderr, which is the journal under systemd.
+void log_line(const std::string& text) {
+  fmt::print(stderr, "abbe-web: {}\n", text);
+}
+
+int refuse(const Error& error) {
+  log_line(error.text);
+  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  return exit_code(error.code);
+}
+
+/// Reads a line without showing it on a terminal.
+std::string read_password() {
+  termios shown{};
+  const bool terminal = ::tcgetattr(STDIN_FILENO, &shown) == 0;
+  if (terminal) {
+    fmt::print(stderr, "password: ");
+    termios hidden = shown;
+    hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &hidden);
+  }
+  std::string password;
+  std::getline(std::cin, password);
+  if (terminal) {
+    ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &shown);
+    fmt::print(stderr, "\n");
+  }
+  return password;
+}
+
+int hash_password(const std::string& user, const std::string& role_name) {
+  const auto role = abbe::web::web_role_named(role_name);
+  const auto line = abbe::web::web_user_line(user, *role, read_password());
+  if (!line) return refuse(line.error());
+  fmt::print("{}\n", *line);
+  return kDone;
+}
+
+/// `abbe` in the folder of abbe-web; if it is not there, the one in PATH.
+std::filesystem::path abbe_program() {
+  std::error_code error;
+  auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / "abbe";
+  return !error && std::filesystem::exists(beside, error) ? beside : "abbe";
+}
+
+/// Reports a certificate that has expired, or will soon, while the page runs.
+void report_certificate(const std::filesystem::path& file) {
+  using std::chrono::system_clock;
+  const auto now = system_clock::now();
+  if (const auto valid = abbe::web::check_certificate(file, now); !valid)
+    return log_line(valid.error().text);
+  const auto dates = abbe::web::read_certificate(file);
+  if (!dates || dates->until - now > kCertificateNotice) return;
+  const auto days = std::chrono::duration_cast<std::chrono::days>(dates->until - now).count();
+  log_line(fmt::format("certificate {} expires in {} days", file.string(), days));
+}
+
+/// Until SIGTERM or SIGINT. Feeds the watchdog of systemd.
+void wait_for_stop(const sigset_t& stop, const std::filesystem::path& certificate) {
+  using Clock = std::chrono::steady_clock;
+  const auto feed_period = abbe::daemon::watchdog_period();
+  const timespec period{.tv_sec = 1, .tv_nsec = 0};
+  auto next_check = Clock::now();
+  for (;;) {
+    if (sigtimedwait(&stop, nullptr, &period) > 0) return;
+    if (feed_period) abbe::daemon::notify_alive();
+    if (certificate.empty() || Clock::now() < next_check) continue;
+    next_check = Clock::now() + kCertificatePeriod;
+    report_certificate(certificate);
+  }
+}
+
+int serve(const std::string& file) {
+  auto settings = abbe::daemon::load_web_settings(file);
+  if (!settings)
+    return refuse({ErrorCode::BadInput, settings.error().text, settings.error().details});
+  const auto web = settings->web;
+  if (::geteuid() == 0)
+    log_line("warning: runs as root; abbe-web.service runs it as the user abbe-web");
+
+  (void)::setpriority(PRIO_PROCESS, 0, kNice);  // of all threads: they inherit it
+
+  // Blocked before any thread starts, so that only this thread receives them.
+  sigset_t stop;
+  sigemptyset(&stop);
+  sigaddset(&stop, SIGTERM);
+  sigaddset(&stop, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &stop, nullptr);
+  auto page = abbe::web::PageServer::start({.settings = std::move(*settings),
+                                            .config_file = file,
+                                            .abbe_program = abbe_program(),
+                                            .report = log_line});
+  if (!page) return refuse(page.error());
+
+  const bool v6 = web.address.find(':') != std::string::npos;
+  log_line(fmt::format("serving http{}://{}{}{}:{}/", web.tls() ? "s" : "", v6 ? "[" : "",
+                       web.address, v6 ? "]" : "", (*page)->port()));
+  abbe::daemon::notify_ready("serving");
+  wait_for_stop(stop, web.certificate);
+  abbe::daemon::notify_stopping();
+  page->reset();
+  log_line("stopped");
+  return kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Serves the page of abbe: live axes, calibration, models, recordings. Asks abbed over its "
+      "control socket. Read-only unless a user logs in."};
+  app.footer(footer());
+  app.set_version_flag("--version", "abbe-web " ABBE_VERSION);
+  std::string file = "/etc/abbe/abbed.toml", user, role = "view";
+  app.add_option("-c,--config", file, "configuration file; the table [web] is used")
+      ->capture_default_str();
+  auto* const hash = app.add_option("--hash-password", user,
+                                    "read a password from standard input and print the line of "
+                                    "this user for the file [web] users");
+  app.add_option("--role", role, "of the user: view, calibrate or administer")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"view", "calibrate", "administer"}))
+      ->needs(hash);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kUsage;
+  }
+
+  try {
+    return user.empty() ? serve(file) : hash_password(user, role);
+  } catch (const std::exception& e) {
+    log_line(fmt::format("internal error: {}", e.what()));
+    return kInternal;
+  }
+}

@@ -1,0 +1,197 @@
+#include "abbe/web/model_views.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "abbe/base/text_file.hpp"
+#include "abbe/base/units.hpp"
+#include "abbe/base/utc_text.hpp"
+#include "abbe/model/model_store.hpp"
+#include "abbe/report/model_report.hpp"
+#include "model_json.hpp"
+
+namespace abbe::web {
+namespace {
+
+using daemon::ModelDocument;
+using daemon::ModelStore;
+using daemon::Result;
+using daemon::StoreAction;
+using daemon::StoreEntry;
+using daemon::StoreEvent;
+using nlohmann::json;
+
+constexpr std::size_t kMostViews = 8;          ///< a view has some 100 kB
+constexpr std::size_t kMostTrendModels = 100;  ///< the newest
+constexpr std::size_t kMostEvents = 200;       ///< the newest
+
+/// Invalid UTF-8, which names of files may contain, is replaced.
+std::string text_of(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string_view action_in_words(StoreAction action) {
+  switch (action) {
+    case StoreAction::Added:
+      return "added";
+    case StoreAction::Activated:
+      return "activated";
+    case StoreAction::Forced:
+      return "activated by force";
+    case StoreAction::RolledBack:
+      return "rolled back";
+    case StoreAction::Drifted:
+      return "drift found";
+  }
+  return "";
+}
+
+json entry_json(const StoreEntry& entry) {
+  return {{"id", entry.id},
+          {"active", entry.active},
+          {"accepted", entry.accepted},
+          {"reasons", entry.reasons},
+          {"added", daemon::to_text(entry.added)},
+          {"method", entry.method},
+          {"machine", entry.machine},
+          {"fault", entry.fault}};
+}
+
+json event_json(const StoreEvent& event) {
+  return {{"action", action_in_words(event.action)},
+          {"id", event.id},
+          {"who", event.actor.who},
+          {"why", event.actor.why},
+          {"when", daemon::to_text(event.actor.when)}};
+}
+
+Result<std::string> id_of(const ModelStore& store, const std::string& name) {
+  if (name != "active") return store.find(name);
+  auto active = store.active_id();
+  if (!active) return tl::unexpected(active.error());
+  if (*active) return **active;
+  return daemon::fail(daemon::ErrorCode::Refused, "no model is active");
+}
+
+struct TrendValue {
+  std::string name;
+  bool is_angle = false;
+  std::vector<json> value, u;  ///< one for each model; null: the model does not have it
+};
+
+/// Adds the values of one model, the `index`-th of the trend.
+void add_to_trend(std::vector<std::pair<std::string, TrendValue>>& trend, std::size_t index,
+                  const daemon::CertifiedValues& values) {
+  for (const auto& group : values.groups) {
+    for (const auto& v : group.values) {
+      if (v.value.empty()) continue;
+      auto found = std::ranges::find(trend, v.key, &std::pair<std::string, TrendValue>::first);
+      if (found == trend.end())
+        found = trend.insert(trend.end(), {v.key, {v.name, v.is_angle, {}, {}}});
+      TrendValue& row = found->second;
+      row.value.resize(index);
+      row.u.resize(index);
+      row.value.push_back(daemon::kUmPerM * v.value_si);
+      row.u.push_back(daemon::kUmPerM * v.u_si);
+    }
+  }
+}
+
+}  // namespace
+
+Result<json> ModelViews::history() const {
+  const ModelStore store{store_};
+  const auto entries = store.list();
+  if (!entries) return tl::unexpected(entries.error());
+  const auto events = store.history();
+  if (!events) return tl::unexpected(events.error());
+
+  json out{{"models", json::array()}, {"events", json::array()}};
+  for (const StoreEntry& entry : *entries) out["models"].push_back(entry_json(entry));
+  const std::size_t first = events->size() - std::min(events->size(), kMostEvents);
+  for (std::size_t i = events->size(); i > first; --i)
+    out["events"].push_back(event_json((*events)[i - 1]));
+  return out;
+}
+
+Result<std::string> ModelViews::model(const std::string& name) {
+  const ModelStore store{store_};
+  const auto id = id_of(store, name);
+  if (!id) return tl::unexpected(id.error());
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = views_.find(*id); known != views_.end()) return known->second;
+  }
+
+  const auto document = store.load(*id);
+  if (!document) return tl::unexpected(document.error());
+  std::string view = text_of(model_json(*document));
+  const std::lock_guard lock(mutex_);
+  if (views_.size() >= kMostViews) views_.erase(views_.begin());
+  views_[*id] = view;
+  return view;
+}
+
+Result<std::string> ModelViews::trend() {
+  const ModelStore store{store_};
+  auto entries = store.list();
+  if (!entries) return tl::unexpected(entries.error());
+  std::erase_if(*entries, [](const StoreEntry& e) { return !e.accepted || !e.fault.empty(); });
+  if (entries->size() > kMostTrendModels) entries->resize(kMostTrendModels);
+  std::ranges::reverse(*entries);  // oldest first
+  std::string ids;
+  for (const StoreEntry& entry : *entries) ids += entry.id;
+  const std::lock_guard lock(mutex_);
+  if (ids == trend_of_ && !trend_.empty()) return trend_;
+
+  json models = json::array();
+  std::vector<std::pair<std::string, TrendValue>> trend;
+  for (const StoreEntry& entry : *entries) {
+    const auto document = store.load(entry.id);
+    if (!document) continue;
+    const auto values = daemon::certified_values(*document);
+    if (!values) continue;
+    add_to_trend(trend, models.size(), *values);
+    models.push_back({{"id", entry.id}, {"created", daemon::to_text(document->created)}});
+  }
+
+  json rows = json::array();
+  for (auto& [key, row] : trend) {
+    row.value.resize(models.size());
+    row.u.resize(models.size());
+    rows.push_back({{"key", key},
+                    {"name", row.name},
+                    {"unit", row.is_angle ? "urad" : "um"},
+                    {"value", row.value},
+                    {"u", row.u}});
+  }
+  trend_ = text_of({{"models", std::move(models)}, {"values", std::move(rows)}});
+  trend_of_ = ids;
+  return trend_;
+}
+
+Result<std::string> ModelViews::report(const std::string& name) const {
+  const ModelStore store{store_};
+  const auto id = id_of(store, name);
+  if (!id) return tl::unexpected(id.error());
+  auto document = store.load(*id);
+  if (!document) return tl::unexpected(document.error());
+  daemon::ReportSubject subject{.document = std::move(*document)};
+  if (const auto entries = store.list())
+    for (const StoreEntry& entry : *entries)
+      if (entry.id == *id) subject.entry = entry;
+  if (const auto events = store.history())
+    for (const StoreEvent& event : *events)
+      if (event.id == *id) subject.events.push_back(event);
+  return daemon::model_report(subject);
+}
+
+Result<std::string> ModelViews::model_file(const std::string& name) const {
+  const ModelStore store{store_};
+  const auto id = id_of(store, name);
+  if (!id) return tl::unexpected(id.error());
+  return daemon::read_regular_file(store.model_path(*id));
+}
+
+}  // namespace abbe::web

@@ -1,0 +1,55 @@
+#pragma once
+/// What the routes of the server share.
+
+#include <atomic>
+#include <optional>
+#include <string>
+
+#include "abbe/web/daemon_feed.hpp"
+#include "abbe/web/event_board.hpp"
+#include "abbe/web/model_views.hpp"
+#include "abbe/web/page_server.hpp"
+#include "abbe/web/replays.hpp"
+#include "abbe/web/sessions.hpp"
+#include "http.hpp"
+#include "limited_report.hpp"
+#include "request_rate.hpp"
+
+namespace abbe::web {
+
+struct PageContext {
+  explicit PageContext(PageOptions given)
+      : options(std::move(given)),
+        report(options.report),
+        models(options.settings.config.daemon.models_dir()),
+        sessions(options.settings.web.users),
+        replays(options.abbe_program, options.settings.config.recording.dir),
+        feed(options.settings, board, [this] { return pages.load(); }) {}
+
+  PageOptions options;
+  LimitedReport report;
+  RequestRate rate{kRequestsPerSecond, kRequestsAtOnce};
+  EventBoard board;
+  ModelViews models;
+  Sessions sessions;
+  Replays replays;
+  std::atomic<std::size_t> pages{0}, downloads{0};
+  DaemonFeed feed;  // last: its thread uses the members above
+};
+
+/// "127.0.0.1:43210"
+[[nodiscard]] std::string peer_of(const httplib::Request& request);
+/// The session of the cookie; nullopt: not logged in.
+[[nodiscard]] std::optional<WebSession> session_of(PageContext& context,
+                                                   const httplib::Request& request);
+
+/// Answers GET and HEAD.
+void answer_get(PageContext& context, const httplib::Request& request, httplib::Response& response);
+/// Answers POST: log in, log out, and changes.
+void answer_post(PageContext& context, const httplib::Request& request,
+                 httplib::Response& response);
+/// The stream of events of one page.
+void answer_events(PageContext& context, const httplib::Request& request,
+                   httplib::Response& response);
+
+}  // namespace abbe::web

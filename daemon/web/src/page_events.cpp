@@ -1,0 +1,64 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "page_context.hpp"
+#include "responses.hpp"
+
+namespace abbe::web {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Without an event for this time an empty one is sent, so that both ends notice a lost connection.
+constexpr std::chrono::milliseconds kHeartbeat{1000};
+
+/// The stream of one page.
+struct Stream {
+  EventBoard::Reader reader;
+  Clock::time_point sent = Clock::now();
+};
+
+bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) {
+  auto text = stream.reader.next(context.board, kHeartbeat);
+  if (!text) {
+    sink.done();
+    return true;
+  }
+  if (text->empty()) *text = "event: alive\ndata: {}\n\n";
+  if (!sink.write(text->data(), text->size())) return false;
+  stream.sent = Clock::now();
+  return true;
+}
+
+}  // namespace
+
+void answer_events(PageContext& context, const httplib::Request& request,
+                   httplib::Response& response) {
+  const std::size_t most = context.options.settings.web.most_pages;
+  const std::string peer = peer_of(request);
+  if (context.pages.fetch_add(1) >= most) {
+    context.pages.fetch_sub(1);
+    context.report.line("pages", fmt::format("{}: page refused: {} are open, the limit ([web] "
+                                             "most_pages)",
+                                             peer, most));
+    return send_error(response, 503, fmt::format("{} pages are open, the limit: close one", most));
+  }
+
+  const auto stream = std::make_shared<Stream>();
+  response.set_chunked_content_provider(
+      "text/event-stream",
+      [&context, stream](std::size_t, httplib::DataSink& sink) {
+        return send_events(context, *stream, sink);
+      },
+      [&context, stream, peer](bool success) {
+        context.pages.fetch_sub(1);
+        if (success || Clock::now() - stream->sent < kWriteTimeOut) return;
+        context.report.line("unread " + peer,
+                            fmt::format("{}: the page does not read its events: closed after {} s",
+                                        peer, kWriteTimeOut.count()));
+      });
+}
+
+}  // namespace abbe::web

@@ -1,0 +1,156 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "abbe/config/check_config.hpp"
+#include "abbe/web/recording_list.hpp"
+#include "assets.hpp"
+#include "page_context.hpp"
+#include "responses.hpp"
+
+namespace abbe::web {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostDownloads = 4;
+
+const char* type_of(std::string_view name) {
+  if (name.ends_with(".html")) return "text/html; charset=utf-8";
+  if (name.ends_with(".css")) return "text/css; charset=utf-8";
+  if (name.ends_with(".svg")) return "image/svg+xml";
+  return "text/javascript; charset=utf-8";
+}
+
+/// False if there is no such file.
+bool answer_asset(const std::string& path, httplib::Response& response) {
+  const std::string_view name = path == "/" ? "index.html" : std::string_view{path}.substr(1);
+  const auto files = assets();
+  const auto file = std::ranges::find(files, name, &EmbeddedFile::name);
+  if (file == files.end()) return false;
+  // The browser asks each time, so that a new version of abbe-web is seen at once.
+  response.headers.erase("Cache-Control");
+  response.set_header("Cache-Control", "no-cache");
+  send_asset(response, file->bytes, type_of(name));
+  return true;
+}
+
+json me_json(PageContext& context, const std::optional<WebSession>& session) {
+  const auto& web = context.options.settings.web;
+  json out{{"may_view", session.has_value() || web.view_without_login},
+           {"log_in", context.sessions.possible()}};
+  if (!session) return out;
+  out["user"] = session->user;
+  out["role"] = name(session->role);
+  out["csrf"] = session->csrf;
+  return out;
+}
+
+json configuration_json(const PageContext& context) {
+  const auto& file = context.options.config_file;
+  json out{{"file", file.string()}};
+  const auto checked =
+      daemon::check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
+  if (!checked) {
+    out["faults"] = checked.error().details;
+    if (checked.error().details.empty()) out["faults"] = {checked.error().text};
+    return out;
+  }
+  out["understood"] = daemon::summary_of(checked->config);
+  out["warnings"] = checked->warnings;
+  return out;
+}
+
+void answer_report(PageContext& context, const std::string& id, httplib::Response& response) {
+  // The report has its style in the markup, and neither scripts nor links.
+  response.headers.erase("Content-Security-Policy");
+  response.set_header("Content-Security-Policy",
+                      "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox; "
+                      "frame-ancestors 'none'");
+  auto text = context.models.report(id);
+  if (!text) return send_error(response, text.error());
+  send_text(response, 200, std::move(*text), "text/html; charset=utf-8");
+}
+
+void answer_download(PageContext& context, const httplib::Request& request, const std::string& name,
+                     httplib::Response& response) {
+  auto opened = open_recording(context.options.settings.config.recording.dir, name);
+  if (!opened) return send_error(response, 404, opened.error().text);
+  if (context.downloads.fetch_add(1) >= kMostDownloads) {
+    context.downloads.fetch_sub(1);
+    context.report.line("downloads", fmt::format("{}: download of {} refused: {} are running",
+                                                 peer_of(request), name, kMostDownloads));
+    return send_error(response, 503, "too many downloads are running: try again later");
+  }
+
+  const auto file = std::make_shared<OpenRecording>(std::move(*opened));
+  response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", name));
+  response.set_content_provider(
+      file->bytes, "application/octet-stream",
+      [file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+        std::string part(std::min<std::size_t>(length, 1u << 16), '\0');
+        const ssize_t n =
+            ::pread(file->fd.get(), part.data(), part.size(), static_cast<off_t>(offset));
+        return n > 0 && sink.write(part.data(), static_cast<std::size_t>(n));
+      },
+      [&context](bool) { context.downloads.fetch_sub(1); });
+}
+
+/// The part of the path behind `prefix`; nullopt if it has another beginning.
+std::optional<std::string> behind(const std::string& path, std::string_view prefix) {
+  if (!path.starts_with(prefix)) return std::nullopt;
+  return path.substr(prefix.size());
+}
+
+/// False if there is no such path.
+bool answer_data(PageContext& context, const httplib::Request& request,
+                 httplib::Response& response) {
+  const std::string& path = request.path;
+  if (path == "/events") {
+    answer_events(context, request, response);
+  } else if (path == "/api/status") {
+    send_json(response, context.feed.status());
+  } else if (path == "/api/calibration") {
+    send_json(response, context.feed.calibration());
+  } else if (path == "/api/history") {
+    send_result(response, context.models.history());
+  } else if (path == "/api/trend") {
+    send_result(response, context.models.trend());
+  } else if (path == "/api/recordings") {
+    send_result(response, recordings_json(context.options.settings.config.recording.dir));
+  } else if (path == "/api/configuration") {
+    send_json(response, configuration_json(context));
+  } else if (path == "/api/replay") {
+    send_json(response, context.replays.status());
+  } else if (const auto id = behind(path, "/api/models/")) {
+    send_result(response, context.models.model(*id));
+  } else if (const auto of_report = behind(path, "/reports/")) {
+    answer_report(context, *of_report, response);
+  } else if (const auto of_file = behind(path, "/models/")) {
+    response.set_header("Content-Disposition", "attachment; filename=\"model.json\"");
+    send_result(response, context.models.model_file(*of_file));
+  } else if (const auto recording = behind(path, "/recordings/")) {
+    answer_download(context, request, *recording, response);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void answer_get(PageContext& context, const httplib::Request& request,
+                httplib::Response& response) {
+  if (answer_asset(request.path, response)) return;
+  const auto session = session_of(context, request);
+  if (request.path == "/api/me") return send_json(response, me_json(context, session));
+  if (!session && !context.options.settings.web.view_without_login)
+    return send_error(response, 401, "log in first");
+  if (!answer_data(context, request, response)) send_error(response, 404, "there is no such page");
+}
+
+}  // namespace abbe::web

@@ -1,0 +1,182 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <string>
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/base/control_protocol.hpp"
+#include "calibration_task.hpp"
+#include "page_context.hpp"
+#include "responses.hpp"
+
+namespace abbe::web {
+namespace {
+
+using daemon::ErrorCode;
+using daemon::Result;
+using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr daemon::JsonBounds kBodyBounds{.bytes = kMostRequestBytes, .depth = 8};
+
+/// A request that changes something, the role that it needs, and the request to abbed that it
+/// becomes.
+struct Change {
+  std::string_view path;
+  WebRole role;
+  Result<json> (*request)(const json& body);
+};
+
+Result<json> activation(const json& body) {
+  return json{{"do", "activate"},
+              {"id", body.at("id").get<std::string>()},
+              {"why", body.value("why", std::string{})},
+              {"force", body.value("force", false)}};
+}
+
+Result<json> rollback(const json& body) {
+  return json{{"do", "rollback"}, {"why", body.value("why", std::string{})}};
+}
+
+Result<json> cancellation(const json&) {
+  return json{{"do", "cancel"}};
+}
+
+constexpr std::array kChanges{
+    Change{"/api/activate", WebRole::Administer, activation},
+    Change{"/api/rollback", WebRole::Administer, rollback},
+    Change{"/api/calibrate", WebRole::Calibrate, calibration_task},
+    Change{"/api/cancel", WebRole::Calibrate, cancellation},
+};
+
+/// A browser states where a request comes from; one of another site is refused.
+bool from_this_site(const httplib::Request& request) {
+  if (!request.has_header("Origin")) return true;
+  const std::string origin = request.get_header_value("Origin");
+  const auto host = origin.find("://");
+  return host != std::string::npos && origin.substr(host + 3) == request.get_header_value("Host");
+}
+
+Result<json> body_of(const httplib::Request& request) {
+  if (!request.get_header_value("Content-Type").starts_with(kJson))
+    return daemon::fail(ErrorCode::Usage, "the request must be application/json");
+  if (request.body.empty()) return json::object();
+  auto body = daemon::parse_json(request.body, "request", kBodyBounds);
+  if (body && !body->is_object())
+    return daemon::fail(ErrorCode::Usage, "the request must be a JSON object");
+  return body;
+}
+
+std::string cookie(const PageContext& context, const std::string& token, long max_age_s) {
+  return fmt::format("abbe_session={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", token,
+                     max_age_s, context.options.settings.web.tls() ? "; Secure" : "");
+}
+
+void log_in(PageContext& context, const httplib::Request& request, const json& body,
+            httplib::Response& response) {
+  const auto user = body.at("user").get<std::string>();
+  const auto session = context.sessions.log_in(user, body.at("password").get<std::string>(),
+                                               request.remote_addr, Clock::now());
+  if (!session) {
+    context.report.line("log in " + request.remote_addr,
+                        fmt::format("{}: log in as \"{}\" refused: {}", peer_of(request),
+                                    user.substr(0, 40), session.error().text));
+    return send_error(response, session.error().code == ErrorCode::Refused ? 403 : 503,
+                      session.error().text);
+  }
+  context.options.report(
+      fmt::format("{}: {} logged in ({})", peer_of(request), session->user, name(session->role)));
+  constexpr long kSeconds = 12L * 3600L;
+  response.set_header("Set-Cookie", cookie(context, session->token, kSeconds));
+  send_json(response, {{"user", session->user},
+                       {"role", name(session->role)},
+                       {"csrf", session->csrf},
+                       {"may_view", true},
+                       {"log_in", true}});
+}
+
+void log_out(PageContext& context, const httplib::Request& request, const WebSession& session,
+             httplib::Response& response) {
+  context.sessions.log_out(session.token);
+  context.options.report(fmt::format("{}: {} logged out", peer_of(request), session.user));
+  response.set_header("Set-Cookie", cookie(context, "", 0));
+  send_json(response, json::object());
+}
+
+void change(PageContext& context, const WebSession& session, const Change& asked, const json& body,
+            httplib::Response& response) {
+  auto request = asked.request(body);
+  if (!request) return send_error(response, request.error());
+  (*request)["who"] = session.user;
+  const auto answer = daemon::ask_daemon(context.options.settings.config.control.socket, *request);
+  const auto what = (*request)["do"].get<std::string>();
+  context.options.report(
+      fmt::format("{}: {}: {}", session.user, what, answer ? "done" : answer.error().text));
+  send_result(response, answer);
+}
+
+void replay(PageContext& context, const WebSession& session, const json& body,
+            httplib::Response& response) {
+  const auto recording = body.at("name").get<std::string>();
+  if (const auto begun = context.replays.begin(recording); !begun)
+    return send_error(response, begun.error());
+  context.options.report(fmt::format("{}: replay of {}", session.user, recording));
+  send_json(response, context.replays.status());
+}
+
+void refuse_role(PageContext& context, const httplib::Request& request, const WebSession& session,
+                 WebRole needed, httplib::Response& response) {
+  context.report.line("role " + session.user,
+                      fmt::format("{}: {} refused to {}: needs the role {}", peer_of(request),
+                                  request.path, session.user, name(needed)));
+  send_error(response, 403,
+             fmt::format("{} has the role {}; this needs the role {}", session.user,
+                         name(session.role), name(needed)));
+}
+
+/// What needs a session. `body` is a JSON object.
+void answer_change(PageContext& context, const httplib::Request& request, const WebSession& session,
+                   const json& body, httplib::Response& response) {
+  if (request.path == "/api/logout") return log_out(context, request, session, response);
+  if (request.path == "/api/replay") {
+    if (session.role < WebRole::Calibrate)
+      return refuse_role(context, request, session, WebRole::Calibrate, response);
+    return replay(context, session, body, response);
+  }
+  for (const Change& asked : kChanges) {
+    if (asked.path != request.path) continue;
+    if (session.role < asked.role)
+      return refuse_role(context, request, session, asked.role, response);
+    return change(context, session, asked, body, response);
+  }
+  send_error(response, 404, "there is no such request");
+}
+
+}  // namespace
+
+void answer_post(PageContext& context, const httplib::Request& request,
+                 httplib::Response& response) {
+  if (!from_this_site(request)) {
+    context.report.line(
+        "origin " + request.remote_addr,
+        fmt::format("{}: {} refused: it comes from another site, {}", peer_of(request),
+                    request.path, request.get_header_value("Origin").substr(0, 80)));
+    return send_error(response, 403, "refused: the request comes from another site");
+  }
+  const auto body = body_of(request);
+  if (!body) return send_error(response, body.error());
+
+  try {
+    if (request.path == "/api/login") return log_in(context, request, *body, response);
+    const auto session = session_of(context, request);
+    if (!session) return send_error(response, 401, "log in first");
+    if (request.get_header_value("X-CSRF-Token") != session->csrf)
+      return send_error(response, 403, "refused: the header X-CSRF-Token is missing or wrong");
+    answer_change(context, request, *session, *body, response);
+  } catch (const json::exception& error) {
+    send_error(response, 400, "request: " + daemon::cause_of(error));
+  }
+}
+
+}  // namespace abbe::web

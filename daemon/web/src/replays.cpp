@@ -1,0 +1,136 @@
+#include "abbe/web/replays.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/base/file_descriptor.hpp"
+#include "abbe/web/recording_list.hpp"
+
+namespace abbe::web {
+namespace {
+
+using daemon::ErrorCode;
+using daemon::FileDescriptor;
+using daemon::Result;
+
+constexpr std::size_t kLongestOutput = 4u << 20;
+constexpr int kLowPriority = 19;
+
+struct Child {
+  pid_t pid = 0;
+  FileDescriptor output;
+};
+
+/// Starts the program with its standard output and error in a pipe.
+Result<Child> start_child(std::vector<std::string> command) {
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0)
+    return daemon::fail(ErrorCode::Io, fmt::format("pipe: {}", std::strerror(errno)));
+  FileDescriptor read_end{ends[0]}, write_end{ends[1]};
+
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  for (const int fd : {STDOUT_FILENO, STDERR_FILENO})
+    ::posix_spawn_file_actions_adddup2(&actions, write_end.get(), fd);
+  // abbe-web blocks the signals that stop it; the child must not inherit that.
+  posix_spawnattr_t attributes;
+  ::posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  ::posix_spawnattr_setsigmask(&attributes, &none);
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+
+  std::vector<char*> arguments;
+  for (std::string& word : command) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  pid_t pid = 0;
+  const int failed =
+      ::posix_spawnp(&pid, arguments[0], &actions, &attributes, arguments.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  ::posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0)
+    return daemon::fail(ErrorCode::Io,
+                        fmt::format("start {}: {}", command.front(), std::strerror(failed)));
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(pid), kLowPriority);
+  return Child{.pid = pid, .output = std::move(read_end)};
+}
+
+std::string all_output(int fd) {
+  std::string text;
+  std::array<char, 65536> buffer;  // NOLINT: read() fills what is used
+  for (;;) {
+    const ssize_t n = ::read(fd, buffer.data(), buffer.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return text;
+    if (text.size() < kLongestOutput) text.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+}
+
+/// What `abbe replay --json` printed; lines before the JSON object are its messages.
+nlohmann::json result_json(const std::string& output) {
+  const auto begin = output.find('{');
+  if (begin == std::string::npos) return {{"state", "failed"}, {"error", output}};
+  auto result = daemon::parse_json(output.substr(begin), "abbe replay");
+  if (!result) return {{"state", "failed"}, {"error", output}};
+  return {{"state", "done"}, {"result", std::move(*result)}};
+}
+
+}  // namespace
+
+Replays::~Replays() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (child_ != 0) ::kill(child_, SIGKILL);
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+Result<void> Replays::begin(const std::string& name) {
+  if (const auto exists = open_recording(folder_, name); !exists)
+    return tl::unexpected(exists.error());
+  const std::lock_guard lock(mutex_);
+  if (child_ != 0)
+    return daemon::fail(ErrorCode::Refused, "another recording is being replayed: wait for it");
+  if (thread_.joinable()) thread_.join();
+
+  auto child = start_child({program_.string(), "replay", (folder_ / name).string(), "--json"});
+  if (!child) return tl::unexpected(child.error());
+  child_ = child->pid;
+  status_ = {{"state", "running"}, {"name", name}};
+  thread_ =
+      std::thread([this, child = std::move(*child)] { follow(child.output.get(), child.pid); });
+  return {};
+}
+
+void Replays::follow(int output_fd, pid_t child) {
+  auto result = result_json(all_output(output_fd));
+  // The child remains a zombie until child_ is 0, so that its id is not that of another process.
+  siginfo_t ended{};
+  while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 &&
+         errno == EINTR) {
+  }
+  const std::lock_guard lock(mutex_);
+  child_ = 0;
+  (void)::waitpid(child, nullptr, 0);
+  result["name"] = status_["name"];
+  status_ = std::move(result);
+}
+
+nlohmann::json Replays::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+}  // namespace abbe::web

@@ -1,0 +1,96 @@
+#include "abbe/web/sessions.hpp"
+
+#include <fmt/format.h>
+#include <openssl/rand.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+namespace abbe::web {
+namespace {
+
+using daemon::ErrorCode;
+using daemon::Result;
+
+constexpr std::size_t kMostFailing = 1000;
+
+std::string random_token() {
+  std::array<unsigned char, 32> bytes{};
+  if (RAND_bytes(bytes.data(), static_cast<int>(bytes.size())) != 1)
+    throw std::runtime_error("no random numbers");
+  std::string text;
+  for (const unsigned char byte : bytes) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
+}  // namespace
+
+Result<void> Sessions::check_failures(const std::string& address, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(failures_, [&](const auto& f) { return now - f.second.last >= limits_.pause; });
+  const auto found = failures_.find(address);
+  const bool too_many = found != failures_.end() && found->second.count >= limits_.failures;
+  if (too_many || failures_.size() >= kMostFailing)
+    return daemon::fail(ErrorCode::Refused,
+                        fmt::format("too many wrong passwords: wait {} s", limits_.pause.count()));
+  return {};
+}
+
+Result<WebSession> Sessions::log_in(const std::string& user, const std::string& password,
+                                    const std::string& address, Clock::time_point now) {
+  if (!possible())
+    return daemon::fail(ErrorCode::Refused, "nobody can log in: [web] users names no file");
+  const std::lock_guard one_at_a_time(checking_);
+  if (const auto may = check_failures(address, now); !may) return tl::unexpected(may.error());
+  const auto users = read_web_users(users_file_);
+  if (!users) return tl::unexpected(users.error());
+  const auto found = find_web_user(*users, user, password);
+
+  const std::lock_guard lock(mutex_);
+  if (!found) {
+    Failures& failures = failures_[address];
+    ++failures.count;
+    failures.last = now;
+    return daemon::fail(ErrorCode::Refused, "wrong name or password");
+  }
+  failures_.erase(address);
+  remove_ended(now);
+  if (kept_.size() >= limits_.sessions)
+    kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
+  WebSession session{
+      .token = random_token(), .csrf = random_token(), .user = found->name, .role = found->role};
+  kept_[session.token] = {session, now, now};
+  return session;
+}
+
+std::optional<WebSession> Sessions::find(const std::string& token, Clock::time_point now) {
+  WebSession session;
+  {
+    const std::lock_guard lock(mutex_);
+    remove_ended(now);
+    const auto found = kept_.find(token);
+    if (found == kept_.end()) return std::nullopt;
+    found->second.used = now;
+    session = found->second.session;
+  }
+
+  const auto users = read_web_users(users_file_);
+  if (!users) return std::nullopt;
+  const auto user = std::ranges::find(*users, session.user, &WebUser::name);
+  if (user == users->end() || user->role != session.role) return std::nullopt;
+  return session;
+}
+
+void Sessions::log_out(const std::string& token) {
+  const std::lock_guard lock(mutex_);
+  kept_.erase(token);
+}
+
+void Sessions::remove_ended(Clock::time_point now) {
+  std::erase_if(kept_, [&](const auto& k) {
+    return now - k.second.used >= limits_.idle || now - k.second.begun >= limits_.total;
+  });
+}
+
+}  // namespace abbe::web

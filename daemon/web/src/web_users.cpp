@@ -1,0 +1,149 @@
+#include "abbe/web/web_users.hpp"
+
+#include <crypt.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <sstream>
+
+#include "abbe/base/text_file.hpp"
+
+namespace abbe::web {
+namespace {
+
+using daemon::ErrorCode;
+using daemon::Result;
+
+constexpr std::array<std::string_view, 3> kRoleNames{"view", "calibrate", "administer"};
+constexpr std::size_t kLongestName = 40;
+constexpr const char* kYescrypt = "$y$";  ///< crypt(5): the method that Debian uses for logins
+
+bool is_name(std::string_view name) {
+  return !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
+  });
+}
+
+/// crypt(3) of the password; empty if `setting` is not valid.
+std::string crypted(const std::string& password, const std::string& setting) {
+  auto data = std::make_unique<crypt_data>();  // 32 kB
+  const char* hash = ::crypt_r(password.c_str(), setting.c_str(), data.get());
+  return hash == nullptr || *hash == '*' ? std::string{} : std::string{hash};
+}
+
+bool is_hash(const std::string& hash) {
+  const int seen = ::crypt_checksalt(hash.c_str());
+  return seen == CRYPT_SALT_OK || seen == CRYPT_SALT_TOO_CHEAP;
+}
+
+std::string new_salt() {
+  std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> salt{};
+  const char* made = ::crypt_gensalt_rn(kYescrypt, 0, nullptr, 0, salt.data(), salt.size());
+  return made == nullptr ? std::string{} : std::string{made};
+}
+
+/// Takes the same time for every position of the first difference.
+bool same_text(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned different = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    different |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+  return different == 0;
+}
+
+Result<void> check_mode(const std::filesystem::path& file) {
+  struct stat seen {};
+  if (::stat(file.c_str(), &seen) != 0)
+    return daemon::fail(ErrorCode::Io,
+                        fmt::format("read {}: {}", file.string(), std::strerror(errno)));
+  if ((seen.st_mode & (S_IRWXO | S_IWGRP)) == 0) return {};
+  return daemon::fail(ErrorCode::BadInput,
+                      fmt::format("{}: other users may read or change it: chmod 0640 {}",
+                                  file.string(), file.string()));
+}
+
+/// nullopt for a line that is not NAME:ROLE:HASH.
+std::optional<WebUser> user_of_line(const std::string& line) {
+  const auto first = line.find(':');
+  const auto second = first == std::string::npos ? first : line.find(':', first + 1);
+  if (second == std::string::npos) return std::nullopt;
+  const auto role = web_role_named(line.substr(first + 1, second - first - 1));
+  WebUser user{.name = line.substr(0, first), .hash = line.substr(second + 1)};
+  if (!role || !is_name(user.name) || !is_hash(user.hash)) return std::nullopt;
+  user.role = *role;
+  return user;
+}
+
+}  // namespace
+
+std::string_view name(WebRole role) noexcept {
+  return kRoleNames[static_cast<std::size_t>(role)];
+}
+
+std::optional<WebRole> web_role_named(std::string_view name) noexcept {
+  const auto found = std::ranges::find(kRoleNames, name);
+  if (found == kRoleNames.end()) return std::nullopt;
+  return static_cast<WebRole>(found - kRoleNames.begin());
+}
+
+Result<std::vector<WebUser>> read_web_users(const std::filesystem::path& file) {
+  if (auto mode = check_mode(file); !mode) return tl::unexpected(mode.error());
+  const auto text = daemon::read_regular_file(file);
+  if (!text) return tl::unexpected(text.error());
+
+  std::vector<WebUser> users;
+  std::vector<std::string> faults;
+  std::istringstream lines(*text);
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (line.empty() || line.front() == '#') continue;
+    if (auto user = user_of_line(line)) {
+      users.push_back(std::move(*user));
+    } else {
+      faults.push_back(
+          fmt::format("{}:{}: must be NAME:ROLE:HASH with the role view, calibrate or "
+                      "administer: use the output of `abbe-web --hash-password`",
+                      file.string(), number));
+    }
+  }
+  if (faults.empty()) return users;
+  return tl::unexpected(daemon::Error{
+      ErrorCode::BadInput, fmt::format("{}: {} lines cannot be used", file.string(), faults.size()),
+      std::move(faults)});
+}
+
+std::optional<WebUser> find_web_user(const std::vector<WebUser>& users, const std::string& name,
+                                     const std::string& password) {
+  static const std::string nobody = crypted("", new_salt());
+  const auto user = std::ranges::find(users, name, &WebUser::name);
+  const std::string& hash = user == users.end() ? nobody : user->hash;
+  const std::string seen = crypted(password, hash);
+  if (user == users.end() || password.size() > kLongestPassword || seen.empty() ||
+      !same_text(seen, hash))
+    return std::nullopt;
+  return *user;
+}
+
+Result<std::string> web_user_line(const std::string& name, WebRole role,
+                                  const std::string& password) {
+  if (!is_name(name))
+    return daemon::fail(ErrorCode::Usage,
+                        fmt::format("user \"{}\": a name has 1 to {} of the characters A-Z a-z 0-9 "
+                                    ". _ -",
+                                    name, kLongestName));
+  if (password.size() < kShortestPassword || password.size() > kLongestPassword)
+    return daemon::fail(ErrorCode::Usage, fmt::format("the password must have {} to {} bytes",
+                                                      kShortestPassword, kLongestPassword));
+  const std::string hash = crypted(password, new_salt());
+  if (hash.empty()) return daemon::fail(ErrorCode::Io, "crypt(3) does not support yescrypt");
+  return fmt::format("{}:{}:{}", name, abbe::web::name(role), hash);
+}
+
+}  // namespace abbe::web

@@ -1,0 +1,331 @@
+/// The page over HTTP, from the point of view of browsers: what they see without and with a log in,
+/// and what they cannot do. abbed does not run here; tests/integration/spine/web_test.cpp has it.
+
+#include <httplib.h>
+
+#undef _res  // a macro of resolv.h, which changes headers of Eigen
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "abbe/base/file_descriptor.hpp"
+#include "abbe/model/model_store.hpp"
+#include "abbe/web/page_server.hpp"
+#include "web_folder.hpp"
+
+namespace abbe::web {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using test::kPassword;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct PageServerTest : test::WebFolder {
+  void start(const std::string& web = "",
+             std::chrono::milliseconds write_time_out = kWriteTimeOut) {
+    write_users();
+    ASSERT_TRUE(daemon::ModelStore::open(folder_ / "data/models"));
+    write_config("port = 0\nusers = \"users\"\n" + web);
+    auto read = settings();
+    ASSERT_TRUE(read) << read.error().text;
+    auto page = PageServer::start({.settings = std::move(*read),
+                                   .config_file = folder_ / "abbed.toml",
+                                   .write_time_out = write_time_out,
+                                   .report = [this](const std::string& line) { keep(line); }});
+    ASSERT_TRUE(page) << page.error().text;
+    page_ = std::move(*page);
+  }
+  void keep(const std::string& line) {
+    const std::lock_guard lock(mutex_);
+    log_.push_back(line);
+  }
+  [[nodiscard]] std::vector<std::string> log() const {
+    const std::lock_guard lock(mutex_);
+    return log_;
+  }
+
+  [[nodiscard]] httplib::Client browser() const {
+    return httplib::Client{"127.0.0.1", page_->port()};
+  }
+
+  struct LoggedIn {
+    httplib::Headers headers;  ///< cookie and CSRF token
+    json me;
+  };
+  [[nodiscard]] LoggedIn log_in(const std::string& user) const {
+    auto client = browser();
+    const auto answer = client.Post(
+        "/api/login", json{{"user", user}, {"password", kPassword}}.dump(), "application/json");
+    if (!answer || answer->status != 200) return {};
+    const std::string cookie = answer->get_header_value("Set-Cookie");
+    LoggedIn in{{{"Cookie", cookie.substr(0, cookie.find(';'))}}, json::parse(answer->body)};
+    in.headers.emplace("X-CSRF-Token", in.me["csrf"].get<std::string>());
+    return in;
+  }
+  [[nodiscard]] int post(const httplib::Headers& headers, const std::string& path,
+                         const json& body) const {
+    auto client = browser();
+    const auto answer = client.Post(path, headers, body.dump(), "application/json");
+    return answer ? answer->status : 0;
+  }
+
+  mutable std::mutex mutex_;
+  std::vector<std::string> log_;
+  std::unique_ptr<PageServer> page_;
+};
+
+TEST_F(PageServerTest, ServesThePageWithItsLibrariesAndStrictHeaders) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  auto client = browser();
+  for (const char* file : {"/", "/main.js", "/style.css", "/three.min.js", "/chart.min.js"}) {
+    const auto answer = client.Get(file);
+    ASSERT_TRUE(answer) << file;
+    EXPECT_EQ(answer->status, 200) << file;
+    EXPECT_FALSE(answer->body.empty()) << file;
+    const std::string policy = answer->get_header_value("Content-Security-Policy");
+    EXPECT_THAT(policy, HasSubstr("default-src 'none'"));
+    EXPECT_THAT(policy, Not(HasSubstr("unsafe")));
+    EXPECT_EQ(answer->get_header_value("X-Content-Type-Options"), "nosniff");
+  }
+  for (const char* file :
+       {"/etc/passwd", "/../abbed.toml", "/recordings/../users", "/recordings/%2e%2e%2fusers"})
+    EXPECT_GE(client.Get(file)->status, 400) << file;
+}
+
+TEST_F(PageServerTest, ShowsWithoutALogInAndChangesNothing) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  auto client = browser();
+  const auto me = client.Get("/api/me");
+  ASSERT_TRUE(me);
+  EXPECT_TRUE(json::parse(me->body)["may_view"]);
+  EXPECT_EQ(client.Get("/api/history")->status, 200);
+  for (const char* path :
+       {"/api/activate", "/api/rollback", "/api/calibrate", "/api/cancel", "/api/replay"})
+    EXPECT_EQ(post({}, path, json::object()), 401) << path;
+}
+
+TEST_F(PageServerTest, ShowsNothingBeforeALogInIfSoConfigured) {
+  ASSERT_NO_FATAL_FAILURE(start("view_without_login = false\n"));
+  auto client = browser();
+  for (const char* path :
+       {"/api/history", "/api/status", "/events", "/api/configuration", "/recordings/a.mcap"})
+    EXPECT_EQ(client.Get(path)->status, 401) << path;
+  const auto in = log_in("view");
+  EXPECT_EQ(client.Get("/api/history", in.headers)->status, 200);
+}
+
+TEST_F(PageServerTest, ARoleMayDoWhatItNamesAndNoMore) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto view = log_in("view"), calibrate = log_in("calibrate"),
+             administer = log_in("administer");
+  const json id{{"id", "0123456789abcdef"}};
+  EXPECT_EQ(post(view.headers, "/api/cancel", json::object()), 403);
+  EXPECT_EQ(post(calibrate.headers, "/api/activate", id), 403);
+  EXPECT_THAT(log(),
+              Contains(HasSubstr("/api/activate refused to calibrate: needs the role administer")));
+  // Allowed, but abbed does not run.
+  EXPECT_EQ(post(calibrate.headers, "/api/cancel", json::object()), 503);
+  EXPECT_EQ(post(administer.headers, "/api/activate", id), 503);
+}
+
+TEST_F(PageServerTest, AChangeNeedsTheTokenAndComesFromThisSite) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto in = log_in("administer");
+  httplib::Headers without = in.headers;
+  without.erase("X-CSRF-Token");
+  EXPECT_EQ(post(without, "/api/cancel", json::object()), 403);
+  httplib::Headers other = in.headers;
+  other.emplace("Origin", "https://evil.example");
+  EXPECT_EQ(post(other, "/api/cancel", json::object()), 403);
+  EXPECT_THAT(log(), Contains(HasSubstr("another site, https://evil.example")));
+  // A form of another site cannot send this type.
+  auto client = browser();
+  EXPECT_EQ(client.Post("/api/cancel", in.headers, "{}", "text/plain")->status, 400);
+  EXPECT_EQ(post(in.headers, "/api/cancel", json::object()), 503);
+}
+
+TEST_F(PageServerTest, ARequestForAnotherNameIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(start("host_names = [\"press3.example\"]\n"));
+  auto client = browser();
+  EXPECT_EQ(client.Get("/api/me", {{"Host", "evil.example"}})->status, 421);
+  EXPECT_EQ(client.Get("/api/me", {{"Host", "press3.example:8440"}})->status, 200);
+  EXPECT_THAT(log(), Contains(HasSubstr("\"evil.example\" is not a name of this page")));
+}
+
+TEST_F(PageServerTest, AFloodOfRequestsIsRefusedByName) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  auto client = browser();
+  client.set_keep_alive(true);
+  int refused = 0;
+  for (int i = 0; i < 400; ++i) {
+    const auto answer = client.Get("/api/me");
+    if (answer && answer->status == 429) ++refused;
+  }
+  EXPECT_GT(refused, 50);
+  EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: more than 40 requests/s: refused")));
+}
+
+TEST_F(PageServerTest, APageTooManyIsRefusedByName) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n"));
+  std::atomic<bool> open{false}, done{false};
+  std::thread first([&] {
+    auto client = browser();
+    (void)client.Get("/events", [&](const char*, std::size_t) {
+      open = true;
+      open.notify_all();
+      return !done;
+    });
+  });
+  open.wait(false);
+  auto client = browser();
+  const auto second = client.Get("/events");
+  done = true;
+  first.join();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->status, 503);
+  EXPECT_THAT(log(), Contains(HasSubstr("page refused: 1 are open")));
+}
+
+/// A connection that asks for a file and never reads it.
+daemon::FileDescriptor deaf_client(std::uint16_t port, const std::string& file) {
+  daemon::FileDescriptor fd{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(port);
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto* const address = reinterpret_cast<const sockaddr*>(&to);  // NOLINT
+  EXPECT_EQ(::connect(fd.get(), address, sizeof to), 0);
+  const std::string request = "GET " + file + " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  EXPECT_EQ(::send(fd.get(), request.data(), request.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(request.size()));
+  return fd;
+}
+
+TEST_F(PageServerTest, DownloadsThatNobodyReadsEndAndOthersGoOn) {
+  constexpr std::size_t kBytes = 32u << 20;
+  std::filesystem::create_directories(folder_ / "data/recordings");
+  write("data/recordings/a.mcap", std::string(kBytes, 'x'));
+  ASSERT_NO_FATAL_FAILURE(start("", 200ms));
+  std::vector<daemon::FileDescriptor> deaf;
+  for (int i = 0; i < 4; ++i) deaf.push_back(deaf_client(page_->port(), "/recordings/a.mcap"));
+
+  auto client = browser();
+  std::size_t received = 0;
+  for (int i = 0; i < 100 && received == 0; ++i) {
+    const auto answer = client.Get("/recordings/a.mcap");
+    ASSERT_TRUE(answer);
+    if (answer->status == 200) received = answer->body.size();
+    if (received == 0) std::this_thread::sleep_for(50ms);
+  }
+  EXPECT_EQ(received, kBytes);
+  EXPECT_EQ(client.Get("/api/me")->status, 200);
+}
+
+TEST_F(PageServerTest, ABodyThatIsTooLargeOrNotJsonIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto in = log_in("calibrate");
+  auto client = browser();
+  EXPECT_EQ(client.Post("/api/calibrate", in.headers, "{", "application/json")->status, 400);
+  EXPECT_EQ(client.Post("/api/calibrate", in.headers, "[]", "application/json")->status, 400);
+  const auto large =
+      client.Post("/api/calibrate", in.headers, std::string(2u << 20, ' '), "application/json");
+  EXPECT_TRUE(!large || large->status == 413);
+  EXPECT_EQ(client.Get("/api/me")->status, 200);
+}
+
+TEST_F(PageServerTest, AFaultInAFileForACalibrationIsNamedWithItsLine) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto in = log_in("calibrate");
+  auto client = browser();
+  const auto fault = [&](const json& body) {
+    const auto answer = client.Post("/api/calibrate", in.headers, body.dump(), "application/json");
+    return answer ? answer->body : "no answer";
+  };
+  EXPECT_THAT(fault({{"method", "otf"},
+                     {"path", {{"file", "p.csv"}, {"text", "x_mm,y_mm,z_mm\n0,0,0\n1,b,0\n"}}}}),
+              HasSubstr("p.csv:3"));
+  EXPECT_THAT(fault({{"method", "evemu"},
+                     {"calibrator", {{"file", "c.toml"}, {"text", "[calibrator]\nname = 1\n"}}}}),
+              HasSubstr("c.toml:2"));
+  EXPECT_THAT(fault({{"method", "magic"}}), HasSubstr("must be otf, evemu or mfb"));
+  EXPECT_THAT(fault(json::object()), HasSubstr("method"));
+}
+
+template <auto free>
+struct Free {
+  template <class T>
+  void operator()(T* object) const {
+    free(object);
+  }
+};
+
+/// Writes a certificate for localhost that signs itself, and its key.
+void write_certificate(const std::filesystem::path& folder, std::chrono::seconds valid_for) {
+  const std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>> key{EVP_EC_gen("P-256")};
+  const std::unique_ptr<X509, Free<X509_free>> certificate{X509_new()};
+  X509_set_version(certificate.get(), X509_VERSION_3);
+  X509_gmtime_adj(X509_getm_notBefore(certificate.get()), -2L * 86400);
+  X509_gmtime_adj(X509_getm_notAfter(certificate.get()), valid_for.count());
+  X509_NAME* const name = X509_get_subject_name(certificate.get());
+  const auto* const common_name = reinterpret_cast<const unsigned char*>("localhost");  // NOLINT
+  X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, common_name, -1, -1, 0);
+  X509_set_issuer_name(certificate.get(), name);
+  X509_set_pubkey(certificate.get(), key.get());
+  ASSERT_GT(X509_sign(certificate.get(), key.get(), EVP_sha256()), 0);
+
+  const std::unique_ptr<BIO, Free<BIO_free>> to{BIO_new_file((folder / "web.pem").c_str(), "w")},
+      key_to{BIO_new_file((folder / "key.pem").c_str(), "w")};
+  ASSERT_EQ(PEM_write_bio_X509(to.get(), certificate.get()), 1);
+  ASSERT_EQ(
+      PEM_write_bio_PrivateKey(key_to.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr), 1);
+}
+
+constexpr const char* kTls = "certificate = \"web.pem\"\nkey = \"key.pem\"\n";
+
+TEST_F(PageServerTest, AnExpiredCertificateIsRefusedWithItsDate) {
+  write_certificate(folder_, -1h);
+  write_config(std::string{"port = 0\n"} + kTls);
+  auto read = settings();
+  ASSERT_TRUE(read) << read.error().text;
+  const auto page = PageServer::start({.settings = std::move(*read),
+                                       .config_file = folder_ / "abbed.toml",
+                                       .report = [](const std::string&) {}});
+  ASSERT_FALSE(page);
+  EXPECT_THAT(page.error().text, HasSubstr("web.pem expired on "));
+}
+
+TEST_F(PageServerTest, ServesOverTls) {
+  write_certificate(folder_, 24h);
+  ASSERT_NO_FATAL_FAILURE(start(kTls));
+  httplib::SSLClient client{"127.0.0.1", page_->port()};
+  client.enable_server_certificate_verification(false);
+  const auto me = client.Get("/api/me");
+  ASSERT_TRUE(me);
+  EXPECT_EQ(me->status, 200);
+  EXPECT_THAT(me->get_header_value("Strict-Transport-Security"), HasSubstr("max-age="));
+  const auto in = client.Post("/api/login", json{{"user", "view"}, {"password", kPassword}}.dump(),
+                              "application/json");
+  ASSERT_TRUE(in);
+  EXPECT_THAT(in->get_header_value("Set-Cookie"), HasSubstr("; Secure"));
+}
+
+}  // namespace
+}  // namespace abbe::web

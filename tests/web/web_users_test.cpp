@@ -1,0 +1,100 @@
+/// Users, passwords and sessions.
+
+#include <gmock/gmock.h>
+
+#include "abbe/web/sessions.hpp"
+#include "web_folder.hpp"
+
+namespace abbe::web {
+namespace {
+
+using namespace std::chrono_literals;
+using test::kPassword;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+struct WebUsersTest : test::WebFolder {
+  WebUsersTest() { write_users(); }
+  [[nodiscard]] std::filesystem::path users() const { return folder_ / "users"; }
+  Sessions::Clock::time_point now_ = Sessions::Clock::now();
+};
+
+TEST_F(WebUsersTest, APasswordIsFoundInTheFileAndAnotherOneIsNot) {
+  const auto read = read_web_users(users());
+  ASSERT_TRUE(read);
+  EXPECT_THAT(*read, SizeIs(3));
+  const auto found = find_web_user(*read, "calibrate", kPassword);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->role, WebRole::Calibrate);
+  EXPECT_FALSE(find_web_user(*read, "calibrate", kPassword + "!"));
+  EXPECT_FALSE(find_web_user(*read, "nobody", kPassword));
+}
+
+TEST_F(WebUsersTest, TheFileDoesNotContainThePassword) {
+  const auto line = web_user_line("anna", WebRole::View, kPassword);
+  ASSERT_TRUE(line);
+  EXPECT_THAT(*line, AllOf(HasSubstr("anna:view:$y$"), ::testing::Not(HasSubstr(kPassword))));
+  EXPECT_NE(*line, web_user_line("anna", WebRole::View, kPassword).value());  // another salt
+}
+
+TEST_F(WebUsersTest, NamesAndShortPasswordsAreRefused) {
+  EXPECT_FALSE(web_user_line("an:na", WebRole::View, kPassword));
+  EXPECT_FALSE(web_user_line("", WebRole::View, kPassword));
+  EXPECT_FALSE(web_user_line("anna", WebRole::View, "short"));
+}
+
+TEST_F(WebUsersTest, FaultyLinesAreNamed) {
+  write("users", "# comment\nanna:boss:$y$j9T$x$y\nbert:view:secret\ncarl\n");
+  const auto read = read_web_users(users());
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().details,
+              ElementsAre(HasSubstr("users:2:"), HasSubstr("users:3:"), HasSubstr("users:4:")));
+}
+
+TEST_F(WebUsersTest, AFileThatOthersMayReadIsRefused) {
+  ::chmod(users().c_str(), 0644);
+  const auto read = read_web_users(users());
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().text, HasSubstr("chmod 0640"));
+}
+
+TEST_F(WebUsersTest, ASessionEndsWhenItIsIdleTooLongOrLoggedOut) {
+  Sessions sessions(users(), {.idle = 60s});
+  const auto session = sessions.log_in("view", kPassword, "::1", now_);
+  ASSERT_TRUE(session);
+  EXPECT_TRUE(sessions.find(session->token, now_ + 59s));
+  EXPECT_TRUE(sessions.find(session->token, now_ + 118s));
+  EXPECT_FALSE(sessions.find(session->token, now_ + 178s));
+  const auto again = sessions.log_in("view", kPassword, "::1", now_);
+  sessions.log_out(again->token);
+  EXPECT_FALSE(sessions.find(again->token, now_));
+}
+
+TEST_F(WebUsersTest, ASessionEndsWhenItsUserIsRemoved) {
+  Sessions sessions(users());
+  const auto session = sessions.log_in("view", kPassword, "::1", now_);
+  ASSERT_TRUE(sessions.find(session->token, now_));
+  write("users", "# nobody\n");
+  EXPECT_FALSE(sessions.find(session->token, now_));
+}
+
+TEST_F(WebUsersTest, AfterTooManyWrongPasswordsTheAddressWaits) {
+  Sessions sessions(users(), {.failures = 2, .pause = 60s});
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(sessions.log_in("view", "wrong", "10.0.0.1", now_));
+  const auto refused = sessions.log_in("view", kPassword, "10.0.0.1", now_);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("wait 60 s"));
+  EXPECT_TRUE(sessions.log_in("view", kPassword, "10.0.0.2", now_));
+  EXPECT_TRUE(sessions.log_in("view", kPassword, "10.0.0.1", now_ + 61s));
+}
+
+TEST_F(WebUsersTest, WithoutAFileNobodyCanLogIn) {
+  Sessions sessions({});
+  EXPECT_FALSE(sessions.possible());
+  EXPECT_FALSE(sessions.log_in("view", kPassword, "::1", now_));
+}
+
+}  // namespace
+}  // namespace abbe::web

@@ -1,0 +1,165 @@
+/// The page in Chromium, from the wire of the simulated devices to what a person sees and clicks.
+/// The programs in tests/web/browser are the person; they end with an error if the page does not
+/// show what it must, or reports an error on its console.
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "abbe/base/file_descriptor.hpp"
+#include "abbe/web/web_users.hpp"
+#include "touching_run.hpp"
+
+namespace abbe::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kPassword = "a long password";
+
+/// abbe-web and a browser beside the programs of `Run`.
+template <class Run>
+struct Page : Run {
+  /// After abbed.toml was written.
+  void add_page() {
+    std::string users;
+    for (const auto role : {web::WebRole::Calibrate, web::WebRole::Administer})
+      users += web::web_user_line(std::string{web::name(role)}, role, kPassword).value() + "\n";
+    this->write("users", users);
+    ::chmod(this->file("users").c_str(), 0640);
+    this->write("abbed.toml", text_of(this->file("abbed.toml")) +
+                                  "[web]\nport = 0\nlive_hz = 100\nusers = \"users\"\n");
+  }
+
+  /// Starts abbe-web; after abbed, which reads the same file.
+  void open_server() {
+    web_ = this->start({ABBE_WEB_PROGRAM, "--config", this->file("abbed.toml")}, "web");
+    ASSERT_TRUE(eventually([this] { return !url().empty() || !web_->running(); }));
+    ASSERT_TRUE(web_->running()) << web_->err();
+  }
+
+  /// From the log of abbe-web; empty before it listens.
+  [[nodiscard]] std::string url() const {
+    const std::string log = web_->err();
+    const auto begin = log.find("http://");
+    const auto end = log.find('\n', begin);
+    return begin == std::string::npos || end == std::string::npos ? ""
+                                                                  : log.substr(begin, end - begin);
+  }
+
+  /// Starts a program of tests/web/browser.
+  void browse(const std::string& program, const std::vector<std::string>& more = {}) {
+    const char* node = ::getenv("ABBE_NODE");
+    const char* screenshots = ::getenv("ABBE_SCREENSHOTS");
+    std::vector<std::string> command{node == nullptr ? "/usr/bin/node" : node,
+                                     std::string{ABBE_BROWSER_TESTS} + "/" + program, url(),
+                                     screenshots == nullptr ? this->file("") : screenshots};
+    command.insert(command.end(), more.begin(), more.end());
+    browser_ = this->start(std::move(command), program);
+  }
+  /// True when the program of the browser has printed `word`.
+  [[nodiscard]] bool browser_prints(const std::string& word) {
+    const bool printed = eventually(
+        [&] { return browser_->out().find(word) != std::string::npos || !browser_->running(); },
+        kPatienceForARun);
+    return printed && browser_->out().find(word) != std::string::npos;
+  }
+  void expect_browser_ends_well() {
+    EXPECT_EQ(browser_->wait_for_end(2 * kPatienceForARun), 0)
+        << browser_->out() << browser_->err() << web_->err();
+    if (this->HasFailure()) return;
+    fmt::print("{}", browser_->out());
+  }
+
+  /// A connection that asks for the events and never reads them.
+  [[nodiscard]] daemon::FileDescriptor deaf_page() const {
+    daemon::FileDescriptor fd{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+    const int smallest = 1;
+    (void)::setsockopt(fd.get(), SOL_SOCKET, SO_RCVBUF, &smallest, sizeof smallest);
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(std::stoi(url().substr(url().rfind(':') + 1))));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const auto* const address = reinterpret_cast<const sockaddr*>(&to);  // NOLINT
+    EXPECT_EQ(::connect(fd.get(), address, sizeof to), 0);
+    const std::string request = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    EXPECT_EQ(::send(fd.get(), request.data(), request.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(request.size()));
+    return fd;
+  }
+
+  std::unique_ptr<Program> web_, browser_;
+};
+
+struct PageOnTheFly : Page<Spine> {
+  void start_everything() {
+    write_path("path.csv", path());
+    ASSERT_NO_FATAL_FAILURE(start_simulator());
+    hold_simulator();
+    write_configuration();
+    add_page();
+    ASSERT_NO_FATAL_FAILURE(start_abbed());
+    ASSERT_NO_FATAL_FAILURE(open_server());
+  }
+};
+
+TEST_F(PageOnTheFly, IsCalibratedByClickingAndEveryViewIsRight) {
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  browse("otf.mjs", {file("path.csv"), kPassword});
+  ASSERT_TRUE(browser_prints("BEGUN")) << browser_->out() << browser_->err();
+  simulator_->signal(SIGCONT);
+  ASSERT_NO_FATAL_FAILURE(expect_browser_ends_well());
+  EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+
+  browse("views.mjs");
+  expect_browser_ends_well();
+
+  // The recording is finished when abbed ends.
+  EXPECT_EQ(abbed_->stop(), 0);
+  browse("replay.mjs", {kPassword});
+  expect_browser_ends_well();
+}
+
+TEST_F(PageOnTheFly, ShowsAtOnceThatAbbedOrItsServerIsLost) {
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  browse("lost.mjs");
+  ASSERT_TRUE(browser_prints("OPEN")) << browser_->out() << browser_->err();
+  EXPECT_EQ(abbed_->stop(), 0);
+  ASSERT_TRUE(browser_prints("ABBED LOST")) << browser_->out() << browser_->err();
+  EXPECT_EQ(web_->stop(), 0);
+  ASSERT_TRUE(browser_prints("SERVER LOST")) << browser_->out() << browser_->err();
+  expect_browser_ends_well();
+}
+
+TEST_F(PageOnTheFly, APageThatReadsNoEventsIsClosedByName) {
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  const daemon::FileDescriptor deaf = deaf_page();
+  EXPECT_TRUE(eventually([this] {
+    return web_->err().find("the page does not read its events: closed") != std::string::npos;
+  })) << web_->err();
+}
+
+struct PageBallArray : Page<TouchingRun> {};
+
+TEST_F(PageBallArray, IsCalibratedByClicking) {
+  ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
+  write_touching_configuration();
+  add_page();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  ASSERT_NO_FATAL_FAILURE(open_server());
+  browse("array.mjs", {file("calibrator.toml"), kPassword});
+  ASSERT_TRUE(browser_prints("BEGUN")) << browser_->out() << browser_->err();
+  let_machine_go();
+  expect_browser_ends_well();
+  EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+}
+
+}  // namespace
+}  // namespace abbe::test

@@ -1,5 +1,5 @@
 #pragma once
-/// Compares phases of a run with requests to those without. The peer is the same comparison between
+/// Compares phases of a run with requests (of programs or pages) to those without. The peer is the same comparison between
 /// the odd and the even phases without requests: it shows what other load on the computer changes.
 
 #include <fmt/format.h>
@@ -18,6 +18,11 @@ enum class Outcome { Met, Inconclusive, Missed };
 
 inline Outcome worse(Outcome a, Outcome b) {
   return std::max(a, b);
+}
+
+inline int exit_code(Outcome outcome) {
+  constexpr int kMissed = 1, kInconclusive = 3;
+  return outcome == Outcome::Met ? 0 : outcome == Outcome::Missed ? kMissed : kInconclusive;
 }
 
 /// A figure with and without requests, as a ratio to that without.
@@ -86,9 +91,7 @@ inline Outcome report_acquisition(const std::string& stream, const AcquisitionCo
                stream, 100.0 * share, each.quiet, each.requested);
   }
 
-  const auto figure = [&stream](const char* what) {
-    return fmt::format("live status, {} of {}", what, stream);
-  };
+  const auto figure = [&stream](const char* what) { return fmt::format("{} of {}", what, stream); };
   Outcome outcome = report_ratio(figure("time in receive(), p99,"), of.of(receive(0.99)));
   outcome = worse(outcome, report_ratio(figure("mean scheduling delay"),
                                         of.of(&AcquisitionPhase::mean_delay_us)));

@@ -99,6 +99,33 @@ async function artefactView(place, balls) {
   return () => { stop(); space.end(); };
 }
 
+/** The planned places of a Multi-Feature Bar, with the one that is to be touched next. */
+async function barView(place, bars) {
+  const space = await Space.create(place, ...corners(bars.flatMap((b) => b.holes_mm)),
+    "Places of the bar with the next hole");
+  for (const bar of bars) {
+    space.path(bar.holes_mm, 0x6e7f90);
+    space.dots(bar.holes_mm, 0x6e7f90, 0.008);
+  }
+  let shown = "", drawn = [];
+  const mark = () => {
+    const next = state.status?.session.next;
+    const now = next ? `${next.measurement} ${next.on}` : "";
+    if (now === shown) return;
+    shown = now;
+    drawn.forEach((object) => space.remove(object));
+    drawn = [];
+    const bar = bars.find((b) => b.measurement === next?.measurement);
+    if (!bar) return;
+    drawn.push(space.path(bar.holes_mm, 0xe69f00), space.dots(bar.holes_mm, 0xe69f00, 0.014));
+    const hole = bar.holes_mm[Number(/^hole (\d+)/.exec(next.on)?.[1]) - 1];
+    if (hole) drawn.push(space.ball(hole, 0.02 * space.size, 0xe69f00));
+  };
+  mark();
+  const stop = listen("status", mark);
+  return () => { stop(); space.end(); };
+}
+
 /** The balls in the request of a calibration with a ball array; empty: it has none. */
 function ballsOf(request) {
   return (request?.calibrator?.balls ?? []).map((b) => ({
@@ -107,12 +134,13 @@ function ballsOf(request) {
 }
 
 async function drawing(place) {
-  const { request, driven_mm } = await get("api/calibration");
+  const { request, driven_mm, bars } = await get("api/calibration");
   place.replaceChildren();
   const balls = ballsOf(request);
   if (request?.path_m?.length > 1)
     return pathView(place, request.path_m.map((p) => p.map((x) => 1e3 * x)), driven_mm);
   if (balls.length > 1) return artefactView(place, balls);
+  if (bars.length > 0) return barView(place, bars);
   return () => {};
 }
 

@@ -10,6 +10,7 @@
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/model/model_store.hpp"
+#include "bar_drawing.hpp"
 
 namespace abbe::web {
 namespace {
@@ -179,11 +180,17 @@ json DaemonFeed::status() const {
 }
 
 json DaemonFeed::calibration() const {
-  const std::lock_guard lock(mutex_);
-  json path = json::array();
-  for (const auto& p : path_.points_m)
-    path.push_back({kMmPerM * p[0], kMmPerM * p[1], kMmPerM * p[2]});
-  return {{"session", path_.session}, {"request", request_}, {"driven_mm", std::move(path)}};
+  json out;
+  {
+    const std::lock_guard lock(mutex_);
+    json path = json::array();
+    for (const auto& p : path_.points_m)
+      path.push_back({kMmPerM * p[0], kMmPerM * p[1], kMmPerM * p[2]});
+    out = {{"session", path_.session}, {"request", request_}, {"driven_mm", std::move(path)}};
+  }
+
+  out["bars"] = bars_of(out["request"]);
+  return out;
 }
 
 }  // namespace abbe::web

@@ -15,11 +15,13 @@
 
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/web/web_users.hpp"
+#include "bar_run.hpp"
 #include "touching_run.hpp"
 
 namespace abbe::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr const char* kPassword = "a long password";
@@ -159,6 +161,20 @@ TEST_F(PageBallArray, IsCalibratedByClicking) {
   let_machine_go();
   expect_browser_ends_well();
   EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+}
+
+struct PageBar : Page<BarRun> {};
+
+TEST_F(PageBar, ItsPlacesAreDrawnAndASessionIsCancelled) {
+  ASSERT_NO_FATAL_FAILURE(start_bar_simulator());
+  write_bar_configuration();
+  add_page();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  ASSERT_NO_FATAL_FAILURE(open_server());
+  browse("bar.mjs", {file("bar/bar.toml"), file("bar/plan.toml"), kPassword});
+  expect_browser_ends_well();
+  EXPECT_THAT(status()["session"]["reason"].get<std::string>(),
+              AllOf(HasSubstr("cancelled by"), HasSubstr("(as calibrate)")));
 }
 
 }  // namespace

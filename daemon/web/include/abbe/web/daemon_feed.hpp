@@ -37,7 +37,8 @@ class DaemonFeed {
 
   /// The last answer to "status", null before the first and while abbed does not answer. Any thread.
   [[nodiscard]] nlohmann::json status() const;
-  /// The request of the present or last session and its driven path, lengths in mm. Any thread.
+  /// {"session", "request", "driven_mm", "bars": see bars_of()} of the present or last session; the
+  /// request as abbed received it, lengths in m. Any thread.
   [[nodiscard]] nlohmann::json calibration() const;
 
  private:

@@ -1,0 +1,23 @@
+// A calibration with a Multi-Feature Bar is begun by clicking; the places of the bar are drawn, with
+// the first one marked.   bar.mjs URL FOLDER BAR.TOML PLAN.TOML PASSWORD
+
+import { chooseFile, clickButton, goTo, logIn, screenshot, waitForText, withPage } from "./chromium.mjs";
+
+const [url, out, bar, plan, password] = process.argv.slice(2);
+
+await withPage(url, out, async (context) => {
+  const { page } = context;
+  page.on("dialog", (dialog) => dialog.accept());
+  await logIn(context, "calibrate", password);
+  await goTo(context, "calibration");
+  await page.select("#method", "mfb");
+  await chooseFile(context, "#bar-file", bar);
+  await chooseFile(context, "#plan-file", plan);
+  await clickButton(context, "Begin");
+  await waitForText(context, "Next: hole 1", "#view");
+  await page.waitForSelector(".space canvas");
+  await screenshot(context, "bar-begun");
+  await clickButton(context, "Cancel the calibration");
+  await waitForText(context, "cancelled", "#message");
+  return [];
+});

@@ -29,9 +29,8 @@ int status_of(ErrorCode code) {
 }
 
 /// Sends `length` bytes from `bytes`, which `owner` keeps alive.
-template <class Owner>
 void send_bytes(httplib::Response& response, std::string_view bytes, const char* type,
-                Owner owner) {
+                const std::shared_ptr<const void>& owner) {
   if (bytes.empty()) {
     response.set_content(std::string{}, type);
     return;

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+
+#include "abbe/calib/iso/standard_values.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -11,6 +14,11 @@ namespace {
 /// SHA-256 of the first input of the model; empty if the document lists no input.
 std::string provenance(const ModelDocument& document) {
   return document.inputs.empty() ? std::string{} : document.inputs.front().sha256;
+}
+
+std::optional<double> largest_U_m(const calib::VolumetricModel& model) {
+  const auto volume = calib::iso::volume_error(model);
+  return volume ? std::optional(volume->max_U_m) : std::nullopt;
 }
 
 std::string not_known_since(const std::string& damaged_state) {
@@ -129,6 +137,8 @@ ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument d
                      .recording_sha256 = provenance(document),
                      .created = document.created,
                      .active_since = std::min(now, utc_.to_host(activation.actor.when)),
+                     .hash = model_hash(document),
+                     .largest_U_m = largest_U_m(document.model),
                      .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 

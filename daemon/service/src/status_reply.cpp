@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/base/units.hpp"
+#include "abbe/base/utc_text.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "model_status_name.hpp"
@@ -129,11 +130,16 @@ struct SeenModel {
     id = active.model->id;
     method = active.model->method;
     recording_sha256 = active.model->recording_sha256;
+    hash = active.model->hash;
+    created = active.model->created;
+    largest_U_m = active.model->largest_U_m;
   }
   v1::ModelStatus status;
   std::string reason;
   bool known;
-  std::string id, method, recording_sha256;
+  std::string id, method, recording_sha256, hash;
+  protocol::UtcTime created{};
+  std::optional<double> largest_U_m;
 };
 
 json model_json(const SeenModel& model) {
@@ -142,6 +148,9 @@ json model_json(const SeenModel& model) {
     out["id"] = model.id;
     out["method"] = model.method;
     out["recording_sha256"] = model.recording_sha256;
+    out["hash"] = model.hash;
+    out["created"] = to_text(model.created);
+    if (model.largest_U_m) out["largest_U_um"] = *model.largest_U_m * kUmPerM;
   }
   return out;
 }

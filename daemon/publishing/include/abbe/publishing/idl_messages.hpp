@@ -3,6 +3,7 @@
 /// model; no other mathematics. Pure, thread-safe; allocates.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,6 +25,9 @@ struct PublishedModel {
   std::string recording_sha256;
   protocol::UtcTime created{};
   protocol::HostTime active_since{};
+  std::string hash = {};  ///< model_hash() of the document
+  /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
+  std::optional<double> largest_U_m = {};
   calib::VolumetricModel model;
 };
 

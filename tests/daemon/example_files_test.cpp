@@ -98,11 +98,11 @@ TEST_F(ExampleFiles, AreListed) {
   for (const char* name : {"abbed.toml", "machine.toml", "sim.toml", "calibrator.toml", "path.csv",
                            "tracker.csv", "encoder.csv", "touches.csv", "bar.toml", "plan.toml",
                            "barpoints.csv", "gauge.toml", "parts.toml", "errors.csv", "points.csv",
-                           "verification.csv", "certificate.toml", "truth.csv"})
+                           "verification.csv", "certificate.toml", "mtconnect-devices.xml", "truth.csv"})
     EXPECT_THAT(ran.out, HasSubstr(name));
   std::istringstream lines(ran.out.substr(0, ran.out.find("\n\n")));
   for (std::string line; std::getline(lines, line);)
-    EXPECT_THAT(line, ::testing::MatchesRegex("[a-z.]+ +[a-z].*")) << "without a purpose";
+    EXPECT_THAT(line, ::testing::MatchesRegex("[a-z.-]+ +[a-z].*")) << "without a purpose";
   EXPECT_THAT(abbe("--help").out, HasSubstr("example"));
 }
 

@@ -220,7 +220,7 @@ TEST_F(FilesPage, NamesEveryKeyOfAModel) {
 
 TEST_F(FilesPage, HasASectionForEveryExampleOfTheProgram) {
   const auto list = test::run_abbe(folder_.path(), "example");
-  const std::regex file("(^|\n)([a-z]+\\.[a-z]+) ");
+  const std::regex file("(^|\n)([a-z-]+\\.[a-z]+) ");
   std::size_t count = 0;
   for (std::sregex_iterator it(list.out.begin(), list.out.end(), file), end; it != end; ++it) {
     EXPECT_THAT(sections_, Contains(Key((*it)[2].str())));

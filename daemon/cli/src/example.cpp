@@ -39,6 +39,7 @@ constexpr std::array kPurposes{
     Purpose{"measured.csv", "directly measured error motions for abbe model compare"},
     Purpose{"foxglove.json", "a layout for recordings in Foxglove or Lichtblick"},
     Purpose{"certificate.toml", "people, serial numbers and conditions for abbe report"},
+    Purpose{"mtconnect-devices.xml", "the device for an MTConnect agent that reads abbe-mtconnect"},
     Purpose{"truth.csv", "the errors of a simulated machine"},
 };
 
@@ -63,7 +64,7 @@ std::string_view purpose_of(std::string_view name) {
 std::string list_of_examples() {
   std::string text;
   for (const EmbeddedText& file : example_files())
-    text += fmt::format("{:<17} {}\n", file.name, purpose_of(file.name));
+    text += fmt::format("{:<22} {}\n", file.name, purpose_of(file.name));
   return text + "\nabbe example NAME > NAME writes one of them.\n";
 }
 

@@ -29,6 +29,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_evemu(root, config);
   read_control(root, base, config);
   (void)read_web(root, base);  // checked only: abbe-web uses it
+  (void)read_mtconnect(root);  // checked only: abbe-mtconnect uses it
   root.close();
 
   return config;

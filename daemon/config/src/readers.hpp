@@ -3,6 +3,7 @@
 /// values, adds a fault for each invalid value, and closes its sections.
 
 #include "abbe/config/config.hpp"
+#include "abbe/config/mtconnect_config.hpp"
 #include "abbe/config/section.hpp"
 #include "abbe/config/web_config.hpp"
 
@@ -29,5 +30,6 @@ void read_drift(Section& root, Config& out);
 void read_evemu(Section& root, Config& out);
 void read_control(Section& root, const std::filesystem::path& base, Config& out);
 [[nodiscard]] WebConfig read_web(Section& root, const std::filesystem::path& base);
+[[nodiscard]] MtconnectConfig read_mtconnect(Section& root);
 
 }  // namespace abbe::daemon

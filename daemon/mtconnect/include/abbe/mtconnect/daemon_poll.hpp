@@ -1,0 +1,46 @@
+#pragma once
+/// Asks abbed for its status once a second, on a thread of its own: an abbed that hangs must not
+/// delay the heartbeat of the agents.
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "abbe/base/error.hpp"
+#include "abbe/base/file_descriptor.hpp"
+
+namespace abbe::mtconnect {
+
+class DaemonPoll {
+ public:
+  using Answer = daemon::Result<nlohmann::json>;
+
+  explicit DaemonPoll(std::filesystem::path control_socket,
+                      std::chrono::milliseconds period = std::chrono::seconds{1});
+  DaemonPoll(const DaemonPoll&) = delete;
+  DaemonPoll& operator=(const DaemonPoll&) = delete;
+  ~DaemonPoll();  ///< waits for the end of a request, at most a few seconds
+
+  /// Becomes readable when take() has an answer.
+  [[nodiscard]] int wake_fd() const noexcept { return wake_.get(); }
+  /// The latest answer, once; an Error if abbed did not answer. Any thread.
+  [[nodiscard]] std::optional<Answer> take();
+
+ private:
+  void run();
+
+  std::filesystem::path socket_;
+  std::chrono::milliseconds period_;
+  daemon::FileDescriptor wake_;
+  std::mutex mutex_;
+  std::condition_variable stop_requested_;
+  bool stopping_ = false;
+  std::optional<Answer> answer_;
+  std::thread thread_;
+};
+
+}  // namespace abbe::mtconnect

@@ -1,0 +1,45 @@
+#pragma once
+/// What an MTConnect agent is told about abbe, derived from the answer of abbed to "status". The
+/// names of the data items are those of daemon/examples/mtconnect-devices.xml. Pure, thread-safe; allocates.
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+
+namespace abbe::mtconnect {
+
+struct Message {
+  std::string code, text;
+  friend bool operator==(const Message&, const Message&) = default;
+};
+
+enum class Level { Warning, Fault };
+
+struct Raised {
+  Level level = Level::Warning;
+  std::string text;
+  friend bool operator==(const Raised&, const Raised&) = default;
+};
+
+/// What is raised, by native code. Empty: NORMAL.
+using Condition = std::map<std::string, Raised>;
+
+/// An event, a message or a condition. nullopt: UNAVAILABLE, because abbed is away or has no such
+/// value.
+using Value =
+    std::variant<std::optional<std::string>, std::optional<Message>, std::optional<Condition>>;
+
+/// By name of the data item. Always all data items.
+using Observations = std::map<std::string, Value>;
+
+/// `status`: the answer to {"do": "status"}. Throws nlohmann::json::exception if a member is missing
+/// or has another type, and std::out_of_range for an unknown state of a calibration, as from another
+/// version of abbed.
+[[nodiscard]] Observations observations_of(const nlohmann::json& status);
+
+/// abbed is away: everything is UNAVAILABLE.
+[[nodiscard]] Observations nothing_observed();
+
+}  // namespace abbe::mtconnect

@@ -1,0 +1,30 @@
+#pragma once
+/// Texts of SHDR, the line format between an MTConnect adapter and an agent: fields separated by "|",
+/// the first one a time [cppagent, "SHDR 2.0"]. Pure, thread-safe; allocates.
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::mtconnect {
+
+/// Longest text of a field in bytes, before it is quoted. Longer ones are cut between two
+/// characters.
+inline constexpr std::size_t kLongestText = 1000;
+
+/// `text` as one field.
+/// - A line break or another control character becomes a space: SHDR cannot escape a line break, and
+///   XML, which the agent writes, cannot contain the others. A byte that is not UTF-8 becomes "?".
+/// - A text with "|", or with a quotation mark at its beginning, is enclosed in quotation marks, with
+///   a backslash before "|", quotation marks and backslashes.
+[[nodiscard]] std::string shdr_field(std::string_view text);
+
+/// A native code. The agent takes a part behind ":" for the condition's id, so ":" becomes "_".
+[[nodiscard]] std::string shdr_code(std::string_view code);
+
+/// UTC with microseconds, the resolution of an agent: "2024-05-17T08:30:00.123456Z".
+[[nodiscard]] std::string shdr_time(protocol::UtcTime time);
+
+}  // namespace abbe::mtconnect

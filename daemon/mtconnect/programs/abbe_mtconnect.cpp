@@ -1,0 +1,186 @@
+// abbe-mtconnect: an MTConnect adapter. It asks abbed over the control socket and sends SHDR to
+// agents (cppagent). It is a separate process without privileges, so that no packet from the network
+// can stop abbed.
+#include <signal.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "abbe/base/exit_codes.hpp"
+#include "abbe/base/service_manager.hpp"
+#include "abbe/config/mtconnect_config.hpp"
+#include "abbe/mtconnect/daemon_poll.hpp"
+#include "abbe/mtconnect/limited_log.hpp"
+#include "abbe/mtconnect/shdr_feed.hpp"
+#include "abbe/mtconnect/shdr_server.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+using abbe::daemon::Error;
+using abbe::daemon::ErrorCode;
+using abbe::daemon::ExitCode;
+using abbe::daemon::MtconnectSettings;
+using abbe::mtconnect::DaemonPoll;
+using abbe::mtconnect::ShdrFeed;
+using abbe::mtconnect::ShdrServer;
+
+constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
+              kInternal = number(ExitCode::Internal);
+// Longest time between two looks at signals, watchdog and heartbeats.
+constexpr auto kCycle = 100ms;
+
+volatile sig_atomic_t stop_requested = 0;
+
+std::string footer() {
+  return "Example: abbe-mtconnect -c /etc/abbe/abbed.toml\n"
+         "`abbe example mtconnect-devices.xml` prints the device for the agent.\n" +
+         abbe::daemon::exit_codes_text(
+             {{ExitCode::Done, "stopped by SIGTERM or SIGINT"},
+              {ExitCode::Usage},
+              {ExitCode::BadInput, "the configuration cannot be used"},
+              {ExitCode::Io, "address and port cannot be used: another process listens there"},
+              {ExitCode::Internal}});
+}
+
+void log_line(std::string_view line) {
+  fmt::print(stderr, "abbe-mtconnect: {}\n", line);
+}
+
+int refuse(const Error& error) {
+  log_line(error.text);
+  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  return exit_code(error.code);
+}
+
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
+}
+
+abbe::protocol::UtcTime utc_now() {
+  return abbe::protocol::UtcTime{std::chrono::system_clock::now().time_since_epoch()};
+}
+
+/// The state of abbed, for its agents and for the log.
+class Adapter {
+ public:
+  /// What a client receives first.
+  [[nodiscard]] std::string greeting() const {
+    return "* adapterVersion: " ABBE_VERSION "\n" + feed_.everything(utc_now());
+  }
+
+  /// Lines with what changed.
+  [[nodiscard]] std::string take(const DaemonPoll::Answer& answer) {
+    if (!answer) return away(answer.error().text);
+    try {
+      auto observed = abbe::mtconnect::observations_of(*answer);
+      if (answers_ != true) log_line("abbed answers");
+      answers_ = true;
+      return feed_.update(std::move(observed), utc_now());
+    } catch (const std::exception& error) {
+      return away(fmt::format("the answer of abbed is not that of this version: {}", error.what()));
+    }
+  }
+
+ private:
+  std::string away(const std::string& fault) {
+    if (answers_ != false) log_line(fmt::format("everything is UNAVAILABLE: {}", fault));
+    answers_ = false;
+    return feed_.update(abbe::mtconnect::nothing_observed(), utc_now());
+  }
+
+  ShdrFeed feed_;
+  std::optional<bool> answers_;  ///< nullopt: not asked yet
+};
+
+void serve(ShdrServer& server, Adapter& adapter, DaemonPoll& poll) {
+  using Clock = std::chrono::steady_clock;
+  const auto period = abbe::daemon::watchdog_period();
+  auto next_alive = Clock::now();
+
+  while (stop_requested == 0) {
+    server.cycle(kCycle, poll.wake_fd());
+    if (const auto answer = poll.take()) server.send(adapter.take(*answer));
+    if (period && Clock::now() >= next_alive) {
+      abbe::daemon::notify_alive();
+      next_alive = Clock::now() + *period;
+    }
+  }
+
+  abbe::daemon::notify_stopping();
+}
+
+int run(const MtconnectSettings& settings) {
+  Adapter adapter;
+  abbe::mtconnect::LimitedLog clients(log_line);
+  const auto& wanted = settings.mtconnect;
+  auto server = ShdrServer::listen(
+      {.address = wanted.address,
+       .port = wanted.port,
+       .heartbeat = std::chrono::duration_cast<std::chrono::milliseconds>(wanted.heartbeat)},
+      [&adapter] { return adapter.greeting(); },
+      [&clients](std::string_view line) { clients.line(line); });
+  if (!server) return refuse(server.error());
+  stop_on_signals();
+
+  log_line(fmt::format("listening at {}, port {}", wanted.address, server->port()));
+  if (!wanted.address.starts_with("127.") && wanted.address != "::1")
+    log_line("every computer that reaches this address can read the state of the machine");
+  DaemonPoll poll(settings.control_socket);
+  abbe::daemon::notify_ready("serving SHDR");
+  serve(*server, adapter, poll);
+  return kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "MTConnect adapter: sends calibration, uncertainty and health of the machine as SHDR to "
+      "agents."};
+  app.footer(footer());
+  app.set_version_flag("--version", "abbe-mtconnect " ABBE_VERSION);
+  MtconnectSettings settings;
+  std::string config;
+  auto* const socket =
+      app.add_option("--socket", settings.control_socket, "control socket of abbed")
+          ->capture_default_str();
+  auto* const address =
+      app.add_option("--address", settings.mtconnect.address,
+                     "numeric address to listen on; 0.0.0.0: every network, without a password")
+          ->capture_default_str();
+  auto* const port =
+      app.add_option("--port", settings.mtconnect.port, "0: any free port")->capture_default_str();
+  app.add_option("-c,--config", config,
+                 "take socket, address, port and heartbeat from this abbed.toml")
+      ->excludes(socket)
+      ->excludes(address)
+      ->excludes(port);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kUsage;
+  }
+
+  try {
+    if (!config.empty()) {
+      auto loaded = abbe::daemon::load_mtconnect_settings(config);
+      if (!loaded) return refuse(loaded.error());
+      settings = *loaded;
+    }
+    return run(settings);
+  } catch (const std::exception& e) {
+    log_line(fmt::format("internal error: {}", e.what()));
+    return kInternal;
+  }
+}

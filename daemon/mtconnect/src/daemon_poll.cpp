@@ -1,0 +1,67 @@
+#include "abbe/mtconnect/daemon_poll.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include "abbe/base/control_protocol.hpp"
+
+namespace abbe::mtconnect {
+namespace {
+
+using daemon::ErrorCode;
+
+// Longer than the hub's longest cycle under load, shorter than two heartbeats.
+constexpr std::chrono::seconds kTimeOut{2};
+
+DaemonPoll::Answer ask(const std::filesystem::path& socket) {
+  try {
+    return daemon::ask_daemon(socket, {{"do", "status"}}, kTimeOut);
+  } catch (const std::exception& error) {
+    return daemon::fail(ErrorCode::Io, std::string{"ask abbed: "} + error.what());
+  }
+}
+
+}  // namespace
+
+DaemonPoll::DaemonPoll(std::filesystem::path control_socket, std::chrono::milliseconds period)
+    : socket_(std::move(control_socket)),
+      period_(period),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      thread_([this] { run(); }) {}
+
+DaemonPoll::~DaemonPoll() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  stop_requested_.notify_one();
+  thread_.join();
+}
+
+std::optional<DaemonPoll::Answer> DaemonPoll::take() {
+  std::uint64_t count = 0;
+  (void)!::read(wake_.get(), &count, sizeof count);
+  const std::lock_guard lock(mutex_);
+  return std::exchange(answer_, std::nullopt);
+}
+
+void DaemonPoll::run() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    lock.unlock();
+    Answer answer = ask(socket_);
+    lock.lock();
+
+    answer_ = std::move(answer);
+    const std::uint64_t one = 1;
+    (void)!::write(wake_.get(), &one, sizeof one);
+    stop_requested_.wait_for(lock, period_, [this] { return stopping_; });
+  }
+}
+
+}  // namespace abbe::mtconnect

@@ -16,8 +16,6 @@ using test::ShdrClient;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 constexpr const char* kLine = "2024-05-17T08:30:00.123456Z|avail|AVAILABLE\n";
 constexpr auto kPatience = 20s;  // only a failure waits it out
@@ -47,6 +45,13 @@ class ShdrServerTest : public ::testing::Test {
     auto client = std::make_unique<ShdrClient>(server_->port());
     EXPECT_TRUE(client->connected());
     EXPECT_TRUE(eventually([&] { return client->read() && client->view().events.size() == 1; }));
+    return client;
+  }
+  /// A client that has begun its heartbeat.
+  std::unique_ptr<ShdrClient> agent() {
+    auto client = connected();
+    EXPECT_TRUE(client->send("* PING\n"));
+    EXPECT_TRUE(eventually([&] { return client->read() && !client->view().commands.empty(); }));
     return client;
   }
   /// The line of the log about the end of a client.
@@ -154,18 +159,27 @@ TEST_F(ShdrServerTest, DisconnectsAClientThatSendsALineWithoutEnd) {
   EXPECT_THAT(end_of(*client), HasSubstr("sends a line of more than"));
 }
 
-TEST_F(ShdrServerTest, RefusesMoreClientsThanItsLimit) {
+TEST_F(ShdrServerTest, RefusesMoreAgentsThanItsLimit) {
   listen({.clients = 2});
-  auto first = connected();
-  const auto second = connected();
+  auto first = agent();
+  const auto second = agent();
   ShdrClient third(server_->port());
   EXPECT_TRUE(eventually([&] { return !third.read(); }));
-  EXPECT_THAT(log_,
-              Contains(AllOf(HasSubstr(third.name()), HasSubstr("refused: 2 are connected"))));
+  EXPECT_THAT(log_, Contains(AllOf(HasSubstr(third.name()), HasSubstr("refused: 2 agents"))));
 
   first.reset();
   EXPECT_TRUE(eventually([&] { return server_->clients() == 1; }));
   (void)connected();
+}
+
+TEST_F(ShdrServerTest, ReplacesTheOldestClientThatIsNotAnAgent) {
+  listen({.clients = 3});
+  const auto first = agent();
+  const auto older = connected(), newer = connected();
+  const auto fourth = agent();
+  EXPECT_EQ(server_->clients(), 3u);
+  EXPECT_THAT(end_of(*older), HasSubstr("never sent a * PING"));
+  for (const auto* stays : {first.get(), newer.get(), fourth.get()}) EXPECT_EQ(end_of(*stays), "");
 }
 
 TEST_F(ShdrServerTest, ReportsAClientThatCloses) {

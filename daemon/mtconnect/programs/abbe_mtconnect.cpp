@@ -1,6 +1,6 @@
 // abbe-mtconnect: an MTConnect adapter. It asks abbed over the control socket and sends SHDR to
-// agents (cppagent). It is a separate process without privileges, so that no packet from the network
-// can stop abbed.
+// agents (cppagent). It is a separate process without privileges, so that no packet from the
+// network can stop abbed.
 #include <signal.h>
 
 #include <fmt/format.h>

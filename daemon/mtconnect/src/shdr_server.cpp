@@ -90,8 +90,8 @@ void ShdrServer::accept_some(Clock::time_point now) {
         accept_paused_until_ = now + kAcceptPause;
       return;
     }
-    if (clients_.size() >= options_.clients) {
-      log_(fmt::format("client {}: refused: {} are connected, the limit", accepted.peer,
+    if (clients_.size() >= options_.clients && !make_place()) {
+      log_(fmt::format("client {}: refused: {} agents are connected, the limit", accepted.peer,
                        options_.clients));
       continue;
     }
@@ -105,6 +105,15 @@ void ShdrServer::accept_some(Clock::time_point now) {
     flush(clients_.back(), now);
   }
   disconnect_faulty();
+}
+
+bool ShdrServer::make_place() {
+  const auto oldest = std::ranges::find(clients_, Clock::time_point{}, &Client::last_ping);
+  if (oldest == clients_.end()) return false;
+  oldest->fault =
+      fmt::format("{} are connected, the limit, and it never sent a * PING", options_.clients);
+  disconnect_faulty();
+  return true;
 }
 
 /// Reads at most one buffer, so that a client that sends much does not delay the others.

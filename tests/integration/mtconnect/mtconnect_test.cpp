@@ -21,10 +21,7 @@ using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::IsSupersetOf;
 using testing::Key;
-using testing::Not;
 
 class Mtconnect : public Spine {
  protected:
@@ -57,6 +54,14 @@ class Mtconnect : public Spine {
       const auto found = view.events.find(name);
       return found != view.events.end() && found->second == value;
     });
+  }
+  /// Waits for a value of the data item.
+  std::string value_of(const std::string& name) {
+    EXPECT_TRUE(agent_sees([&](const ShdrView& view) {
+      const auto found = view.events.find(name);
+      return found != view.events.end() && found->second != "UNAVAILABLE";
+    })) << name;
+    return agent_->view().events.at(name);
   }
   bool agent_sees_level(const std::string& condition, const std::string& level) {
     return agent_sees([&](const ShdrView& view) { return view.level(condition) == level; });
@@ -104,6 +109,27 @@ TEST_F(Mtconnect, ShowsADeviceThatFails) {
               HasSubstr(std::to_string(tracker_port_)));
 }
 
+TEST_F(Mtconnect, ShowsACalibrationUntilItsModelIsActive) {
+  write_path("path.csv", path());
+  start_simulator();
+  hold_simulator();
+  configure();
+  start_abbed();
+  ASSERT_NO_FATAL_FAILURE(start_adapter());
+  ASSERT_NO_FATAL_FAILURE(connect());
+  EXPECT_TRUE(agent_sees("process_state", "READY"));
+  EXPECT_EQ(agent_->view().events.at("process_id"), "UNAVAILABLE");
+  const auto calibration = calibrate("path.csv");
+  ASSERT_EQ(calibration.code, 0) << calibration.err;
+
+  EXPECT_TRUE(agent_sees("process_state", "COMPLETE"));
+  const auto model = status()["model"];
+  EXPECT_EQ(agent_->view().events.at("model_id"), model["id"]);
+  EXPECT_EQ(agent_->view().events.at("model_date"), model["created"]);
+  EXPECT_EQ(agent_->view().events.at("process_kind"), "otf");
+  EXPECT_GT(std::stod(value_of("u_volume")), 0.0);
+}
+
 TEST_F(Mtconnect, StatesTheActiveModelAndItsUncertainty) {
   configure();
   const auto document = activate_a_model();
@@ -116,9 +142,9 @@ TEST_F(Mtconnect, StatesTheActiveModelAndItsUncertainty) {
   EXPECT_TRUE(agent_sees("model_date", status()["model"]["created"]));
   // U(V) of the report has k = 2 and is in m; the data item has seven decimals of mm.
   const auto volume = calib::iso::volume_error(document.model).value();
-  EXPECT_NEAR(std::stod(agent_->view().events.at("u_volume")), volume.max_U_m / 2.0 * 1e3, 5e-8);
+  EXPECT_NEAR(std::stod(value_of("u_volume")), volume.max_U_m / 2.0 * 1e3, 5e-8);
   EXPECT_GT(volume.max_U_m, 0.0);
-  EXPECT_EQ(agent_->view().events.at("u_type"), "COMBINED");
+  EXPECT_EQ(value_of("u_type"), "COMBINED");
   EXPECT_THAT(agent_->view().conditions.at("calibration"), Contains(Key("MODEL_STALE")))
       << "no device has reported axis positions";
 }

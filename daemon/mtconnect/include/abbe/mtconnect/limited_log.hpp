@@ -19,8 +19,8 @@ class LimitedLog {
   static constexpr std::chrono::minutes kPeriod{1};
 
   explicit LimitedLog(Write write) : write_(std::move(write)) {}
-  /// Writes the line, or counts it. The first line of the next period states the number of lines that
-  /// were not written.
+  /// Writes the line, or counts it. Before the first line of the next period it writes the number
+  /// of lines that were not written.
   void line(std::string_view text, Clock::time_point now = Clock::now());
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
-/// What an MTConnect agent is told about abbe, derived from the answer of abbed to "status". The
-/// names of the data items are those of daemon/examples/mtconnect-devices.xml. Pure, thread-safe; allocates.
+/// What an MTConnect agent shows of abbe, derived from the answer of abbed to "status". The names
+/// of the data items are those of daemon/examples/mtconnect-devices.xml. Pure, thread-safe;
+/// allocates.
 
 #include <map>
 #include <nlohmann/json.hpp>
@@ -34,9 +35,9 @@ using Value =
 /// By name of the data item. Always all data items.
 using Observations = std::map<std::string, Value>;
 
-/// `status`: the answer to {"do": "status"}. Throws nlohmann::json::exception if a member is missing
-/// or has another type, and std::out_of_range for an unknown state of a calibration, as from another
-/// version of abbed.
+/// `status`: the answer to {"do": "status"}. Throws, if it is that of another version of abbed:
+/// nlohmann::json::exception if a member is missing or has another type, std::out_of_range for an
+/// unknown state of a calibration.
 [[nodiscard]] Observations observations_of(const nlohmann::json& status);
 
 /// abbed is away: everything is UNAVAILABLE.

@@ -15,7 +15,7 @@ namespace abbe::mtconnect {
 class ShdrFeed {
  public:
   /// The text of a condition that stays raised is sent at most once in this time: a device that is
-  /// away may report a new text with every attempt, and each would be an entry in the agent's buffer.
+  /// away may report a new text with every attempt, and each fills a place of the agent's buffer.
   static constexpr std::chrono::seconds kTextPeriod{10};
 
   /// Lines that tell a client what changed since the last call; empty: nothing. `now` dates them.

@@ -20,9 +20,11 @@ struct ShdrServerOptions {
   std::string address = "127.0.0.1";  ///< numeric
   std::uint16_t port = 7878;          ///< 0: any free port
   std::chrono::milliseconds heartbeat = std::chrono::seconds{10};
-  std::size_t clients = 16;  ///< a further client is refused
-  /// A client with more bytes waiting for it is disconnected, also one that has read nothing for two
-  /// heartbeats while bytes wait.
+  /// At the limit a further client replaces the oldest one that never sent "* PING", which is not
+  /// an agent; if there is none, the further client is refused.
+  std::size_t clients = 16;
+  /// A client with more bytes waiting for it is disconnected, also one that has read nothing for
+  /// two heartbeats while bytes wait.
   std::size_t unsent_bytes = 256u << 10;
   int socket_buffer_bytes = 64 << 10;  ///< of the kernel, for each client
   /// Bytes of a client in one second. An agent sends 7 in each heartbeat.
@@ -36,8 +38,8 @@ class ShdrServer {
   using Greeting = std::function<std::string()>;
   using Clock = std::chrono::steady_clock;
 
-  /// Usage for an address that is not numeric; Io if the address and port cannot be used, for example
-  /// because another process listens there.
+  /// Usage for an address that is not numeric; Io if the address and port cannot be used, for
+  /// example because another process listens there.
   [[nodiscard]] static daemon::Result<ShdrServer> listen(ShdrServerOptions options,
                                                          Greeting greeting, Log log);
 
@@ -65,6 +67,7 @@ class ShdrServer {
              std::uint16_t port);
 
   void accept_some(Clock::time_point now);
+  [[nodiscard]] bool make_place();
   void read(Client& client, Clock::time_point now);
   void answer_lines(Client& client, Clock::time_point now);
   void flush(Client& client, Clock::time_point now);

@@ -1,6 +1,6 @@
 #pragma once
-/// Texts of SHDR, the line format between an MTConnect adapter and an agent: fields separated by "|",
-/// the first one a time [cppagent, "SHDR 2.0"]. Pure, thread-safe; allocates.
+/// Texts of SHDR, the line format between an MTConnect adapter and an agent: fields separated by
+/// "|", the first one a time [cppagent, "SHDR 2.0"]. Pure, thread-safe; allocates.
 
 #include <cstddef>
 #include <string>
@@ -15,10 +15,11 @@ namespace abbe::mtconnect {
 inline constexpr std::size_t kLongestText = 1000;
 
 /// `text` as one field.
-/// - A line break or another control character becomes a space: SHDR cannot escape a line break, and
-///   XML, which the agent writes, cannot contain the others. A byte that is not UTF-8 becomes "?".
-/// - A text with "|", or with a quotation mark at its beginning, is enclosed in quotation marks, with
-///   a backslash before "|", quotation marks and backslashes.
+/// - A line break or another control character becomes a space: SHDR cannot escape a line break,
+///   and XML, which the agent writes, cannot contain the others. A byte that is not UTF-8 becomes
+///   "?".
+/// - A text with "|", or with a quotation mark at its beginning, is enclosed in quotation marks,
+///   with a backslash before "|", quotation marks and backslashes.
 [[nodiscard]] std::string shdr_field(std::string_view text);
 
 /// A native code. The agent takes a part behind ":" for the condition's id, so ":" becomes "_".

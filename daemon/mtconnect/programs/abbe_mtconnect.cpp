@@ -141,6 +141,28 @@ int run(const MtconnectSettings& settings) {
   return kDone;
 }
 
+struct Options {
+  MtconnectSettings settings;
+  std::string config;
+};
+
+void add_options(CLI::App& app, Options& out) {
+  auto* const socket =
+      app.add_option("--socket", out.settings.control_socket, "control socket of abbed")
+          ->capture_default_str();
+  auto* const address =
+      app.add_option("--address", out.settings.mtconnect.address,
+                     "numeric address to listen on; 0.0.0.0: every network, without a password")
+          ->capture_default_str();
+  auto* const port = app.add_option("--port", out.settings.mtconnect.port, "0: any free port")
+                         ->capture_default_str();
+  app.add_option("-c,--config", out.config,
+                 "take socket, address, port and heartbeat from this abbed.toml")
+      ->excludes(socket)
+      ->excludes(address)
+      ->excludes(port);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -149,22 +171,8 @@ int main(int argc, char** argv) {
       "agents."};
   app.footer(footer());
   app.set_version_flag("--version", "abbe-mtconnect " ABBE_VERSION);
-  MtconnectSettings settings;
-  std::string config;
-  auto* const socket =
-      app.add_option("--socket", settings.control_socket, "control socket of abbed")
-          ->capture_default_str();
-  auto* const address =
-      app.add_option("--address", settings.mtconnect.address,
-                     "numeric address to listen on; 0.0.0.0: every network, without a password")
-          ->capture_default_str();
-  auto* const port =
-      app.add_option("--port", settings.mtconnect.port, "0: any free port")->capture_default_str();
-  app.add_option("-c,--config", config,
-                 "take socket, address, port and heartbeat from this abbed.toml")
-      ->excludes(socket)
-      ->excludes(address)
-      ->excludes(port);
+  Options options;
+  add_options(app, options);
 
   try {
     app.parse(argc, argv);
@@ -173,12 +181,9 @@ int main(int argc, char** argv) {
   }
 
   try {
-    if (!config.empty()) {
-      auto loaded = abbe::daemon::load_mtconnect_settings(config);
-      if (!loaded) return refuse(loaded.error());
-      settings = *loaded;
-    }
-    return run(settings);
+    if (options.config.empty()) return run(options.settings);
+    const auto settings = abbe::daemon::load_mtconnect_settings(options.config);
+    return settings ? run(*settings) : refuse(settings.error());
   } catch (const std::exception& e) {
     log_line(fmt::format("internal error: {}", e.what()));
     return kInternal;

@@ -110,6 +110,7 @@ struct Abbed::State {
   std::optional<DeviceSet> devices;
   std::optional<TouchService> touching;
   std::optional<TrackerService> tracker;
+  std::optional<StoreChanges> store_changes;
   std::optional<Hub> hub;
   WallTime running_since;
   std::promise<void> hub_may_run;  // broken if the start of abbed failed
@@ -282,6 +283,7 @@ struct Abbed::State {
     verification.emplace(config);
     touching.emplace(*devices, devices->moves());
     tracker.emplace(*devices, devices->longest_tracker_order());
+    store_changes.emplace(config.daemon.models_dir());
     hub.emplace(HubParts{.config = config,
                          .time = time,
                          .devices = *devices,
@@ -292,7 +294,8 @@ struct Abbed::State {
                          .reference = &*reference,
                          .touching = &*touching,
                          .verification = &*verification,
-                         .tracker = &*tracker});
+                         .tracker = &*tracker,
+                         .store_changes = &*store_changes});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 

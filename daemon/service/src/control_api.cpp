@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -14,9 +16,9 @@
 
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/config/linear_axes.hpp"
+#include "abbe/service/store_changes.hpp"
 #include "motion_requests.hpp"
 #include "status_reply.hpp"
-#include "store_requests.hpp"
 #include "tracker_requests.hpp"
 
 namespace abbe::daemon {
@@ -124,17 +126,49 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
   };
 }
 
+/// Long enough for a store whose lock is free, and short enough for a stop that waits behind it.
+constexpr std::chrono::milliseconds kStorePatience{50};
+
+/// {"id": of the active model} if the change is done; {"change": number} while it runs.
+Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number) {
+  if (!number) return tl::unexpected(number.error());
+  const auto outcome = changes.outcome(*number, kStorePatience);
+  json answer{{"ok", true}, {"change", *number}};
+  if (outcome) {
+    if (!*outcome) return tl::unexpected(outcome->error());
+    answer["id"] = **outcome;
+  }
+  return [answer](const Hub&) { return reply(answer); };
+}
+
+Result<StoreChanges*> changes_of(const HubParts& parts) {
+  if (parts.store_changes != nullptr) return parts.store_changes;
+  return fail(ErrorCode::Refused, "this daemon changes no models");
+}
+
 Result<OnHub> activate(const HubParts& parts, const json& request) {
-  return activate_model(parts.config.daemon.models_dir(),
-                        {.id = request.at("id").get<std::string>(),
-                         .who = who(request),
-                         .why = remark_of(request.value("why", std::string{}), kLongestReason),
-                         .force = request.value("force", false)});
+  const auto changes = changes_of(parts);
+  if (!changes) return tl::unexpected(changes.error());
+  return answer_change(
+      **changes,
+      (*changes)->activate({.id = request.at("id").get<std::string>(),
+                            .who = who(request),
+                            .why = remark_of(request.value("why", std::string{}), kLongestReason),
+                            .force = request.value("force", false)}));
 }
 
 Result<OnHub> rollback(const HubParts& parts, const json& request) {
-  return roll_back_model(parts.config.daemon.models_dir(), who(request),
-                         remark_of(request.value("why", std::string{}), kLongestReason));
+  const auto changes = changes_of(parts);
+  if (!changes) return tl::unexpected(changes.error());
+  return answer_change(
+      **changes, (*changes)->roll_back(who(request), remark_of(request.value("why", std::string{}),
+                                                               kLongestReason)));
+}
+
+Result<OnHub> change(const HubParts& parts, const json& request) {
+  const auto changes = changes_of(parts);
+  if (!changes) return tl::unexpected(changes.error());
+  return answer_change(**changes, request.at("number").get<std::uint64_t>());
 }
 
 Result<OnHub> cancel(const HubParts&, const json& request) {
@@ -274,6 +308,7 @@ constexpr std::array kVerbs{
     Verb{"reference", "", Role::Change, reference},
     Verb{"activate", "", Role::Change, activate},
     Verb{"rollback", "", Role::Change, rollback},
+    Verb{"change", "", Role::Look, change},
     Verb{"verification", "", Role::Look, verification},
     Verb{"touch", "cancel", Role::Look, cancel_touching},  // the role Look is enough for a stop
     Verb{"touch", "where", Role::Look, where_it_stands},

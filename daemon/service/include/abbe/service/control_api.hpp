@@ -11,6 +11,7 @@
 ///     {"do": "cancel", "who": REMARK}
 ///     {"do": "activate", "id": ID, "why": TEXT, "force": false, "who": REMARK}
 ///     {"do": "rollback", "why": TEXT, "who": REMARK}
+///     {"do": "change", "number": NUMBER}
 ///     {"do": "touch", "where": true}
 ///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z],
 ///                                 "normal": [i, j, k]}, ...],
@@ -32,9 +33,10 @@
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
 /// "status" alone; "calibration" the "request" of the present or last session. "activate" and
-/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. The calling thread reads the request and writes
-/// the answer. Hub::call() runs the part that needs the hub's thread; the duration of this part
-/// does not depend on the size of the request.
+/// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They return
+/// the "change" and, if it is done, the "id" of the active model; until then ask with "change". The
+/// calling thread reads the request and writes the answer. Hub::call() runs the part that needs the
+/// hub's thread; the duration of this part does not depend on the size of the request.
 
 #include <chrono>
 #include <nlohmann/json.hpp>

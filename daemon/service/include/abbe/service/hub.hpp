@@ -30,6 +30,7 @@
 #include "abbe/service/calibration_service.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
+#include "abbe/service/store_changes.hpp"
 #include "abbe/service/touch_service.hpp"
 #include "abbe/service/tracker_service.hpp"
 #include "abbe/service/verification_service.hpp"
@@ -50,6 +51,7 @@ struct HubParts {
   TouchService* touching = nullptr;
   VerificationService* verification = nullptr;
   TrackerService* tracker = nullptr;
+  StoreChanges* store_changes = nullptr;
 };
 
 class Hub : private PipelineObserver {

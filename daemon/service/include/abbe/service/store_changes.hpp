@@ -1,0 +1,53 @@
+#pragma once
+/// Changes which model of the store is active, for clients that may not write to the store. A change
+/// runs on an ordinary thread, because the store's lock may be held by another process: a request,
+/// for example a stop, must not wait for it. One change at a time. Thread-safe.
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "abbe/base/error.hpp"
+#include "abbe/model/model_store.hpp"
+
+namespace abbe::daemon {
+
+struct Activation {
+  std::string id;        ///< or a beginning of it that no other model has
+  std::string who, why;  ///< kept in the store
+  bool force = false;    ///< also a model that the gate refused; needs `why`
+};
+
+class StoreChanges {
+ public:
+  explicit StoreChanges(std::filesystem::path store) : store_(std::move(store)) {}
+
+  /// Begins a change and returns its number. Usage for a forced activation without reason; Refused
+  /// while another change runs.
+  [[nodiscard]] Result<std::uint64_t> activate(Activation asked);
+  /// The same for the model that was active before.
+  [[nodiscard]] Result<std::uint64_t> roll_back(std::string who, std::string why);
+
+  /// Waits at most `patience` for the change. The id of the model that is active then, or the Error
+  /// of the store; nullopt while the change runs. Usage for another number than the last one.
+  [[nodiscard]] std::optional<Result<std::string>> outcome(std::uint64_t number,
+                                                           std::chrono::milliseconds patience);
+
+ private:
+  using Change = std::function<Result<std::string>(ModelStore&)>;
+  [[nodiscard]] Result<std::uint64_t> begin(Change change);
+
+  std::filesystem::path store_;
+  std::mutex mutex_;  // of the members below
+  std::uint64_t number_ = 0;
+  std::future<Result<std::string>> running_;
+  std::optional<Result<std::string>> done_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,74 @@
+#include "abbe/service/store_changes.hpp"
+
+#include <fmt/format.h>
+
+#include "abbe/service/background_tasks.hpp"
+#include "outcome.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+/// For the lock of the store, after which the outcome names its holder.
+constexpr std::chrono::seconds kLockPatience{5};
+
+StoreActor store_actor(std::string who, std::string why) {
+  return {std::move(who), std::move(why),
+          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+}
+
+}  // namespace
+
+Result<std::uint64_t> StoreChanges::activate(Activation asked) {
+  if (asked.force && asked.why.empty())
+    return fail(ErrorCode::Usage,
+                "activate: \"force\" needs \"why\": a forced activation is recorded with its "
+                "reason");
+  return begin([asked = std::move(asked)](ModelStore& store) -> Result<std::string> {
+    auto id = store.find(asked.id);
+    if (!id) return id;
+    const auto done = store.activate(*id, store_actor(asked.who, asked.why), asked.force);
+    if (!done) return tl::unexpected(done.error());
+    return id;
+  });
+}
+
+Result<std::uint64_t> StoreChanges::roll_back(std::string who, std::string why) {
+  return begin([who = std::move(who), why = std::move(why)](ModelStore& store) {
+    return store.rollback(store_actor(who, why));
+  });
+}
+
+Result<std::uint64_t> StoreChanges::begin(Change change) {
+  const std::lock_guard lock(mutex_);
+  if (running_.valid() && running_.wait_for(std::chrono::seconds{0}) != std::future_status::ready)
+    return fail(ErrorCode::Refused,
+                fmt::format("change {} of the model store is not done yet: try again in some "
+                            "seconds",
+                            number_));
+
+  running_ = run_abandonable(
+      [folder = store_, change = std::move(change)]() -> Result<std::string> {
+        auto store = ModelStore::open(folder);
+        if (!store) return tl::unexpected(store.error());
+        store->set_lock_timeout(kLockPatience);
+        return change(*store);
+      });
+  done_.reset();
+  return ++number_;
+}
+
+std::optional<Result<std::string>> StoreChanges::outcome(std::uint64_t number,
+                                                         std::chrono::milliseconds patience) {
+  const std::lock_guard lock(mutex_);
+  if (number == 0 || number != number_)
+    return fail(ErrorCode::Usage, fmt::format("change {} of the model store is not known; the "
+                                              "last one is {}",
+                                              number, number_));
+  if (running_.valid()) {
+    if (running_.wait_for(patience) != std::future_status::ready) return std::nullopt;
+    done_ = outcome_of(running_);
+  }
+  return done_;
+}
+
+}  // namespace abbe::daemon

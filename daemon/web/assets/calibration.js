@@ -46,6 +46,14 @@ function sessionParts(session) {
   ].filter((part) => part !== null);
 }
 
+/** The first three axes in mm; null while one of them is not known. */
+function place_mm(positions_m) {
+  const known = (positions_m ?? []).slice(0, 3).filter((x) => typeof x === "number");
+  return known.length === 3 ? known.map((x) => 1e3 * x) : null;
+}
+
+const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+
 function corners(points) {
   const of = (pick) => [0, 1, 2].map((i) => pick(...points.map((p) => p[i])));
   return [of(Math.min), of(Math.max)];
@@ -60,8 +68,8 @@ async function pathView(place, path_mm, driven_mm) {
   const redraw = () => {
     space.remove(line);
     if (driven.length > 1) line = space.path(driven, 0xe69f00);
-    const at = (state.live ?? []).slice(0, 3).map((x) => 1e3 * x);
-    if (at.length === 3 && !at.some(Number.isNaN)) {
+    const at = place_mm(state.live);
+    if (at) {
       ball ??= space.ball(at, 0.012 * space.size, 0x2fd3a0);
       ball.position.set(...at);
     }
@@ -69,12 +77,13 @@ async function pathView(place, path_mm, driven_mm) {
   };
   redraw();
   const least = space.size / 500;
+  let shown = null;
   const stop = listen("live", (positions_m) => {
-    if (state.status?.session.state !== "acquiring" || positions_m.some((x) => x === null)) return;
-    const at = positions_m.slice(0, 3).map((x) => 1e3 * x);
+    const at = place_mm(positions_m);
+    if (!at || (shown && distance(at, shown) < least)) return;
+    shown = at;
     const last = driven.at(-1);
-    if (last && Math.hypot(...at.map((x, i) => x - last[i])) < least) return;
-    driven.push(at);
+    if (state.status?.session.state === "acquiring" && !(last && distance(at, last) < least)) driven.push(at);
     redraw();
   });
   return () => { stop(); space.end(); };
@@ -228,17 +237,18 @@ export async function show(place) {
   const parts = h("div"), view = h("div");
   place.append(h("h2", {}, "Session"), parts, view, controls());
   const onStatus = (status) => {
-    if (!parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
+    if (status && !parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
   };
   if (state.status) onStatus(state.status);
 
-  let endDrawing = () => {}, ended = false;
+  let endDrawing = () => {}, ended = false, drawings = 0;
   const redraw = async () => {
     endDrawing();
     endDrawing = () => {};
+    const number = ++drawings;
     try {
       const end = await drawing(view);
-      if (ended) end();
+      if (ended || number !== drawings) end();
       else endDrawing = end;
     } catch (error) {
       view.replaceChildren(h("p", { class: "warn" }, error.message));

@@ -14,7 +14,7 @@ async function change(path, body, done, again) {
   } catch (error) {
     message(error.message);
   }
-  await again();
+  await again().catch((error) => message(error.message));
 }
 
 function activate(model, again) {
@@ -44,7 +44,7 @@ function modelTable(models, again) {
     m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), when(m.added), m.method,
     m.machine, verdict(m),
     mayActivate() && !m.active && !m.fault
-      ? h("button", { type: "button", onclick: () => activate(m, again) }, "Activate") : ""]));
+      ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, again) }, "Activate") : ""]));
 }
 
 function eventTable(events) {
@@ -91,8 +91,14 @@ export async function show(place) {
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
       h("h2", {}, "Events"), eventTable(events));
   };
+  let endTrend = () => {};
+  const fillTrend = async () => {
+    endTrend();
+    trends.replaceChildren();
+    endTrend = await trend(trends);
+  };
   await fill();
-  const endTrend = await trend(trends);
-  const stop = listen("store", () => fill().catch((error) => message(error.message)));
+  await fillTrend();
+  const stop = listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));
   return () => { stop(); endTrend(); };
 }

@@ -68,6 +68,7 @@ export function show(place) {
   let axesShown = "", pending = false;
 
   const onStatus = (status) => {
+    if (!status) return;
     const names = JSON.stringify(status.axes);
     if (names !== axesShown) {
       axesShown = names;
@@ -86,7 +87,7 @@ export function show(place) {
     pending = true;
     requestAnimationFrame(() => {
       pending = false;
-      showPositions(state.live);
+      showPositions(state.lost ? null : state.live);
     });
   };
 

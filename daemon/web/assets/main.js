@@ -1,7 +1,7 @@
 // The frame of the page: views by the part of the address behind "#", states, log in.
 
 import { h } from "./dom.js";
-import { connect, get, listen, post, state } from "./server.js";
+import { connect, disconnect, get, listen, post, state } from "./server.js";
 
 const views = {
   live: () => import("./live.js"),
@@ -27,11 +27,17 @@ async function show() {
     else link.removeAttribute("aria-current");
   }
   try {
-    const view = await load();
+    let view = null, fault = null;
+    try {
+      view = await load();
+    } catch (error) {
+      fault = error;
+    }
     if (number !== shown) return;
     leave();
     leave = () => {};
     find("view").replaceChildren(place);
+    if (fault) throw fault;
     document.title = `abbe: ${name}`;
     if (!state.me.may_view) {
       place.append(h("p", {}, "Log in to see this page."));
@@ -57,6 +63,7 @@ listen("lost", (reason) => {
 });
 
 listen("status", (status) => {
+  if (!status) return;
   find("machine").textContent = status.machine;
   const model = status.model;
   const good = model.state === "ACTIVE" ? "good" : model.state === "INVALID" ? "bad" : "warn";
@@ -77,6 +84,7 @@ async function changeUser(me) {
   state.me = me;
   showUser();
   if (me.may_view) connect();
+  else disconnect();
   await show();
 }
 
@@ -87,7 +95,7 @@ find("log-in").addEventListener("click", async () => {
     return;
   }
   await post("api/logout").catch(() => {});
-  await changeUser(await get("api/me"));
+  await get("api/me").then(changeUser, (error) => message(error.message));
 });
 find("log-in-cancel").addEventListener("click", () => find("log-in-dialog").close());
 find("log-in-form").addEventListener("submit", async (event) => {
@@ -117,5 +125,7 @@ find("skip").addEventListener("click", (event) => {
   event.preventDefault();
   find("view").focus();
 });
+// The session has ended, or its role has changed.
+listen("logged out", () => get("api/me").then(changeUser, () => {}));
 addEventListener("hashchange", show);
 get("api/me").then(changeUser, (error) => message(error.message));

@@ -2,17 +2,18 @@
 
 import { draw } from "./charts.js";
 import { facts, fixed, h, list, table, when } from "./dom.js";
-import { get } from "./server.js";
+import { get, listen } from "./server.js";
 import { Space } from "./space.js";
 
 const kLongest = 0.12;  // of the diagonal of the box: the longest vector of the field
 
+/** `number` of the residuals: lengths, so that their mean is not near 0. */
 function residuals(model) {
   const row = (what, f) => [h("th", { scope: "row" }, what), fixed(f.mean_um, 3), fixed(f.rms_um, 3), fixed(f.max_um, 3)];
   const r = model.residuals;
   const number = (title) => ({ title, number: true });
   const parts = [h("h2", {}, "Before and after"),
-    table("residuals of the fit", ["residuals of the fit, um", number("mean"), number("rms"), number("largest")],
+    table("residuals of the fit", ["residuals of the fit, um", number("mean length"), number("rms"), number("largest")],
       [row("before", r.before), row("after", r.after)])];
   if (r.held_out?.before_um > 0)
     parts.push(h("p", {}, `Held-out ${r.held_out.what}, not used in the fit: ` +
@@ -122,15 +123,21 @@ async function fieldView(place, field) {
 
 /** Options for the models of the store; the one that is shown is chosen. */
 async function chooser(id) {
-  const { models } = await get("api/history");
+  const models = (await get("api/history")).models.filter((m) => !m.fault);
   if (models.length === 0) return null;
   const active = models.find((m) => m.active);
   const shown = id === "active" ? (active ?? models[0]).id : id;
-  const select = h("select", { id: "model-choice" }, models.filter((m) => !m.fault).map((m) =>
+  const select = h("select", { id: "model-choice" }, models.map((m) =>
     h("option", { value: m.id, selected: m.id === shown },
       `${m.id}, ${when(m.added)}, ${m.active ? "active" : m.accepted ? "accepted" : "refused"}`)));
   select.addEventListener("change", () => { location.hash = `model/${select.value}`; });
-  return { select, shown };
+  const state = (m) => m && `${m.id}${m.active}${m.accepted}`;
+  const changed = async () => {
+    const { models: now } = await get("api/history");
+    return state(now.find((m) => m.id === shown)) !== state(models.find((m) => m.id === shown)) ||
+      (id === "active" && now.find((m) => m.active)?.id !== active?.id);
+  };
+  return { select, shown, changed, noneActive: id === "active" && !active };
 }
 
 function origin(model) {
@@ -150,7 +157,9 @@ export async function show(place) {
     return () => {};
   }
   const model = await get(`api/models/${choice.shown}`);
-  place.append(
+  const notice = h("p", { class: "warn", role: "status" },
+    choice.noneActive ? "No model is active; the newest one is shown." : "");
+  place.append(notice,
     h("div", { class: "tools" }, h("label", { for: "model-choice" }, "Model"), choice.select,
       h("a", { href: `reports/${choice.shown}`, target: "_blank" }, "Report to print"),
       h("a", { href: `models/${choice.shown}`, download: "model.json" }, "model.json")),
@@ -160,7 +169,10 @@ export async function show(place) {
   place.append(space, h("h2", {}, "Error motions"), motions, unknowns(model),
     h("h2", {}, "Values of the standards"), ...values(model));
 
-  const ends = [await motionView(motions, model)];
+  const ends = [listen("store", async () => {
+    if (await choice.changed().catch(() => false))
+      notice.textContent = "The models have changed since this view was opened: open it again.";
+  }), await motionView(motions, model)];
   try {
     ends.push(await fieldView(space, model.field));
   } catch (error) {

@@ -50,7 +50,7 @@ export async function show(place) {
       recordings.map((r) => [
         h("a", { href: `recordings/${encodeURIComponent(r.name)}`, download: r.name }, r.name),
         bytes(r.bytes), when(r.modified), r.finished ? "finished" : "being written",
-        mayReplay() ? h("button", { type: "button", onclick: () => begin(r.name) }, "Replay") : ""])));
+        mayReplay() ? h("button", { type: "button", "aria-label": `Replay ${r.name}`, onclick: () => begin(r.name) }, "Replay") : ""])));
   };
   await fill();
   await follow();

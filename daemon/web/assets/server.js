@@ -12,7 +12,7 @@ export function listen(topic, listener) {
   return () => listeners.get(topic).delete(listener);
 }
 
-function tell(topic, value) {
+function notify(topic, value) {
   for (const listener of listeners.get(topic) ?? []) listener(value);
 }
 
@@ -36,6 +36,7 @@ async function read(response) {
   } catch {
     throw new Error(`${response.status} ${response.statusText}`);
   }
+  if (response.status === 401 && state.me.user) notify("logged out", null);
   if (!response.ok) throw new Error(answer.error ?? response.statusText);
   return answer;
 }
@@ -46,7 +47,7 @@ let events = null;
 let lastEvent = 0;
 let sourceFault = "";
 
-function heard() {
+function onEvent() {
   lastEvent = performance.now();
   report(sourceFault === "" ? null : `abbed does not answer: ${sourceFault}`);
 }
@@ -54,16 +55,31 @@ function heard() {
 function report(lost) {
   if (lost === state.lost) return;
   state.lost = lost;
-  tell("lost", lost);
+  notify("lost", lost);
 }
 
 function on(name, take) {
   events.addEventListener(name, (event) => {
     const value = JSON.parse(event.data);
     take(value);
-    heard();
-    tell(name, value);
+    onEvent();
+    notify(name, value);
   });
+}
+
+/** Ends the stream: nothing may be shown before a log in. */
+export function disconnect() {
+  events?.close();
+  events = null;
+  state.status = state.live = null;
+  report(null);
+}
+
+/** The reason why the server gives no stream. */
+async function explainRefusal() {
+  const answer = await fetch("events").catch(() => null);
+  if (answer?.ok === false) report((await answer.json().catch(() => ({}))).error ?? answer.statusText);
+  await answer?.body?.cancel();
 }
 
 /** Opens the stream; called again, it opens a new one. */
@@ -71,14 +87,19 @@ export function connect() {
   events?.close();
   events = new EventSource("events");
   lastEvent = performance.now();
-  on("source", (source) => { sourceFault = source.alive ? "" : source.reason; });
+  on("source", (source) => {
+    sourceFault = source.alive ? "" : source.reason;
+    if (!source.alive) state.status = state.live = null;
+  });
   on("status", (status) => { state.status = status; });
   on("live", (positions) => { state.live = positions; });
   for (const name of ["alive", "calibration", "store"]) on(name, () => {});
   events.addEventListener("error", () => {
     report("no connection to abbe-web: the values are not current");
     // After an answer that is not a stream (too many pages) the browser does not try again.
-    if (events.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
+    if (events?.readyState !== EventSource.CLOSED) return;
+    explainRefusal();
+    setTimeout(() => { if (events) connect(); }, 2000);
   });
 }
 

@@ -82,7 +82,7 @@ export class Space {
   }
 
   /** A text that always faces the viewer. */
-  text(words, at, colour = "#8fa1b3") {
+  text(words, at, colour = isDark() ? "#8fa1b3" : "#4d5761") {
     const canvas = h("canvas", { width: 256, height: 64 });
     const pen = canvas.getContext("2d");
     pen.font = "48px sans-serif";

@@ -27,6 +27,8 @@ using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 using abbe::daemon::ExitCode;
 
+using SystemTime = std::chrono::system_clock::time_point;
+
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kInternal = number(ExitCode::Internal);
 constexpr int kNice = 10;  ///< below abbed, which must not wait for a page
@@ -90,30 +92,35 @@ std::filesystem::path abbe_program() {
   return !error && std::filesystem::exists(beside, error) ? beside : "abbe";
 }
 
-/// Reports a certificate that has expired, or will soon, while the page runs.
-void report_certificate(const std::filesystem::path& file) {
-  using std::chrono::system_clock;
-  const auto now = system_clock::now();
-  if (const auto valid = abbe::web::check_certificate(file, now); !valid)
-    return log_line(valid.error().text);
-  const auto dates = abbe::web::read_certificate(file);
-  if (!dates || dates->until - now > kCertificateNotice) return;
-  const auto days = std::chrono::duration_cast<std::chrono::days>(dates->until - now).count();
-  log_line(fmt::format("certificate {} expires in {} days", file.string(), days));
+/// Reports when the certificate that the page uses expires or has expired: it was read at the start.
+void report_certificate(const std::filesystem::path& file, SystemTime until) {
+  const auto left = until - SystemTime::clock::now();
+  if (left > kCertificateNotice) return;
+  const auto hours = std::chrono::duration_cast<std::chrono::hours>(left).count();
+  log_line(hours < 0
+               ? fmt::format("certificate {} has expired: replace it and restart abbe-web",
+                             file.string())
+               : fmt::format("certificate {} expires in {} h: replace it and restart abbe-web",
+                             file.string(), hours));
 }
 
-/// Until SIGTERM or SIGINT. Feeds the watchdog of systemd.
-void wait_for_stop(const sigset_t& stop, const std::filesystem::path& certificate) {
+/// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd.
+int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page,
+                   const std::filesystem::path& certificate, SystemTime certificate_until) {
   using Clock = std::chrono::steady_clock;
   const auto feed_period = abbe::daemon::watchdog_period();
   const timespec period{.tv_sec = 1, .tv_nsec = 0};
   auto next_check = Clock::now();
   for (;;) {
-    if (sigtimedwait(&stop, nullptr, &period) > 0) return;
+    if (sigtimedwait(&stop, nullptr, &period) > 0) return kDone;
+    if (!page.serving()) {
+      log_line("the server has stopped accepting connections");
+      return number(ExitCode::Io);
+    }
     if (feed_period) abbe::daemon::notify_alive();
     if (certificate.empty() || Clock::now() < next_check) continue;
     next_check = Clock::now() + kCertificatePeriod;
-    report_certificate(certificate);
+    report_certificate(certificate, certificate_until);
   }
 }
 
@@ -133,6 +140,9 @@ int serve(const std::string& file) {
   sigaddset(&stop, SIGTERM);
   sigaddset(&stop, SIGINT);
   pthread_sigmask(SIG_BLOCK, &stop, nullptr);
+  SystemTime certificate_until{};
+  if (const auto dates = abbe::web::read_certificate(web.certificate); web.tls() && dates)
+    certificate_until = dates->until;
   auto page = abbe::web::PageServer::start({.settings = std::move(*settings),
                                             .config_file = file,
                                             .abbe_program = abbe_program(),
@@ -143,11 +153,11 @@ int serve(const std::string& file) {
   log_line(fmt::format("serving http{}://{}{}{}:{}/", web.tls() ? "s" : "", v6 ? "[" : "",
                        web.address, v6 ? "]" : "", (*page)->port()));
   abbe::daemon::notify_ready("serving");
-  wait_for_stop(stop, web.certificate);
+  const int code = run_until_stop(stop, **page, web.certificate, certificate_until);
   abbe::daemon::notify_stopping();
   page->reset();
   log_line("stopped");
-  return kDone;
+  return code;
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ using daemon::kMmPerM;
 using nlohmann::json;
 
 constexpr std::chrono::milliseconds kStatusPeriod{500}, kFilesPeriod{1000}, kIdlePeriod{500};
-constexpr std::chrono::milliseconds kAnswerTimeOut{2000};
+constexpr std::chrono::milliseconds kAnswerTimeOut{4000};  // more than the 3 s of abbed
 constexpr double kFirstStep_m = 1e-3;  ///< shortest distance of two points of the driven path
 
 /// One line; invalid UTF-8, which devices may have sent, is replaced.
@@ -102,22 +102,24 @@ void DaemonFeed::ask_status() {
   {
     const std::lock_guard lock(mutex_);
     status_ = std::move(*answer);
-    if (id == path_.session) return;
-    path_ = {.session = id, .points_m = {}};
+    if (id == path_.session && request_known_) return;
+    if (id != path_.session) path_ = {.session = id, .points_m = {}};
     least_step_m_ = kFirstStep_m;
     request_ = nullptr;
   }
-  ask_request(id);
+  request_known_ = ask_request(id);
 }
 
-void DaemonFeed::ask_request(std::uint64_t session) {
+/// False if abbed does not answer.
+bool DaemonFeed::ask_request(std::uint64_t session) {
   auto answer = connection_.ask({{"do", "calibration"}}, kAnswerTimeOut);
-  if (!answer) return;
+  if (!answer) return false;
   {
     const std::lock_guard lock(mutex_);
     request_ = answer->value("request", json{});
   }
   board_.post(Topic::Calibration, event_text({{"session", session}}));
+  return true;
 }
 
 void DaemonFeed::ask_positions() {
@@ -170,6 +172,8 @@ void DaemonFeed::report_source(std::string reason) {
   board_.post(Topic::Source,
               event_text({{"alive", source_fault_.empty()}, {"reason", source_fault_}}));
   if (source_fault_.empty()) return;
+  board_.post(Topic::Live, "null");
+  board_.post(Topic::Status, "null");
   const std::lock_guard lock(mutex_);
   status_ = nullptr;
 }

@@ -36,4 +36,8 @@ void LimitedReport::line(const std::string& subject, const std::string& text) {
   sink_(printable(text) + more);
 }
 
+void LimitedReport::always(const std::string& text) {
+  sink_(printable(text));
+}
+
 }  // namespace abbe::web

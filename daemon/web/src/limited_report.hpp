@@ -18,6 +18,8 @@ class LimitedReport {
   explicit LimitedReport(std::function<void(const std::string&)> sink) : sink_(std::move(sink)) {}
   /// `subject` is an address or a kind of event; lines of one subject are counted together.
   void line(const std::string& subject, const std::string& text);
+  /// A line that is never left out.
+  void always(const std::string& text);
 
  private:
   using Clock = std::chrono::steady_clock;

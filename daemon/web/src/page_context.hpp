@@ -2,6 +2,7 @@
 /// What the routes of the server share.
 
 #include <atomic>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -34,19 +35,24 @@ struct PageContext {
   Sessions sessions;
   Replays replays;
   std::atomic<std::size_t> pages{0}, downloads{0};
-  DaemonFeed feed;  // last: its thread uses the members above
+  std::atomic<int> port{0};
+  std::mutex changing;  // one change of a user at a time reaches abbed
+  DaemonFeed feed;      // last: its thread uses the members above
 };
 
+/// Cookies are of a computer, not of a port: the name has the port, for two pages on one computer.
+[[nodiscard]] std::string cookie_name(const PageContext& context);
 /// "127.0.0.1:43210"
 [[nodiscard]] std::string peer_of(const httplib::Request& request);
 /// The session of the cookie; nullopt: not logged in.
 [[nodiscard]] std::optional<WebSession> session_of(PageContext& context,
-                                                   const httplib::Request& request);
+                                                   const httplib::Request& request,
+                                                   SessionUse use = SessionUse::Request);
 
 /// Answers GET and HEAD.
 void answer_get(PageContext& context, const httplib::Request& request, httplib::Response& response);
 /// Answers POST: log in, log out, and changes.
-void answer_post(PageContext& context, const httplib::Request& request,
+void answer_post(PageContext& context, const httplib::Request& request, const std::string& body,
                  httplib::Response& response);
 /// The stream of events of one page.
 void answer_events(PageContext& context, const httplib::Request& request,

@@ -17,12 +17,24 @@ constexpr std::chrono::milliseconds kHeartbeat{1000};
 /// The stream of one page.
 struct Stream {
   EventBoard::Reader reader;
+  httplib::Request request;  ///< with the cookie
   Clock::time_point sent = Clock::now();
+  Clock::time_point checked = Clock::now();
 };
+
+/// False once the session of the page has ended. The stream is no use of the session: a page that
+/// nobody uses is logged out.
+bool may_go_on(PageContext& context, Stream& stream) {
+  const auto now = Clock::now();
+  if (context.options.settings.web.view_without_login || now - stream.checked < kHeartbeat)
+    return true;
+  stream.checked = now;
+  return session_of(context, stream.request, SessionUse::Look).has_value();
+}
 
 bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) {
   auto text = stream.reader.next(context.board, kHeartbeat);
-  if (!text) {
+  if (!text || !may_go_on(context, stream)) {
     sink.done();
     return true;
   }
@@ -47,17 +59,19 @@ void answer_events(PageContext& context, const httplib::Request& request,
   }
 
   const auto stream = std::make_shared<Stream>();
+  stream->request.headers = request.headers;
   response.set_chunked_content_provider(
       "text/event-stream",
       [&context, stream](std::size_t, httplib::DataSink& sink) {
         return send_events(context, *stream, sink);
       },
-      [&context, stream, peer](bool success) {
+      [&context, stream, peer, address = request.remote_addr](bool success) {
         context.pages.fetch_sub(1);
-        if (success || Clock::now() - stream->sent < kWriteTimeOut) return;
-        context.report.line("unread " + peer,
-                            fmt::format("{}: the page does not read its events: closed after {} s",
-                                        peer, kWriteTimeOut.count()));
+        const auto patience = context.options.write_time_out;
+        if (success || Clock::now() - stream->sent < patience) return;
+        context.report.line("unread " + address,
+                            fmt::format("{}: the page does not read its events: closed after {} ms",
+                                        peer, patience.count()));
       });
 }
 

@@ -87,6 +87,10 @@ void answer_download(PageContext& context, const httplib::Request& request, cons
     return send_error(response, 503, "too many downloads are running: try again later");
   }
 
+  if (opened->bytes == 0) {
+    context.downloads.fetch_sub(1);
+    return send_text(response, 200, {}, "application/octet-stream");
+  }
   const auto file = std::make_shared<OpenRecording>(std::move(*opened));
   response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", name));
   response.set_content_provider(

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <chrono>
+#include <filesystem>
+#include <mutex>
 #include <string>
+#include <thread>
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/control_protocol.hpp"
@@ -18,6 +21,8 @@ using daemon::Result;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kStorePatience{10};
+constexpr std::chrono::milliseconds kStorePeriod{100};
 constexpr daemon::JsonBounds kBodyBounds{.bytes = kMostRequestBytes, .depth = 8};
 
 /// A request that changes something, the role that it needs, and the request to abbed that it
@@ -58,19 +63,19 @@ bool from_this_site(const httplib::Request& request) {
   return host != std::string::npos && origin.substr(host + 3) == request.get_header_value("Host");
 }
 
-Result<json> body_of(const httplib::Request& request) {
+Result<json> body_of(const httplib::Request& request, const std::string& text) {
   if (!request.get_header_value("Content-Type").starts_with(kJson))
     return daemon::fail(ErrorCode::Usage, "the request must be application/json");
-  if (request.body.empty()) return json::object();
-  auto body = daemon::parse_json(request.body, "request", kBodyBounds);
+  if (text.empty()) return json::object();
+  auto body = daemon::parse_json(text, "request", kBodyBounds);
   if (body && !body->is_object())
     return daemon::fail(ErrorCode::Usage, "the request must be a JSON object");
   return body;
 }
 
 std::string cookie(const PageContext& context, const std::string& token, long max_age_s) {
-  return fmt::format("abbe_session={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", token,
-                     max_age_s, context.options.settings.web.tls() ? "; Secure" : "");
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", cookie_name(context),
+                     token, max_age_s, context.options.settings.web.tls() ? "; Secure" : "");
 }
 
 void log_in(PageContext& context, const httplib::Request& request, const json& body,
@@ -85,7 +90,7 @@ void log_in(PageContext& context, const httplib::Request& request, const json& b
     return send_error(response, session.error().code == ErrorCode::Refused ? 403 : 503,
                       session.error().text);
   }
-  context.options.report(
+  context.report.always(
       fmt::format("{}: {} logged in ({})", peer_of(request), session->user, name(session->role)));
   constexpr long kSeconds = 12L * 3600L;
   response.set_header("Set-Cookie", cookie(context, session->token, kSeconds));
@@ -99,9 +104,24 @@ void log_in(PageContext& context, const httplib::Request& request, const json& b
 void log_out(PageContext& context, const httplib::Request& request, const WebSession& session,
              httplib::Response& response) {
   context.sessions.log_out(session.token);
-  context.options.report(fmt::format("{}: {} logged out", peer_of(request), session.user));
+  context.report.always(fmt::format("{}: {} logged out", peer_of(request), session.user));
   response.set_header("Set-Cookie", cookie(context, "", 0));
   send_json(response, json::object());
+}
+
+/// The answer of abbed. A change of the model store that another process delays is asked for again.
+Result<json> ask_abbed(const std::filesystem::path& socket, const json& request) {
+  auto answer = daemon::ask_daemon(socket, request);
+  const auto until = Clock::now() + kStorePatience;
+  while (answer && answer->contains("change") && !answer->contains("id")) {
+    if (Clock::now() > until)
+      return daemon::fail(ErrorCode::Io,
+                          "the model store has not answered for 10 s; the change may still take "
+                          "place: see History");
+    std::this_thread::sleep_for(kStorePeriod);
+    answer = daemon::ask_daemon(socket, {{"do", "change"}, {"number", (*answer)["change"]}});
+  }
+  return answer;
 }
 
 void change(PageContext& context, const WebSession& session, const Change& asked, const json& body,
@@ -109,9 +129,10 @@ void change(PageContext& context, const WebSession& session, const Change& asked
   auto request = asked.request(body);
   if (!request) return send_error(response, request.error());
   (*request)["who"] = session.user;
-  const auto answer = daemon::ask_daemon(context.options.settings.config.control.socket, *request);
+  const std::lock_guard lock(context.changing);
+  const auto answer = ask_abbed(context.options.settings.config.control.socket, *request);
   const auto what = (*request)["do"].get<std::string>();
-  context.options.report(
+  context.report.always(
       fmt::format("{}: {}: {}", session.user, what, answer ? "done" : answer.error().text));
   send_result(response, answer);
 }
@@ -121,7 +142,7 @@ void replay(PageContext& context, const WebSession& session, const json& body,
   const auto recording = body.at("name").get<std::string>();
   if (const auto begun = context.replays.begin(recording); !begun)
     return send_error(response, begun.error());
-  context.options.report(fmt::format("{}: replay of {}", session.user, recording));
+  context.report.always(fmt::format("{}: replay of {}", session.user, recording));
   send_json(response, context.replays.status());
 }
 
@@ -155,7 +176,7 @@ void answer_change(PageContext& context, const httplib::Request& request, const 
 
 }  // namespace
 
-void answer_post(PageContext& context, const httplib::Request& request,
+void answer_post(PageContext& context, const httplib::Request& request, const std::string& text,
                  httplib::Response& response) {
   if (!from_this_site(request)) {
     context.report.line(
@@ -164,7 +185,7 @@ void answer_post(PageContext& context, const httplib::Request& request,
                     request.path, request.get_header_value("Origin").substr(0, 80)));
     return send_error(response, 403, "refused: the request comes from another site");
   }
-  const auto body = body_of(request);
+  const auto body = body_of(request, text);
   if (!body) return send_error(response, body.error());
 
   try {

@@ -24,7 +24,10 @@ constexpr std::string_view kFinished = ".mcap", kRunning = ".mcap.part";
 constexpr std::size_t kMostListed = 1000;  ///< the newest
 
 bool is_recording(std::string_view name) {
-  return !name.starts_with('.') && name.find('/') == std::string_view::npos &&
+  const auto allowed = [](char c) {
+    return static_cast<unsigned char>(c) >= ' ' && c != '/' && c != '"';
+  };
+  return !name.starts_with('.') && std::ranges::all_of(name, allowed) &&
          (name.ends_with(kFinished) || name.ends_with(kRunning));
 }
 
@@ -47,10 +50,11 @@ Result<nlohmann::json> recordings_json(const fs::path& folder) {
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     Found found{.name = at->path().filename().string(), .bytes = 0, .modified = {}};
     if (!is_recording(found.name)) continue;
-    std::error_code gone;  // retention may remove a file meanwhile
+    std::error_code gone, changed;  // retention may remove a file meanwhile
+    if (at->symlink_status(gone).type() != fs::file_type::regular) continue;
     found.bytes = at->file_size(gone);
-    found.modified = at->last_write_time(gone);
-    if (!gone) files.push_back(std::move(found));
+    found.modified = at->last_write_time(changed);
+    if (!gone && !changed) files.push_back(std::move(found));
   }
   if (error)
     return daemon::fail(ErrorCode::Io,

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/resource.h>
@@ -10,6 +11,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -27,6 +29,8 @@ using daemon::Result;
 
 constexpr std::size_t kLongestOutput = 4u << 20;
 constexpr int kLowPriority = 19;
+constexpr std::chrono::minutes kLongestReplay{60};
+constexpr int kPollPeriod_ms = 1000;
 
 struct Child {
   pid_t pid = 0;
@@ -44,6 +48,7 @@ Result<Child> start_child(std::vector<std::string> command) {
   ::posix_spawn_file_actions_init(&actions);
   for (const int fd : {STDOUT_FILENO, STDERR_FILENO})
     ::posix_spawn_file_actions_adddup2(&actions, write_end.get(), fd);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
   // abbe-web blocks the signals that stop it; the child must not inherit that.
   posix_spawnattr_t attributes;
   ::posix_spawnattr_init(&attributes);
@@ -67,14 +72,26 @@ Result<Child> start_child(std::vector<std::string> command) {
   return Child{.pid = pid, .output = std::move(read_end)};
 }
 
-std::string all_output(int fd) {
+/// What the child writes until it ends; after kLongestReplay it is killed.
+std::string all_output(int fd, pid_t child) {
+  const auto until = std::chrono::steady_clock::now() + kLongestReplay;
   std::string text;
   std::array<char, 65536> buffer;  // NOLINT: read() fills what is used
-  for (;;) {
+  for (bool killed = false;;) {
+    pollfd polled{.fd = fd, .events = POLLIN, .revents = 0};
+    const int ready = ::poll(&polled, 1, kPollPeriod_ms);
+    if (!killed && std::chrono::steady_clock::now() > until) {
+      ::kill(child, SIGKILL);
+      killed = true;
+      text = fmt::format("abbe replay took longer than {} min and was ended",
+                         std::chrono::duration_cast<std::chrono::minutes>(kLongestReplay).count());
+    }
+    if (ready <= 0) continue;
     const ssize_t n = ::read(fd, buffer.data(), buffer.size());
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return text;
-    if (text.size() < kLongestOutput) text.append(buffer.data(), static_cast<std::size_t>(n));
+    if (!killed && text.size() < kLongestOutput)
+      text.append(buffer.data(), static_cast<std::size_t>(n));
   }
 }
 
@@ -115,7 +132,7 @@ Result<void> Replays::begin(const std::string& name) {
 }
 
 void Replays::follow(int output_fd, pid_t child) {
-  auto result = result_json(all_output(output_fd));
+  auto result = result_json(all_output(output_fd, child));
   // The child remains a zombie until child_ is 0, so that its id is not that of another process.
   siginfo_t ended{};
   while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 &&

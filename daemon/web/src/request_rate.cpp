@@ -12,7 +12,7 @@ constexpr std::size_t kMostAddresses = 4096;
 bool RequestRate::take(const std::string& address, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (buckets_.size() >= kMostAddresses) forget_full_ones(now);
-  if (buckets_.size() >= kMostAddresses) return false;
+  if (buckets_.size() >= kMostAddresses && !buckets_.contains(address)) return false;
 
   Bucket& bucket = buckets_.try_emplace(address, Bucket{at_once_, now}).first->second;
   const double elapsed_s = std::chrono::duration<double>(now - bucket.at).count();

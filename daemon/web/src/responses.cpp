@@ -1,5 +1,6 @@
 #include "responses.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -38,13 +39,14 @@ void send_bytes(httplib::Response& response, std::string_view bytes, const char*
   response.set_content_provider(
       bytes.size(), type,
       [bytes, owner](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
-        return sink.write(bytes.data() + offset, length);
+        if (offset > bytes.size()) return false;
+        return sink.write(bytes.data() + offset, std::min(length, bytes.size() - offset));
       });
 }
 
 }  // namespace
 
-void add_security_headers(httplib::Response& response, bool tls) {
+void add_security_headers(httplib::Response& response) {
   response.set_header("Content-Security-Policy", kContentPolicy);
   response.set_header("X-Content-Type-Options", "nosniff");
   response.set_header("Referrer-Policy", "no-referrer");
@@ -52,7 +54,6 @@ void add_security_headers(httplib::Response& response, bool tls) {
   response.set_header("Cross-Origin-Resource-Policy", "same-origin");
   response.set_header("X-Frame-Options", "DENY");
   response.set_header("Cache-Control", "no-store");
-  if (tls) response.set_header("Strict-Transport-Security", "max-age=31536000");
 }
 
 void send_asset(httplib::Response& response, std::string_view bytes, const char* type) {

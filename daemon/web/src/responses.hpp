@@ -14,8 +14,8 @@ namespace abbe::web {
 inline constexpr const char* kJson = "application/json";
 
 /// Headers of every answer: nothing is loaded from elsewhere, no script or style is in the markup,
-/// no other site may frame the page or read from it. `tls`: browsers are told to stay with TLS.
-void add_security_headers(httplib::Response& response, bool tls);
+/// no other site may frame the page or read from it.
+void add_security_headers(httplib::Response& response);
 
 /// `bytes` must exist for the whole life of the server.
 void send_asset(httplib::Response& response, std::string_view bytes, const char* type);

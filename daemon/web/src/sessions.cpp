@@ -31,7 +31,7 @@ Result<void> Sessions::check_failures(const std::string& address, Clock::time_po
   std::erase_if(failures_, [&](const auto& f) { return now - f.second.last >= limits_.pause; });
   const auto found = failures_.find(address);
   const bool too_many = found != failures_.end() && found->second.count >= limits_.failures;
-  if (too_many || failures_.size() >= kMostFailing)
+  if (too_many)
     return daemon::fail(ErrorCode::Refused,
                         fmt::format("too many wrong passwords: wait {} s", limits_.pause.count()));
   return {};
@@ -49,6 +49,9 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
 
   const std::lock_guard lock(mutex_);
   if (!found) {
+    if (failures_.size() >= kMostFailing)
+      failures_.erase(
+          std::ranges::min_element(failures_, {}, [](const auto& f) { return f.second.last; }));
     Failures& failures = failures_[address];
     ++failures.count;
     failures.last = now;
@@ -60,25 +63,28 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
     kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
   WebSession session{
       .token = random_token(), .csrf = random_token(), .user = found->name, .role = found->role};
-  kept_[session.token] = {session, now, now};
+  kept_[session.token] = {session, found->hash, now, now};
   return session;
 }
 
-std::optional<WebSession> Sessions::find(const std::string& token, Clock::time_point now) {
+std::optional<WebSession> Sessions::find(const std::string& token, Clock::time_point now,
+                                         SessionUse use) {
   WebSession session;
+  std::string hash;
   {
     const std::lock_guard lock(mutex_);
     remove_ended(now);
     const auto found = kept_.find(token);
     if (found == kept_.end()) return std::nullopt;
-    found->second.used = now;
+    if (use == SessionUse::Request) found->second.used = now;
     session = found->second.session;
+    hash = found->second.hash;
   }
 
   const auto users = read_web_users(users_file_);
   if (!users) return std::nullopt;
   const auto user = std::ranges::find(*users, session.user, &WebUser::name);
-  if (user == users->end() || user->role != session.role) return std::nullopt;
+  if (user == users->end() || user->role != session.role || user->hash != hash) return std::nullopt;
   return session;
 }
 

@@ -125,8 +125,8 @@ std::optional<WebUser> find_web_user(const std::vector<WebUser>& users, const st
   const auto user = std::ranges::find(users, name, &WebUser::name);
   const std::string& hash = user == users.end() ? nobody : user->hash;
   const std::string seen = crypted(password, hash);
-  if (user == users.end() || password.size() > kLongestPassword || seen.empty() ||
-      !same_text(seen, hash))
+  if (user == users.end() || password.size() > kLongestPassword ||
+      password.find('\0') != std::string::npos || seen.empty() || !same_text(seen, hash))
     return std::nullopt;
   return *user;
 }

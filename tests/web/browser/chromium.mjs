@@ -49,6 +49,13 @@ export async function openPage(url, out, { expectLoss = false } = {}) {
 export async function goTo({ page }, name) {
   await page.click(`nav a[href="#${name}"]`);
   await page.waitForFunction((n) => document.getElementById("view").dataset.ready === n, {}, name);
+  const fault = await viewFault({ page });
+  if (fault) throw new Error(`the view ${name} shows a fault: ${fault}`);
+}
+
+/** The fault that a view shows instead of its content; null: none. */
+export async function viewFault({ page }) {
+  return page.evaluate(() => document.querySelector("#view > div > p.bad")?.innerText ?? null);
 }
 
 /** Waits until the page shows the text, in the element of `selector`. */

@@ -16,7 +16,7 @@ struct CertificateDates {
 [[nodiscard]] daemon::Result<CertificateDates> read_certificate(const std::filesystem::path& file);
 
 /// BadInput if the certificate has expired or is not yet valid: "certificate web.crt expired on
-/// 2026-11-01T00:00:00Z: make a new one (...)".
+/// 2026-11-01: replace it and restart abbe-web".
 [[nodiscard]] daemon::Result<void> check_certificate(const std::filesystem::path& file,
                                                      std::chrono::system_clock::time_point now);
 

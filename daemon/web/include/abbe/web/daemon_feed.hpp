@@ -47,7 +47,7 @@ class DaemonFeed {
   void cycle(Clock::time_point now);
   void ask_positions();
   void ask_status();
-  void ask_request(std::uint64_t session);
+  [[nodiscard]] bool ask_request(std::uint64_t session);
   void follow_files();
   void follow_path(const nlohmann::json& positions_m);
   void report_source(std::string reason);
@@ -61,6 +61,7 @@ class DaemonFeed {
   std::string source_fault_ = "not asked yet";
   std::string files_seen_;
   bool acquiring_ = false;
+  bool request_known_ = false;  ///< of the session path_.session
 
   mutable std::mutex mutex_;  // of the following members
   nlohmann::json status_, request_;

@@ -5,7 +5,8 @@
 ///   open pages                 [web] most_pages
 ///   requests of one address    kRequestsPerSecond on average
 ///   a page that does not read  closed after kWriteTimeOut
-///   a request                  kMostRequestBytes
+///   a request                  kMostRequestBytes, kRequestTime from its first byte to its last
+///   connections of one address LimitedServer::kConnectionsOfAddress
 ///
 /// Whatever a browser does, abbed gets the requests of one client: those of DaemonFeed, and one at
 /// a time of logged-in users.
@@ -23,14 +24,14 @@
 namespace abbe::web {
 
 inline constexpr double kRequestsPerSecond = 40.0, kRequestsAtOnce = 200.0;
-inline constexpr std::chrono::milliseconds kWriteTimeOut{5000}, kReadTimeOut{5000};
+inline constexpr std::chrono::milliseconds kWriteTimeOut{5000}, kRequestTime{10000};
 inline constexpr std::size_t kMostRequestBytes = 1u << 20;
 
 struct PageOptions {
   daemon::WebSettings settings;
   std::filesystem::path config_file;            ///< shown as understood
   std::filesystem::path abbe_program = "abbe";  ///< for replays
-  std::chrono::milliseconds write_time_out = kWriteTimeOut;
+  std::chrono::milliseconds write_time_out = kWriteTimeOut, request_time = kRequestTime;
   /// Receives one line per event: log in, change, refusal, limit. Any thread.
   std::function<void(const std::string&)> report;
 };
@@ -42,6 +43,8 @@ class PageServer {
   [[nodiscard]] static daemon::Result<std::unique_ptr<PageServer>> start(PageOptions options);
   virtual ~PageServer() = default;
   [[nodiscard]] virtual std::uint16_t port() const = 0;
+  /// False once the server cannot accept connections any more.
+  [[nodiscard]] virtual bool serving() const = 0;
 };
 
 }  // namespace abbe::web

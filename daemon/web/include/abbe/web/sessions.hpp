@@ -20,6 +20,9 @@ struct WebSession {
   WebRole role = WebRole::View;
 };
 
+/// Whether a look at the session counts as its use, which delays its end.
+enum class SessionUse { Request, Look };
+
 struct SessionLimits {
   std::chrono::seconds idle = std::chrono::hours{1};  ///< without a request
   std::chrono::seconds total = std::chrono::hours{12};
@@ -40,14 +43,17 @@ class Sessions {
                                                   const std::string& password,
                                                   const std::string& address,
                                                   Clock::time_point now);
-  /// The session of a cookie, as long as its user has the same role in the file of users.
-  [[nodiscard]] std::optional<WebSession> find(const std::string& token, Clock::time_point now);
+  /// The session of a cookie, as long as its user has the same role and password in the file of
+  /// users.
+  [[nodiscard]] std::optional<WebSession> find(const std::string& token, Clock::time_point now,
+                                               SessionUse use = SessionUse::Request);
   void log_out(const std::string& token);
   [[nodiscard]] bool possible() const noexcept { return !users_file_.empty(); }
 
  private:
   struct Kept {
     WebSession session;
+    std::string hash;  ///< of the password, as it was at the log-in
     Clock::time_point begun, used;
   };
   struct Failures {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "abbe/dds/json_lines.hpp"
@@ -228,11 +229,24 @@ void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
   if (std::exchange(calibration_[e.machine()], line) != line) print(line);
 }
 
+/// The decision on the vector of the line before.
+void WatchedMachines::print_decision(const Publisher& publisher, const v1::Compensation& c) {
+  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
+  const nlohmann::ordered_json line{{"machine", c.machine()},
+                                    {"decision",
+                                     {{"sequence_number", c.sequence_number()},
+                                      {"apply", decision.apply},
+                                      {"reason", decision.reason}}}};
+  std::printf("%s\n", line.dump().c_str());
+  std::fflush(stdout);
+}
+
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
                                   const v1::Compensation& c) {
+  if (options_.json) return print_decision(publisher, c);
   const auto now = WallClock::now();
-  if (options_.json || now - machine.last_live < (on_terminal_ ? std::chrono::milliseconds{100}
-                                                               : std::chrono::seconds{1}))
+  if (now - machine.last_live <
+      (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
     return;
   machine.last_live = now;
   const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));

@@ -93,6 +93,7 @@ class WatchedMachines {
   void show_model(Machine& machine, const Publisher& publisher);
   void show_health(const v1::Health& h);
   void show_event(const v1::CalibrationEvent& e);
+  void print_decision(const Publisher& publisher, const v1::Compensation& c);
   /// Prints the line with position, vector and decision. On a terminal the line is updated in
   /// place; otherwise a new line is printed once a second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c);

@@ -1,0 +1,15 @@
+"""Errors of abbe."""
+
+
+class Error(Exception):
+    """A message of abbe.
+
+    code: "bad_input", "usage", "refused", "data_insufficient" or "io".
+    details: further lines, for example one for each fault of a file with file, line and field.
+    """
+
+    def __init__(self, code: str, text: str, details: list[str] | None = None):
+        super().__init__("\n".join([text, *(details or [])]))
+        self.code = code
+        self.text = text
+        self.details = list(details or [])

@@ -36,7 +36,8 @@ TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
                             .held_out_before_m = 1e-5 / 3,
                             .held_out_after_m = 1e-7 / 3,
                             .notes = {"a \"note\"", "another"},
-                            .residuals = {{0.1 / 3, 1e-5 / 3, 1e-7 / 7}, {0.2, 2e-5, 3e-7}}};
+                            .residuals = {{0.1 / 3, 1e-5 / 3, 1e-7 / 7}, {0.2, 2e-5, 3e-7}},
+                            .places_m = {{{0.1 / 3, 0.2, -0.3}, {0.0, 0.1 / 7, 0.0}}, {}}};
   const auto text = to_json(document);
   const auto read = parse_model(text, "model.json");
   ASSERT_TRUE(read) << read.error().text << read.error().details.front();
@@ -49,11 +50,23 @@ TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
        {std::pair{"\"notes\": [", "\"notes\": [1,"},
         std::pair{"\"held_out\": \"legs\"", "\"held_out\": 3"},
         std::pair{"before_um_after_um\": [", "before_um_after_um\": [[1],"},
+        std::pair{"places_mm\": [", "places_mm\": [1,"},
         std::pair{"\"notes\": [", "\"notes\": {}, \"more\": ["}}) {
     const auto refused = parse_model(replaced(text, what, with), "model.json");
     ASSERT_FALSE(refused) << with;
     EXPECT_THAT(refused.error().details.front(), HasSubstr("run.")) << with;
   }
+}
+
+TEST(ModelDocument, KeepsTheVersionThatIdentifiedTheModel) {
+  const auto document = synthetic_document(1);
+  auto text = to_json(document);
+  const auto begin = text.find("\"abbe_version\": \"") + 17;
+  text.replace(begin, text.find('"', begin) - begin, "0.0.7-earlier");
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(read->software, "0.0.7-earlier");
+  EXPECT_EQ(to_json(*read), text);
 }
 
 TEST(ModelDocument, ReadsBackToTheSameBits) {

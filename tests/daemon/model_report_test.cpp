@@ -124,10 +124,14 @@ TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
                                     .held_out_before_m = 12.5e-6,
                                     .held_out_after_m = 0.25e-6,
                                     .notes = {"the air was not measured"},
-                                    .residuals = {{0.5, 1e-5, 1e-7}, {1.5, 2e-5, 2e-7}}};
+                                    .residuals = {{0.5, 1e-5, 1e-7}, {1.5, 2e-5, 2e-7}},
+                                    .places_m = {{{-0.2, 0.1, -0.3}, {0.2, 0.1, -0.2}}}};
+  subject.document.software = "0.0.7-earlier";
   EXPECT_THAT(model_report(subject).value(),
               AllOf(HasSubstr("12.500 um rms"), HasSubstr("0.250 um rms"), HasSubstr("at legs"),
                     HasSubstr("Residuals of the fit along the path, rms, after"),
+                    HasSubstr("Where was measured"), HasSubstr("the driven path"),
+                    HasSubstr("abbe 0.0.7-earlier; this report: abbe "),
                     HasSubstr("<li>the air was not measured</li>")));
 }
 

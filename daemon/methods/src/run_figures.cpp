@@ -11,7 +11,8 @@ RunFigures run_figures(const calib::Verdict& verdict, std::string_view held_out)
           .held_out_before_m = or_none(verdict.held_out.no_compensation_rms_m),
           .held_out_after_m = or_none(verdict.held_out.candidate_rms_m),
           .notes = verdict.notes,
-          .residuals = {}};
+          .residuals = {},
+          .places_m = {}};
 }
 
 }  // namespace abbe::daemon

@@ -247,7 +247,8 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto tracker_drift = read_tracker_drift(in);
   const auto bar = read_bar_figures(in);
   const auto run = read_run_figures(in);
-  const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode");
+  const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode"),
+             software = read_optional(in, "abbe_version");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
@@ -255,7 +256,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
   ModelDocument document{std::move(*model), method,        estimator,  machine,
                          machine_hash,      *created,      statistics, inputs,
                          artefact,          recording_gap, mode,       backlash,
-                         tracker_drift,     bar,           run};
+                         tracker_drift,     bar,           run,        software};
   if (hash == model_hash(document)) return document;
   in.fault("hash", "is not the hash of the content: the file was changed or damaged");
 

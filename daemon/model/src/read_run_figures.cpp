@@ -37,6 +37,20 @@ std::vector<RunFigures::Interval> read_intervals(ModelReader& in, const ModelJso
   return intervals;
 }
 
+/// Models of earlier versions do not have them.
+std::vector<std::vector<calib::Vector3>> read_places(ModelReader& in, const ModelJson& run) {
+  const std::string path = "run.places_mm";
+  std::vector<std::vector<calib::Vector3>> places;
+  if (!run.is_object() || !run.contains("places_mm")) return places;
+  const ModelJson& list = run.at("places_mm");
+  if (!list.is_array()) {
+    in.fault(path, "must be an array");
+    return places;
+  }
+  for (const ModelJson& line : list) places.push_back(in.vectors(&line, path));
+  return places;
+}
+
 }  // namespace
 
 std::optional<RunFigures> read_run_figures(ModelReader& in) {
@@ -47,7 +61,8 @@ std::optional<RunFigures> read_run_figures(ModelReader& in) {
                     .held_out_before_m = in.number_of(run, path, "held_out_before_um", kMicroUnit),
                     .held_out_after_m = in.number_of(run, path, "held_out_after_um", kMicroUnit),
                     .notes = read_notes(in, in.find(run, path, "notes")),
-                    .residuals = read_intervals(in, in.find(run, path, kResiduals))};
+                    .residuals = read_intervals(in, in.find(run, path, kResiduals)),
+                    .places_m = read_places(in, run)};
 }
 
 }  // namespace abbe::daemon

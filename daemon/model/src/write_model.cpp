@@ -201,12 +201,13 @@ void write_run(JsonText& out, const RunFigures& run) {
     return fmt::format("[{}, {}, {}]", to_decimal(i.at_m, kMm), to_decimal(i.before_m, kMicroUnit),
                        to_decimal(i.after_m, kMicroUnit));
   });
+  const auto places = array_of(run.places_m, [](const auto& line) { return vectors_mm(line); });
   out.key("run");
   out.raw(fmt::format(
       "{{\"held_out\": {}, \"held_out_before_um\": {}, \"held_out_after_um\": {},\n    \"notes\": "
-      "{},\n    \"path_mm_before_um_after_um\": {}}}",
+      "{},\n    \"path_mm_before_um_after_um\": {},\n    \"places_mm\": {}}}",
       JsonText::quoted(run.held_out), to_decimal(run.held_out_before_m, kMicroUnit),
-      to_decimal(run.held_out_after_m, kMicroUnit), notes, residuals));
+      to_decimal(run.held_out_after_m, kMicroUnit), notes, residuals, places));
 }
 
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {
@@ -247,7 +248,7 @@ std::string to_json(const ModelDocument& document) {
   const auto& model = document.model;
   JsonText out;
   out.member("schema", kModelSchema);
-  out.member("abbe_version", kVersion);
+  out.member("abbe_version", document.software.empty() ? kVersion : document.software);
   out.member("hash", model_hash(document));
   out.member("created", to_text(document.created));
   out.member("method", document.method);

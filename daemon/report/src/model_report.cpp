@@ -6,6 +6,7 @@
 #include "abbe/report/model_figures.hpp"
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
+#include "abbe/report/space_drawing.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -47,6 +48,28 @@ void add_run_residuals(HtmlReport& page, const RunFigures& run) {
                .x_label = "length of the path, m",
                .y_label = "um",
                .curves = {curve}});
+}
+
+/// The path or the places of the artefact, in the box of the model and around it.
+void add_places(HtmlReport& page, const ModelDocument& document, const calib::iso::LineBox& box) {
+  if (!document.run || document.run->places_m.empty()) return;
+  calib::Vector3 low_m = box.low_m, high_m = box.high_m;
+  SpaceDrawing drawing{.title = "Where was measured", .box_mm = {}, .lines = {}};
+  for (const auto& line : document.run->places_m) {
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      low_m = low_m.cwiseMin(line[i]);
+      high_m = high_m.cwiseMax(line[i]);
+      if (i > 0) drawing.lines.push_back({"", kMmPerM * line[i - 1], kMmPerM * line[i]});
+    }
+  }
+  drawing.box_mm = {kMmPerM * low_m, kMmPerM * high_m};
+  drawing.one_colour = document.method == "otf";
+  const auto what = document.method == "otf"     ? "the driven path"
+                    : document.method == "evemu" ? "the balls in each position of the array"
+                                                 : "the bar in each of its positions";
+  page.heading("Where was measured");
+  page.paragraph(fmt::format("Scale readings: {}.", what));
+  page.drawing(drawing);
 }
 
 void add_passes(HtmlReport& page, const BarFigures& bar) {
@@ -97,6 +120,7 @@ Result<std::string> model_report(const ReportSubject& subject) {
   page.page_break();
   add_value_curves(page, *values);
   if (document.run) add_run_residuals(page, *document.run);
+  add_places(page, document, values->standard.box);
   add_field(page, document.model, values->standard.box);
   if (document.model.tables() != nullptr) {
     page.heading("Tables of the model");

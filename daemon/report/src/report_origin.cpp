@@ -80,7 +80,10 @@ Facts facts_of(const ReportSubject& subject) {
                        joined({e.name, e.manufacturer, e.model, e.serial, e.certificate}));
   add_conditions(facts, subject);
   add_if(facts, "remark", d.remark);
-  facts.emplace_back("software", std::string("abbe ") + ABBE_VERSION);
+  facts.emplace_back(
+      "software",
+      fmt::format("abbe {}; this report: abbe {}",
+                  document.software.empty() ? ABBE_VERSION : document.software, ABBE_VERSION));
   return facts;
 }
 

@@ -1,8 +1,10 @@
 #include "abbe/methods/evemu/method.hpp"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/config/capabilities.hpp"
@@ -71,6 +73,18 @@ RotationPoints reference_of(const json& object) {
     reference.points.push_back(
         {.reading_m = vector_of(p.at("reading_m")), .V_m = vector_of(p.at("V_m"))});
   return reference;
+}
+
+/// The readings of the balls, one polyline for each position of the array.
+std::vector<std::vector<Vector3>> places_of_balls(const evemu::Observations& observations) {
+  std::vector<std::vector<Vector3>> places;
+  std::optional<int> position;
+  for (const evemu::BallError& row : observations.rows) {
+    if (position != row.position) places.emplace_back();
+    position = row.position;
+    places.back().push_back(row.reading_m);
+  }
+  return places;
 }
 
 std::string touches_sha256(std::span<const calib::evemu::Touch> touches) {
@@ -148,6 +162,7 @@ ModelDocument EvemuMethod::document_of(const Candidate& candidate, const Config&
                                        std::vector<InputFile> inputs, protocol::UtcTime created) {
   auto document = evemu_document(candidate.solution, config, std::move(inputs), created);
   document.run = run_figures(candidate.verdict, "positions");
+  document.run->places_m = places_of_balls(candidate.observations);
   return document;
 }
 

@@ -159,6 +159,10 @@ ModelDocument MfbMethod::document_of(const Candidate& candidate, const Config& c
   auto document =
       mfb_document(candidate, mfb::Options{}.solve.estimator, config, std::move(inputs), created);
   document.run = run_figures(candidate.verdict, "points");
+  const auto& solution = candidate.found.solution;
+  for (const auto& pose : solution.poses)
+    document.run->places_m.push_back(
+        {pose.origin_m, pose.origin_m + pose.axes * candidate.found.observations.bar.O_m.back()});
   return document;
 }
 

@@ -84,6 +84,38 @@ class RmsAlongPath {
   std::array<double, kIntervals> before_{}, after_{}, counts_{};
 };
 
+/// The driven path: its rows in order, without those that lie on the straight line between others.
+std::vector<calib::Vector3> driven_path(const RunResiduals& run) {
+  constexpr double kStraight_m = 0.5e-3;
+  std::vector<const calib::otf::PlacedResidual*> rows;
+  for (const auto& row : run) rows.push_back(&row);
+  std::ranges::stable_sort(rows, {}, &calib::otf::PlacedResidual::way_m);
+
+  std::vector<calib::Vector3> path;
+  std::vector<calib::Vector3> skipped;  // between the last vertex and the row before this one
+  for (const auto* row : rows) {
+    const calib::Vector3& q_m = row->axis_position_m;
+    if (!path.empty() && !skipped.empty()) {
+      const calib::Vector3 chord_m = q_m - path.back();
+      const auto aside = [&](const calib::Vector3& p_m) {
+        const calib::Vector3 from_m = p_m - path.back();
+        return from_m.cross(chord_m).norm() > kStraight_m * chord_m.norm();
+      };
+      if (std::ranges::any_of(skipped, aside)) {
+        path.push_back(skipped.back());
+        skipped.clear();
+      }
+    }
+    if (path.empty()) {
+      path.push_back(q_m);
+    } else {
+      skipped.push_back(q_m);
+    }
+  }
+  if (!skipped.empty()) path.push_back(skipped.back());
+  return path;
+}
+
 TrackerDriftFigures drift_figures(const calib::otf::TrackerDrift& drift) {
   return {.largest_m = drift.largest_m(),
           .u_repeatability_m = drift.u_repeatability_m,
@@ -117,6 +149,8 @@ ModelDocument otf_document(const OtfCandidate& candidate, const Config& config,
   const bool stands = candidate.mode == calib::otf::Mode::Standstill;
   document.run = run_figures(candidate.verdict, stands ? "positions" : "legs");
   document.run->residuals = RmsAlongPath(candidate.residuals).intervals();
+  for (const RunResiduals& run : candidate.residuals)
+    document.run->places_m.push_back(driven_path(run));
   return document;
 }
 

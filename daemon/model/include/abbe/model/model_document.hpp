@@ -87,6 +87,9 @@ struct RunFigures {
   double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
   std::vector<std::string> notes;                          ///< of the verdict
   std::vector<Interval> residuals;                         ///< of a run along a path, else empty
+  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of each
+  /// position of an array, the bar in each of its positions. Absent in models of earlier versions.
+  std::vector<std::vector<calib::Vector3>> places_m{};
   friend bool operator==(const RunFigures&, const RunFigures&) = default;
 };
 
@@ -120,6 +123,8 @@ struct ModelDocument {
   std::optional<BarFigures> bar{};
   /// Not in the hash, as other statistics. Absent in models of earlier versions.
   std::optional<RunFigures> run{};
+  /// Version of abbe that identified the model; empty: this one. Not in the hash.
+  std::string software{};
 };
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);

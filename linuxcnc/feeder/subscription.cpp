@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "subscription.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "abbe/dds/grid_nodes.hpp"
+#include "abbe/messages/cdr.hpp"
+
+namespace abbe::linuxcnc {
+namespace {
+
+using daemon::Topic;
+
+/// abbe-dds repeats ModelState every second; an older one is not valid (daemon/docs/dds.md).
+constexpr std::chrono::milliseconds kLongestSilence{1500};
+
+/// Tool offsets that differ by less count as equal.
+constexpr double kSameTool_m = 1e-6;
+
+std::string millimetres(const calib::Vector3& v_m) {
+  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", v_m[0] * 1e3, v_m[1] * 1e3, v_m[2] * 1e3);
+}
+
+/// Malformed payloads are skipped: any participant of the domain may send them.
+template <class T, class Use>
+void with(const dds::Arrival& arrival, Use use) {
+  if (auto value = daemon::decode<T>(arrival.payload)) use(std::move(*value));
+}
+
+}  // namespace
+
+std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_most) {
+  readers_.wait(at_most);
+  readers_.take([this](const dds::Arrival& arrival) { take(arrival); });
+
+  std::string reason = why_not();
+  const bool was_usable = usable_->field.has_value();
+  if (!reason.empty()) {
+    if (was_usable || usable_->reason != reason)
+      usable_ = std::make_shared<const Usable>(Usable{std::nullopt, std::move(reason), {}});
+    return usable_;
+  }
+
+  const dds::ReceivedModel& model = publishers_.at(*pin_.pinned()).model;
+  const std::string& id = model.state()->model_id();
+  if (was_usable && usable_->model_id == id && !std::exchange(grid_changed_, false)) return usable_;
+
+  grid_changed_ = false;
+  const auto nodes = model.grid();
+  auto lattice = dds::lattice_of(*nodes);
+  usable_ =
+      std::make_shared<const Usable>(lattice ? Usable{std::move(*lattice), {}, id}
+                                             : Usable{std::nullopt, lattice.error().text, {}});
+  return usable_;
+}
+
+void Subscription::take(const dds::Arrival& arrival) {
+  const auto key = daemon::payload_key(arrival.topic, arrival.payload);
+  if (!key || key->machine != options_.machine) return;
+
+  const auto from = dds::participant_of(arrival.writer);
+  pin_.heard(from, Clock::now());
+  keep(arrival, publishers_[from]);
+  std::erase_if(publishers_, [this](const auto& p) { return !pin_.remembers(p.first); });
+}
+
+void Subscription::keep(const dds::Arrival& arrival, Publisher& publisher) {
+  switch (arrival.topic) {
+    case Topic::ModelState:
+      return with<v1::ModelState>(arrival, [&](v1::ModelState&& state) {
+        publisher.state_from = arrival.writer;
+        publisher.state_at = Clock::now();
+        publisher.model.state(std::move(state));
+      });
+    case Topic::ErrorModel:
+      return with<v1::ErrorModel>(
+          arrival, [&](v1::ErrorModel&& model) { publisher.model.model(std::move(model)); });
+    case Topic::ErrorGrid:
+      return with<v1::ErrorGrid>(arrival, [&](v1::ErrorGrid&& slice) {
+        publisher.model.slice(std::move(slice));
+        grid_changed_ = true;
+      });
+    default:
+      return;
+  }
+}
+
+bool Subscription::alive(const Publisher& publisher) const {
+  return publisher.state_from && Clock::now() - publisher.state_at < kLongestSilence &&
+         readers_.is_alive(*publisher.state_from);
+}
+
+std::string Subscription::why_not() const {
+  const auto pinned = pin_.pinned();
+  const auto found = pinned ? publishers_.find(*pinned) : publishers_.end();
+  if (found == publishers_.end())
+    return "nothing received about machine \"" + options_.machine + "\"";
+
+  const Publisher& publisher = found->second;
+  const auto decision = publisher.model.decide(alive(publisher));
+  return decision.apply ? why_not_model(publisher) : decision.reason;
+}
+
+std::string Subscription::why_not_model(const Publisher& publisher) const {
+  const auto& model = publisher.model.model();
+  if (!model || model->model_id() != publisher.model.state()->model_id())
+    return "no ErrorModel received of the active model";
+  const auto& t = model->tool_offset_m();
+  const calib::Vector3 of_model_m(t[0], t[1], t[2]);
+  if (!((of_model_m - options_.tool_offset_m).norm() < kSameTool_m))
+    return "the model is for the tool offset " + millimetres(of_model_m) + ", not for " +
+           millimetres(options_.tool_offset_m);
+  return {};
+}
+
+}  // namespace abbe::linuxcnc

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// Subscribes to the model of one machine and decides by the rule of abbe_v1.idl whether its grid
+/// may be applied. Used by one thread.
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "abbe/calib/error_lattice.hpp"
+#include "abbe/dds/publisher_pin.hpp"
+#include "abbe/dds/readers.hpp"
+#include "abbe/dds/received_model.hpp"
+#include "correction_field.hpp"
+
+namespace abbe::linuxcnc {
+
+struct SubscriptionOptions {
+  std::string machine;
+  calib::Vector3 tool_offset_m;  ///< of the tool in the spindle
+};
+
+class Subscription {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::array kTopics{daemon::Topic::ModelState, daemon::Topic::ErrorModel,
+                                      daemon::Topic::ErrorGrid};
+
+  /// `readers` must outlive the subscription and read kTopics.
+  Subscription(SubscriptionOptions options, dds::Readers& readers)
+      : options_(std::move(options)), readers_(readers) {}
+
+  /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
+  /// replaced only when the decision changes. Never null.
+  [[nodiscard]] std::shared_ptr<const Usable> poll(std::chrono::milliseconds at_most);
+
+ private:
+  struct Publisher {
+    dds::ReceivedModel model;
+    std::optional<dds::WriterId> state_from;
+    Clock::time_point state_at{};
+  };
+
+  void take(const dds::Arrival& arrival);
+  void keep(const dds::Arrival& arrival, Publisher& publisher);
+  [[nodiscard]] bool alive(const Publisher& publisher) const;
+  [[nodiscard]] std::string why_not() const;
+  [[nodiscard]] std::string why_not_model(const Publisher& publisher) const;
+
+  SubscriptionOptions options_;
+  dds::Readers& readers_;
+  dds::PublisherPin pin_;
+  std::map<dds::ParticipantId, Publisher> publishers_;
+  bool grid_changed_ = false;
+  std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
+};
+
+}  // namespace abbe::linuxcnc

@@ -3,6 +3,7 @@
 faults. The number of the phase is in the signal `phase`, which is recorded with the positions.
 
 Prints one line for each phase. Exit code 1: LinuxCNC did not do what it was told."""
+import json
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import hal
 import linuxcnc
 
 FEED = 6000  # mm/min, 100 mm/s
+HALF_STEP_NM = 5.1  # of the encoders in positions.toml.in, with rounding
 # The machine moves to the start, then the part that is measured.
 PATHS = {
     "line": ("G1 X-250 Y-200 Z-350", "G1 X250 Y200 Z-50"),
@@ -107,6 +109,8 @@ def drive_path(first):
         move(start)
         phase(first + number)
         move(measured)
+        if first == PHASES["with"] and not active():
+            fail("the correction was switched off on the path: the feeder or the model failed, see feeder.log")
         phase(0)
 
 
@@ -114,6 +118,22 @@ def write_request(name):
     """The programs of abbe belong to another user: demo/linuxcnc/run does what is asked."""
     open(name, "w").close()
     wait_until(name + " is answered", lambda: os.path.exists(name + ".done"))
+
+
+def compare_positions():
+    """What abbed reads from its encoders, at standstill, against the joint positions with correction."""
+    write_request("read-positions")
+    status = json.load(open("status.json"))
+    stream = next(s for s in status["streams"] if s["name"] == "encoder")
+    reading_mm = [hal.get_value("joint.%d.pos-cmd" % j) + hal.get_value("abbe-correction.%d.applied" % j)
+                  for j in range(3)]
+    off_nm = max(1e6 * abs(1e3 * p - r) for p, r in zip(status["position_m"], reading_mm))
+    with open("positions.txt", "w") as out:
+        out.write("abbed reads the axes of LinuxCNC at %.1f Hz, %d gaps in %d samples; at standstill they "
+                  "differ by %.1f nm (allowed: half a step, %g nm)\n"
+                  % (stream["rate_hz"], stream["gaps"], stream["samples"], off_nm, HALF_STEP_NM))
+    if off_nm > HALF_STEP_NM:
+        fail("abbed reads %s m, the joints are at %s mm" % (status["position_m"], reading_mm))
 
 
 def not_a_number():
@@ -189,6 +209,8 @@ def main():
     switch_on()
     drive_path(PHASES["with"])
     print("drive: path with correction", flush=True)
+    time.sleep(0.5)
+    compare_positions()
     for name in FAULTS:
         fault(name)
 

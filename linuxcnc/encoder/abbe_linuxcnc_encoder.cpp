@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// abbe-linuxcnc-encoder: gives abbed the scale readings of a LinuxCNC control as CANopen encoders
+// on CAN over UDP. It reads the stream of the realtime component `sampler`.
+#include <arpa/inet.h>
+#include <hal.h>
+#include <netinet/in.h>
+#include <rtapi.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "abbe/protocol/exit_codes.hpp"
+#include "encoder_frames.hpp"
+
+namespace {
+
+using namespace abbe::linuxcnc;
+
+using abbe::protocol::ExitCode;
+constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
+              kIo = number(ExitCode::Io), kInternal = number(ExitCode::Internal);
+constexpr int kSamplerKey = 0x48534130;  // of sampler.0 in LinuxCNC 2.9; the others follow
+constexpr char kColumns[] = "ffffffb";   // cfg= of the sampler: motor (3), offset (3), homed
+constexpr std::chrono::microseconds kPollPeriod{200};
+
+volatile sig_atomic_t stop_requested = 0;
+
+struct Options {
+  std::string peer = "127.0.0.1";
+  std::uint16_t peer_port = 0, local_port = 0;
+  int channel = 0;
+  std::uint32_t every = 5;
+  EncoderBusOptions bus;
+};
+
+/// The component in HAL, attached to the stream of a sampler.
+class SamplerStream {
+ public:
+  explicit SamplerStream(int channel) : id_(hal_init("abbe-encoder")) {
+    if (id_ < 0) return;
+    hal_ready(id_);
+    attached_ = hal_stream_attach(&stream_, id_, kSamplerKey + channel, kColumns) >= 0;
+  }
+  ~SamplerStream() {
+    if (attached_) hal_stream_detach(&stream_);
+    if (id_ >= 0) hal_exit(id_);
+  }
+  SamplerStream(const SamplerStream&) = delete;
+  SamplerStream& operator=(const SamplerStream&) = delete;
+
+  [[nodiscard]] bool attached() const { return attached_; }
+
+  /// All samples that are waiting.
+  void read(std::vector<ServoSample>& samples) {
+    samples.clear();
+    hal_stream_data values[HAL_STREAM_MAX_PINS];
+    unsigned number = 0;
+    while (hal_stream_read(&stream_, values, &number) >= 0) {
+      ServoSample sample;
+      sample.number = number;
+      for (std::size_t i = 0; i < kEncoderJoints; ++i) {
+        sample.motor_mm[i] = values[i].f;
+        sample.offset_mm[i] = values[kEncoderJoints + i].f;
+      }
+      sample.homed = values[2 * kEncoderJoints].b;
+      samples.push_back(sample);
+    }
+  }
+
+ private:
+  int id_;
+  hal_stream_t stream_{};
+  bool attached_ = false;
+};
+
+/// A UDP socket on `local_port`, connected to abbed; -1: refused.
+int open_socket(const Options& options) {
+  sockaddr_in local{}, peer{};
+  local.sin_family = peer.sin_family = AF_INET;
+  local.sin_port = htons(options.local_port);
+  peer.sin_port = htons(options.peer_port);
+  if (::inet_pton(AF_INET, options.peer.c_str(), &peer.sin_addr) != 1) return -1;
+  // To a peer on this computer the socket is on loopback, too.
+  if ((ntohl(peer.sin_addr.s_addr) >> 24) == 127) local.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const auto bound = [&](int (*call)(int, const sockaddr*, socklen_t), sockaddr_in& address) {
+    return call(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+  };
+  if (fd >= 0 && bound(::bind, local) && bound(::connect, peer)) return fd;
+  if (fd >= 0) ::close(fd);
+  return -1;
+}
+
+int run(const Options& options) {
+  SamplerStream stream(options.channel);
+  if (!stream.attached()) {
+    std::fprintf(
+        stderr,
+        "abbe-linuxcnc-encoder: no stream of sampler.%d with cfg=%s: LinuxCNC does not run, "
+        "or its HAL file does not load that sampler\n",
+        options.channel, kColumns);
+    return kIo;
+  }
+  const int fd = open_socket(options);
+  if (fd < 0) {
+    std::fprintf(stderr, "abbe-linuxcnc-encoder: no UDP socket from port %u to %s:%u: %s\n",
+                 unsigned{options.local_port}, options.peer.c_str(), unsigned{options.peer_port},
+                 std::strerror(errno));
+    return kIo;
+  }
+
+  Decimation decimation(options.every);
+  std::vector<ServoSample> samples;
+  std::uint8_t sequence = 0;
+  std::uint64_t sent = 0;
+  stream.read(samples);  // those of the time before the start are discarded
+  while (stop_requested == 0) {
+    stream.read(samples);
+    if (const auto due = decimation.choose(samples)) {
+      const auto datagram = encoder_datagram(*due, sequence++, options.bus);
+      // Without a receiver the datagram is lost, as on a bus without a listener.
+      sent += ::send(fd, datagram.data(), datagram.size(), MSG_DONTWAIT) > 0 ? 1 : 0;
+    }
+    std::this_thread::sleep_for(kPollPeriod);
+  }
+
+  ::close(fd);
+  std::fprintf(
+      stderr, "abbe-linuxcnc-encoder: %llu cycles sent, %llu omitted because they were late\n",
+      static_cast<unsigned long long>(sent), static_cast<unsigned long long>(decimation.late()));
+  return kDone;
+}
+
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Sends the scale readings of LinuxCNC to abbed as CANopen encoders on CAN over UDP. In "
+      "abbed.toml: [encoder] transport = \"udp\", sync = \"external\", local_port = --peer-port, "
+      "peer_port = --local-port, sync_period_us = servo period times --every."};
+  app.set_version_flag("--version", "abbe-linuxcnc-encoder " ABBE_VERSION);
+  Options options;
+  app.add_option("--peer", options.peer, "IPv4 address of abbed")->capture_default_str();
+  app.add_option("--peer-port", options.peer_port, "UDP port of abbed")->required();
+  app.add_option("--local-port", options.local_port, "UDP port of this program")->required();
+  app.add_option("--channel", options.channel, "number of the sampler")
+      ->check(CLI::Range(0, 7))
+      ->capture_default_str();
+  app.add_option("--every", options.every, "send every n-th servo cycle")
+      ->check(CLI::Range(1U, 100U))
+      ->capture_default_str();
+  app.add_option("--first-node", options.bus.first_node, "node of joint 0; the others follow")
+      ->check(CLI::Range(1, 125))
+      ->capture_default_str();
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kDone : kUsage;
+  }
+
+  try {
+    stop_on_signals();
+    return run(options);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "abbe-linuxcnc-encoder: internal error: %s\n", e.what());
+    return kInternal;
+  }
+}

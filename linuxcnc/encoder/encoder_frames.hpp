@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// The joints of LinuxCNC as CANopen encoders on CAN over UDP, for `[encoder] transport = "udp"`
+/// and `sync = "external"` of abbed. Pure.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace abbe::linuxcnc {
+
+inline constexpr std::size_t kEncoderJoints = 3;
+
+/// One servo cycle, from the stream of LinuxCNC's `sampler`. Lengths in mm.
+struct ServoSample {
+  std::uint32_t number = 0;
+  std::array<double, kEncoderJoints> motor_mm{};   ///< at the scale: feedback of the motor
+  std::array<double, kEncoderJoints> offset_mm{};  ///< joint.N.motor-offset
+  bool homed = false;
+
+  /// The scale reading q in the coordinates of the joint, with the correction that is applied.
+  [[nodiscard]] double reading_mm(std::size_t joint) const {
+    return motor_mm[joint] - offset_mm[joint];
+  }
+};
+
+struct EncoderBusOptions {
+  int first_node = 1;      ///< of joint 0; the others follow
+  double step_mm = 10e-6;  ///< of one count: step_nm = 10 in abbed.toml
+};
+
+/// One datagram: SYNC, and the answer of every node (TPDO 1: the position, 32 bits). There is no
+/// answer, and the axis is missing in abbe, before homing and for a reading that is not finite or
+/// beyond 32 bits.
+[[nodiscard]] std::vector<std::byte> encoder_datagram(const ServoSample& sample,
+                                                      std::uint8_t sequence,
+                                                      const EncoderBusOptions& options);
+
+/// Chooses which samples are sent: every n-th, and only the newest of those read together. abbed
+/// dates a SYNC by its arrival, so a sample that waited must not be sent as if it were new.
+class Decimation {
+ public:
+  explicit Decimation(std::uint32_t every) : every_(every) {}
+  /// The sample to send, if any, of those that one read returned.
+  [[nodiscard]] std::optional<ServoSample> choose(std::span<const ServoSample> read);
+  [[nodiscard]] std::uint64_t late() const { return late_; }  ///< due samples that were not sent
+
+ private:
+  std::uint32_t every_;
+  std::uint64_t late_ = 0;
+};
+
+}  // namespace abbe::linuxcnc

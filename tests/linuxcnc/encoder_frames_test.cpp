@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Scale readings of LinuxCNC as CANopen frames (linuxcnc/encoder).
+#include "encoder_frames.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/pdo.hpp"
+#include "abbe/protocol/can/udp_framing.hpp"
+
+namespace {
+
+using abbe::linuxcnc::Decimation;
+using abbe::linuxcnc::encoder_datagram;
+using abbe::linuxcnc::EncoderBusOptions;
+using abbe::linuxcnc::ServoSample;
+namespace can = abbe::protocol::can;
+
+ServoSample sample_at(double x_mm, double y_mm, double z_mm) {
+  ServoSample sample;
+  sample.offset_mm = {0.0, -3.0, 200.0};
+  sample.motor_mm = {x_mm, y_mm - 3.0, z_mm + 200.0};
+  sample.homed = true;
+  return sample;
+}
+
+/// Positions in mm by node, as abbed decodes them; the first frame must be the SYNC.
+std::map<std::uint32_t, double> decoded_mm(const ServoSample& sample) {
+  const EncoderBusOptions options;
+  const auto bytes = encoder_datagram(sample, 7, options);
+  auto view = can::DatagramView::parse(bytes);
+  EXPECT_TRUE(view);
+  EXPECT_EQ(view->sequence(), 7);
+  can::CanFrame frame;
+  EXPECT_TRUE(view->next(frame));
+  EXPECT_EQ(frame.id, can::cob::kSync);
+  EXPECT_EQ(frame.length, 0);
+
+  std::map<std::uint32_t, double> positions_mm;
+  while (view->next(frame)) {
+    const auto count = can::decode_position(frame.payload(), can::PositionType::Signed32);
+    EXPECT_TRUE(count);
+    positions_mm[frame.id - can::cob::kTpdo1] = static_cast<double>(*count) * options.step_mm;
+  }
+  return positions_mm;
+}
+
+TEST(EncoderFrames, CarryTheReadingOfEveryJointToHalfAStep) {
+  const auto mm = decoded_mm(sample_at(-250.123456, 0.0, -350.000004));
+  ASSERT_EQ(mm.size(), 3u);
+  const double half_step_mm = 0.5 * EncoderBusOptions{}.step_mm + 1e-9;
+  EXPECT_NEAR(mm.at(1), -250.123456, half_step_mm);
+  EXPECT_NEAR(mm.at(2), 0.0, half_step_mm);
+  EXPECT_NEAR(mm.at(3), -350.000004, half_step_mm);
+}
+
+TEST(EncoderFrames, BeforeHomingThereIsOnlyTheSync) {
+  ServoSample sample = sample_at(1, 2, 3);
+  sample.homed = false;
+  EXPECT_TRUE(decoded_mm(sample).empty());
+}
+
+TEST(EncoderFrames, AReadingThatCannotBeEncodedIsMissing) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double bad_mm : {nan, infinity, -infinity, 1e9}) {
+    const auto mm = decoded_mm(sample_at(1.0, bad_mm, 3.0));
+    EXPECT_EQ(mm.size(), 2u) << bad_mm;
+    EXPECT_FALSE(mm.contains(2)) << bad_mm;
+  }
+}
+
+TEST(Decimation, SendsEveryNthSampleAndNeverALateOne) {
+  Decimation decimation(5);
+  int sent = 0;
+  for (std::uint32_t n = 1; n <= 100; ++n) {
+    ServoSample sample;
+    sample.number = n;
+    if (const auto due = decimation.choose({&sample, 1})) {
+      EXPECT_EQ(due->number % 5, 0u);
+      ++sent;
+    }
+  }
+  EXPECT_EQ(sent, 20);
+  EXPECT_EQ(decimation.late(), 0u);
+
+  std::vector<ServoSample> together(12);  // read together after a pause: 100 to 111
+  for (std::uint32_t i = 0; i < 12; ++i) together[i].number = 100 + i;
+  EXPECT_FALSE(decimation.choose(together));
+  EXPECT_EQ(decimation.late(), 3u);  // 100, 105, 110
+  together.resize(11);
+  const auto newest = decimation.choose(together);
+  ASSERT_TRUE(newest);
+  EXPECT_EQ(newest->number, 110u);
+}
+
+}  // namespace

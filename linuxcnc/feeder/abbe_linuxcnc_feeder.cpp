@@ -158,14 +158,15 @@ int main(int argc, char** argv) {
       ->required()
       ->expected(3);
   app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
+      ->check(CLI::Range(0U, dds::kHighestDomain))
       ->capture_default_str();
   app.add_option("--profile", options.participant.profiles,
                  "XML file with a participant profile \"abbe\" (default: built in)");
   app.add_option("--security", options.participant.security,
                  "folder of keys of a subscriber, from `abbe dds keys`");
   app.add_option("--clamp-mm", options.clamp_mm,
-                 "largest correction of an axis; a larger one is not applied at all")
-      ->check(CLI::PositiveNumber)
+                 "largest correction of an axis, 0.001 to 1; a larger one is not applied at all")
+      ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str();
   app.add_option("--period-us", options.period_us, "period of the loop")
       ->check(CLI::Range(100L, 20'000L))

@@ -29,7 +29,8 @@ Wanted wanted(const Usable& usable, double silence_s, bool homed, const calib::V
 
   const auto correction_m = command_correction(*usable.field, position_m);
   if (!correction_m) return refuse("outside the volume of the model");
-  if (correction_m->cwiseAbs().maxCoeff() > limits.clamp_m)
+  // A clamp that is NaN refuses, too.
+  if (!(correction_m->cwiseAbs().maxCoeff() <= limits.clamp_m))
     return refuse("the correction is larger than the clamp");
   return {*correction_m, true, {}};
 }

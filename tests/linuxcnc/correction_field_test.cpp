@@ -63,6 +63,8 @@ TEST(Wanted, IsTheCorrectionIfEverythingIsRight) {
 TEST(Wanted, EveryRefusalHasAReasonAndIsZero) {
   FeedLimits narrow;
   narrow.clamp_m = 1e-6;
+  FeedLimits unusable;
+  unusable.clamp_m = std::numeric_limits<double>::quiet_NaN();
   const Usable drift{std::nullopt, "ModelState is DRIFT", {}};
   const Vector3 outside_m(0.5, 0.0, 0.0);
   const std::vector<std::pair<abbe::linuxcnc::Wanted, std::string>> refusals{
@@ -73,6 +75,8 @@ TEST(Wanted, EveryRefusalHasAReasonAndIsZero) {
       {abbe::linuxcnc::wanted(usable(), 0.02, true, outside_m, {}),
        "outside the volume of the model"},
       {abbe::linuxcnc::wanted(usable(), 0.02, true, kPlace_m, narrow),
+       "the correction is larger than the clamp"},
+      {abbe::linuxcnc::wanted(usable(), 0.02, true, kPlace_m, unusable),
        "the correction is larger than the clamp"}};
   for (const auto& [refusal, reason] : refusals) {
     EXPECT_FALSE(refusal.valid);

@@ -63,7 +63,7 @@ void add_places(HtmlReport& page, const ModelDocument& document, const calib::is
     }
   }
   drawing.box_mm = {kMmPerM * low_m, kMmPerM * high_m};
-  drawing.one_colour = document.method == "otf";
+  drawing.one_colour = true;
   const auto what = document.method == "otf"     ? "the driven path"
                     : document.method == "evemu" ? "the balls in each position of the array"
                                                  : "the bar in each of its positions";

@@ -80,6 +80,14 @@ TEST_F(WebUsersTest, ASessionEndsWhenItsUserIsRemoved) {
   EXPECT_FALSE(sessions.find(session->token, now_));
 }
 
+TEST_F(WebUsersTest, ASessionEndsWhenItsPasswordIsChanged) {
+  Sessions sessions(users());
+  const auto session = sessions.log_in("view", kPassword, "::1", now_);
+  ASSERT_TRUE(sessions.find(session->token, now_));
+  write("users", web_user_line("view", WebRole::View, "another long password").value() + "\n");
+  EXPECT_FALSE(sessions.find(session->token, now_));
+}
+
 TEST_F(WebUsersTest, AfterTooManyWrongPasswordsTheAddressWaits) {
   Sessions sessions(users(), {.failures = 2, .pause = 60s});
   for (int i = 0; i < 2; ++i) EXPECT_FALSE(sessions.log_in("view", "wrong", "10.0.0.1", now_));

@@ -28,10 +28,11 @@ drivers::CounterCardOptions card_options(const UsbCardConfig& config, double spe
   options.transfer_time = stretched(options.transfer_time, speed);
   auto& session = options.session;
 
-  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.silence,
-                         &session.status_period, &session.reopen_after, &session.retry_after}) {
+  for (auto* time_out : {&session.open_timeout, &session.control_timeout, &session.status_period,
+                         &session.reopen_after, &session.retry_after}) {
     *time_out = stretched(*time_out, speed);
   }
+  session.silence = stretched_silence(session.silence, speed);
 
   return options;
 }

@@ -113,8 +113,9 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   options.receiver.sync_period = config.sync_period;
   options.receiver.sampling_delay = config.sampling_delay;
   options.receiver.u_sampling_delay = config.u_sampling_delay;
-  options.receiver.heartbeat_timeout = stretched(options.receiver.heartbeat_timeout, speed);
-  options.supervisor.silence = stretched(options.supervisor.silence, speed);
+  options.receiver.heartbeat_timeout =
+      stretched_silence(options.receiver.heartbeat_timeout, speed);
+  options.supervisor.silence = stretched_silence(options.supervisor.silence, speed);
   options.supervisor.sdo.timeout = stretched(options.supervisor.sdo.timeout, speed);
   options.reopen_after = stretched(options.reopen_after, speed);
 

@@ -15,4 +15,13 @@ namespace abbe::daemon {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(longer);
 }
 
+/// stretched(), for the silence after which a device has a fault. The operating system stops a
+/// simulated device, which shares the processors with other programs, for longer than many a
+/// device may be silent: at `speed` > 1 the silence lasts at least a second of its clock.
+[[nodiscard]] inline std::chrono::nanoseconds stretched_silence(std::chrono::nanoseconds silence,
+                                                                double speed) {
+  constexpr std::chrono::nanoseconds kLongestPause = std::chrono::seconds{1};
+  return stretched(speed > 1.0 ? std::max(silence, kLongestPause) : silence, speed);
+}
+
 }  // namespace abbe::daemon

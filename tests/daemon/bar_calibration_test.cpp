@@ -86,6 +86,33 @@ TEST(BarCalibration, FindsAnotherBar) {
   EXPECT_LT(largest_error_m(s, calibrated(s)), 0.03e-6);
 }
 
+TEST(BarCalibration, AnInclinedBarIsAsLong) {
+  // The readings of X are shorter than the bar by 2.5 um at 3 mrad and 27 um at 10 mrad.
+  for (const double inclination_rad : {3e-3, -10e-3}) {
+    sim::mfb::ReversalOptions inclined = without_noise();
+    inclined.inclination_rad = inclination_rad;
+    const Simulated s = simulated(inclined);
+    // Of the straightness of the machine, 2 um, a part of `inclination_rad` is along the bar.
+    EXPECT_LT(largest_error_m(s, calibrated(s)), 0.06e-6) << inclination_rad;
+  }
+}
+
+TEST(BarCalibration, DirectionOfTheGaugeIsInTheUncertainty) {
+  Simulated s = simulated(without_noise());
+  s.gauge.u_alignment_rad = 0.0;
+  const double aligned_m = calibrated(s).positioning.back().gauge_m;
+  s.gauge.u_alignment_rad = 1e-3;
+  const double length_m = s.truth_m.back().x();
+  // e^2 / 2 of two angles of 1 mrad: expectation and standard deviation 1e-6
+  EXPECT_NEAR(calibrated(s).positioning.back().gauge_m,
+              std::hypot(aligned_m, std::sqrt(2.0) * 1e-6 * length_m), 1e-10);
+  s.gauge.u_alignment_rad.reset();  // +-0.3 mm over its length
+  const double gauge_m = s.gauge.faces.back().distance_m;
+  EXPECT_NEAR(calibrated(s).positioning.back().gauge_m,
+              std::hypot(aligned_m, std::sqrt(2.0) * length_m * 0.03e-6 / (gauge_m * gauge_m)),
+              1e-10);
+}
+
 TEST(BarCalibration, GrowthIsTakenOut) {
   sim::mfb::ReversalOptions warm = without_noise();
   warm.probing.temperature = {
@@ -158,6 +185,33 @@ TEST(BarCalibration, CovarianceContainsWhatIsCommon) {
   EXPECT_EQ(C.topRows<3>().norm(), 0.0);
   EXPECT_EQ(C.bottomRows<2>().norm(), 0.0);
   EXPECT_TRUE(calib::mfb::check(found.bar)) << calib::mfb::check(found.bar).error().text;
+}
+
+/// The points of one pass have the errors of its end points in common: their mean is less certain
+/// than that of independent points.
+TEST(BarCalibration, MeanOfThePointsIsAsUncertainAsStated) {
+  double squares = 0.0, squares_if_independent = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const Simulated s = simulated(usual(seed));
+    const BarCalibration found = calibrated(s);
+    const Eigen::MatrixXd& C = found.bar.covariance_m2;
+    const double factor = found.student_t95 / 1.959964;
+    for (Eigen::Index k = 1; k < 3; ++k) {
+      Eigen::VectorXd all = Eigen::VectorXd::Zero(C.rows());
+      double off_m = 0.0;
+      for (std::size_t i = 0; i < s.truth_m.size(); ++i) {
+        all(3 * static_cast<Eigen::Index>(i) + k) = 1.0;
+        off_m += found.bar.O_m[i](k) - s.truth_m[i](k);
+      }
+      squares += std::pow(factor * off_m, 2) / all.dot(C * all);
+      squares_if_independent +=
+          std::pow(factor * off_m, 2) / all.dot(C.diagonal().asDiagonal() * all);
+      ++count;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
+  EXPECT_GT(std::sqrt(squares_if_independent / count), 1.5);
 }
 
 TEST(BarCalibration, TurnedBarIsRefusedByPass) {

@@ -37,15 +37,16 @@ Result<AlongBar> along_bar(const Plan& plan) {
   const Vector3 first = plan.measurements.front().bar_x.normalized();
   AlongBar along;
   first.cwiseAbs().maxCoeff(&along.axis);
-  along.sign = first(along.axis) < 0.0 ? -1.0 : 1.0;
+  along.component = first(along.axis);
+  const double sign = std::copysign(1.0, along.component);
 
   for (const Measurement& m : plan.measurements) {
     const Vector3 x = m.bar_x.normalized();
-    const double off = (x - along.sign * Vector3::Unit(along.axis)).norm();
+    const double off = (x - sign * Vector3::Unit(along.axis)).norm();
     if (off > kMostFromAxis_rad) {
       return failure(ErrorCode::BadInput,
-                     message(m.name, ": bar_x is ", 1e3 * off, " mrad from ",
-                             along.sign < 0.0 ? "-" : "", "XYZ"[along.axis],
+                     message(m.name, ": bar_x is ", 1e3 * off, " mrad from ", sign < 0.0 ? "-" : "",
+                             "XYZ"[along.axis],
                              ": for a calibration the bar lies along one axis in all passes"));
     }
   }
@@ -76,7 +77,7 @@ Result<std::vector<bool>> reversed_passes(const Plan& plan) {
   return reversed;
 }
 
-/// Readings along the bar at its holes, and the place of its line: means over all passes.
+/// Distances along the bar of its holes, and the place of its line: means over all passes.
 struct LineOfBar {
   std::vector<double> along_m;
   Vector3 middle_m = Vector3::Zero();  ///< centre of the tip, machine axes
@@ -160,22 +161,52 @@ struct PositioningCovariances {
   Eigen::MatrixXd gauge_m2, abbe_m2, temperature_m2;
 };
 
+/// Correlations of the deviations of one pass after end-point levelling, if those before are
+/// independent and have one variance: row i of `relative` are the weights of the deviations before
+/// in that of point i. Points without variance have correlation 0.
+Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& relative) {
+  const Eigen::MatrixXd covariance = relative * relative.transpose();
+  const auto inverse = [](double variance) {
+    return variance > 1e-9 ? 1.0 / std::sqrt(variance) : 0.0;
+  };
+  const Eigen::VectorXd scale = covariance.diagonal().unaryExpr(inverse);
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
+}
+
+/// x is relative to point 1, y and z to the line through the first and the last point.
+struct LevelledCorrelations {
+  Eigen::MatrixXd x, yz;
+
+  explicit LevelledCorrelations(const std::vector<Vector3>& O_m) {
+    const Eigen::Index holes = std::ssize(O_m);
+    Eigen::MatrixXd from_first = Eigen::MatrixXd::Identity(holes, holes), from_line = from_first;
+    for (Eigen::Index i = 0; i < holes; ++i) {
+      const double part = O_m[static_cast<std::size_t>(i)].x() / O_m.back().x();
+      from_first(i, 0) -= 1.0;
+      from_line(i, 0) -= 1.0 - part;
+      from_line(i, holes - 1) -= part;
+    }
+    x = correlation_of(from_first);
+    yz = correlation_of(from_line);
+  }
+};
+
 /// Contributions of all kinds to the calibrated points.
 void set_uncertainty(BarCalibration& found, const PositioningCovariances& x) {
   const Eigen::Index holes = std::ssize(found.bar.O_m);
   constexpr double kNormal95 = 1.959964;
   const double factor = found.student_t95 / kNormal95;
+  const LevelledCorrelations correlation(found.bar.O_m);
   Eigen::MatrixXd& covariance_m2 = found.bar.covariance_m2;
   covariance_m2 = Eigen::MatrixXd::Zero(3 * holes, 3 * holes);
 
   for (Eigen::Index i = 1; i < holes; ++i) {
-    const bool last = i + 1 == holes;
-    Vector3 u_m = factor * found.u_repeats_m[static_cast<std::size_t>(i)];
-    if (last) {
-      u_m.tail<2>().setZero();
-    }
-    covariance_m2.diagonal().segment<3>(3 * i) = u_m.cwiseAbs2();
     for (Eigen::Index k = 1; k < holes; ++k) {
+      const Vector3 u_i_m = factor * found.u_repeats_m[static_cast<std::size_t>(i)];
+      const Vector3 u_k_m = factor * found.u_repeats_m[static_cast<std::size_t>(k)];
+      const Vector3 r(correlation.x(i, k), correlation.yz(i, k), correlation.yz(i, k));
+      covariance_m2.block<3, 3>(3 * i, 3 * k).diagonal() =
+          r.cwiseProduct(u_i_m).cwiseProduct(u_k_m);
       covariance_m2(3 * i, 3 * k) += x.gauge_m2(i, k) + x.abbe_m2(i, k) + x.temperature_m2(i, k);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "abbe/calib/root_sum_of_squares.hpp"
@@ -71,11 +72,12 @@ Result<void> check_faces(const StepGauge& gauge) {
 
 Result<void> check_gauge(const StepGauge& gauge) {
   const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
-  const bool valid = valid_number(gauge.u_m) && valid_number(gauge.u_per_m) &&
-                     std::isfinite(gauge.temperature_K) && valid_number(gauge.u_temperature_K) &&
-                     std::isfinite(expansion.alpha_per_K) &&
-                     valid_number(expansion.u_alpha_per_K) &&
-                     valid_number(gauge.u_rotation_rad.value_or(0.0)) && gauge.origin_m.allFinite();
+  const bool valid =
+      valid_number(gauge.u_m) && valid_number(gauge.u_per_m) &&
+      std::isfinite(gauge.temperature_K) && valid_number(gauge.u_temperature_K) &&
+      std::isfinite(expansion.alpha_per_K) && valid_number(expansion.u_alpha_per_K) &&
+      valid_number(gauge.u_rotation_rad.value_or(0.0)) &&
+      valid_number(gauge.u_alignment_rad.value_or(0.0)) && gauge.origin_m.allFinite();
   if (!valid) {
     return failure(ErrorCode::BadInput,
                    message("step gauge \"", gauge.name,
@@ -112,6 +114,16 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
   return weights;
 }
 
+/// Relative standard uncertainty of all distances by the direction of the gauge. An angle e between
+/// gauge and bar makes the measured distances 1 / cos e = 1 + e^2 / 2 times as long. Both components
+/// of e have the standard uncertainty u: e^2 / 2 has the expectation u^2 and the variance u^4.
+double u_of_alignment(const StepGauge& gauge) {
+  const double length_m = gauge.faces.back().distance_m;
+  const double u_rad =
+      gauge.u_alignment_rad.value_or(kGaugeAlignment_m / (std::numbers::sqrt3 * length_m));
+  return std::numbers::sqrt2 * u_rad * u_rad;
+}
+
 /// Relative standard uncertainty of all distances at the temperature of the gauge.
 double u_of_scale(const StepGauge& gauge) {
   const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
@@ -133,12 +145,13 @@ Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const AlongBar&
     return tl::unexpected(valid.error());
   }
   if (along_m.front() < faces_m.front() || along_m.back() > faces_m.back()) {
-    return failure(ErrorCode::BadInput,
-                   message("step gauge: reaches from ", kMmPerM * direction.of(faces_m.front()),
-                           " to ", kMmPerM * direction.of(faces_m.back()),
-                           " mm (readings), the holes of the bar from ",
-                           kMmPerM * direction.of(along_m.front()), " to ",
-                           kMmPerM * direction.of(along_m.back()), " mm"));
+    return failure(
+        ErrorCode::BadInput,
+        message("step gauge: reaches from ", kMmPerM * direction.reading_m(faces_m.front()), " to ",
+                kMmPerM * direction.reading_m(faces_m.back()),
+                " mm (readings), the holes of the bar from ",
+                kMmPerM * direction.reading_m(along_m.front()), " to ",
+                kMmPerM * direction.reading_m(along_m.back()), " mm"));
   }
 
   const Eigen::Index faces = std::ssize(faces_m), points = std::ssize(along_m);
@@ -161,7 +174,7 @@ Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const AlongBar&
   const Eigen::RowVectorXd at_first = weights.row(0);
   weights.rowwise() -= at_first;
 
-  const double u_scale = u_of_scale(gauge);
+  const double u_scale = root_sum_of_squares(u_of_scale(gauge), u_of_alignment(gauge));
   return Positioning{weights * E_faces_m,
                      weights * variance_m2.asDiagonal() * weights.transpose() +
                          u_scale * u_scale * distance_m * distance_m.transpose()};

@@ -7,21 +7,25 @@
 
 namespace abbe::calib::mfb {
 
-/// Machine axis along the bar, and whether the bar points to larger (1) or smaller (-1) readings.
+/// Direction of bar and gauge. The readings are those of the machine axis along the bar, which is
+/// inclined to the bar: a reading changes by the distance along the bar times `component`.
 struct AlongBar {
-  Eigen::Index axis = 0;
-  double sign = 1.0;
-  [[nodiscard]] double of(const Vector3& v) const { return sign * v(axis); }
-  [[nodiscard]] double of(double reading_m) const { return sign * reading_m; }
+  Eigen::Index axis = 0;   ///< machine axis
+  double component = 1.0;  ///< of the unit vector along the bar; negative: to smaller readings
+  /// Distance along the bar from reading 0.
+  [[nodiscard]] double of(const Vector3& v) const { return of(v(axis)); }
+  [[nodiscard]] double of(double reading_m) const { return reading_m / component; }
+  [[nodiscard]] double reading_m(double distance_m) const { return distance_m * component; }
 };
 
 /// E_XX at points along the bar relative to the first point.
 struct Positioning {
   Eigen::VectorXd E_m;
-  Eigen::MatrixXd covariance_m2;  ///< of calibration, temperature and repeatability of the gauge
+  /// of calibration, alignment, temperature and repeatability of the gauge
+  Eigen::MatrixXd covariance_m2;
 };
 
-/// `along_m`: readings along the bar at the points, ascending. BadInput: invalid values of the gauge,
+/// `along_m`: AlongBar::of() of the points, ascending. BadInput: invalid values of the gauge,
 /// a face whose readings do not fit its distance, or points beyond the first or last face.
 [[nodiscard]] Result<Positioning> positioning_by_gauge(const StepGauge& gauge,
                                                        const AlongBar& direction,

@@ -9,10 +9,13 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -63,6 +66,55 @@ fs::path beside_output(const CalibrateBarArguments& arguments, std::string_view 
   return fs::path(arguments.files.out).replace_extension(extension);
 }
 
+bool has_readings(const mfb::StepGauge& gauge) {
+  return !gauge.faces.front().readings_m.empty();
+}
+
+/// What a gauge.toml states besides name and readings.
+std::vector<double> stated_values(const mfb::StepGauge& gauge) {
+  const calib::Expansivity expansion = gauge.expansion.value_or(calib::Expansivity{});
+  std::vector<double> values{gauge.u_m,
+                             gauge.u_per_m,
+                             expansion.alpha_per_K,
+                             expansion.u_alpha_per_K,
+                             gauge.temperature_K,
+                             gauge.u_temperature_K,
+                             gauge.u_rotation_rad.value_or(-1.0),
+                             gauge.u_alignment_rad.value_or(-1.0)};
+  values.insert(values.end(), gauge.origin_m.begin(), gauge.origin_m.end());
+  values.insert(values.end(), gauge.tool_offset_m.begin(), gauge.tool_offset_m.end());
+  for (const mfb::GaugeFace& face : gauge.faces) values.push_back(face.distance_m);
+  return values;
+}
+
+bool same_gauge(const mfb::StepGauge& a, const mfb::StepGauge& b) {
+  constexpr double kRounding = 1e-11;  // of the text in a file
+  const auto values_a = stated_values(a), values_b = stated_values(b);
+  return a.name == b.name &&
+         std::equal(values_a.begin(), values_a.end(), values_b.begin(), values_b.end(),
+                    [](double x, double y) { return std::abs(x - y) <= kRounding; });
+}
+
+/// gauge.toml that the command writes. One of an earlier run is used by --continue if it states
+/// the same gauge as --gauge.
+Result<void> check_measured_gauge(const CalibrateBarArguments& arguments, const GaugeFile& given) {
+  const fs::path file = beside_output(arguments, ".gauge.toml");
+  if (has_readings(given.gauge) || !fs::exists(file)) return {};
+  if (!arguments.continues)
+    return fail(ErrorCode::Usage,
+                fmt::format("{}: exists: --continue uses its readings; else remove it, or choose "
+                            "another -o",
+                            file.string()));
+  const auto measured = read_gauge_toml(file);
+  if (!measured) return tl::unexpected(measured.error());
+  if (same_gauge(measured->gauge, given.gauge)) return {};
+  return fail(
+      ErrorCode::BadInput,
+      fmt::format("{}: its readings are of gauge \"{}\" with other values than those of "
+                  "\"{}\" in {}: remove it, then --continue touches the gauge again",
+                  file.string(), measured->gauge.name, given.gauge.name, arguments.files.gauge));
+}
+
 std::string text_of(const calib::Vector3& v) {
   return fmt::format("{:g}, {:g}, {:g}", v.x(), v.y(), v.z());
 }
@@ -86,6 +138,13 @@ Result<void> wait_for_operator(const std::string& instruction, bool yes) {
   return fail(ErrorCode::Refused, "ended by a signal; --continue goes on at this pass");
 }
 
+/// How well the gauge must be aligned, so that its uncertainty is true.
+std::string alignment_of(const mfb::StepGauge& gauge) {
+  return gauge.u_alignment_rad
+             ? fmt::format("(u {:g} mrad)", 1e3 * *gauge.u_alignment_rad)
+             : fmt::format("within {:g} mm over its length", kMmPerM * mfb::kGaugeAlignment_m);
+}
+
 class BarCalibration {
  public:
   BarCalibration(const CalibrateBarArguments& arguments, BarToCalibrate what, BarPassesFile points,
@@ -104,8 +163,7 @@ class BarCalibration {
       if (arguments_.at_most != 0 && done++ == arguments_.at_most) return false;
       if (auto made = touch_pass(m); !made) return tl::unexpected(made.error());
     }
-    if (!what_.gauge.gauge.faces.front().readings_m.empty() || fs::exists(gauge_file()))
-      return true;
+    if (has_readings(what_.gauge.gauge) || fs::exists(gauge_file())) return true;
     if (arguments_.at_most != 0 && done == arguments_.at_most) return false;
     if (auto made = touch_gauge(); !made) return tl::unexpected(made.error());
     return true;
@@ -113,9 +171,8 @@ class BarCalibration {
 
   /// gauge.toml with readings.
   [[nodiscard]] fs::path gauge_file() const {
-    return what_.gauge.gauge.faces.front().readings_m.empty()
-               ? beside_output(arguments_, ".gauge.toml")
-               : fs::path(arguments_.files.gauge);
+    return has_readings(what_.gauge.gauge) ? fs::path(arguments_.files.gauge)
+                                           : beside_output(arguments_, ".gauge.toml");
   }
   [[nodiscard]] const fs::path& points_file() const { return points_.file(); }
 
@@ -160,9 +217,10 @@ class BarCalibration {
     mfb::StepGauge gauge = what_.gauge.gauge;
     const mfb::Measurement& normal = what_.plan.plan.measurements.front();
     const auto ready = wait_for_operator(
-        fmt::format("step gauge {}: put it where the bar was, along ({}), the centre of the tip on "
-                    "its first face at ({}) mm, within 1 mm.",
-                    gauge.name, text_of(normal.bar_x), text_of(kMmPerM * gauge.origin_m)),
+        fmt::format("step gauge {}: put it where the bar was, along ({}) {}, the centre of the tip "
+                    "on its first face at ({}) mm, within 1 mm.",
+                    gauge.name, text_of(normal.bar_x), alignment_of(gauge),
+                    text_of(kMmPerM * gauge.origin_m)),
         arguments_.yes);
     if (!ready) return ready;
 
@@ -208,6 +266,8 @@ class BarCalibration {
 int run(const CalibrateBarArguments& arguments) {
   auto what = read_files(arguments.files);
   if (!what) return report(what.error());
+  if (auto usable = check_measured_gauge(arguments, what->gauge); !usable)
+    return report(usable.error());
   auto points = BarPassesFile::open(beside_output(arguments, ".points.csv"), what->bar.bar,
                                     arguments.continues);
   if (!points) return report(points.error());

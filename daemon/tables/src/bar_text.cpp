@@ -89,6 +89,8 @@ std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comm
                    kUmPerM * gauge.expansion->u_alpha_per_K);
   if (gauge.u_rotation_rad)
     fmt::format_to(out, "u_rotation_urad = {:.15g}\n", kUmPerM * *gauge.u_rotation_rad);
+  if (gauge.u_alignment_rad)
+    fmt::format_to(out, "u_alignment_mrad = {:.15g}\n", 1e3 * *gauge.u_alignment_rad);
   for (const calib::mfb::GaugeFace& face : gauge.faces)
     fmt::format_to(out, "\n[[step]]\ndistance_mm = {:.15g}\nreadings_mm = {}\n",
                    kMmPerM * face.distance_m, toml_list(face.readings_m, kMmPerM));

@@ -34,6 +34,9 @@ void read_gauge_head(Section head, StepGauge& out) {
   double u_rotation_rad = 0.0;
   if (head.get("u_rotation_urad", u_rotation_rad, kMicro, kNotNegative))
     out.u_rotation_rad = u_rotation_rad;
+  double u_alignment_rad = 0.0;
+  if (head.get("u_alignment_mrad", u_alignment_rad, kMilli, {0.0, 20.0}))
+    out.u_alignment_rad = u_alignment_rad;
   head.close();
 }
 

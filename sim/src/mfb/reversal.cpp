@@ -29,6 +29,10 @@ Vector3d bar_origin_m(const TruthMachine& machine, const ReversalOptions& option
   return Vector3d(kBeside_m, middle(Axis::Y), middle(Axis::Z)) + options.tool_offset_m;
 }
 
+Vector3d bar_x(const ReversalOptions& options) {
+  return {std::cos(options.inclination_rad), std::sin(options.inclination_rad), 0.0};
+}
+
 /// Random numbers of the gauge: of face i from i (runs + 1) on, of the whole gauge beyond.
 struct GaugeDraw {
   const ReversalOptions& options;
@@ -80,7 +84,7 @@ std::vector<Measurement> reversal_plan(const TruthMachine& machine,
       plan.push_back({.name = name,
                       .position = name,
                       .origin_m = bar_origin_m(machine, options),
-                      .bar_x = Vector3d::UnitX(),
+                      .bar_x = bar_x(options),
                       .bar_z = (reversed ? -1.0 : 1.0) * Vector3d::UnitZ(),
                       .tool_offset_m = options.tool_offset_m,
                       .probed = reversed ? Probed::FromBelow : Probed::FromAbove});
@@ -91,7 +95,7 @@ std::vector<Measurement> reversal_plan(const TruthMachine& machine,
 
 Vector3d gauge_origin_m(const TruthMachine& machine, const ReversalOptions& options) {
   return bar_origin_m(machine, options) + options.gauge.beside_bar_m -
-         options.gauge.step_m * Vector3d::UnitX();
+         options.gauge.step_m * bar_x(options);
 }
 
 std::vector<double> gauge_distances_m(double bar_length_m, const StepGauge& gauge) {
@@ -117,7 +121,7 @@ std::vector<Vector3d> gauge_faces_m(const TruthMachine& machine, double bar_leng
     const double off_m =
         i == 0 ? 0.0 : gauge.u_m * draw.number(draw.first_of(i)) + slope * stated_m;
     const double true_m = (stated_m + off_m) * (1.0 + alpha_per_K * (true_C - kReference_C));
-    faces_m.emplace_back(gauge_origin_m(machine, options) + true_m * Vector3d::UnitX());
+    faces_m.emplace_back(gauge_origin_m(machine, options) + true_m * bar_x(options));
   }
   return faces_m;
 }

@@ -166,6 +166,17 @@ TEST_F(BarReversal, WithoutAnOperatorOrFilesItIsRefused) {
   EXPECT_EQ(half.code, 3) << half.err;
   EXPECT_THAT(half.err, HasSubstr("all have them or none"));
 
+  write("bar.gauge.toml", replaced(replaced(text_of(file("bar") + "/gauge.toml"),
+                                            "(distance_mm = .*)", "$1\nreadings_mm = [25.0]"),
+                                   "u_um = [0-9.e-]+", "u_um = 0.5"));
+  const auto stale = calibrate({});
+  EXPECT_EQ(stale.code, 2) << stale.err;
+  EXPECT_THAT(stale.err, HasSubstr("bar.gauge.toml: exists: --continue uses its readings"));
+  const auto other = calibrate({"--continue"});
+  EXPECT_EQ(other.code, 3) << other.err;
+  EXPECT_THAT(other.err, HasSubstr("bar.gauge.toml: its readings are of gauge"));
+  std::filesystem::remove(file("bar.gauge.toml"));
+
   write("bar.points.csv", "measurement,feature,index,side,k,x_mm,y_mm,z_mm\nN1,hole,1,,0,1,2,3\n");
   const auto torn = calibrate({"--continue"});
   EXPECT_EQ(torn.code, 3) << torn.err;

@@ -7,7 +7,9 @@
 ///
 /// Positioning: a step gauge along the same axis shows the error of the machine E_XX = true distance
 /// - measured distance. On a line beside that of the bar, the rotations of the machine change it by
-/// rotation times distance of the lines (Abbe error). Between the faces E_XX is linear.
+/// rotation times distance of the lines (Abbe error). Between the faces E_XX is linear. The gauge lies
+/// along bar_x of the first measurement, which may be inclined to the axis; the rest of its
+/// misalignment is in the uncertainty.
 /// Units: m, rad, K. Pure.
 
 #include <optional>
@@ -24,6 +26,10 @@ struct GaugeFace {
   double distance_m = 0.0;         ///< from the first face, calibrated, at 20 degC
   std::vector<double> readings_m;  ///< of the axis along the bar, one or more runs
 };
+/// A gauge without u_alignment_rad is aligned with the bar within +-0.3 mm over its length, in both
+/// directions across it.
+inline constexpr double kGaugeAlignment_m = 0.3e-3;
+
 struct StepGauge {
   std::string name;
   std::vector<GaugeFace> faces;  ///< ascending distances from 0
@@ -35,13 +41,16 @@ struct StepGauge {
   Vector3 tool_offset_m = Vector3::Zero();  ///< tool reference point to tip
   /// Standard uncertainty of the rotations of the machine along the bar, relative to hole 1.
   std::optional<double> u_rotation_rad;
+  /// Standard uncertainty of each of the two angles between gauge and bar. nullopt:
+  /// kGaugeAlignment_m over its length.
+  std::optional<double> u_alignment_rad;
 };
 
 /// Standard uncertainties of x of each point.
 struct PositioningBudget {
-  double repeats_m = 0.0;      ///< mean of the passes, with the factor of Student's t
-  double gauge_m = 0.0;        ///< calibration, temperature and repeatability of the gauge
-  double abbe_m = 0.0;         ///< rotations of the machine times distance of the lines
+  double repeats_m = 0.0;  ///< mean of the passes, with the factor of Student's t
+  double gauge_m = 0.0;    ///< calibration, alignment, temperature and repeatability of the gauge
+  double abbe_m = 0.0;     ///< rotations of the machine times distance of the lines
   double temperature_m = 0.0;  ///< of the bar
 };
 
@@ -74,7 +83,6 @@ struct BarCalibration {
 /// Whether the touches of one pass show the bar as planned: the errors of observe(), for a bar that
 /// lies turned, another bar, a wrong feature or too few touches. `touches`: of that measurement.
 [[nodiscard]] Result<void> check_pass(const Bar& nominal, const Plan& plan, std::size_t measurement,
-                                      const PassTouches& touches,
-                                      const ObserveLimits& limits = {});
+                                      const PassTouches& touches, const ObserveLimits& limits = {});
 
 }  // namespace abbe::calib::mfb

@@ -16,7 +16,8 @@ namespace abbe::daemon {
 /// gauge.toml:
 ///
 ///   [gauge]  name, origin_mm, tool_offset_mm, u_um, u_um_per_m, temperature_C, u_temperature_K,
-///            alpha_um_per_m_K and u_alpha_um_per_m_K (both or neither), u_rotation_urad
+///            alpha_um_per_m_K and u_alpha_um_per_m_K (both or neither), u_rotation_urad,
+///            u_alignment_mrad
 ///   [[step]] distance_mm, readings_mm
 struct GaugeFile {
   InputFile source;

@@ -1,7 +1,7 @@
 #pragma once
 /// The calibration of a Multi-Feature Bar by reversal on a simulated measuring machine: the bar is
 /// probed as it lies and turned by 180 degrees about its x axis, again and again, and a step gauge
-/// gives the positioning of the machine. The bar lies along X. Pure; deterministic from the seed.
+/// gives the positioning of the machine. Bar and gauge lie along X, or nearly. Pure; deterministic from the seed.
 
 #include "abbe/sim/mfb/files.hpp"
 
@@ -23,6 +23,7 @@ struct StepGauge {
 struct ReversalOptions {
   std::size_t repeats = 5;  ///< normal and reversed passes, each with a clamping of its own
   Eigen::Vector3d tool_offset_m{0.0, 0.0, -0.15};  ///< tool reference point to tip
+  double inclination_rad = 0.0;  ///< of bar and gauge to X, in the plane of X and Y
   ProbingOptions probing;
   StepGauge gauge;
 };

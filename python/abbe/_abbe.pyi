@@ -1,5 +1,6 @@
 """Types of the extension module."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,16 +36,23 @@ class Model:
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Of the parameters, in their order; m^2, m rad, rad^2."""
-    def error_at(self, points_m: ArrayLike, tool_m: ArrayLike | None = None
+    def error_at(self, points_m: ArrayLike, tool_m: ArrayLike | None = None,
+                 direction: Sequence[int] | None = None
                  ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """(V (N, 3) in m, its covariance (N, 3, 3) in m^2, inside (N)) at N x 3 scale readings.
 
-        inside: the reading is in the validity volume, and the model holds for the tool. With backlash
-        V is the mean of both directions of travel.
+        inside: the reading is in the validity volume, and the model holds for the tool. direction:
+        of the travel of X, Y, Z, -1, 0 (unknown) or 1 each; abbe.Error if the model has no backlash.
+        Where it is unknown, V is the mean of both directions, and the covariance contains half the
+        difference.
         """
-    def correction_at(self, points_m: ArrayLike, tool_m: ArrayLike | None = None
+    def correction_at(self, points_m: ArrayLike, tool_m: ArrayLike | None = None,
+                      direction: Sequence[int] | None = None
                       ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """(c (N, 3) in m, inside (N)): to reach the nominal position p, command p + c."""
+        """(c (N, 3) in m, inside (N)): to reach the nominal position p, command p + c.
+
+        direction: as for error_at(), in which the axes reach p.
+        """
 
 class Recording:
     """A recording of abbed (MCAP), also a damaged one."""

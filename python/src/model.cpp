@@ -1,7 +1,9 @@
+#include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -48,11 +50,32 @@ py::array_t<double> table_of(std::span<const Vector3> rows) {
   return out;
 }
 
+/// Direction of travel of X, Y, Z: -1, 0 (unknown) or 1 each.
+using Direction = std::optional<std::array<int, 3>>;
+
+calib::estimation::AxisTravel travel_of(const ModelDocument& document, const Direction& direction) {
+  calib::estimation::AxisTravel travel{};
+  if (!direction) return travel;
+  if (document.model.travel() == nullptr)
+    throw Raised({daemon::ErrorCode::DataInsufficient,
+                  "direction: the model has no backlash, so V in one direction of travel is not "
+                  "known; leave the direction out",
+                  {}});
+  for (std::size_t a = 0; a < travel.size(); ++a) {
+    const int towards = (*direction)[a];
+    if (towards < -1 || towards > 1)
+      refuse(fmt::format("direction: {} for {}: must be -1, 0 (unknown) or 1", towards, "XYZ"[a]));
+    travel[a] = static_cast<calib::estimation::Travel>(towards);
+  }
+  return travel;
+}
+
 /// (V_m (N, 3), cov_m2 (N, 3, 3), inside (N)).
 py::tuple error_at(const ModelDocument& document, const Points& points_m,
-                   const std::optional<Vector3>& tool_m) {
+                   const std::optional<Vector3>& tool_m, const Direction& direction) {
   const py::ssize_t n = rows_of(points_m, "points_m");
   const Vector3 tool = tool_of(document, tool_m);
+  const auto travel = travel_of(document, direction);
   py::array_t<double> V({n, py::ssize_t{3}}), cov({n, py::ssize_t{3}, py::ssize_t{3}});
   py::array_t<bool> inside(n);
   const double* const at = points_m.data();
@@ -62,7 +85,7 @@ py::tuple error_at(const ModelDocument& document, const Points& points_m,
   {
     const py::gil_scoped_release other_threads_may_run;
     for (py::ssize_t i = 0; i < n; ++i) {
-      const auto error = document.model.error_at(Vector3(at + 3 * i), tool);
+      const auto error = document.model.error_at(Vector3(at + 3 * i), tool, travel);
       Eigen::Map<Vector3>(to_V + 3 * i) = error.V_m;
       Eigen::Map<calib::Matrix3>(to_cov + 9 * i) = error.cov_V_m2;  // symmetric
       to_inside[i] = error.inside && error.tool_ok;
@@ -73,9 +96,10 @@ py::tuple error_at(const ModelDocument& document, const Points& points_m,
 
 /// (c_m (N, 3), inside (N)).
 py::tuple correction_at(const ModelDocument& document, const Points& points_m,
-                        const std::optional<Vector3>& tool_m) {
+                        const std::optional<Vector3>& tool_m, const Direction& direction) {
   const py::ssize_t n = rows_of(points_m, "points_m");
   const Vector3 tool = tool_of(document, tool_m);
+  const auto travel = travel_of(document, direction);
   py::array_t<double> c({n, py::ssize_t{3}});
   py::array_t<bool> inside(n);
   const double* const at = points_m.data();
@@ -85,7 +109,7 @@ py::tuple correction_at(const ModelDocument& document, const Points& points_m,
   {
     const py::gil_scoped_release other_threads_may_run;
     for (py::ssize_t i = 0; i < n && !fault; ++i) {
-      const auto found = document.model.command_correction(Vector3(at + 3 * i), tool);
+      const auto found = document.model.command_correction(Vector3(at + 3 * i), tool, travel);
       if (!found) {
         fault = daemon::error_of(found.error());
         continue;
@@ -155,8 +179,10 @@ void bind_model(py::module_& module) {
       .def_property_readonly("parameters", parameters_of)
       .def_property_readonly("covariance",
                              [](const ModelDocument& d) { return d.model.covariance(); })
-      .def("error_at", error_at, py::arg("points_m"), py::arg("tool_m") = py::none())
-      .def("correction_at", correction_at, py::arg("points_m"), py::arg("tool_m") = py::none());
+      .def("error_at", error_at, py::arg("points_m"), py::arg("tool_m") = py::none(),
+           py::arg("direction") = py::none())
+      .def("correction_at", correction_at, py::arg("points_m"), py::arg("tool_m") = py::none(),
+           py::arg("direction") = py::none());
 }
 
 }  // namespace abbe::python

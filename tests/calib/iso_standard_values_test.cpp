@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -24,23 +25,34 @@ std::vector<Vector3> iso_corners(const Vector3& low_m, const Vector3& high_m) {
   return all;
 }
 
-/// Nodes -0.3, -0.15 .. 0.3 m in X and Y, -0.4 .. -0.1 m in Z. All tables are 0; translations and
-/// squareness have independent standard uncertainties of 0.1 um or urad, rotations none.
-ModelDescription iso_zero_model() {
-  const auto x = equidistant_nodes(-0.3, 0.3, 0.15).value();
+AxisNodes iso_nodes() {
+  return equidistant_nodes(-0.3, 0.3, 0.15).value();
+}
+
+/// Nodes -0.3, -0.15 .. 0.3 m in X (or `x`) and Y, -0.4 .. -0.1 m in Z. All tables are 0;
+/// translations and squareness have independent standard uncertainties of 0.1 um or urad, rotations
+/// none.
+ModelDescription iso_zero_model(const AxisNodes& x = iso_nodes()) {
+  const auto y = iso_nodes();
   const auto z = equidistant_nodes(-0.4, -0.1, 0.075).value();
-  const auto layout = ParameterLayout::observable_with_one_target({}, {x, x, z}).value();
+  const auto layout = ParameterLayout::observable_with_one_target({}, {x, y, z}).value();
   const auto n = static_cast<Eigen::Index>(layout.model_size());
   const std::vector<Vector3> tools{kIsoTool};
   Eigen::MatrixXd covariance = kIsoU_m * kIsoU_m * Eigen::MatrixXd::Identity(n, n);
   for (const Table& table : layout.tables()) {
     if (is_rotation(table.motion.motion)) {
-      covariance.diagonal().segment(static_cast<Eigen::Index>(table.offset), 5).setZero();
+      const MachineNodes nodes{x, y, z};
+      covariance.diagonal()
+          .segment(static_cast<Eigen::Index>(table.offset),
+                   std::ssize(nodes[index(table.motion.axis)].nodes_m))
+          .setZero();
     }
   }
   return VolumetricModel::from_vector(
              layout, Gauge::G1, tools, Eigen::VectorXd::Zero(n), covariance,
-             ValidityVolume::hull_of(iso_corners({-0.3, -0.3, -0.4}, {0.3, 0.3, -0.1})).value())
+             ValidityVolume::hull_of(
+                 iso_corners({x.nodes_m.front(), -0.3, -0.4}, {x.nodes_m.back(), 0.3, -0.1}))
+                 .value())
       .value()
       .description();
 }
@@ -81,19 +93,53 @@ TEST(StandardValues, PositioningIsTheRangeOfTheMeanDeviations) {
   EXPECT_NEAR(x.mean.back().value, 2e-6, 1e-15);        // 3 - 1
   EXPECT_NEAR(x.mean.back().u, std::sqrt(2.0) * kIsoU_m, 1e-15);
   EXPECT_FALSE(x.B) << "the model has no differences between the directions";
-  EXPECT_EQ(x.E.value, x.M.value);
+  EXPECT_FALSE(x.E);
 }
 
 TEST(StandardValues, StraightnessIsRelativeToTheLeastSquaresLine) {
   ModelDescription model = iso_zero_model();
-  // At -0.3 .. 0.3 m: 4, 1, 0, 1, 4 um plus a line. Mean 2: deviations 2, -1, -2, -1, 2.
+  // At -0.3 .. 0.3 m: 4, 1, 0, 1, 4 um plus a line. The ends stand for half as much travel as the
+  // others: mean (2 + 1 + 0 + 1 + 2) / 4 = 1.5, deviations 2.5, -0.5, -1.5, -0.5, 2.5.
   set_table(model, "EYX", [](double x) { return 4e-6 * x * x / 0.09 + 7e-6 * x + 5e-6; });
   const iso::Straightness s = straightness_named(values_of(model), "EYX");
   EXPECT_NEAR(s.range.value, 4e-6, 1e-15);
-  EXPECT_NEAR(s.deviation[1].value, -1e-6, 1e-15);
+  EXPECT_NEAR(s.deviation[1].value, -0.5e-6, 1e-15);
   EXPECT_NEAR(straightness_named(values_of(model), "EZX").range.value, 0.0, 1e-15);
-  // Deviation 1 of five independent values: 1 - 1/5 - (p_1)^2 / sum p^2, p = -2 .. 2.
-  EXPECT_NEAR(s.deviation[1].u, kIsoU_m * std::sqrt(1.0 - 0.2 - 0.1), 1e-12);
+  // Deviation 1 of five independent values at p = -2 .. 2, with the weights w = (1, 2, 2, 2, 1) / 8 of
+  // the mean and (M p) / (p M p) = (-5/6, -1, 0, 1, 5/6) / (16/3) of the slope.
+  const std::array slope{-5.0 / 6.0, -1.0, 0.0, 1.0, 5.0 / 6.0};
+  double variance = 0.0;
+  for (std::size_t i = 0; i < 5; ++i) {
+    const double w = (i == 0 || i == 4 ? 1.0 : 2.0) / 8.0;
+    variance += std::pow((i == 1 ? 1.0 : 0.0) - w + slope[i] * 3.0 / 16.0, 2);
+  }
+  EXPECT_NEAR(s.deviation[1].u, kIsoU_m * std::sqrt(variance), 1e-12);
+}
+
+TEST(StandardValues, DenseNodesDoNotTurnTheReferenceLine) {
+  // The same polygon, known at nine more places in its first interval.
+  ModelDescription even = iso_zero_model();
+  std::vector<double> more_m = even.nodes[0].nodes_m;
+  for (int i = 1; i < 10; ++i) {
+    more_m.insert(more_m.begin() + i, -0.3 + 0.015 * i);
+  }
+  ModelDescription dense = iso_zero_model({more_m});
+  const auto polygon = [](double x) {  // 4, 1, 0, 1, 4 um at the nodes of `even`
+    const double node = std::abs(x) / 0.15;
+    return 1e-6 * (node < 1.0 ? node : 1.0 + 3.0 * (node - 1.0));
+  };
+  set_table(even, "EYX", polygon);
+  set_table(dense, "EYX", polygon);
+  const iso::Straightness a = straightness_named(values_of(even), "EYX"),
+                          b = straightness_named(values_of(dense), "EYX");
+  EXPECT_NEAR(a.range.value, 4e-6, 1e-15);
+  EXPECT_NEAR(b.range.value, 4e-6, 1e-12);
+}
+
+TEST(StandardValues, LongAxesHaveFiveTargetsPerMetre) {
+  const ModelDescription model = iso_zero_model(equidistant_nodes(-1.5, 1.5, 0.75).value());
+  EXPECT_GE(values_of(model).positioning[0].targets_m.size(), 15u);
+  EXPECT_EQ(values_of(model).positioning[1].targets_m.size(), 5u);
 }
 
 TEST(StandardValues, SquarenessIsTheAngleBetweenTheLinesOfTwoAxes) {
@@ -129,7 +175,8 @@ TEST(StandardValues, ARotationOfTheWholeVolumeChangesNothing) {
     EXPECT_NEAR(s.angle.value, 0.0, 1e-15) << s.name;
   }
   for (const auto& d : values.diagonals) {
-    EXPECT_NEAR(d.E.value, 0.0, 1e-15) << d.name;
+    EXPECT_NEAR(d.M.value, 0.0, 1e-15) << d.name;
+    EXPECT_FALSE(d.E || d.B) << "the model has no differences between the directions";
   }
 }
 
@@ -141,9 +188,9 @@ TEST(StandardValues, ADiagonalOfAScaledMachineIsTooLongByTheScale) {
   const auto values = values_of(model);
   const double length_m = std::sqrt(0.6 * 0.6 + 0.6 * 0.6 + 0.3 * 0.3);
   for (const auto& d : values.diagonals) {
-    EXPECT_NEAR(d.E.value, 20e-6 * length_m, 1e-12) << d.name;
+    EXPECT_NEAR(d.M.value, 20e-6 * length_m, 1e-12) << d.name;
     EXPECT_NEAR(d.along_m.back(), length_m, 1e-12);
-    EXPECT_NEAR(d.mean.back().value, d.E.value, 1e-15);
+    EXPECT_NEAR(d.mean.back().value, d.M.value, 1e-15);
   }
   EXPECT_NEAR((values.diagonals[1].from_m - Vector3(0.3, -0.3, -0.4)).norm(), 0.0, 1e-12) << "NPP";
 }
@@ -159,7 +206,8 @@ TEST(StandardValues, DiagonalsShowASquarenessError) {
   EXPECT_NEAR(values.diagonals[1].mean.back().value, 10e-6 * 0.36 / length_m, 1e-12);
   EXPECT_NEAR(values.diagonals[2].mean.back().value, 10e-6 * 0.36 / length_m, 1e-12);
   EXPECT_NEAR(values.diagonals[3].mean.back().value, -10e-6 * 0.36 / length_m, 1e-12);
-  EXPECT_NEAR(values.diagonals[0].E.u, values.worst_diagonal().E.u, 0.1 * kIsoU_m);
+  EXPECT_NEAR(values.diagonals[0].M.u, values.diagonal_of_largest_M().M.u, 0.1 * kIsoU_m);
+  EXPECT_EQ(values.diagonal_of_largest_E(), nullptr);
 }
 
 /// The same with one difference for each table.
@@ -187,8 +235,9 @@ TEST(StandardValues, BacklashIsTheReversalError) {
   ASSERT_TRUE(x.B && x.mean_B);
   EXPECT_NEAR(x.B->value, -3e-6, 1e-15);
   EXPECT_NEAR(x.mean_B->value, -3e-6, 1e-15);
-  EXPECT_NEAR(x.M.value, 0.9e-6, 1e-15);         // 10 um/m^2 (0.3 m)^2
-  EXPECT_NEAR(x.E.value, 0.9e-6 + 3e-6, 1e-15);  // the largest backward, the smallest forward
+  EXPECT_NEAR(x.M.value, 0.9e-6, 1e-15);  // 10 um/m^2 (0.3 m)^2
+  ASSERT_TRUE(x.E);
+  EXPECT_NEAR(x.E->value, 0.9e-6 + 3e-6, 1e-15);  // the largest backward, the smallest forward
   EXPECT_NEAR(x.M.u, std::sqrt(2.0) * kIsoU_m, 1e-12) << "without half the backlash";
   ASSERT_TRUE(values.positioning[1].B);
   EXPECT_NEAR(values.positioning[1].B->value, 0.0, 1e-15);
@@ -216,8 +265,8 @@ void expect_values_of_V(const VolumetricModel& model) {
     const Vector3 along = (d.to_m - d.from_m).normalized();
     const double all = along.dot(model.V_at(d.to_m, tool) - model.V_at(d.from_m, tool));
     EXPECT_NEAR(d.mean.back().value, all, 1e-15) << d.name;
-    EXPECT_GE(d.E.value, std::abs(all) - 1e-15);
-    EXPECT_GT(d.E.u, 0.0);
+    EXPECT_GE(d.M.value, std::abs(all) - 1e-15);
+    EXPECT_GT(d.M.u, 0.0);
   }
 }
 

@@ -31,7 +31,7 @@ CertificateDetails certificate_details() {
   d.temperature_C = 20.4;
   d.u_temperature_K = 0.3;
   d.feed_mm_per_min = 2500.0;
-  d.equipment = {{"laser tracker", "Example Instruments", "T1", "4711", "D-K-12345"}};
+  d.equipment = {{"laser tracker", "Example Instruments", "T1", "4711", "D-K-12345", "2099-12-31"}};
   return d;
 }
 
@@ -136,11 +136,34 @@ TEST(CalibrationCertificate, NamesEverythingThatIsMissing) {
   const auto refused = calibration_certificate(subject);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
-  EXPECT_THAT(
-      refused.error().details,
-      ::testing::ElementsAre("laboratory.name", "laboratory.city", HasSubstr("laboratory.country"),
-                             "customer.name", "customer.city", "person.name", "machine.serial",
-                             "certificate.location", HasSubstr("dates such as")));
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre("certificate.number", "laboratory.name", "laboratory.city",
+                                     HasSubstr("laboratory.country"), "customer.name",
+                                     "customer.city", "person.name", "machine.serial",
+                                     "certificate.location", HasSubstr("dates such as")));
+}
+
+TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
+  ReportSubject subject = certified_subject(3);
+  subject.details.begin_date = "2026-11-25";
+  subject.details.end_date = "2026-11-24";
+  subject.details.issue_date = "2026-11-23";
+  subject.details.equipment.front().valid_until = "2026-11-20";
+  const auto refused = calibration_certificate(subject);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("end_date: 2026-11-24 is before begin_date"),
+                                     HasSubstr("issue_date: 2026-11-23 is before the end"),
+                                     HasSubstr("\"laser tracker\": its calibration was valid until "
+                                               "2026-11-20")));
+}
+
+TEST(CalibrationCertificate, StatesConditionsOnlyOfTheMeasurementThatHadThem) {
+  const std::string text =
+      calibration_certificate(certified_subject(3), certified_subject(4)).value();
+  const std::string as_left = text.substr(text.find(">As left<"));
+  EXPECT_THAT(text, HasSubstr(">20.400<"));
+  EXPECT_THAT(as_left, AllOf(Not(HasSubstr(">20.400<")), HasSubstr("State of the machine")));
 }
 
 TEST(CalibrationCertificate, StaysValidWithHostileTexts) {
@@ -154,14 +177,14 @@ TEST(CalibrationCertificate, StaysValidWithHostileTexts) {
   d.number = d.person = d.role = d.remark = d.machine_serial = d.machine_model = name;
   d.laboratory.name = d.laboratory.city = d.customer.name = d.customer.city = name;
   d.customer.street = d.laboratory_code = name;
-  d.equipment = {{name, name, name, name, name}, {name, "", "", "", ""}};
+  d.equipment = {{name, name, name, name, name, ""}, {name, "", "", "", "", ""}};
   const auto text = calibration_certificate(subject).value();
   EXPECT_EQ(schema_faults(text), "");
   EXPECT_THAT(text, Not(HasSubstr("<a>")));
 
   subject.document.machine = " \t ";
   d.role = d.remark = d.customer.street = d.laboratory_code = " \n ";
-  d.equipment = {{"probe", " ", " ", " ", " "}};
+  d.equipment = {{"probe", " ", " ", " ", " ", ""}};
   EXPECT_EQ(schema_faults(calibration_certificate(subject).value()), "") << "white space";
 }
 

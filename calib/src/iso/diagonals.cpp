@@ -45,7 +45,7 @@ Diagonal diagonal_of(const ErrorFunctions& functions, const LineBox& box, std::s
   for (Eigen::Index i = 0; i < mean.rows(); ++i) {
     d.mean.push_back(functions.with_u(mean.row(i)));
   }
-  d.M = d.E = range_of(functions, mean);
+  d.M = range_of(functions, mean);
   if (functions.has_travel()) {
     const Eigen::MatrixXd up = diagonal_rows(functions, d, forward),
                           down = diagonal_rows(functions, d, backward);

@@ -1,11 +1,13 @@
 #include "iso/lines.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace abbe::calib::iso {
 namespace {
 
-constexpr std::size_t kFewestTargets = 5;  // [ISO 230-2] for axes up to 2 m
+// [ISO 230-2] for axes up to 2 m; for longer ones fewer per metre are allowed.
+constexpr double kFewestTargets = 5.0, kFewestPerMetre = 5.0;
 
 /// The largest factor with which all corners of the box about `centre_m` are in the volume.
 double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
@@ -35,7 +37,9 @@ double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
 
 /// Halves the longest interval until there are enough targets.
 void complete(std::vector<double>& targets_m) {
-  while (targets_m.size() < kFewestTargets) {
+  const double length_m = targets_m.back() - targets_m.front();
+  const double fewest = std::max(kFewestTargets, std::ceil(kFewestPerMetre * length_m - 1e-9));
+  while (static_cast<double>(targets_m.size()) < fewest) {
     std::size_t longest = 1;
     for (std::size_t i = 1; i < targets_m.size(); ++i) {
       if (targets_m[i] - targets_m[i - 1] > targets_m[longest] - targets_m[longest - 1] + 1e-9) {

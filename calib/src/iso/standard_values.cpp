@@ -17,7 +17,7 @@ Positioning positioning_of(const ErrorFunctions& functions, const AxisLine& line
   for (Eigen::Index i = 0; i < mean.rows(); ++i) {
     p.mean.push_back(functions.with_u(mean.row(i) - mean.row(0)));
   }
-  p.M = p.E = range_of(functions, mean);
+  p.M = range_of(functions, mean);
 
   if (functions.has_travel()) {
     const Eigen::MatrixXd up = line.rows(functions, component, Travel::Forward),
@@ -31,22 +31,37 @@ Positioning positioning_of(const ErrorFunctions& functions, const AxisLine& line
   return p;
 }
 
-/// Row vector w such that w f is the slope of the least-squares line through the values f at the
-/// targets:  w_i = (p_i - mean p) / sum (p_k - mean p)^2.
-Eigen::RowVectorXd slope_weights(const std::vector<double>& targets_m) {
-  Eigen::RowVectorXd p = Eigen::Map<const Eigen::RowVectorXd>(
-      targets_m.data(), static_cast<Eigen::Index>(targets_m.size()));
-  p.array() -= p.mean();
-  return p / p.squaredNorm();
-}
+/// The least-squares line over the travel of a curve f that is linear between the targets p_i:
+///     min over a, b of the integral of (f(p) - a - b (p - p_mean))^2 dp
+///     mean = sum w_i f_i,   slope = sum (M q)_i f_i / q^T M q,   q_i = p_i - p_mean
+/// w_i: the part of the travel nearest to target i; M: the integrals of the products of the hat
+/// functions of the targets, tridiagonal.
+struct ReferenceLine {
+  Eigen::RowVectorXd mean, slope;  ///< weights of the values
+  Eigen::VectorXd from_mean_m;     ///< q
+
+  explicit ReferenceLine(const std::vector<double>& targets_m) {
+    const Eigen::Index n = std::ssize(targets_m);
+    const auto p = Eigen::Map<const Eigen::VectorXd>(targets_m.data(), n);
+    mean = Eigen::RowVectorXd::Zero(n);
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);
+    for (Eigen::Index i = 0; i + 1 < n; ++i) {
+      const double h = p(i + 1) - p(i);
+      mean.segment<2>(i).array() += 0.5 * h / (p(n - 1) - p(0));
+      M.block<2, 2>(i, i) += h / 6.0 * (Eigen::Matrix2d() << 2.0, 1.0, 1.0, 2.0).finished();
+    }
+    from_mean_m = p.array() - mean.dot(p);
+    slope = (M * from_mean_m).transpose();
+    slope /= slope.dot(from_mean_m);
+  }
+};
 
 Straightness straightness_of(const ErrorFunctions& functions, const AxisLine& line, Motion motion) {
   Straightness s{.motion = {motion, line.axis}};
   const Eigen::MatrixXd rows = line.rows(functions, direction(motion));
-  const Eigen::RowVectorXd weights = slope_weights(line.targets_m);
-  const Eigen::RowVectorXd slope = weights * rows, mean = rows.colwise().mean();
-  const Eigen::VectorXd p = weights.transpose() / weights.squaredNorm();
-  const Eigen::MatrixXd rest = rows.rowwise() - mean - p * slope;
+  const ReferenceLine reference(line.targets_m);
+  const Eigen::RowVectorXd slope = reference.slope * rows, mean = reference.mean * rows;
+  const Eigen::MatrixXd rest = rows.rowwise() - mean - reference.from_mean_m * slope;
   for (Eigen::Index i = 0; i < rest.rows(); ++i) {
     s.deviation.push_back(functions.with_u(rest.row(i)));
   }
@@ -56,7 +71,7 @@ Straightness straightness_of(const ErrorFunctions& functions, const AxisLine& li
 
 /// Row of the slope of component `of` of V on a line.
 Eigen::RowVectorXd slope_row(const ErrorFunctions& functions, const AxisLine& line, Axis of) {
-  return slope_weights(line.targets_m) * line.rows(functions, index(of));
+  return ReferenceLine(line.targets_m).slope * line.rows(functions, index(of));
 }
 
 std::array<Squareness, 3> squareness_of(const ErrorFunctions& functions,
@@ -94,10 +109,18 @@ std::vector<Angular> angular_of(const ErrorFunctions& functions,
 
 }  // namespace
 
-const Diagonal& StandardValues::worst_diagonal() const {
+const Diagonal& StandardValues::diagonal_of_largest_M() const {
   return *std::max_element(
       diagonals.begin(), diagonals.end(),
-      [](const Diagonal& a, const Diagonal& b) { return a.E.value < b.E.value; });
+      [](const Diagonal& a, const Diagonal& b) { return a.M.value < b.M.value; });
+}
+
+const Diagonal* StandardValues::diagonal_of_largest_E() const {
+  const auto largest = std::max_element(
+      diagonals.begin(), diagonals.end(), [](const Diagonal& a, const Diagonal& b) {
+        return a.E.value_or(Value{}).value < b.E.value_or(Value{}).value;
+      });
+  return largest->E ? &*largest : nullptr;
 }
 
 Result<StandardValues> standard_values(const VolumetricModel& model) {

@@ -64,6 +64,7 @@ void read_equipment(Section& root, CertificateDetails& out) {
     section.get("model", e.model);
     section.get("serial", e.serial);
     section.get("certificate", e.certificate);
+    read_date(section, "valid_until", e.valid_until);
     section.close();
   }
 }

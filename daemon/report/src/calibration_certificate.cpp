@@ -20,12 +20,49 @@ std::string date_of(protocol::UtcTime time) {
   return to_text(time).substr(0, kDate);
 }
 
+/// Days of the measurement: those of the details, else that of the model.
+struct MeasurementDays {
+  std::string begin, end;
+  explicit MeasurementDays(const ReportSubject& subject)
+      : begin(subject.details.begin_date), end(subject.details.end_date) {
+    const std::string day = date_of(subject.document.created);
+    if (begin.empty()) begin = end.empty() ? day : std::min(day, end);
+    if (end.empty()) end = std::max(day, begin);
+  }
+};
+
+/// Dates that contradict each other. Dates as in ISO 8601 are ordered as texts.
+void add_wrong_dates(const ReportSubject& subject, std::vector<std::string>& wrong) {
+  const CertificateDetails& d = subject.details;
+  for (const std::string& date : {d.begin_date, d.end_date, d.issue_date})
+    if (!date.empty() && !is_date(date)) {
+      wrong.emplace_back("certificate: dates such as \"2026-11-26\"");
+      return;
+    }
+  const MeasurementDays days(subject);
+  if (days.end < days.begin)
+    wrong.push_back(
+        fmt::format("certificate.end_date: {} is before begin_date, {}", days.end, days.begin));
+  if (!d.issue_date.empty() && d.issue_date < days.end)
+    wrong.push_back(
+        fmt::format("certificate.issue_date: {} is before the end of the measurement, {}",
+                    d.issue_date, days.end));
+  for (const EquipmentDetails& e : d.equipment)
+    if (!e.valid_until.empty() && e.valid_until < days.end)
+      wrong.push_back(
+          fmt::format("equipment \"{}\": its calibration was valid until {}, the "
+                      "measurement ended {}",
+                      e.name, e.valid_until, days.end));
+}
+
 /// Entries without which a certificate is not valid.
-std::vector<std::string> missing_entries(const CertificateDetails& d) {
+std::vector<std::string> missing_entries(const ReportSubject& subject) {
+  const CertificateDetails& d = subject.details;
   std::vector<std::string> missing;
   const auto require = [&missing](bool present, const char* what) {
     if (!present) missing.emplace_back(what);
   };
+  require(!xml_text(d.number).empty(), "certificate.number");
   require(!xml_text(d.laboratory.name).empty(), "laboratory.name");
   require(!xml_text(d.laboratory.city).empty(), "laboratory.city");
   require(is_country_code(d.laboratory.country),
@@ -39,22 +76,20 @@ std::vector<std::string> missing_entries(const CertificateDetails& d) {
   constexpr std::array<std::string_view, 5> kLocations{"laboratory", "customer", "laboratoryBranch",
                                                        "customerBranch", "other"};
   require(std::ranges::find(kLocations, d.location) != kLocations.end(), "certificate.location");
-  for (const auto& date : {d.begin_date, d.end_date, d.issue_date})
-    require(date.empty() || is_date(date), "certificate: dates such as \"2026-11-26\"");
+  add_wrong_dates(subject, missing);
   return missing;
 }
 
 void write_core_data(XmlText& out, const ReportSubject& subject) {
   const CertificateDetails& d = subject.details;
-  const std::string measured = date_of(subject.document.created);
+  const MeasurementDays days(subject);
   out.open("dcc:coreData");
   out.element("dcc:countryCodeISO3166_1", d.laboratory.country);
   out.element("dcc:usedLangCodeISO639_1", "en");
   out.element("dcc:mandatoryLangCodeISO639_1", "en");
-  out.element("dcc:uniqueIdentifier",
-              xml_text(d.number).empty() ? "abbe-" + model_id(subject.document) : d.number);
-  out.element("dcc:beginPerformanceDate", d.begin_date.empty() ? measured : d.begin_date);
-  out.element("dcc:endPerformanceDate", d.end_date.empty() ? measured : d.end_date);
+  out.element("dcc:uniqueIdentifier", d.number);
+  out.element("dcc:beginPerformanceDate", days.begin);
+  out.element("dcc:endPerformanceDate", days.end);
   out.element("dcc:performanceLocation", d.location);
   out.element_if("dcc:issueDate", d.issue_date);
   out.close();
@@ -135,7 +170,7 @@ Result<void> write_result(XmlText& out, const ReportSubject& subject, State stat
 
 Result<std::string> calibration_certificate(const ReportSubject& as_found,
                                             const std::optional<ReportSubject>& as_left) {
-  if (auto missing = missing_entries(as_found.details); !missing.empty())
+  if (auto missing = missing_entries(as_found); !missing.empty())
     return tl::make_unexpected(
         Error{ErrorCode::BadInput,
               "certificate: entries are missing or invalid; give them with --details FILE",

@@ -90,6 +90,10 @@ void write_conditions(XmlText& out, const ReportSubject& subject, State state,
                       const CertificateDetails& d) {
   out.open("dcc:influenceConditions");
   write_state(out, subject, state);
+  if (state == State::AsLeft) {  // the details state the conditions of the other measurement
+    out.close();
+    return;
+  }
   if (d.temperature_C)
     write_condition(out, "temperature", state, *d.temperature_C, "\\degreecelsius",
                     d.u_temperature_K ? fmt::format("{:.3f}", 2.0 * *d.u_temperature_K) : "");
@@ -101,14 +105,22 @@ void write_conditions(XmlText& out, const ReportSubject& subject, State state,
   out.close();
 }
 
+/// "certificate D-K-1, valid until 2027-03-31"
+std::string calibration_of(const EquipmentDetails& e) {
+  std::string text = xml_text(e.certificate).empty() ? "" : "certificate " + e.certificate;
+  if (!e.valid_until.empty())
+    text += fmt::format("{}valid until {}", text.empty() ? "" : ", ", e.valid_until);
+  return text;
+}
+
 void write_equipment(XmlText& out, const std::vector<EquipmentDetails>& equipment) {
   if (equipment.empty()) return;
   out.open("dcc:measuringEquipments");
   for (const EquipmentDetails& e : equipment) {
     out.open("dcc:measuringEquipment");
     write_name(out, e.name);
-    if (!xml_text(e.certificate).empty())
-      write_contents(out, "dcc:description", {"certificate " + e.certificate});
+    if (const std::string calibration = calibration_of(e); !xml_text(calibration).empty())
+      write_contents(out, "dcc:description", {calibration});
     if (!xml_text(e.manufacturer).empty()) {
       out.open("dcc:manufacturer");
       write_name(out, e.manufacturer);

@@ -52,26 +52,30 @@ CertifiedValue without_u(std::string key, std::string name, double length_m, dou
           .value_si = length_m};
 }
 
-CertifiedValue reversal(std::string key, std::string name, const std::optional<Value>& value) {
+/// Values that need both directions of travel.
+CertifiedValue of_both_directions(std::string key, std::string name,
+                                  const std::optional<Value>& value) {
   if (value) return certified(std::move(key), std::move(name), *value, false);
   return {.key = std::move(key), .name = std::move(name), .why = std::string(kNoTravel)};
 }
 
 ValueGroup volume_group(const calib::iso::VolumeError& e) {
-  return {"Volumetric error",
-          fmt::format("|V| of the functional point at {} points of the box, in the gauge of the "
-                      "model, and without the rigid motion that fits best. U(V): expanded "
-                      "uncertainty of V, k = 2; after compensation with the model at least this "
-                      "is to be expected.",
-                      e.points),
-          {without_u("V.mean", "before: |V|, mean", e.mean_m, e.max_U_m),
-           certified("V.max", "before: |V|, largest", e.largest, false),
-           without_u("V.rigid-free.mean", "before, without rigid motion: mean", e.rigid_free_mean_m,
-                     e.max_U_m),
-           without_u("V.rigid-free.max", "before, without rigid motion: largest",
-                     e.rigid_free_max_m, e.max_U_m),
-           without_u("U.mean", "after: U(V), mean", e.mean_U_m, e.max_U_m),
-           without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m)}};
+  return {
+      "Volumetric error",
+      fmt::format("|V| of the functional point at {} points of the box, in the gauge of the "
+                  "model, and without the rigid motion that fits best. U(V) = 2 "
+                  "sqrt(u_x^2 + u_y^2 + u_z^2) of the model: |V| that is left after "
+                  "compensation is below it with 95 to 99 %, apart from what the uncertainty does "
+                  "not contain.",
+                  e.points),
+      {without_u("V.mean", "before: |V|, mean", e.mean_m, e.max_U_m),
+       certified("V.max", "before: |V|, largest", e.largest, false),
+       without_u("V.rigid-free.mean", "before, without rigid motion: mean", e.rigid_free_mean_m,
+                 e.max_U_m),
+       without_u("V.rigid-free.max", "before, without rigid motion: largest", e.rigid_free_max_m,
+                 e.max_U_m),
+       without_u("U.mean", "after: U(V), mean", e.mean_U_m, e.max_U_m),
+       without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m)}};
 }
 
 ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
@@ -79,17 +83,20 @@ ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
       "Positioning (ISO 230-1, ISO 230-2)",
       "V along the axis on the line through the centre of the box. M: range of the mean of both "
       "directions, which is the range of EXX, EYY, EZZ. E: range over both directions. B: largest "
-      "reversal error, forward minus backward. A, R and s of ISO 230-2 need repeated approaches, "
-      "which a model does not contain.",
+      "reversal error, forward minus backward. E and B are stated only if the model has "
+      "differences between the directions. A, R and s of ISO 230-2 need repeated approaches, "
+      "which a model does not contain. A range that is not several times as large as its U is an "
+      "upper limit: noise makes ranges larger.",
       {}};
   for (const calib::iso::Positioning& p : standard.positioning) {
     const char axis = letter(p.axis);
     group.values.push_back(certified(fmt::format("{}.M", axis),
                                      fmt::format("{0}: M, range of E{0}{0}", axis), p.M, false));
-    group.values.push_back(certified(fmt::format("{}.E", axis),
-                                     fmt::format("{}: E, systematic deviation", axis), p.E, false));
     group.values.push_back(
-        reversal(fmt::format("{}.B", axis), fmt::format("{}: B, reversal error", axis), p.B));
+        of_both_directions(fmt::format("{}.E", axis),
+                           fmt::format("{}: E, bidirectional systematic deviation", axis), p.E));
+    group.values.push_back(of_both_directions(fmt::format("{}.B", axis),
+                                              fmt::format("{}: B, reversal error", axis), p.B));
   }
   return group;
 }
@@ -97,7 +104,7 @@ ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
 ValueGroup straightness_group(const calib::iso::StandardValues& standard) {
   ValueGroup group{"Straightness (ISO 230-1)",
                    "Range of V across the axis, on the same lines, relative to the least-squares "
-                   "straight line.",
+                   "straight line over the travel.",
                    {}};
   for (const calib::iso::Straightness& s : standard.straightness) {
     const std::string name = calib::name(s.motion);
@@ -152,17 +159,26 @@ ValueGroup backlash_group(const calib::VolumetricModel& model) {
 ValueGroup diagonal_group(const calib::iso::StandardValues& standard) {
   ValueGroup group{"Diagonals (ISO 230-6)",
                    "V along the body diagonals of the box. P: travel in positive direction of X, "
-                   "Y, Z, N: in negative direction. E: range over both directions. E_d: the "
-                   "largest E.",
+                   "Y, Z, N: in negative direction. M: range of the mean of both directions. E: "
+                   "range over both directions, E_d the largest E; stated only if the model has "
+                   "differences between the directions.",
                    {}};
-  const calib::iso::Diagonal& worst = standard.worst_diagonal();
+  const calib::iso::Diagonal& longest = standard.diagonal_of_largest_M();
   group.values.push_back(
-      certified("E_d", fmt::format("E_d, of diagonal {}", worst.name), worst.E, false));
+      certified("M_d", fmt::format("largest M, of {}", longest.name), longest.M, false));
+  const calib::iso::Diagonal* worst = standard.diagonal_of_largest_E();
+  group.values.push_back(of_both_directions(
+      "E_d",
+      worst != nullptr ? fmt::format("E_d, diagonal systematic deviation, of {}", worst->name)
+                       : "E_d, diagonal systematic deviation",
+      worst != nullptr ? worst->E : std::nullopt));
   for (const calib::iso::Diagonal& d : standard.diagonals) {
     group.values.push_back(
-        certified(d.name + ".E", fmt::format("{}: E, systematic deviation", d.name), d.E, false));
+        certified(d.name + ".M", fmt::format("{}: M, range", d.name), d.M, false));
+    group.values.push_back(of_both_directions(
+        d.name + ".E", fmt::format("{}: E, bidirectional systematic deviation", d.name), d.E));
     group.values.push_back(
-        reversal(d.name + ".B", fmt::format("{}: B, reversal error", d.name), d.B));
+        of_both_directions(d.name + ".B", fmt::format("{}: B, reversal error", d.name), d.B));
   }
   return group;
 }

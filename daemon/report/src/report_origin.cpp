@@ -77,7 +77,8 @@ Facts facts_of(const ReportSubject& subject) {
   add_if(facts, "customer", contact_text(d.customer));
   for (const EquipmentDetails& e : d.equipment)
     facts.emplace_back("equipment",
-                       joined({e.name, e.manufacturer, e.model, e.serial, e.certificate}));
+                       joined({e.name, e.manufacturer, e.model, e.serial, e.certificate,
+                               e.valid_until.empty() ? "" : "valid until " + e.valid_until}));
   add_conditions(facts, subject);
   add_if(facts, "remark", d.remark);
   facts.emplace_back(

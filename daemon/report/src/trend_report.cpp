@@ -45,7 +45,7 @@ LineChart empty_trend(std::string title, std::string y_label) {
 void add_trend_charts(HtmlReport& page, const std::vector<TrendPoint>& points) {
   LineChart positioning = empty_trend("Positioning: M of each axis", "um");
   LineChart squareness = empty_trend("Squareness", "urad");
-  LineChart diagonals = empty_trend("Diagonals: E of each", "um");
+  LineChart diagonals = empty_trend("Diagonals: M of each", "um");
   for (const calib::Axis axis : calib::kAllAxes)
     positioning.curves.push_back(trend_curve(
         points, std::string(1, letter(axis)),
@@ -57,7 +57,7 @@ void add_trend_charts(HtmlReport& page, const std::vector<TrendPoint>& points) {
   for (std::size_t k = 0; k < 4; ++k)
     diagonals.curves.push_back(
         trend_curve(points, points.front().values.standard.diagonals[k].name,
-                    [k](const CertifiedValues& v) { return v.standard.diagonals[k].E; }));
+                    [k](const CertifiedValues& v) { return v.standard.diagonals[k].M; }));
   for (const LineChart* chart : {&positioning, &squareness, &diagonals}) page.plot(*chart);
 }
 
@@ -77,10 +77,12 @@ void add_trend_table(HtmlReport& page, const std::vector<TrendPoint>& points) {
     rows.push_back({model_id(point.subject->document),
                     to_text(point.subject->document.created).substr(0, kMinutes),
                     kLamps.at(static_cast<std::size_t>(verdict.signal)),
-                    text_of_key(point.values, "V.max"), text_of_key(point.values, "E_d"),
+                    text_of_key(point.values, "V.max"), text_of_key(point.values, "M_d"),
                     text_of_key(point.values, "EC0Y")});
   }
-  page.table({"model", "measured (UTC)", "verdict", "largest |V|", "E_d", "EC0Y"}, rows);
+  page.table(
+      {"model", "measured (UTC)", "verdict", "largest |V|", "largest M of a diagonal", "EC0Y"},
+      rows);
 }
 
 }  // namespace

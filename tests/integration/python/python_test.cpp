@@ -13,6 +13,7 @@
 #include "abbe/model/model_document.hpp"
 #include "abbe/recording/recording_reader.hpp"
 #include "spine.hpp"
+#include "synthetic_model.hpp"
 
 namespace abbe::test {
 namespace {
@@ -99,6 +100,52 @@ TEST_F(Python, EvaluatesAModelBitForBitAsCpp) {
   EXPECT_LT(outside, 190u);
 }
 
+TEST_F(Python, EvaluatesInADirectionOfTravel) {
+  auto document = daemon::test::synthetic_document(3);
+  document.model = daemon::test::synthetic_travel_model(3);
+  write("travel.json", daemon::to_json(document));
+  constexpr const char* kDirections = R"(
+import abbe, sys
+model = abbe.Model.load(sys.argv[1])
+for direction in ([1, -1, 1], (-1, 0, 1), None):
+    V_m, _, _ = model.error_at([[0.01, 0.02, -0.2]], direction=direction)
+    c_m, _ = model.correction_at([[0.01, 0.02, -0.2]], direction=direction)
+    print(*(x.hex() for x in [*V_m[0], *c_m[0]]))
+for wrong in ([2, 0, 0], [1, 1]):
+    try:
+        model.error_at([[0.0, 0.0, -0.2]], direction=wrong)
+    except (abbe.Error, TypeError) as error:
+        print(type(error).__name__, error)
+)";
+  const auto seen = python({"-c", kDirections, file("travel.json")});
+  ASSERT_EQ(seen.code, 0) << seen.err;
+
+  using calib::estimation::Travel;
+  const calib::Vector3 p(0.01, 0.02, -0.2), tool = document.model.tool_offsets_m().front();
+  std::istringstream lines{seen.out};
+  const auto next_vector = [&lines] {
+    calib::Vector3 v;
+    for (double& number : v) {
+      std::string word;
+      lines >> word;
+      number = std::strtod(word.c_str(), nullptr);
+    }
+    return v;
+  };
+  std::vector<calib::Vector3> different;
+  for (const calib::estimation::AxisTravel& travel :
+       {calib::estimation::AxisTravel{Travel::Forward, Travel::Backward, Travel::Forward},
+        calib::estimation::AxisTravel{Travel::Backward, Travel::Unknown, Travel::Forward},
+        calib::estimation::AxisTravel{}}) {
+    different.push_back(next_vector());
+    EXPECT_EQ(different.back(), document.model.error_at(p, tool, travel).V_m);
+    EXPECT_EQ(next_vector(), document.model.command_correction(p, tool, travel).value().c_m);
+  }
+  EXPECT_NE(different[0], different[1]);
+  EXPECT_NE(different[1], different[2]);
+  EXPECT_THAT(seen.out, AllOf(HasSubstr("direction: 2 for X"), HasSubstr("TypeError")));
+}
+
 TEST_F(Python, RaisesErrorsWithTheMessageOfAbbe) {
   constexpr const char* kFaults = R"(
 import abbe, sys
@@ -112,6 +159,7 @@ fault(lambda: abbe.Model.load("missing.json"))
 fault(lambda: abbe.Recording.open(sys.argv[1]))
 fault(lambda: model.error_at([1.0, 2.0]))
 fault(lambda: model.error_at([[1.0, 2.0]]))
+fault(lambda: model.error_at([[0.0, 0.0, 0.0]], direction=[1, 0, 0]))
 fault(lambda: abbe.Control("/no/such/socket").status())
 fault(lambda: abbe.Subscription(program="no-such-program"))
 )";
@@ -121,8 +169,9 @@ fault(lambda: abbe.Subscription(program="no-such-program"))
       seen.out,
       AllOf(HasSubstr("io: read missing.json"), HasSubstr("model.json: is not an MCAP file"),
             HasSubstr("usage: points_m: must be an array of N x 3 numbers"),
+            HasSubstr("direction: the model has no backlash"),
             HasSubstr("io: connect /no/such/socket"), HasSubstr("io: start no-such-program")));
-  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 6);
+  EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 7);
 }
 
 /// Counts and times of all samples, exact.

@@ -6,7 +6,8 @@
 ///
 /// Uncertainty: each value f is a linear function of the parameters, f = a U, u^2 = a cov(U) a^T
 /// ([GUM] 5.2.2 eq. (13)). A range max - min is evaluated as the difference at the two positions at
-/// which it occurs. Where U exceeds the variation of the curve, noise makes a range too large.
+/// which it occurs. The noise of the estimate makes a range larger than the true one on average: a
+/// range that is not several times as large as its U is an upper limit, not an estimate.
 /// Not contained: the scatter of repeated approaches (a model has no repetitions, so the A, R and
 /// s of ISO 230-2 cannot be computed), errors between the nodes, and changes after the measurement.
 ///
@@ -40,25 +41,27 @@ struct LineBox {
 
 /// Positioning along one axis on the line through the centre of the box ([ISO 230-2]; terms there
 /// refer to mean deviations x_i of repeated approaches; here x_i is the component of V along the
-/// axis). Targets p_i: the nodes of the model inside the box and its ends, at least 5.
+/// axis). Targets p_i: the nodes of the model inside the box and its ends, at least 5, and at least 5
+/// per metre.
 ///     x_i up, x_i down: V for approaches forward and backward;  x_i: their mean;
 ///     B_i = x_i up - x_i down
 ///     M = max x_i - min x_i                        mean bidirectional positional deviation
 ///     B = the B_i with the largest |B_i|           reversal error, with its sign
 ///     E = max(x_i up, x_i down) - min(x_i up, x_i down)   bidirectional systematic deviation
-/// Without differences between the directions in the model, B is absent and E = M.
+/// Without differences between the directions in the model, B and E are absent.
 struct Positioning {
   Axis axis = Axis::X;
   std::vector<double> targets_m;
   std::vector<Value> mean;  ///< x_i relative to that at the first target; u of the difference
-  Value M, E;
-  std::optional<Value> B, mean_B;  ///< mean_B: mean of all B_i
+  Value M;
+  std::optional<Value> E, B, mean_B;  ///< mean_B: mean of all B_i
   /// ISO 230-1: range of the linear positioning error (EXX), the same as M.
   [[nodiscard]] const Value& range() const { return M; }
 };
 
 /// Straightness of the functional point on the line of Positioning: range of the component of V
-/// after subtraction of the least-squares straight line over the targets ([ISO 230-1]).
+/// after subtraction of the least-squares straight line over the travel ([ISO 230-1]), V being linear
+/// between the targets, so that the line does not depend on where the targets are dense.
 struct Straightness {
   ErrorMotion motion;
   std::vector<Value> deviation;  ///< from the reference line, at the targets of the axis
@@ -93,7 +96,8 @@ struct Diagonal {
   std::vector<double> along_m;  ///< distance from the beginning
   std::vector<Value> mean;      ///< mean of both directions of travel, relative to the beginning
   Value M;                      ///< range of the mean
-  Value E;  ///< bidirectional systematic deviation: range over both directions; M without backlash
+  /// Bidirectional systematic deviation: range over both directions; absent without backlash.
+  std::optional<Value> E;
   std::optional<Value> B;  ///< reversal error of the largest size, with its sign
 };
 
@@ -105,8 +109,9 @@ struct StandardValues {
   std::array<Squareness, 3> squareness;    ///< EC0Y EB0Z EA0Z
   std::vector<Angular> angular;            ///< EAX .. ECZ, those in the model
   std::array<Diagonal, 4> diagonals;
-  /// The largest E of the diagonals: E_d, diagonal systematic deviation.
-  [[nodiscard]] const Diagonal& worst_diagonal() const;
+  [[nodiscard]] const Diagonal& diagonal_of_largest_M() const;
+  /// Its E is E_d, the diagonal systematic deviation. nullptr without backlash.
+  [[nodiscard]] const Diagonal* diagonal_of_largest_E() const;
 };
 
 /// DegenerateGeometry if the model has no validity volume.
@@ -119,7 +124,8 @@ struct VolumeError {
   Value largest;                     ///< the largest |V|, u of V in its direction
   /// The same without the rigid motion that fits best to the lattice.
   double rigid_free_mean_m = 0.0, rigid_free_rms_m = 0.0, rigid_free_max_m = 0.0;
-  /// U(V) = 2 sqrt(trace cov V): what remains at least is to be expected after compensation.
+  /// U(V) = 2 sqrt(trace cov V). |V| that is left after compensation is below it with a probability
+  /// of 95 % (one uncertain direction) to 99 % (three alike).
   double mean_U_m = 0.0, max_U_m = 0.0;
 };
 [[nodiscard]] Result<VolumeError> volume_error(const VolumetricModel&);

@@ -16,6 +16,7 @@ struct Contact {
 
 struct EquipmentDetails {
   std::string name, manufacturer, model, serial, certificate;
+  std::string valid_until{};  ///< last day of its calibration, "2027-03-31"
 };
 
 struct CertificateDetails {
@@ -26,6 +27,7 @@ struct CertificateDetails {
   std::string laboratory_code;  ///< accreditation
   std::string person, role;     ///< who is responsible and signs
   std::string machine_manufacturer, machine_model, machine_serial;
+  /// Conditions of the measurement; with two models those of the first one (as found).
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
 };

@@ -161,8 +161,10 @@ Result<OnHub> rollback(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
   if (!changes) return tl::unexpected(changes.error());
   return answer_change(
-      **changes, (*changes)->roll_back(who(request), remark_of(request.value("why", std::string{}),
-                                                               kLongestReason)));
+      **changes, (*changes)->roll_back(
+                     {.active = request.at("active").get<std::string>(),
+                      .who = who(request),
+                      .why = remark_of(request.value("why", std::string{}), kLongestReason)}));
 }
 
 Result<OnHub> change(const HubParts& parts, const json& request) {

@@ -41,7 +41,9 @@ Result<json> activation(const json& body) {
 }
 
 Result<json> rollback(const json& body) {
-  return json{{"do", "rollback"}, {"why", body.value("why", std::string{})}};
+  return json{{"do", "rollback"},
+              {"active", body.at("active").get<std::string>()},
+              {"why", body.value("why", std::string{})}};
 }
 
 Result<json> cancellation(const json&) {

@@ -26,6 +26,7 @@
 
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/web/certificate.hpp"
 #include "abbe/web/page_server.hpp"
 #include "web_folder.hpp"
 
@@ -384,13 +385,13 @@ struct Free {
   }
 };
 
-/// Writes a certificate for localhost that signs itself, and its key.
-void write_certificate(const std::filesystem::path& folder, std::chrono::seconds valid_for) {
+/// Writes a certificate for localhost that signs itself, and its key. `until`: as ASN.1 has it.
+void write_certificate(const std::filesystem::path& folder, const char* until) {
   const std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>> key{EVP_EC_gen("P-256")};
   const std::unique_ptr<X509, Free<X509_free>> certificate{X509_new()};
   X509_set_version(certificate.get(), X509_VERSION_3);
   X509_gmtime_adj(X509_getm_notBefore(certificate.get()), -2L * 86400);
-  X509_gmtime_adj(X509_getm_notAfter(certificate.get()), valid_for.count());
+  ASSERT_EQ(ASN1_TIME_set_string(X509_getm_notAfter(certificate.get()), until), 1);
   X509_NAME* const name = X509_get_subject_name(certificate.get());
   const auto* const common_name = reinterpret_cast<const unsigned char*>("localhost");  // NOLINT
   X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, common_name, -1, -1, 0);
@@ -408,7 +409,7 @@ void write_certificate(const std::filesystem::path& folder, std::chrono::seconds
 constexpr const char* kTls = "certificate = \"web.pem\"\nkey = \"key.pem\"\n";
 
 TEST_F(PageServerTest, AnExpiredCertificateIsRefusedWithItsDate) {
-  write_certificate(folder_, -1h);
+  write_certificate(folder_, "240229120000Z");
   write_config(std::string{"port = 0\n"} + kTls);
   auto read = settings();
   ASSERT_TRUE(read) << read.error().text;
@@ -416,11 +417,19 @@ TEST_F(PageServerTest, AnExpiredCertificateIsRefusedWithItsDate) {
                                        .config_file = folder_ / "abbed.toml",
                                        .report = [](const std::string&) {}});
   ASSERT_FALSE(page);
-  EXPECT_THAT(page.error().text, HasSubstr("web.pem expired on "));
+  EXPECT_THAT(page.error().text, HasSubstr("web.pem expired on 2024-02-29"));
+}
+
+TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {
+  write_certificate(folder_, "99991231235959Z");
+  const auto dates = read_certificate(folder_ / "web.pem");
+  ASSERT_TRUE(dates);
+  EXPECT_EQ(day_of(dates->until), "9999-12-31");
+  ASSERT_NO_FATAL_FAILURE(start(kTls));
 }
 
 TEST_F(PageServerTest, ServesOverTls) {
-  write_certificate(folder_, 24h);
+  write_certificate(folder_, "20991231235959Z");
   ASSERT_NO_FATAL_FAILURE(start(kTls));
   httplib::SSLClient client{"127.0.0.1", page_->port()};
   client.enable_server_certificate_verification(false);

@@ -23,9 +23,15 @@ struct PageContext {
       : options(std::move(given)),
         report(options.report),
         models(options.settings.config.daemon.models_dir()),
-        sessions(options.settings.web.users),
+        sessions(options.settings.web.users,
+                 {.idle = seconds_of(options.settings.web.session_idle)},
+                 [this](const std::string& line) { report.always(line); }),
         replays(options.abbe_program, options.settings.config.recording.dir),
         feed(options.settings, board, [this] { return pages.load(); }) {}
+
+  static std::chrono::seconds seconds_of(std::chrono::nanoseconds time) {
+    return std::chrono::duration_cast<std::chrono::seconds>(time);
+  }
 
   PageOptions options;
   LimitedReport report;

@@ -11,6 +11,7 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -18,12 +19,14 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 #include <vector>
 
+#include "abbe/base/control_protocol.hpp"
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/web/certificate.hpp"
@@ -37,8 +40,10 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using test::kPassword;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 struct PageServerTest : test::WebFolder {
   void start(const std::string& web = "", std::chrono::milliseconds write_time_out = kWriteTimeOut,
@@ -161,7 +166,7 @@ TEST_F(PageServerTest, AChangeNeedsTheTokenAndComesFromThisSite) {
   EXPECT_THAT(log(), Contains(HasSubstr("another site, https://evil.example")));
   // A form of another site cannot send this type.
   auto client = browser();
-  EXPECT_EQ(client.Post("/api/cancel", in.headers, "{}", "text/plain")->status, 400);
+  EXPECT_EQ(client.Post("/api/cancel", in.headers, "{}", "text/plain")->status, 415);
   EXPECT_EQ(post(in.headers, "/api/cancel", json::object()), 503);
 }
 
@@ -207,19 +212,25 @@ TEST_F(PageServerTest, APageTooManyIsRefusedByName) {
   EXPECT_THAT(log(), Contains(HasSubstr("page refused: 1 are open")));
 }
 
+void connect_to(std::uint16_t port, const daemon::FileDescriptor& fd) {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(port);
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto* const peer = reinterpret_cast<const sockaddr*>(&to);  // NOLINT
+  EXPECT_EQ(::connect(fd.get(), peer, sizeof to), 0);
+}
+
 /// A connection from `address`, one of 127.0.0.0/8, that has sent `text`.
 daemon::FileDescriptor connection(std::uint16_t port, const std::string& text,
                                   const char* address = "127.0.0.1") {
   daemon::FileDescriptor fd{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
-  sockaddr_in from{}, to{};
-  from.sin_family = to.sin_family = AF_INET;
+  sockaddr_in from{};
+  from.sin_family = AF_INET;
   ::inet_pton(AF_INET, address, &from.sin_addr);
-  to.sin_port = htons(port);
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   const auto* const own = reinterpret_cast<const sockaddr*>(&from);  // NOLINT
-  const auto* const peer = reinterpret_cast<const sockaddr*>(&to);   // NOLINT
   EXPECT_EQ(::bind(fd.get(), own, sizeof from), 0);
-  EXPECT_EQ(::connect(fd.get(), peer, sizeof to), 0);
+  connect_to(port, fd);
   (void)::send(fd.get(), text.data(), text.size(), MSG_NOSIGNAL);
   return fd;
 }
@@ -280,16 +291,180 @@ TEST_F(PageServerTest, ALongHeadIsRefusedByName) {
     const std::string line = "GET /" + std::string(3u << 20, 'a');
     (void)::send(fd.get(), line.data(), line.size(), MSG_NOSIGNAL);
   });
-  (void)all_of(fd);
+  EXPECT_THAT(all_of(fd), StartsWith("HTTP/1.1 431 "));
   sending.join();
-  EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: a request of more than")));
+  EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: a request with more than 32768 bytes")));
+}
+
+TEST_F(PageServerTest, ManyOrLongHeadersAreRefused) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  std::string many;
+  for (int i = 0; i < 200; ++i) many += "a:\r\n";
+  EXPECT_THAT(all_of(connection(page_->port(), get_request("/", many))),
+              StartsWith("HTTP/1.1 431 "));
+  const std::string line = "a: " + std::string(10'000, 'a') + "\r\n";
+  EXPECT_THAT(all_of(connection(page_->port(), get_request("/", line))),
+              StartsWith("HTTP/1.1 431 "));
+}
+
+// httplib matches this header with a regular expression.
+TEST_F(PageServerTest, ALongRangeDoesNoHarm) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  std::string range = "rANGE: bytes=0-0";
+  while (range.size() < 7900) range += ",0-0";
+  const auto fd =
+      connection(page_->port(), get_request("/icon.svg", range + "\r\nConnection: close\r\n"));
+  EXPECT_THAT(all_of(fd), StartsWith("HTTP/1.1 200 "));
 }
 
 TEST_F(PageServerTest, ASlowRequestIsClosedByName) {
   ASSERT_NO_FATAL_FAILURE(start("", kWriteTimeOut, 100ms));
   const auto fd = connection(page_->port(), "GET / HT");
-  (void)all_of(fd);
+  EXPECT_THAT(all_of(fd), StartsWith("HTTP/1.1 408 "));
   EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: a request took longer than 100 ms: closed")));
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+std::string post_request(const std::string& headers, const std::string& body) {
+  return "POST /api/login HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n" + body;
+}
+
+// httplib parses such a body with a regular expression and a search of quadratic time.
+TEST_F(PageServerTest, OnlyJsonIsReadFromABody) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  for (const char* type : {"multipart/form-data; boundary=x", "text/plain", ""}) {
+    const auto fd =
+        connection(page_->port(),
+                   post_request(fmt::format("Content-Type: {}\r\nContent-Length: 500\r\n", type),
+                                std::string(500, '\r')));
+    EXPECT_THAT(all_of(fd), StartsWith("HTTP/1.1 415 ")) << type;
+  }
+}
+
+TEST_F(PageServerTest, ALengthThatIsTooLargeOrUnclearIsRefusedBeforeTheBody) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const std::string json = "Content-Type: application/json\r\n";
+  const auto answer = [&](const std::string& headers, const std::string& body) {
+    return all_of(connection(page_->port(), post_request(json + headers, body)));
+  };
+  EXPECT_THAT(answer("Content-Length: 99999999999999999999\r\n", "{}"),
+              StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer("Content-Length: -1\r\n", "{}"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer("Content-Length: 2\r\nContent-Length: 3\r\n", "{}"),
+              StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer("Content-Length: 2\r\nTransfer-Encoding: chunked\r\n", "{}"),
+              StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer("", ""), StartsWith("HTTP/1.1 400 "));
+  // The answer arrives although the client still sends.
+  EXPECT_THAT(answer("Content-Length: 2000000\r\n", std::string(2'000'000, ' ')),
+              StartsWith("HTTP/1.1 413 "));
+}
+
+TEST_F(PageServerTest, TheBodyOfAGetIsNotTakenForARequest) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const std::string hidden = get_request("/api/me");
+  const auto fd =
+      connection(page_->port(),
+                 get_request("/", fmt::format("Content-Length: {}\r\n", hidden.size())) + hidden);
+  const std::string answers = all_of(fd);
+  EXPECT_THAT(answers, StartsWith("HTTP/1.1 400 "));
+  EXPECT_EQ(count_of(answers, "HTTP/1.1 "), 1u) << answers;
+}
+
+TEST_F(PageServerTest, AnAnswerHasOneConnectionHeader) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto posted = connection(
+      page_->port(), post_request("Content-Type: application/json\r\nContent-Length: 2\r\n"
+                                  "Connection: close\r\n",
+                                  "{}"));
+  EXPECT_EQ(count_of(all_of(posted), "Connection: "), 1u);
+  const auto got = connection(page_->port(), get_request("/api/me", "Connection: close\r\n"));
+  EXPECT_EQ(count_of(all_of(got), "Connection: "), 1u);
+}
+
+TEST_F(PageServerTest, AnswersRequestsThatAreSentTogether) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto fd = connection(page_->port(), get_request("/api/me") + get_request("/icon.svg") +
+                                                get_request("/api/me", "Connection: close\r\n"));
+  EXPECT_EQ(count_of(all_of(fd), "HTTP/1.1 200 "), 3u);
+}
+
+TEST_F(PageServerTest, AnOldClientGetsAnAnswerAndTheEnd) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const std::string old = " HTTP/1.0\r\nHost: localhost\r\n\r\n";
+  EXPECT_THAT(all_of(connection(page_->port(), "GET /api/me" + old)), HasSubstr(" 200 "));
+  EXPECT_THAT(all_of(connection(page_->port(), "GET /events" + old)), HasSubstr(" 505 "));
+}
+
+TEST_F(PageServerTest, WhatIsNotHttpIsClosed) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const std::string garbage = "\x16\x03\x01 nothing\r\nGET / HTTP/1.1\r\n\r\n";
+  EXPECT_EQ(count_of(all_of(connection(page_->port(), garbage)), "HTTP/1.1 "), 1u);
+}
+
+/// No further file descriptor can be opened while this exists.
+class NoFileDescriptors {
+ public:
+  NoFileDescriptors() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    rlimit none = before_;
+    none.rlim_cur = 3;  // poll(2) refuses more descriptors than the limit
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  NoFileDescriptors(const NoFileDescriptors&) = delete;
+  NoFileDescriptors& operator=(const NoFileDescriptors&) = delete;
+  ~NoFileDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(PageServerTest, AnErrorOfAcceptIsNamedAndPasses) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const daemon::FileDescriptor fd{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  {
+    const NoFileDescriptors none;
+    connect_to(page_->port(), fd);
+    while (page_->fault().empty()) std::this_thread::yield();
+    EXPECT_THAT(page_->fault(), HasSubstr("Too many open files"));
+  }
+  const std::string request = get_request("/api/me", "Connection: close\r\n");
+  (void)::send(fd.get(), request.data(), request.size(), MSG_NOSIGNAL);
+  EXPECT_THAT(all_of(fd), StartsWith("HTTP/1.1 200 "));
+  EXPECT_EQ(page_->fault(), "");
+  EXPECT_FALSE(page_->ended());
+  EXPECT_THAT(log(), Contains(HasSubstr("connections cannot be accepted: Too many open files")));
+}
+
+/// The listening socket of this process at the port.
+int listener_at(std::uint16_t port) {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const int fd = std::stoi(entry.path().filename());
+    int listens = 0;
+    socklen_t size = sizeof listens;
+    if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &size) != 0 || listens == 0) continue;
+    sockaddr_in at{};
+    size = sizeof at;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&at), &size) == 0 &&  // NOLINT
+        ntohs(at.sin_port) == port)
+      return fd;
+  }
+  return -1;
+}
+
+TEST_F(PageServerTest, AServerThatCannotListenAnyMoreNamesItAlthoughAPageIsOpen) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto events = connection(page_->port(), get_request("/events"));
+  char first = 0;
+  ASSERT_EQ(::recv(events.get(), &first, 1, 0), 1);
+  ASSERT_EQ(::shutdown(listener_at(page_->port()), SHUT_RDWR), 0);
+  while (!page_->ended()) std::this_thread::yield();
+  EXPECT_THAT(page_->fault(), HasSubstr("connections cannot be accepted: Invalid argument"));
 }
 
 TEST_F(PageServerTest, ManyConnectionsOfOneAddressLeaveAnotherItsAnswer) {
@@ -345,6 +520,33 @@ TEST_F(PageServerTest, DownloadsThatNobodyReadsEndAndOthersGoOn) {
   }
   EXPECT_EQ(received, kBytes);
   EXPECT_EQ(client.Get("/api/me")->status, 200);
+}
+
+/// abbed as the page sees it: `answers` gives the answer to a request, by "do".
+std::unique_ptr<daemon::ControlServer> fake_abbed(const std::filesystem::path& folder,
+                                                  std::map<std::string, json> answers) {
+  std::filesystem::create_directories(folder / "run");
+  auto server = daemon::ControlServer::open(
+      folder / "run/control.sock",
+      [answers = std::move(answers)](const json& request, const daemon::ControlPeer&) {
+        const auto found = answers.find(request.at("do").get<std::string>());
+        if (found != answers.end()) return found->second;
+        return daemon::refusal({daemon::ErrorCode::Refused, "not in this test"});
+      });
+  EXPECT_TRUE(server);
+  return std::move(*server);
+}
+
+TEST_F(PageServerTest, AnAnswerOfAbbedWithoutPositionsIsAnEventWithoutPositions) {
+  const auto abbed = fake_abbed(folder_, {{"status", {{"ok", true}}}, {"live", {{"ok", true}}}});
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto events = connection(page_->port(), get_request("/events"));
+  std::string seen;
+  std::array<char, 4096> buffer{};
+  for (ssize_t n = 0; seen.find("event: live\ndata: []\n") == std::string::npos &&
+                      (n = ::recv(events.get(), buffer.data(), buffer.size(), 0)) > 0;)
+    seen.append(buffer.data(), static_cast<std::size_t>(n));
+  EXPECT_THAT(seen, HasSubstr("event: live\ndata: []\n"));
 }
 
 TEST_F(PageServerTest, ABodyThatIsTooLargeOrNotJsonIsRefused) {
@@ -426,6 +628,7 @@ TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {
   ASSERT_TRUE(dates);
   EXPECT_EQ(day_of(dates->until), "9999-12-31");
   ASSERT_NO_FATAL_FAILURE(start(kTls));
+  EXPECT_EQ(page_->fault(), "");
 }
 
 TEST_F(PageServerTest, ServesOverTls) {

@@ -28,7 +28,6 @@ struct PageContext {
                  [this](const std::string& line) { report.always(line); }),
         replays(options.abbe_program, options.settings.config.recording.dir),
         feed(options.settings, board, [this] { return pages.load(); }) {}
-
   static std::chrono::seconds seconds_of(std::chrono::nanoseconds time) {
     return std::chrono::duration_cast<std::chrono::seconds>(time);
   }
@@ -43,7 +42,8 @@ struct PageContext {
   std::atomic<std::size_t> pages{0}, downloads{0};
   std::atomic<int> port{0};
   std::mutex changing;  // one change of a user at a time reaches abbed
-  DaemonFeed feed;      // last: its thread uses the members above
+  std::atomic<bool> stopping{false};
+  DaemonFeed feed;  // last: its thread uses the members above
 };
 
 /// Cookies are of a computer, not of a port: the name has the port, for two pages on one computer.

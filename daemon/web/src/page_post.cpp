@@ -65,9 +65,7 @@ bool from_this_site(const httplib::Request& request) {
   return host != std::string::npos && origin.substr(host + 3) == request.get_header_value("Host");
 }
 
-Result<json> body_of(const httplib::Request& request, const std::string& text) {
-  if (!request.get_header_value("Content-Type").starts_with(kJson))
-    return daemon::fail(ErrorCode::Usage, "the request must be application/json");
+Result<json> body_of(const std::string& text) {
   if (text.empty()) return json::object();
   auto body = daemon::parse_json(text, "request", kBodyBounds);
   if (body && !body->is_object())
@@ -187,7 +185,7 @@ void answer_post(PageContext& context, const httplib::Request& request, const st
                     request.path, request.get_header_value("Origin").substr(0, 80)));
     return send_error(response, 403, "refused: the request comes from another site");
   }
-  const auto body = body_of(request, text);
+  const auto body = body_of(text);
   if (!body) return send_error(response, body.error());
 
   try {

@@ -467,6 +467,22 @@ TEST_F(PageServerTest, AServerThatCannotListenAnyMoreNamesItAlthoughAPageIsOpen)
   EXPECT_THAT(page_->fault(), HasSubstr("connections cannot be accepted: Invalid argument"));
 }
 
+TEST_F(PageServerTest, OneAddressLeavesPlacesForPagesOfOthers) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 4\n"));
+  std::vector<daemon::FileDescriptor> open;
+  const auto opens = [&](const char* address) {
+    open.push_back(connection(page_->port(), get_request("/events"), address));
+    std::array<char, 12> status{};
+    (void)::recv(open.back().get(), status.data(), status.size(), MSG_WAITALL);
+    return std::string{status.data() + 9, 3};
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(opens("127.0.0.1"), "200");
+  EXPECT_EQ(opens("127.0.0.1"), "503");
+  EXPECT_EQ(opens("127.0.0.2"), "200");
+  EXPECT_EQ(opens("127.0.0.2"), "503");
+  EXPECT_THAT(log(), Contains(HasSubstr("page refused: 3 are open on this computer")));
+}
+
 TEST_F(PageServerTest, ManyConnectionsOfOneAddressLeaveAnotherItsAnswer) {
   ASSERT_NO_FATAL_FAILURE(start());
   std::vector<daemon::FileDescriptor> silent;

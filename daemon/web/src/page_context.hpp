@@ -14,6 +14,7 @@
 #include "abbe/web/sessions.hpp"
 #include "http.hpp"
 #include "limited_report.hpp"
+#include "page_places.hpp"
 #include "request_rate.hpp"
 
 namespace abbe::web {
@@ -27,7 +28,8 @@ struct PageContext {
                  {.idle = seconds_of(options.settings.web.session_idle)},
                  [this](const std::string& line) { report.always(line); }),
         replays(options.abbe_program, options.settings.config.recording.dir),
-        feed(options.settings, board, [this] { return pages.load(); }) {}
+        pages(options.settings.web.most_pages),
+        feed(options.settings, board, [this] { return pages.taken(); }) {}
   static std::chrono::seconds seconds_of(std::chrono::nanoseconds time) {
     return std::chrono::duration_cast<std::chrono::seconds>(time);
   }
@@ -39,7 +41,8 @@ struct PageContext {
   ModelViews models;
   Sessions sessions;
   Replays replays;
-  std::atomic<std::size_t> pages{0}, downloads{0};
+  PagePlaces pages;
+  std::atomic<std::size_t> downloads{0};
   std::atomic<int> port{0};
   std::mutex changing;  // one change of a user at a time reaches abbed
   std::atomic<bool> stopping{false};

@@ -553,6 +553,23 @@ std::unique_ptr<daemon::ControlServer> fake_abbed(const std::filesystem::path& f
   return std::move(*server);
 }
 
+TEST_F(PageServerTest, AChangeDoesNotWaitForeverForAnotherOneNorDoesTheEnd) {
+  const auto abbed = fake_abbed(folder_, {{"activate", {{"ok", true}, {"change", 1}}},
+                                          {"change", {{"ok", true}, {"change", 1}}}});
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto in = log_in("administer");
+  const json id{{"id", "0123456789abcdef"}};
+  std::vector<int> statuses(2);
+  std::vector<std::thread> users;
+  for (int& status : statuses)
+    users.emplace_back([&] { status = post(in.headers, "/api/activate", id); });
+  // One of them waits for the store, which never answers; the other one for its turn.
+  while (statuses[0] == 0 && statuses[1] == 0) std::this_thread::sleep_for(10ms);
+  page_.reset();
+  for (std::thread& user : users) user.join();
+  EXPECT_THAT(statuses, Each(503));
+}
+
 TEST_F(PageServerTest, AnAnswerOfAbbedWithoutPositionsIsAnEventWithoutPositions) {
   const auto abbed = fake_abbed(folder_, {{"status", {{"ok", true}}}, {"live", {{"ok", true}}}});
   ASSERT_NO_FATAL_FAILURE(start());

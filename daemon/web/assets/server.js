@@ -16,9 +16,16 @@ function notify(topic, value) {
   for (const listener of listeners.get(topic) ?? []) listener(value);
 }
 
+// What the page asks by itself, for example after an event, must not keep a user logged in who has left.
+const kAttended_ms = 60_000;
+let lastInput = performance.now();
+for (const name of ["pointerdown", "keydown", "wheel"])
+  globalThis.addEventListener?.(name, () => { lastInput = performance.now(); }, { capture: true, passive: true });
+
 /** The answer as JSON; throws an Error with the text of the server. */
 export async function get(path) {
-  return read(await fetch(path, { credentials: "same-origin" }));
+  const attended = performance.now() - lastInput < kAttended_ms;
+  return read(await fetch(path, { credentials: "same-origin", headers: attended ? {} : { "X-Unattended": "1" } }));
 }
 
 export async function post(path, body = {}) {

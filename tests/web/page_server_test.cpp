@@ -38,6 +38,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using test::kPassword;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
@@ -667,6 +668,18 @@ TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {
   EXPECT_EQ(day_of(dates->until), "9999-12-31");
   ASSERT_NO_FATAL_FAILURE(start(kTls));
   EXPECT_EQ(page_->fault(), "");
+}
+
+TEST_F(PageServerTest, AKeyThatOthersMayReadIsNamed) {
+  write_certificate(folder_, "20991231235959Z");
+  ::chmod((folder_ / "key.pem").c_str(), 0640);
+  ASSERT_NO_FATAL_FAILURE(start(kTls));
+  EXPECT_THAT(log(), Not(Contains(HasSubstr("key.pem"))));
+  ::chmod((folder_ / "key.pem").c_str(), 0644);
+  page_.reset();
+  ASSERT_NO_FATAL_FAILURE(start(kTls));
+  EXPECT_THAT(log(), Contains(AllOf(HasSubstr("key.pem: other users may read it"),
+                                    HasSubstr("chmod 0640"))));
 }
 
 TEST_F(PageServerTest, ServesOverTls) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <charconv>
@@ -279,6 +280,12 @@ class HttpPageServer final : public PageServer {
   std::optional<AcceptLoop> accepting_;  // last: its thread uses the members above
 };
 
+/// Who reads the key can pretend to be this page.
+bool others_may_read(const std::filesystem::path& key) {
+  struct stat seen {};
+  return ::stat(key.c_str(), &seen) == 0 && (seen.st_mode & (S_IROTH | S_IWOTH)) != 0;
+}
+
 /// Null without TLS.
 Result<TlsContext> tls_of(const daemon::WebConfig& web) {
   if (!web.tls()) return TlsContext{};
@@ -326,6 +333,9 @@ std::optional<WebSession> session_of(PageContext& context, const httplib::Reques
 Result<std::unique_ptr<PageServer>> PageServer::start(PageOptions options) {
   auto tls = tls_of(options.settings.web);
   if (!tls) return tl::unexpected(tls.error());
+  if (const auto& key = options.settings.web.key; others_may_read(key))
+    options.report(fmt::format(
+        "warning: key {}: other users may read it: chgrp abbe-web, chmod 0640", key.string()));
   auto page = std::make_unique<HttpPageServer>(std::move(options), std::move(*tls));
   if (auto listening = page->listen(); !listening) return tl::unexpected(listening.error());
   return page;

@@ -14,6 +14,7 @@ namespace abbe::web {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 struct ModelViewsTest : test::WebFolder {
   std::string add(unsigned seed) {
@@ -43,6 +44,24 @@ TEST_F(ModelViewsTest, AModelThatIsAddedIsInHistoryAndTrend) {
   add(2);
   EXPECT_EQ(nlohmann::json::parse(views_.trend().value())["models"].size(), 2u);
   EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 2u);
+}
+
+TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {
+  const std::string id = add(1);
+  const std::string before = views_.report(id).value();
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  ASSERT_TRUE(store->activate(id, {.who = "anna", .why = "step gauge passed", .when = {}}));
+  const std::string after = views_.report(id).value();
+  EXPECT_THAT(before, Not(HasSubstr("step gauge passed")));
+  EXPECT_THAT(after, HasSubstr("step gauge passed"));
+}
+
+TEST_F(ModelViewsTest, AtTheEndNothingMoreIsMade) {
+  const std::string kept = add(1), other = add(2);
+  ASSERT_TRUE(views_.model(kept));
+  views_.stop();
+  EXPECT_TRUE(views_.model(kept));
+  EXPECT_FALSE(views_.model(other));
 }
 
 TEST_F(ModelViewsTest, ShowsMoreModelsThanItKeeps) {

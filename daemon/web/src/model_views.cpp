@@ -27,7 +27,7 @@ using daemon::StoreEntry;
 using daemon::StoreEvent;
 using nlohmann::json;
 
-constexpr std::size_t kMostViews = 10;         ///< history, trend, and models of some 100 kB
+constexpr std::size_t kMostViews = 12;         ///< history, trend, models of some 100 kB, reports
 constexpr std::size_t kMostTrendModels = 100;  ///< the newest
 constexpr std::size_t kMostEvents = 200;       ///< the newest
 
@@ -170,6 +170,19 @@ Result<std::string> trend_text(const ModelStore& store) {
   return text_of({{"models", std::move(models)}, {"values", std::move(rows)}});
 }
 
+Result<std::string> report_text(const ModelStore& store, const std::string& id) {
+  auto document = store.load(id);
+  if (!document) return tl::unexpected(document.error());
+  daemon::ReportSubject subject{.document = std::move(*document)};
+  if (const auto entries = store.list())
+    for (const StoreEntry& entry : *entries)
+      if (entry.id == id) subject.entry = entry;
+  if (const auto events = store.history())
+    for (const StoreEvent& event : *events)
+      if (event.id == id) subject.events.push_back(event);
+  return daemon::model_report(subject);
+}
+
 }  // namespace
 
 Result<std::string> ModelViews::kept(const std::string& key, const std::string& stamp,
@@ -178,6 +191,7 @@ Result<std::string> ModelViews::kept(const std::string& key, const std::string& 
   if (auto known = find_kept(key, stamp)) return std::move(*known);
   const std::lock_guard one(one_at_a_time);
   if (auto known = find_kept(key, stamp)) return std::move(*known);  // made meanwhile
+  if (stopping_) return daemon::fail(daemon::ErrorCode::Io, "abbe-web stops");
   auto text = make();
   if (!text) return text;
   const std::lock_guard lock(mutex_);
@@ -218,20 +232,11 @@ Result<std::string> ModelViews::trend() {
 }
 
 Result<std::string> ModelViews::report(const std::string& name) {
-  const std::lock_guard one(making_model_);
   const ModelStore store{store_};
   const auto id = id_of(store, name);
   if (!id) return tl::unexpected(id.error());
-  auto document = store.load(*id);
-  if (!document) return tl::unexpected(document.error());
-  daemon::ReportSubject subject{.document = std::move(*document)};
-  if (const auto entries = store.list())
-    for (const StoreEntry& entry : *entries)
-      if (entry.id == *id) subject.entry = entry;
-  if (const auto events = store.history())
-    for (const StoreEvent& event : *events)
-      if (event.id == *id) subject.events.push_back(event);
-  return daemon::model_report(subject);
+  return kept("report " + *id, stamp_of(store), making_model_,
+              [&store, &id] { return report_text(store, *id); });
 }
 
 Result<std::string> ModelViews::model_file(const std::string& name) const {

@@ -112,6 +112,7 @@ class HttpPageServer final : public PageServer {
   HttpPageServer& operator=(const HttpPageServer&) = delete;
   ~HttpPageServer() override {
     context_.stopping = true;
+    context_.models.stop();
     accepting_.reset();
     context_.board.close();
     server_.end_connections();

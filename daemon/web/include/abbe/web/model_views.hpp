@@ -3,6 +3,7 @@
 /// RFC 3339. Other processes change the store: what is kept is used only while the files that it was
 /// made of have the same inode, time and size. Thread-safe.
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -18,6 +19,9 @@ namespace abbe::web {
 class ModelViews {
  public:
   explicit ModelViews(std::filesystem::path store) : store_(std::move(store)) {}
+
+  /// Views that wait for others to be made end with an Error.
+  void stop() noexcept { stopping_ = true; }
 
   /// {"models": [newest first], "events": [newest first]}.
   [[nodiscard]] daemon::Result<std::string> history();
@@ -47,6 +51,7 @@ class ModelViews {
                                                      const std::string& stamp);
 
   std::filesystem::path store_;
+  std::atomic<bool> stopping_{false};
   std::mutex making_model_, making_list_;  // one at a time: each takes much of a processor
   std::mutex mutex_;                       // of the members below
   std::map<std::string, Kept> kept_;

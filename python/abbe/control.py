@@ -51,9 +51,12 @@ class Control:
         """Makes a model active and returns its id. force: although the gate refused it; needs why."""
         return self._change({"do": "activate", "id": model_id, "why": why, "force": force})
 
-    def roll_back(self, why: str = "") -> str:
-        """Makes the model active that was active before, and returns its id."""
-        return self._change({"do": "rollback", "why": why})
+    def roll_back(self, active: str, why: str = "") -> str:
+        """Makes the model active that was active before `active`, and returns its id.
+
+        Refused if another model is active, so that a repeated call does not go one model further back.
+        """
+        return self._change({"do": "rollback", "active": active, "why": why})
 
     def follow(self, period_s: float = 0.2) -> Iterator[dict[str, Any]]:
         """The status of the session whenever it changes, until the session has ended."""

@@ -89,6 +89,10 @@ TEST_F(CliModelStore, ListsActivatesAndRollsBackModelsOfAStore) {
   EXPECT_EQ(abbe("model rollback" + at).exit, 0);
   EXPECT_EQ(ModelStore::open(folder).value().active_id().value(), a);
   EXPECT_EQ(abbe("model rollback" + at).exit, 5);
+
+  const auto repeated = abbe("model rollback --active " + b + at);
+  EXPECT_EQ(repeated.exit, 5);
+  EXPECT_THAT(repeated.err, HasSubstr(b + " is not active (model " + a));
 }
 
 TEST_F(CliModelStore, TheConfigurationNamesTheStore) {

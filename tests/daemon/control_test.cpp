@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "abbe/base/control_protocol.hpp"
@@ -310,6 +311,50 @@ TEST_F(Control, WithoutFileDescriptorsTheServerAcceptsAConnectionLater) {
     EXPECT_LT(processor_time() - before, 150ms);  // a server that does not rest uses all of them
   }
   EXPECT_TRUE(client.readable(60s));
+}
+
+TEST_F(Control, ALongRequestDoesNotDelayTheOthers) {
+  std::atomic<bool> begun{false}, may_end{false};
+  const auto server = ControlServer::open(socket(), [&](const json& request, const ControlPeer&) {
+    if (request["do"] == "calibrate") {
+      begun = true;
+      begun.notify_all();
+      may_end.wait(false);
+    }
+    return json{{"ok", true}, {"did", request["do"]}};
+  });
+  ASSERT_TRUE(server);
+  Result<json> answer = json{};
+  std::thread asking([&] {
+    answer = ask_daemon(socket(), {{"do", "calibrate"}, {"text", std::string(1u << 20, 'x')}}, 60s);
+  });
+  begun.wait(false);
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
+  may_end = true;
+  may_end.notify_all();
+  asking.join();
+  ASSERT_TRUE(answer) << answer.error().text;
+  EXPECT_EQ((*answer)["did"], "calibrate");
+}
+
+TEST_F(Control, AClientThatLeavesDuringItsLongRequestHarmsNobody) {
+  std::atomic<bool> begun{false}, may_end{false};
+  const auto server = ControlServer::open(socket(), [&](const json& request, const ControlPeer&) {
+    if (request["do"] == "calibrate") {
+      begun = true;
+      begun.notify_all();
+      may_end.wait(false);
+    }
+    return json{{"ok", true}};
+  });
+  ASSERT_TRUE(server);
+  EXPECT_FALSE(
+      ask_daemon(socket(), {{"do", "calibrate"}, {"text", std::string(1u << 20, 'x')}}, 200ms));
+  begun.wait(false);
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
+  may_end = true;
+  may_end.notify_all();
+  EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}}));
 }
 
 TEST_F(Control, WithoutADaemonTheErrorNamesTheSocket) {

@@ -41,6 +41,7 @@ class ModelAuthorityTest : public ::testing::Test {
   ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow); }
   /// The store as a command in another process opens it.
   ModelStore store() { return ModelStore::open(folder_).value(); }
+  std::string active_id() { return store().active_id().value().value(); }
   [[nodiscard]] ModelDocument document(unsigned seed) const {
     auto d = synthetic_document(seed);
     d.machine_hash = machine_hash(config_);
@@ -180,10 +181,10 @@ TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {
   ASSERT_TRUE(store().activate(forced, actor("crane test"), true));
   ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("calibrate otf"), kNow));
   ASSERT_TRUE(add(authority, document(3), {.accepted = true}, actor("calibrate otf"), kNow));
-  ASSERT_TRUE(store().rollback(actor("drifts")));
+  ASSERT_TRUE(store().rollback(actor("drifts"), active_id()));
   ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_state(authority).reason, "rolled back by anna: drifts");
-  ASSERT_TRUE(store().rollback(actor("drifts too", kNow + 1s)));
+  ASSERT_TRUE(store().rollback(actor("drifts too", kNow + 1s), active_id()));
   ASSERT_TRUE(follow(authority));
   EXPECT_EQ(fresh_state(authority).model->id, forced);
   EXPECT_THAT(fresh_state(authority).reason,
@@ -218,7 +219,7 @@ TEST_F(ModelAuthorityTest, AnUnreadableStoreIsReportedAndReadAgain) {
   const auto first = add(authority, document(1), {.accepted = true}, actor("first"), kNow).value();
 
   ASSERT_TRUE(add(authority, document(2), {.accepted = true}, actor("second"), kNow));
-  ASSERT_TRUE(store().rollback(actor("drifts")));
+  ASSERT_TRUE(store().rollback(actor("drifts"), active_id()));
   const fs::path state = folder_ / "state.json";
   const auto time = fs::last_write_time(state);
   std::string text = text_of(state);
@@ -276,7 +277,7 @@ TEST_F(ModelAuthorityTest, AModelStoredBeforeARollbackIsNotActivatedAfterIt) {
   const auto since = authority.revision();
   auto kept = authority.keeper().keep(document(2), {.accepted = true}, actor("second"), kNow);
   ASSERT_TRUE(kept);
-  ASSERT_TRUE(store().rollback(actor("drifts", kNow + 1s)));
+  ASSERT_TRUE(store().rollback(actor("drifts", kNow + 1s), active_id()));
   ASSERT_TRUE(follow(authority));
   authority.set_active(std::move(*kept->active), since);
   EXPECT_EQ(fresh_state(authority).model->id, first);

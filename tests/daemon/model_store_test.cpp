@@ -85,21 +85,32 @@ TEST_F(ModelStoreTest, ActivatesAndRollsBackThroughSeveralModels) {
   auto store = open();
   for (const auto& id : {a, b, c}) ASSERT_TRUE(store.activate(id, actor("better")));
   EXPECT_EQ(store.active_id().value(), c);
-  EXPECT_EQ(store.rollback(actor("drifts")).value(), b);
-  EXPECT_EQ(store.rollback(actor("worse")).value(), a);
+  EXPECT_EQ(store.rollback(actor("drifts"), c).value(), b);
+  EXPECT_EQ(store.rollback(actor("worse"), b).value(), a);
   EXPECT_EQ(open().active_id().value(), a);
-  const auto none = store.rollback(actor("worse still"));
+  const auto none = store.rollback(actor("worse still"), a);
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::Refused);
+}
+
+TEST_F(ModelStoreTest, ARepeatedRollBackDoesNotGoFurtherBack) {
+  const auto a = add(1), b = add(2), c = add(3);
+  auto store = open();
+  for (const auto& id : {a, b, c}) ASSERT_TRUE(store.activate(id, actor("better")));
+  ASSERT_TRUE(store.rollback(actor("drifts"), c));
+  const auto again = store.rollback(actor("drifts"), c);
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::Refused);
+  EXPECT_EQ(open().active_id().value(), b);
 }
 
 TEST_F(ModelStoreTest, AModelActivatedTwiceIsRolledBackAtOnce) {
   const auto a = add(1), b = add(2);
   auto store = open();
   for (const auto& id : {a, b, b}) ASSERT_TRUE(store.activate(id, actor("better")));
-  EXPECT_EQ(store.rollback(actor("drifts")).value(), a);
+  EXPECT_EQ(store.rollback(actor("drifts"), b).value(), a);
   EXPECT_EQ(open().active_id().value(), a);
-  EXPECT_FALSE(store.rollback(actor("again")));
+  EXPECT_FALSE(store.rollback(actor("again"), a));
 }
 
 // As versions before wrote it: a rollback to the model that was active already.
@@ -107,7 +118,7 @@ TEST_F(ModelStoreTest, ARollbackActivatesTheModelItReports) {
   const auto a = add(1), b = add(2);
   auto store = open();
   for (const auto& id : {a, b, b}) ASSERT_TRUE(store.activate(id, actor("better")));
-  ASSERT_TRUE(store.rollback(actor("drifts")));
+  ASSERT_TRUE(store.rollback(actor("drifts"), b));
   std::string text = text_of(folder_ / "state.json");
   // The keys of an event are in order: the id follows its action.
   text.replace(text.find(a, text.rfind("rolled-back")), a.size(), b);

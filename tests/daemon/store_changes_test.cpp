@@ -44,7 +44,7 @@ struct StoreChangesTest : ::testing::Test {
 };
 
 TEST_F(StoreChangesTest, RollsBackWithUserAndReason) {
-  const auto number = changes_->roll_back("anna", "a crash");
+  const auto number = changes_->roll_back({.active = ids_[1], .who = "anna", .why = "a crash"});
   ASSERT_TRUE(number);
   const auto outcome = changes_->outcome(*number, 60s);
   ASSERT_TRUE(outcome);
@@ -55,6 +55,17 @@ TEST_F(StoreChangesTest, RollsBackWithUserAndReason) {
   ASSERT_TRUE(events);
   EXPECT_EQ(events->back().actor.who, "anna");
   EXPECT_EQ(events->back().actor.why, "a crash");
+}
+
+TEST_F(StoreChangesTest, ARepeatedRollBackIsRefusedAndChangesNothing) {
+  const RollBack asked{.active = ids_[1], .who = "anna", .why = "a crash"};
+  EXPECT_EQ(**changes_->outcome(*changes_->roll_back(asked), 60s), ids_[0]);
+  const auto again = changes_->outcome(*changes_->roll_back(asked), 60s);
+  ASSERT_TRUE(again);
+  ASSERT_FALSE(*again);
+  EXPECT_EQ(again->error().code, ErrorCode::Refused);
+  EXPECT_THAT(again->error().text, HasSubstr(ids_[1] + " is not active (model " + ids_[0]));
+  EXPECT_EQ(ModelStore{folder_ / "models"}.active_id().value(), ids_[0]);
 }
 
 TEST_F(StoreChangesTest, AnUnknownModelIsNamed) {
@@ -76,10 +87,11 @@ TEST_F(StoreChangesTest, WhileAnotherProcessHasTheLockAChangeRunsAndASecondIsRef
   const FileDescriptor held{::open((folder_ / "models/lock").c_str(), O_RDWR | O_CLOEXEC)};
   ASSERT_TRUE(held);
   ASSERT_EQ(::flock(held.get(), LOCK_EX), 0);
-  const auto number = changes_->roll_back("anna", "");
+  const RollBack asked{.active = ids_[1], .who = "anna", .why = ""};
+  const auto number = changes_->roll_back(asked);
   ASSERT_TRUE(number);
   EXPECT_FALSE(changes_->outcome(*number, 0ms));
-  EXPECT_THAT(changes_->roll_back("anna", "").error().text, HasSubstr("is not done yet"));
+  EXPECT_THAT(changes_->roll_back(asked).error().text, HasSubstr("is not done yet"));
   ASSERT_EQ(::flock(held.get(), LOCK_UN), 0);
   const auto outcome = changes_->outcome(*number, 60s);
   ASSERT_TRUE(outcome);

@@ -36,6 +36,13 @@ TEST_F(WebConfigTest, AnAddressOfTheNetworkNeedsACertificate) {
   EXPECT_THAT(faults_of("address = \"::1\"\n"), ElementsAre());
 }
 
+TEST_F(WebConfigTest, AnIdleUserIsLoggedOutAfterTheMinutesOfTheFile) {
+  using namespace std::chrono_literals;
+  EXPECT_EQ(settings()->web.session_idle, 30min);
+  write_config("session_idle_min = 5\n");
+  EXPECT_EQ(settings()->web.session_idle, 5min);
+}
+
 TEST_F(WebConfigTest, ReportsAllFaults) {
   EXPECT_THAT(
       faults_of("address = \"press3\"\nport = 70000\nkey = \"k\"\nlive_hz = 0\npasword = 1\n"),

@@ -35,6 +35,10 @@ class WebFolder : public ::testing::Test {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream{folder_ / name, std::ios::binary} << text;
   }
+  [[nodiscard]] std::string text_of(const std::string& name) const {
+    std::ifstream file{folder_ / name, std::ios::binary};
+    return {std::istreambuf_iterator<char>{file}, {}};
+  }
   /// One user for each role, with the name of the role.
   void write_users() const {
     std::string lines;

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <vector>
+
 #include "abbe/web/sessions.hpp"
 #include "web_folder.hpp"
 
@@ -86,6 +88,51 @@ TEST_F(WebUsersTest, ASessionEndsWhenItsPasswordIsChanged) {
   ASSERT_TRUE(sessions.find(session->token, now_));
   write("users", web_user_line("view", WebRole::View, "another long password").value() + "\n");
   EXPECT_FALSE(sessions.find(session->token, now_));
+}
+
+TEST_F(WebUsersTest, AFaultInTheFileIsReportedWithItsLineAndTheUsersStay) {
+  std::vector<std::string> log;
+  Sessions sessions(users(), {}, [&log](const std::string& line) { log.push_back(line); });
+  const auto session = sessions.log_in("view", kPassword, "::1", now_);
+  ASSERT_TRUE(session);
+  const std::string good = text_of("users");
+  write("users", "anna:view\n" + good);
+  EXPECT_TRUE(sessions.find(session->token, now_));
+  EXPECT_TRUE(sessions.log_in("calibrate", kPassword, "::1", now_));
+  ASSERT_THAT(log, SizeIs(1));
+  EXPECT_THAT(log[0], AllOf(HasSubstr("users:1: must be NAME:ROLE:HASH"),
+                            HasSubstr("the users of the last good file stay")));
+  write("users", good);
+  EXPECT_TRUE(sessions.find(session->token, now_));
+  ASSERT_THAT(log, SizeIs(2));
+  EXPECT_THAT(log[1], HasSubstr("can be used again"));
+}
+
+TEST_F(WebUsersTest, AFaultThatIsThereAtTheStartIsReportedAndNobodyCanLogIn) {
+  write("users", "anna:view\n");
+  std::vector<std::string> log;
+  Sessions sessions(users(), {}, [&log](const std::string& line) { log.push_back(line); });
+  EXPECT_THAT(log, ElementsAre(HasSubstr("users:1: must be NAME:ROLE:HASH")));
+  EXPECT_FALSE(sessions.log_in("view", kPassword, "::1", now_));
+}
+
+TEST_F(WebUsersTest, TheOldestOfTooManySessionsOfAUserEnds) {
+  Sessions sessions(users(), {.of_one_user = 2});
+  const auto other = sessions.log_in("administer", kPassword, "::1", now_);
+  std::vector<std::string> tokens;
+  for (const auto later : {1s, 2s, 3s})
+    tokens.push_back(sessions.log_in("view", kPassword, "::1", now_ + later)->token);
+  EXPECT_FALSE(sessions.find(tokens[0], now_ + 3s));
+  EXPECT_TRUE(sessions.find(tokens[1], now_ + 3s));
+  EXPECT_TRUE(sessions.find(tokens[2], now_ + 3s));
+  EXPECT_TRUE(sessions.find(other->token, now_ + 3s));
+}
+
+TEST_F(WebUsersTest, ALookIsNoUseOfASession) {
+  Sessions sessions(users(), {.idle = 60s});
+  const auto session = sessions.log_in("view", kPassword, "::1", now_);
+  EXPECT_TRUE(sessions.find(session->token, now_ + 59s, SessionUse::Look));
+  EXPECT_FALSE(sessions.find(session->token, now_ + 61s));
 }
 
 TEST_F(WebUsersTest, AfterTooManyWrongPasswordsTheAddressWaits) {

@@ -27,6 +27,7 @@
 #include "abbe/base/control_server.hpp"
 #include "abbe/base/unix_socket.hpp"
 #include "json_line.hpp"
+#include "long_requests.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -39,18 +40,23 @@ constexpr std::size_t kMostUnread = 1u << 20;
 // Pause before the next accept() when no file descriptors are left.
 constexpr auto kAcceptPause = std::chrono::milliseconds{200};
 constexpr int kAcceptsPerCycle = 16;
+constexpr std::size_t kLongRequest = 1u << 16;  ///< bytes; answered by LongRequests
 
 using Clock = std::chrono::steady_clock;
 
 struct Client {
+  std::uint64_t number;
   FileDescriptor fd;
   ControlPeer peer;
   Clock::time_point active;  ///< time of the last received or sent byte
   std::string inbox = {};
   std::string outbox = {};
+  bool long_request = false;  ///< one is being answered; the next one waits
 
   [[nodiscard]] bool has_request() const { return inbox.find('\n') != std::string::npos; }
-  [[nodiscard]] bool may_be_answered() const { return outbox.size() < kMostUnread; }
+  [[nodiscard]] bool may_be_answered() const {
+    return outbox.size() < kMostUnread && !long_request;
+  }
 };
 
 std::string name_of(uid_t uid) {
@@ -128,13 +134,15 @@ class Server final : public ControlServer {
       // once. Therefore its descriptor is replaced by -1, which poll() ignores.
       const bool accept_paused = accept_paused_until_ > now;
       std::vector<pollfd> waits{{wake_.get(), POLLIN, 0},
-                                {accept_paused ? -1 : listener_.get(), POLLIN, 0}};
+                                {accept_paused ? -1 : listener_.get(), POLLIN, 0},
+                                {long_done_.get(), POLLIN, 0}};
       for (const Client& c : clients_) waits.push_back({c.fd.get(), events_of(c), 0});
 
       if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR) return;
       if (waits[0].revents != 0) return;
 
-      std::size_t i = 2;
+      if (waits[2].revents != 0) take_long_answers();
+      std::size_t i = 3;
       for (auto c = clients_.begin(); c != clients_.end(); ++i)
         c = cycle(*c, waits[i].revents) ? std::next(c) : clients_.erase(c);
       close_idle(Clock::now());
@@ -147,6 +155,7 @@ class Server final : public ControlServer {
     auto until = accept_paused_until_ > now ? accept_paused_until_ : Clock::time_point::max();
     for (const Client& c : clients_) {
       if (c.has_request() && c.may_be_answered()) return 0;
+      if (c.long_request) continue;
       until = std::min(until, c.active + limits_.idle);
     }
     if (until == Clock::time_point::max()) return -1;
@@ -157,7 +166,20 @@ class Server final : public ControlServer {
   /// Events to wait for at a client's socket. While a complete request of the client waits for its
   /// answer, nothing more is read from the client.
   static short events_of(const Client& c) {
-    return static_cast<short>((c.has_request() ? 0 : POLLIN) | (c.outbox.empty() ? 0 : POLLOUT));
+    const bool reads = !c.has_request() && !c.long_request;
+    return static_cast<short>((reads ? POLLIN : 0) | (c.outbox.empty() ? 0 : POLLOUT));
+  }
+
+  void take_long_answers() {
+    std::uint64_t count = 0;
+    (void)!::read(long_done_.get(), &count, sizeof count);
+    for (LongRequests::Answered& done : long_.answered()) {
+      const auto c = std::ranges::find(clients_, done.client, &Client::number);
+      if (c == clients_.end()) continue;  // it has left
+      c->outbox += done.line;
+      c->long_request = false;
+      c->active = Clock::now();
+    }
   }
 
   void accept_some() {
@@ -170,7 +192,10 @@ class Server final : public ControlServer {
       }
       ControlPeer peer = peer_at(fd.get());
       make_place_for(peer.uid);
-      clients_.push_back({.fd = std::move(fd), .peer = std::move(peer), .active = Clock::now()});
+      clients_.push_back({.number = ++last_number_,
+                          .fd = std::move(fd),
+                          .peer = std::move(peer),
+                          .active = Clock::now()});
     }
   }
 
@@ -205,7 +230,7 @@ class Server final : public ControlServer {
 
   void close_idle(Clock::time_point now) {
     std::erase_if(clients_, [&](const Client& c) {
-      if (now - c.active < limits_.idle) return false;
+      if (now - c.active < limits_.idle || c.long_request) return false;
       send_closing_line(c, fmt::format("closed: idle for {} ms", limits_.idle.count()));
       return true;
     });
@@ -222,10 +247,16 @@ class Server final : public ControlServer {
   /// Answers at most one request per cycle, so that a client with many requests does not delay the
   /// others. False if the client disconnected or its request is too long.
   bool cycle(Client& c, short revents) {
-    if (!c.has_request() && revents != 0 && !read(c)) return false;
+    if (c.long_request && (revents & (POLLHUP | POLLERR)) != 0) return false;
+    if (!c.has_request() && !c.long_request && revents != 0 && !read(c)) return false;
     if (c.has_request() && c.may_be_answered()) {
       const std::size_t end = c.inbox.find('\n');
-      c.outbox += line_of(answer(c.inbox.substr(0, end), c.peer));
+      if (end < kLongRequest) {
+        c.outbox += line_of(answer(c.inbox.substr(0, end), c.peer));
+      } else {
+        c.long_request = true;
+        long_.take(c.number, c.inbox.substr(0, end), c.peer);
+      }
       c.active = Clock::now();
       c.inbox.erase(0, end + 1);
     }
@@ -283,7 +314,13 @@ class Server final : public ControlServer {
   std::filesystem::path path_;
   Handler handler_;
   std::list<Client> clients_;
+  std::uint64_t last_number_ = 0;
   Clock::time_point accept_paused_until_{};
+  FileDescriptor long_done_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
+  LongRequests long_{[this](const std::string& line, const ControlPeer& peer) {
+                       return line_of(answer(line, peer));
+                     },
+                     long_done_.get()};
   std::thread thread_;
 };
 

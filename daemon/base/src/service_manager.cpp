@@ -13,6 +13,9 @@ void notify_ready(std::string_view status) {
 void notify_stopping() {
   sd_notify(0, "STOPPING=1");
 }
+void notify_status(std::string_view status) {
+  sd_notify(0, fmt::format("STATUS={}", status).c_str());
+}
 void notify_alive() {
   sd_notify(0, "WATCHDOG=1");
 }

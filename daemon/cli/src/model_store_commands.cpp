@@ -20,7 +20,7 @@ namespace {
 
 struct ModelStoreArguments {
   StoreOption store;
-  std::string id, why;
+  std::string id, why, active;
   bool json = false, force = false;
 };
 
@@ -162,7 +162,9 @@ int activate(const ModelStoreArguments& arguments) {
 int rollback(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
-  const auto id = store->rollback(actor(arguments));
+  const auto active = id_named(*store, arguments.active);
+  if (!active) return report(active.error());
+  const auto id = store->rollback(actor(arguments), *active);
   if (!id) return report(id.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -215,7 +217,13 @@ void add_model_activate(CLI::App& parent, int& exit) {
 void add_model_rollback(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<ModelStoreArguments>();
   auto* command = parent.add_subcommand("rollback", "Activate the previously active model again");
+  arguments->active = "active";
   add_store_options(*command, arguments->store);
+  command
+      ->add_option("--active", arguments->active,
+                   "id of the model to leave; refused if another one is active, so that a "
+                   "repeated command does not go one model further back")
+      ->type_name("ID");
   command->add_option("--why", arguments->why, "reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
 }

@@ -48,6 +48,8 @@ WebConfig read_web(Section& root, const std::filesystem::path& base) {
   section.get("host_names", web.host_names);
   section.get("users", web.users, base);
   section.get("view_without_login", web.view_without_login);
+  constexpr Unit kMinutes{1.0 / 60.0};
+  section.get("session_idle_min", web.session_idle, kMinutes, {1.0, 12.0 * 60.0});
   section.get("live_hz", web.live_hz, kPlain, {1.0, 100.0});
   section.get_integer("most_pages", web.most_pages, 1, 64);
   check_reach(section, web);

@@ -171,11 +171,16 @@ Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& acto
   return append(folder_, std::move(*state), std::move(event));
 }
 
-Result<std::string> ModelStore::rollback(const StoreActor& actor) {
+Result<std::string> ModelStore::rollback(const StoreActor& actor, const std::string& active) {
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
+  if (const auto present = state->active(); present != active)
+    return fail(ErrorCode::Refused,
+                fmt::format("roll back: model {} is not active ({} is): nothing was changed; look "
+                            "whether the roll-back has taken place already",
+                            active, present ? "model " + *present : "none"));
   const auto stack = state->activations();
   if (stack.size() < 2)
     return fail(ErrorCode::Refused, "roll back: no model was active before the present one");

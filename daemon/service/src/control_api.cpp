@@ -129,10 +129,12 @@ Result<OnHub> calibrate(const HubParts& parts, const json& request) {
 /// Long enough for a store whose lock is free, and short enough for a stop that waits behind it.
 constexpr std::chrono::milliseconds kStorePatience{50};
 
-/// {"id": of the active model} if the change is done; {"change": number} while it runs.
-Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number) {
+/// {"id": of the active model} if the change is done; {"change": number} while it runs. `patience`:
+/// meanwhile no other client of the control socket gets an answer.
+Result<OnHub> answer_change(StoreChanges& changes, const Result<std::uint64_t>& number,
+                            std::chrono::milliseconds patience = kStorePatience) {
   if (!number) return tl::unexpected(number.error());
-  const auto outcome = changes.outcome(*number, kStorePatience);
+  const auto outcome = changes.outcome(*number, patience);
   json answer{{"ok", true}, {"change", *number}};
   if (outcome) {
     if (!*outcome) return tl::unexpected(outcome->error());
@@ -161,14 +163,17 @@ Result<OnHub> rollback(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
   if (!changes) return tl::unexpected(changes.error());
   return answer_change(
-      **changes, (*changes)->roll_back(who(request), remark_of(request.value("why", std::string{}),
-                                                               kLongestReason)));
+      **changes, (*changes)->roll_back(
+                     {.active = request.at("active").get<std::string>(),
+                      .who = who(request),
+                      .why = remark_of(request.value("why", std::string{}), kLongestReason)}));
 }
 
 Result<OnHub> change(const HubParts& parts, const json& request) {
   const auto changes = changes_of(parts);
   if (!changes) return tl::unexpected(changes.error());
-  return answer_change(**changes, request.at("number").get<std::uint64_t>());
+  return answer_change(**changes, request.at("number").get<std::uint64_t>(),
+                       std::chrono::milliseconds{0});  // a client may ask again and again
 }
 
 Result<OnHub> cancel(const HubParts&, const json& request) {

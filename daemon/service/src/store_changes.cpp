@@ -32,9 +32,9 @@ Result<std::uint64_t> StoreChanges::activate(Activation asked) {
   });
 }
 
-Result<std::uint64_t> StoreChanges::roll_back(std::string who, std::string why) {
-  return begin([who = std::move(who), why = std::move(why)](ModelStore& store) {
-    return store.rollback(store_actor(who, why));
+Result<std::uint64_t> StoreChanges::roll_back(RollBack asked) {
+  return begin([asked = std::move(asked)](ModelStore& store) {
+    return store.rollback(store_actor(asked.who, asked.why), asked.active);
   });
 }
 
@@ -46,8 +46,8 @@ Result<std::uint64_t> StoreChanges::begin(Change change) {
                             "seconds",
                             number_));
 
-  running_ = run_abandonable(
-      [folder = store_, change = std::move(change)]() -> Result<std::string> {
+  running_ =
+      run_abandonable([folder = store_, change = std::move(change)]() -> Result<std::string> {
         auto store = ModelStore::open(folder);
         if (!store) return tl::unexpected(store.error());
         store->set_lock_timeout(kLockPatience);

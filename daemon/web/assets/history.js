@@ -26,9 +26,10 @@ function activate(model, again) {
     `${model.id} is activated; abbed follows within a second.`, again);
 }
 
-function rollBack(again) {
+// `active`: the model that the page shows as active. The request is refused if it is another one by now.
+function rollBack(active, again) {
   const why = prompt("Reason for going back to the model that was active before (for the record):");
-  if (why !== null) change("api/rollback", { why }, "Rolled back.", again);
+  if (why !== null) change("api/rollback", { active, why }, "Rolled back.", again);
 }
 
 function verdict(model) {
@@ -87,7 +88,7 @@ export async function show(place) {
     tables.replaceChildren(h("h2", {}, "Models"),
       models.length ? modelTable(models, fill) : h("p", {}, "The store has no models yet."),
       mayActivate()
-        ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(fill) }, "Roll back"))
+        ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active)?.id ?? "", fill) }, "Roll back"))
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
       h("h2", {}, "Events"), eventTable(events));
   };

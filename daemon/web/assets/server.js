@@ -16,9 +16,16 @@ function notify(topic, value) {
   for (const listener of listeners.get(topic) ?? []) listener(value);
 }
 
+// What the page asks by itself, for example after an event, must not keep a user logged in who has left.
+const kAttended_ms = 60_000;
+let lastInput = performance.now();
+for (const name of ["pointerdown", "keydown", "wheel"])
+  globalThis.addEventListener?.(name, () => { lastInput = performance.now(); }, { capture: true, passive: true });
+
 /** The answer as JSON; throws an Error with the text of the server. */
 export async function get(path) {
-  return read(await fetch(path, { credentials: "same-origin" }));
+  const attended = performance.now() - lastInput < kAttended_ms;
+  return read(await fetch(path, { credentials: "same-origin", headers: attended ? {} : { "X-Unattended": "1" } }));
 }
 
 export async function post(path, body = {}) {
@@ -41,15 +48,34 @@ async function read(response) {
   return answer;
 }
 
-// The server sends an event at least once a second.
+// The server sends an event at least once a second, and positions several times a second.
 const kSilence_ms = 3000;
 let events = null;
-let lastEvent = 0;
+let lastEvent = 0, lastValue = 0;
 let sourceFault = "";
+let connectionFault = state.lost;  // until the next event
 
 function onEvent() {
   lastEvent = performance.now();
-  report(sourceFault === "" ? null : `abbed does not answer: ${sourceFault}`);
+  connectionFault = "";
+  report(whyLost());
+}
+
+/** 3, 4, ... 9, 10, 20, ...: a text that changes is read aloud. */
+function roughSeconds(since) {
+  const s = Math.floor((performance.now() - since) / 1000);
+  return s < 10 ? s : 10 * Math.floor(s / 10);
+}
+
+/** Why the values are not current; null: they are. */
+function whyLost() {
+  if (connectionFault !== "") return connectionFault;
+  if (performance.now() - lastEvent > kSilence_ms)
+    return `abbe-web has sent nothing for ${roughSeconds(lastEvent)} s: the values are not current`;
+  if (sourceFault !== "") return `abbed does not answer: ${sourceFault}`;
+  if (performance.now() - lastValue > kSilence_ms)
+    return `no new value for ${roughSeconds(lastValue)} s: the positions are not current`;
+  return null;
 }
 
 function report(lost) {
@@ -60,8 +86,15 @@ function report(lost) {
 
 function on(name, take) {
   events.addEventListener(name, (event) => {
-    const value = JSON.parse(event.data);
-    take(value);
+    let value = null;
+    try {
+      value = JSON.parse(event.data);
+      take(value);
+    } catch (error) {
+      connectionFault = `abbe-web sent an event that the page does not understand: ${error.message}`;
+      report(whyLost());
+      return;
+    }
     onEvent();
     notify(name, value);
   });
@@ -78,7 +111,10 @@ export function disconnect() {
 /** The reason why the server gives no stream. */
 async function explainRefusal() {
   const answer = await fetch("events").catch(() => null);
-  if (answer?.ok === false) report((await answer.json().catch(() => ({}))).error ?? answer.statusText);
+  if (answer?.ok === false) {
+    connectionFault = (await answer.json().catch(() => ({}))).error ?? answer.statusText;
+    if (events) report(whyLost());
+  }
   await answer?.body?.cancel();
 }
 
@@ -86,16 +122,20 @@ async function explainRefusal() {
 export function connect() {
   events?.close();
   events = new EventSource("events");
-  lastEvent = performance.now();
+  lastEvent = lastValue = performance.now();
   on("source", (source) => {
     sourceFault = source.alive ? "" : source.reason;
     if (!source.alive) state.status = state.live = null;
   });
   on("status", (status) => { state.status = status; });
-  on("live", (positions) => { state.live = positions; });
+  on("live", (positions) => {
+    state.live = Array.isArray(positions) ? positions : null;
+    if (state.live) lastValue = performance.now();
+  });
   for (const name of ["alive", "calibration", "store"]) on(name, () => {});
   events.addEventListener("error", () => {
-    report("no connection to abbe-web: the values are not current");
+    connectionFault = "no connection to abbe-web: the values are not current";
+    report(whyLost());
     // After an answer that is not a stream (too many pages) the browser does not try again.
     if (events?.readyState !== EventSource.CLOSED) return;
     explainRefusal();
@@ -104,6 +144,5 @@ export function connect() {
 }
 
 setInterval(() => {
-  if (events && performance.now() - lastEvent > kSilence_ms)
-    report("abbe-web has sent nothing for 3 s: the values are not current");
+  if (events) report(whyLost());
 }, 500);

@@ -27,12 +27,13 @@ using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 using abbe::daemon::ExitCode;
 
-using SystemTime = std::chrono::system_clock::time_point;
+using SystemClock = std::chrono::system_clock;
+using SystemTime = std::chrono::sys_seconds;
 
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kInternal = number(ExitCode::Internal);
 constexpr int kNice = 10;  ///< below abbed, which must not wait for a page
-constexpr std::chrono::hours kCertificatePeriod{1};
+constexpr std::chrono::hours kNoticePeriod{24};
 constexpr std::chrono::hours kCertificateNotice = std::chrono::days{14};
 
 std::string footer() {
@@ -43,7 +44,8 @@ std::string footer() {
               {ExitCode::Usage},
               {ExitCode::BadInput,
                "the configuration or the certificate cannot be used (an expired one is named)"},
-              {ExitCode::Io, "the address or port cannot be used"},
+              {ExitCode::Io,
+               "the address or port cannot be used, or no connection can be accepted any more"},
               {ExitCode::Internal}});
 }
 
@@ -92,35 +94,49 @@ std::filesystem::path abbe_program() {
   return !error && std::filesystem::exists(beside, error) ? beside : "abbe";
 }
 
-/// Reports when the certificate that the page uses expires or has expired: it was read at the start.
-void report_certificate(const std::filesystem::path& file, SystemTime until) {
-  const auto left = until - SystemTime::clock::now();
-  if (left > kCertificateNotice) return;
-  const auto hours = std::chrono::duration_cast<std::chrono::hours>(left).count();
-  log_line(hours < 0
-               ? fmt::format("certificate {} has expired: replace it and restart abbe-web",
-                             file.string())
-               : fmt::format("certificate {} expires in {} h: replace it and restart abbe-web",
-                             file.string(), hours));
+/// Empty, or when the certificate that the page uses expires or has expired: it was read at the start.
+std::string certificate_notice(const std::filesystem::path& file, SystemTime until) {
+  const auto left = until - std::chrono::floor<std::chrono::seconds>(SystemClock::now());
+  if (file.empty() || left > kCertificateNotice) return {};
+  return fmt::format("certificate {} {} on {}: replace it and restart abbe-web", file.string(),
+                     left.count() <= 0 ? "expired" : "expires", abbe::web::day_of(until));
 }
 
-/// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd.
+/// Tells systemd how the page is, and the log when that changes or kNoticePeriod has passed.
+class Health {
+ public:
+  /// Empty: the page is served without a remark.
+  void report(const std::string& state) {
+    const auto now = std::chrono::steady_clock::now();
+    if (state == state_ && (state.empty() || now < next_)) return;
+    if (!state.empty() || !state_.empty())
+      log_line(state.empty() ? "the page is served again" : state);
+    abbe::daemon::notify_status(state.empty() ? "serving" : state);
+    state_ = state;
+    next_ = now + kNoticePeriod;
+  }
+
+ private:
+  std::string state_;
+  std::chrono::steady_clock::time_point next_;
+};
+
+/// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd as long as
+/// the page is served: then systemd starts a page anew that cannot be reached.
 int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page,
                    const std::filesystem::path& certificate, SystemTime certificate_until) {
-  using Clock = std::chrono::steady_clock;
-  const auto feed_period = abbe::daemon::watchdog_period();
+  const bool watched = abbe::daemon::watchdog_period().has_value();
   const timespec period{.tv_sec = 1, .tv_nsec = 0};
-  auto next_check = Clock::now();
+  Health health;
   for (;;) {
     if (sigtimedwait(&stop, nullptr, &period) > 0) return kDone;
-    if (!page.serving()) {
-      log_line("the server has stopped accepting connections");
+    const std::string fault = page.fault();
+    if (page.ended()) {
+      log_line(fault);
       return number(ExitCode::Io);
     }
-    if (feed_period) abbe::daemon::notify_alive();
-    if (certificate.empty() || Clock::now() < next_check) continue;
-    next_check = Clock::now() + kCertificatePeriod;
-    report_certificate(certificate, certificate_until);
+    health.report(fault.empty() ? certificate_notice(certificate, certificate_until) : fault);
+    if (watched && fault.empty()) abbe::daemon::notify_alive();
   }
 }
 

@@ -7,37 +7,37 @@
 
 #include <ctime>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "abbe/base/text_file.hpp"
-#include "abbe/base/utc_text.hpp"
 
 namespace abbe::web {
 namespace {
 
 using daemon::ErrorCode;
 using daemon::Result;
-using SystemTime = std::chrono::system_clock::time_point;
+using std::chrono::sys_seconds;
 
 struct Free {
   void operator()(BIO* bio) const { BIO_free(bio); }
   void operator()(X509* certificate) const { X509_free(certificate); }
 };
 
-SystemTime time_of(const ASN1_TIME* time) {
+/// UTCTime, and GeneralizedTime for dates from 2050 on (RFC 5280, 4.1.2.5).
+std::optional<sys_seconds> time_of(const ASN1_TIME* time) {
   std::tm parts{};
-  if (ASN1_TIME_to_tm(time, &parts) != 1) return {};
-  return std::chrono::system_clock::from_time_t(::timegm(&parts));
-}
-
-/// "2026-11-01": the day is what a person needs.
-std::string day_of(SystemTime time) {
-  constexpr std::size_t kDay = 10;
-  return daemon::to_text(std::chrono::time_point_cast<std::chrono::nanoseconds>(time))
-      .substr(0, kDay);
+  if (ASN1_TIME_to_tm(time, &parts) != 1) return std::nullopt;
+  return sys_seconds{std::chrono::seconds{::timegm(&parts)}};
 }
 
 }  // namespace
+
+std::string day_of(sys_seconds time) {
+  const std::chrono::year_month_day day{std::chrono::floor<std::chrono::days>(time)};
+  return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(day.year()),
+                     static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
+}
 
 Result<CertificateDates> read_certificate(const std::filesystem::path& file) {
   const auto text = daemon::read_regular_file(file);
@@ -51,11 +51,17 @@ Result<CertificateDates> read_certificate(const std::filesystem::path& file) {
                         fmt::format("certificate {}: not a certificate in PEM form ([web] "
                                     "certificate)",
                                     file.string()));
-  return CertificateDates{.from = time_of(X509_get0_notBefore(certificate.get())),
-                          .until = time_of(X509_get0_notAfter(certificate.get()))};
+  const auto from = time_of(X509_get0_notBefore(certificate.get()));
+  const auto until = time_of(X509_get0_notAfter(certificate.get()));
+  if (!from || !until)
+    return daemon::fail(ErrorCode::BadInput,
+                        fmt::format("certificate {}: its dates cannot be read", file.string()));
+  return CertificateDates{.from = *from, .until = *until};
 }
 
-Result<void> check_certificate(const std::filesystem::path& file, SystemTime now) {
+Result<void> check_certificate(const std::filesystem::path& file,
+                               std::chrono::system_clock::time_point when) {
+  const auto now = std::chrono::floor<std::chrono::seconds>(when);
   const auto dates = read_certificate(file);
   if (!dates) return tl::unexpected(dates.error());
   if (now >= dates->until)

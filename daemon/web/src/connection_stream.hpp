@@ -14,16 +14,25 @@
 namespace abbe::web {
 
 struct ConnectionLimits {
-  std::size_t request_bytes;  ///< of one request: its lines and its body
+  std::size_t body_bytes;  ///< of one request, as it is sent: chunks with their lines
   std::chrono::milliseconds request_time, write_time;
 };
 
+/// Limits of the lines of a request (its head). Each header costs some 100 bytes of memory.
+inline constexpr std::size_t kMostHeadBytes = 32 * 1024, kMostHeadLines = 100;
+/// A client that reads slower than this on average does not get the whole answer.
+inline constexpr std::size_t kSlowestReader_bytes_per_s = 4096;
+
+/// Numeric address of the client of a connection; empty if it has left.
+[[nodiscard]] std::string client_address(int fd);
+
 /// One connection of a browser, with or without TLS. Reads at most the bytes and the time of one
-/// request; httplib itself has no limit of the lines of a request nor of a chunked body. One thread.
+/// request, and waits for a slow reader for a limited time; httplib itself has no limit of the lines
+/// of a request, of a chunked body, or of the time of an answer. One thread.
 class ConnectionStream final : public httplib::Stream {
  public:
   using Clock = std::chrono::steady_clock;
-  enum class Fault { None, TooLarge, TooSlow };
+  enum class Fault { None, LongHead, LongBody, SlowRequest, SlowReader };
 
   /// Does not close `fd`, which becomes non-blocking. `tls`: null without TLS. `stopping`: ends all
   /// waiting.
@@ -36,8 +45,9 @@ class ConnectionStream final : public httplib::Stream {
   [[nodiscard]] bool accept();
   /// False if no request begins within `time_out`.
   [[nodiscard]] bool wait_for_request(std::chrono::milliseconds time_out);
-  /// From now on the limits count for another request.
-  void begin_request();
+  /// From now on the limits count for another request. Waits for all its lines; false if they are
+  /// too long, too many or too slow, or if the client has left.
+  [[nodiscard]] bool read_head();
   [[nodiscard]] Fault fault() const noexcept { return fault_; }
 
   [[nodiscard]] bool is_readable() const override;
@@ -56,17 +66,24 @@ class ConnectionStream final : public httplib::Stream {
   [[nodiscard]] bool wait(short events, Clock::time_point until) const;
   /// The event that TLS needs before it can go on; 0: it failed.
   [[nodiscard]] short event_for(int tls_result) const;
-  [[nodiscard]] ssize_t fill_buffer();
+  /// At most `size` bytes from the client; 0: it has left, -1: a fault.
+  [[nodiscard]] ssize_t receive(char* to, std::size_t size);
+  /// Checks the lines of the head that ends at buffer_[end].
+  [[nodiscard]] bool check_head(std::size_t end);
+  /// Waits until the client accepts more of the answer.
+  [[nodiscard]] bool wait_for_reader(short events) const;
 
   int fd_;
   std::unique_ptr<SSL, FreeTls> tls_;
   ConnectionLimits limits_;
   std::function<bool()> stopping_;
-  std::array<char, 16384> buffer_{};
+  std::array<char, kMostHeadBytes> buffer_{};
   std::size_t at_ = 0, filled_ = 0;  ///< unread: buffer_[at_] to buffer_[filled_ - 1]
-  std::size_t left_ = 0;             ///< bytes of this request that may still come
+  std::size_t left_ = 0;             ///< bytes of this request that may still be read
   Clock::time_point request_until_{};
-  Fault fault_ = Fault::None;
+  std::size_t sent_ = 0;                        ///< bytes of the answer
+  mutable std::chrono::nanoseconds waited_{0};  ///< for the client to read the answer
+  mutable Fault fault_ = Fault::None;           ///< is_writable() of httplib is const
 };
 
 }  // namespace abbe::web

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +21,8 @@ using nlohmann::json;
 
 constexpr std::chrono::milliseconds kStatusPeriod{500}, kFilesPeriod{1000}, kIdlePeriod{500};
 constexpr std::chrono::milliseconds kAnswerTimeOut{4000};  // more than the 3 s of abbed
+/// More than the requests of one cycle take if each runs into its time out.
+constexpr std::chrono::seconds kLongestAsking{45};
 constexpr double kFirstStep_m = 1e-3;  ///< shortest distance of two points of the driven path
 
 /// One line; invalid UTF-8, which devices may have sent, is replaced.
@@ -61,11 +64,14 @@ void DaemonFeed::run() {
   std::unique_lock lock(mutex_);
   while (!stopping_) {
     lock.unlock();
+    cycled_ = Clock::now();
     try {
-      cycle(Clock::now());
+      cycle(cycled_);
     } catch (const json::exception& error) {
       report_source("abbed sent an answer that this abbe-web does not understand: " +
                     daemon::cause_of(error));
+    } catch (const std::exception& error) {  // for example no memory
+      report_source(fmt::format("internal error of abbe-web: {}", error.what()));
     }
     next = std::max(next + (pages_() > 0 ? live_period_ : kIdlePeriod), Clock::now());
     lock.lock();
@@ -92,7 +98,8 @@ void DaemonFeed::ask_status() {
     return;
   }
 
-  for (json& stream : (*answer)["streams"]) stream.erase("latency_counts");
+  if (const auto streams = answer->find("streams"); streams != answer->end())
+    for (json& stream : *streams) stream.erase("latency_counts");
   report_source({});
   board_.post(Topic::Status, event_text(*answer));
   const json session = answer->value("session", json::object());
@@ -128,7 +135,7 @@ void DaemonFeed::ask_positions() {
     report_source(answer.error().text);
     return;
   }
-  const json& positions_m = (*answer)["position_m"];
+  const json positions_m = answer->value("position_m", json::array());
   board_.post(Topic::Live, event_text(positions_m));
   if (acquiring_) follow_path(positions_m);
 }
@@ -176,6 +183,13 @@ void DaemonFeed::report_source(std::string reason) {
   board_.post(Topic::Status, "null");
   const std::lock_guard lock(mutex_);
   status_ = nullptr;
+}
+
+std::string DaemonFeed::fault(Clock::time_point now) const {
+  const auto since = now - cycled_.load();
+  if (since < kLongestAsking) return {};
+  return fmt::format("abbed has not been asked for {} s: the thread is blocked",
+                     std::chrono::duration_cast<std::chrono::seconds>(since).count());
 }
 
 json DaemonFeed::status() const {

@@ -1,83 +1,141 @@
 #include "limited_server.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
+#include <array>
+#include <string_view>
 #include <utility>
 
 namespace abbe::web {
+namespace {
+
+/// A connection whose client acknowledges nothing for this time ends: a tablet that is out of reach
+/// would keep its thread for many minutes (tcp(7)).
+constexpr std::chrono::milliseconds kVanished{15000};
+constexpr std::chrono::milliseconds kDiscardTime{1000}, kDiscardStep{200};
+
+/// Answers a head that httplib does not get to see.
+void refuse_head(ConnectionStream& stream) {
+  const bool is_long = stream.fault() == ConnectionStream::Fault::LongHead;
+  if (!is_long && stream.fault() != ConnectionStream::Fault::SlowRequest) return;
+  const std::string_view status =
+      is_long ? "431 Request Header Fields Too Large" : "408 Request Timeout";
+  const std::string answer =
+      fmt::format("HTTP/1.1 {}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n", status);
+  (void)stream.write(answer.data(), answer.size());
+}
+
+}  // namespace
 
 LimitedServer::LimitedServer(TlsContext tls, ConnectionLimits limits,
                              std::function<void(const std::string&, const std::string&)> report)
-    : tls_(std::move(tls)), limits_(limits), report_(std::move(report)) {}
+    : tls_(std::move(tls)), limits_(limits), report_(std::move(report)) {
+  set_keep_alive_max_count(kRequestsOfConnection);  // stated in answers
+  set_keep_alive_timeout(kBetweenRequests.count());
+}
 
-void LimitedServer::let_more_connections_wait() {
+LimitedServer::~LimitedServer() {
+  daemon::FileDescriptor close{svr_sock_.exchange(INVALID_SOCKET)};
+}
+
+int LimitedServer::listener() {
   constexpr int kWaiting = 128;
   (void)::listen(svr_sock_, kWaiting);
+  return svr_sock_;
 }
 
-bool LimitedServer::process_and_close_socket(socket_t fd) {
-  (void)::fcntl(fd, F_SETFD, FD_CLOEXEC);
-  {
-    ConnectionStream stream(fd, tls_.get(), limits_,
-                            [this] { return svr_sock_ == INVALID_SOCKET; });
-    std::string address;
-    int port = 0;
-    stream.get_remote_ip_and_port(address, port);
-    if (enter(address)) {
-      if (!tls_ || stream.accept()) serve(stream);
-      report_fault(stream, address);
-      leave(address);
-    }
-  }
-  (void)::shutdown(fd, SHUT_RDWR);
-  (void)::close(fd);
-  return true;
-}
-
-void LimitedServer::serve(ConnectionStream& stream) {
-  for (std::size_t n = 1; n <= kRequestsOfConnection; ++n) {
-    if (!stream.wait_for_request(kBetweenRequests)) return;
-    stream.begin_request();
-    bool closed = false, with_body = false;
-    const bool served = process_request(
-        stream, n == kRequestsOfConnection, closed, [&with_body](httplib::Request& request) {
-          request.ranges.clear();
-          with_body = request.method != "GET" && request.method != "HEAD";
-        });
-    if (!served || closed || with_body) return;
-  }
-}
-
-void LimitedServer::report_fault(const ConnectionStream& stream, const std::string& address) {
-  if (stream.fault() == ConnectionStream::Fault::TooLarge)
-    report_("large " + address, fmt::format("{}: a request of more than {} bytes: closed", address,
-                                            limits_.request_bytes));
-  if (stream.fault() == ConnectionStream::Fault::TooSlow)
-    report_("slow " + address, fmt::format("{}: a request took longer than {} ms: closed", address,
-                                           limits_.request_time.count()));
-}
-
-bool LimitedServer::enter(const std::string& address) {
+std::shared_ptr<void> LimitedServer::place_for(const std::string& address) {
   {
     const std::lock_guard lock(mutex_);
     std::size_t& open = connections_[address];
     if (open < kConnectionsOfAddress) {
       ++open;
-      return true;
+      return {this, [this, address](void*) {
+                const std::lock_guard leaving(mutex_);
+                const auto at = connections_.find(address);
+                if (at != connections_.end() && --at->second == 0) connections_.erase(at);
+              }};
     }
   }
   report_("connections " + address,
           fmt::format("{}: more than {} connections: closed", address, kConnectionsOfAddress));
+  return nullptr;
+}
+
+void LimitedServer::serve_connection(daemon::FileDescriptor fd, const std::string& address) {
+  const unsigned vanished_ms = kVanished.count();
+  const int without_delay = 1;
+  (void)::setsockopt(fd.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &vanished_ms, sizeof vanished_ms);
+  (void)::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &without_delay, sizeof without_delay);
+  bool unread = false;
+  {
+    ConnectionStream stream(fd.get(), tls_.get(), limits_, [this] { return stopping_.load(); });
+    if (!tls_ || stream.accept()) unread = serve(stream);
+    report_fault(stream, address);
+  }
+  if (unread) discard_input(fd.get());
+}
+
+bool LimitedServer::serve(ConnectionStream& stream) {
+  for (std::size_t n = 1; n <= kRequestsOfConnection; ++n) {
+    if (!stream.wait_for_request(kBetweenRequests)) return false;
+    if (!stream.read_head()) {
+      refuse_head(stream);
+      return true;
+    }
+    bool closed = false, unread = true;  // also if the request cannot be parsed
+    const bool served =
+        process_request(stream, n == kRequestsOfConnection, closed,
+                        [&unread](httplib::Request& request) { unread = has_body(request); });
+    if (!served || closed || unread) return unread;
+  }
   return false;
 }
 
-void LimitedServer::leave(const std::string& address) {
-  const std::lock_guard lock(mutex_);
-  const auto open = connections_.find(address);
-  if (open != connections_.end() && --open->second == 0) connections_.erase(open);
+void LimitedServer::discard_input(int fd) const {
+  (void)::shutdown(fd, SHUT_WR);
+  const auto until = ConnectionStream::Clock::now() + kDiscardTime;
+  std::array<char, 16384> buffer;  // NOLINT: recv() fills what is used
+  while (!stopping_ && ConnectionStream::Clock::now() < until) {
+    pollfd polled{.fd = fd, .events = POLLIN, .revents = 0};
+    if (::poll(&polled, 1, static_cast<int>(kDiscardStep.count())) <= 0) continue;
+    if (::recv(fd, buffer.data(), buffer.size(), 0) <= 0) return;
+  }
+}
+
+void LimitedServer::report_fault(const ConnectionStream& stream, const std::string& address) {
+  using Fault = ConnectionStream::Fault;
+  switch (stream.fault()) {
+    case Fault::LongHead:
+      return report_("large " + address,
+                     fmt::format("{}: a request with more than {} bytes or {} lines before its "
+                                 "body: closed",
+                                 address, kMostHeadBytes, kMostHeadLines));
+    case Fault::LongBody:
+      return report_("large " + address, fmt::format("{}: a request of more than {} bytes: closed",
+                                                     address, limits_.body_bytes));
+    case Fault::SlowRequest:
+      return report_("slow " + address, fmt::format("{}: a request took longer than {} ms: closed",
+                                                    address, limits_.request_time.count()));
+    case Fault::SlowReader:
+      return report_("unread " + address,
+                     fmt::format("{}: an answer is not read, or by less than {} bytes/s: closed",
+                                 address, kSlowestReader_bytes_per_s));
+    case Fault::None:
+      return;
+  }
+}
+
+bool has_body(const httplib::Request& request) {
+  if (request.has_header("Transfer-Encoding")) return true;
+  if (request.has_header("Content-Length"))
+    return request.get_header_value_count("Content-Length") > 1 ||
+           request.get_header_value("Content-Length") != "0";
+  return request.method != "GET" && request.method != "HEAD";
 }
 
 }  // namespace abbe::web

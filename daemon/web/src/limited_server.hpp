@@ -2,12 +2,15 @@
 
 #include <openssl/ssl.h>
 
+#include <atomic>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 
+#include "abbe/base/file_descriptor.hpp"
 #include "connection_stream.hpp"
 #include "http.hpp"
 
@@ -19,35 +22,51 @@ struct FreeTlsContext {
 using TlsContext = std::unique_ptr<SSL_CTX, FreeTlsContext>;
 
 /// A server of httplib with limits of its own for connections: httplib reads lines and chunked
-/// bodies without a limit of size or total time. Requests for ranges are answered with the whole:
-/// httplib 0.11 does not check the end of a range. A connection ends after a request with a body,
-/// because a body that was refused may be unread.
+/// bodies without a limit of size or total time, and ends after an error of accept(). Requests for
+/// ranges are answered with the whole: httplib 0.11 does not check the end of a range. A connection
+/// ends after a request with a body, because a body that was refused may be unread.
 class LimitedServer final : public httplib::Server {
  public:
   static constexpr std::size_t kConnectionsOfAddress = 48;
   static constexpr std::size_t kRequestsOfConnection = 200;
-  static constexpr std::chrono::milliseconds kBetweenRequests{1000};
+  static constexpr std::chrono::seconds kBetweenRequests{1};
 
   /// `tls`: null without TLS. `report`: a subject, as in LimitedReport, and a line. Any thread.
   LimitedServer(TlsContext tls, ConnectionLimits limits,
                 std::function<void(const std::string&, const std::string&)> report);
+  LimitedServer(const LimitedServer&) = delete;
+  LimitedServer& operator=(const LimitedServer&) = delete;
+  ~LimitedServer() override;
 
-  /// After the bind: httplib lets 5 connections wait for accept(), which the files of one page exceed.
-  void let_more_connections_wait();
+  /// The listening socket, after the bind. httplib lets 5 connections wait for accept(), which the
+  /// files of one page exceed.
+  [[nodiscard]] int listener();
+  /// Ends all waiting of open connections.
+  void end_connections() { stopping_ = true; }
+
+  /// A place for a connection of `address`, which its destructor gives back; null if the address has
+  /// kConnectionsOfAddress already. Any thread.
+  [[nodiscard]] std::shared_ptr<void> place_for(const std::string& address);
+  /// Serves the requests of a connection, and closes it. Any thread.
+  void serve_connection(daemon::FileDescriptor fd, const std::string& address);
 
  private:
-  bool process_and_close_socket(socket_t fd) override;
-  void serve(ConnectionStream& stream);
+  /// True if input of the client may be unread.
+  [[nodiscard]] bool serve(ConnectionStream& stream);
   void report_fault(const ConnectionStream& stream, const std::string& address);
-  /// False if the address has kConnectionsOfAddress already.
-  [[nodiscard]] bool enter(const std::string& address);
-  void leave(const std::string& address);
+  /// Reads what the client still sends: after close() with unread input the kernel would discard the
+  /// answer (RFC 9112, 9.6).
+  void discard_input(int fd) const;
 
   TlsContext tls_;
   ConnectionLimits limits_;
   std::function<void(const std::string&, const std::string&)> report_;
+  std::atomic<bool> stopping_{false};
   std::mutex mutex_;
   std::map<std::string, std::size_t> connections_;  ///< open ones by address; of mutex_
 };
+
+/// A request that announces a body.
+[[nodiscard]] bool has_body(const httplib::Request& request);
 
 }  // namespace abbe::web

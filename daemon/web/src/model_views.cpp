@@ -1,8 +1,13 @@
 #include "abbe/web/model_views.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -22,7 +27,7 @@ using daemon::StoreEntry;
 using daemon::StoreEvent;
 using nlohmann::json;
 
-constexpr std::size_t kMostViews = 8;          ///< a view has some 100 kB
+constexpr std::size_t kMostViews = 12;         ///< history, trend, models of some 100 kB, reports
 constexpr std::size_t kMostTrendModels = 100;  ///< the newest
 constexpr std::size_t kMostEvents = 200;       ///< the newest
 
@@ -98,10 +103,29 @@ void add_to_trend(std::vector<std::pair<std::string, TrendValue>>& trend, std::s
   }
 }
 
-}  // namespace
+/// Inode, time and size of a file; empty if there is none.
+std::string stamp_of(const std::filesystem::path& file) {
+  struct stat seen {};
+  if (::stat(file.c_str(), &seen) != 0) return {};
+  return fmt::format("{} {}.{} {};", seen.st_ino, seen.st_mtim.tv_sec, seen.st_mtim.tv_nsec,
+                     seen.st_size);
+}
 
-Result<json> ModelViews::history() const {
-  const ModelStore store{store_};
+/// The stamps of the state file and of all models: much less work than to read the models.
+std::string stamp_of(const ModelStore& store) {
+  const auto state = store.stamp();
+  const auto folder = store.model_path("any").parent_path();
+  std::vector<std::string> models;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error))
+    models.push_back(at->path().filename().string() + " " + stamp_of(at->path()));
+  std::ranges::sort(models);  // the order of a folder is arbitrary
+  return fmt::format("{} {} {};{}", state.inode, state.modified_ns, state.bytes,
+                     fmt::join(models, ""));
+}
+
+Result<std::string> history_text(const ModelStore& store) {
   const auto entries = store.list();
   if (!entries) return tl::unexpected(entries.error());
   const auto events = store.history();
@@ -112,38 +136,15 @@ Result<json> ModelViews::history() const {
   const std::size_t first = events->size() - std::min(events->size(), kMostEvents);
   for (std::size_t i = events->size(); i > first; --i)
     out["events"].push_back(event_json((*events)[i - 1]));
-  return out;
+  return text_of(out);
 }
 
-Result<std::string> ModelViews::model(const std::string& name) {
-  const ModelStore store{store_};
-  const auto id = id_of(store, name);
-  if (!id) return tl::unexpected(id.error());
-  {
-    const std::lock_guard lock(mutex_);
-    if (const auto known = views_.find(*id); known != views_.end()) return known->second;
-  }
-
-  const auto document = store.load(*id);
-  if (!document) return tl::unexpected(document.error());
-  std::string view = text_of(model_json(*document));
-  const std::lock_guard lock(mutex_);
-  if (views_.size() >= kMostViews) views_.erase(views_.begin());
-  views_[*id] = view;
-  return view;
-}
-
-Result<std::string> ModelViews::trend() {
-  const ModelStore store{store_};
+Result<std::string> trend_text(const ModelStore& store) {
   auto entries = store.list();
   if (!entries) return tl::unexpected(entries.error());
   std::erase_if(*entries, [](const StoreEntry& e) { return !e.accepted || !e.fault.empty(); });
   if (entries->size() > kMostTrendModels) entries->resize(kMostTrendModels);
   std::ranges::reverse(*entries);  // oldest first
-  std::string ids;
-  for (const StoreEntry& entry : *entries) ids += entry.id;
-  const std::lock_guard lock(mutex_);
-  if (ids == trend_of_ && !trend_.empty()) return trend_;
 
   json models = json::array();
   std::vector<std::pair<std::string, TrendValue>> trend;
@@ -166,25 +167,76 @@ Result<std::string> ModelViews::trend() {
                     {"value", row.value},
                     {"u", row.u}});
   }
-  trend_ = text_of({{"models", std::move(models)}, {"values", std::move(rows)}});
-  trend_of_ = ids;
-  return trend_;
+  return text_of({{"models", std::move(models)}, {"values", std::move(rows)}});
 }
 
-Result<std::string> ModelViews::report(const std::string& name) const {
-  const ModelStore store{store_};
-  const auto id = id_of(store, name);
-  if (!id) return tl::unexpected(id.error());
-  auto document = store.load(*id);
+Result<std::string> report_text(const ModelStore& store, const std::string& id) {
+  auto document = store.load(id);
   if (!document) return tl::unexpected(document.error());
   daemon::ReportSubject subject{.document = std::move(*document)};
   if (const auto entries = store.list())
     for (const StoreEntry& entry : *entries)
-      if (entry.id == *id) subject.entry = entry;
+      if (entry.id == id) subject.entry = entry;
   if (const auto events = store.history())
     for (const StoreEvent& event : *events)
-      if (event.id == *id) subject.events.push_back(event);
+      if (event.id == id) subject.events.push_back(event);
   return daemon::model_report(subject);
+}
+
+}  // namespace
+
+Result<std::string> ModelViews::kept(const std::string& key, const std::string& stamp,
+                                     std::mutex& one_at_a_time,
+                                     const std::function<Result<std::string>()>& make) {
+  if (auto known = find_kept(key, stamp)) return std::move(*known);
+  const std::lock_guard one(one_at_a_time);
+  if (auto known = find_kept(key, stamp)) return std::move(*known);  // made meanwhile
+  if (stopping_) return daemon::fail(daemon::ErrorCode::Io, "abbe-web stops");
+  auto text = make();
+  if (!text) return text;
+  const std::lock_guard lock(mutex_);
+  if (kept_.size() >= kMostViews && !kept_.contains(key))
+    kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
+  kept_[key] = {stamp, *text, ++calls_};
+  return text;
+}
+
+std::optional<std::string> ModelViews::find_kept(const std::string& key, const std::string& stamp) {
+  const std::lock_guard lock(mutex_);
+  const auto known = kept_.find(key);
+  if (known == kept_.end() || known->second.stamp != stamp) return std::nullopt;
+  known->second.used = ++calls_;
+  return known->second.text;
+}
+
+Result<std::string> ModelViews::history() {
+  const ModelStore store{store_};
+  return kept("history", stamp_of(store), making_list_, [&store] { return history_text(store); });
+}
+
+Result<std::string> ModelViews::model(const std::string& name) {
+  const ModelStore store{store_};
+  const auto id = id_of(store, name);
+  if (!id) return tl::unexpected(id.error());
+  return kept("model " + *id, stamp_of(store.model_path(*id)), making_model_,
+              [&]() -> Result<std::string> {
+                const auto document = store.load(*id);
+                if (!document) return tl::unexpected(document.error());
+                return text_of(model_json(*document));
+              });
+}
+
+Result<std::string> ModelViews::trend() {
+  const ModelStore store{store_};
+  return kept("trend", stamp_of(store), making_list_, [&store] { return trend_text(store); });
+}
+
+Result<std::string> ModelViews::report(const std::string& name) {
+  const ModelStore store{store_};
+  const auto id = id_of(store, name);
+  if (!id) return tl::unexpected(id.error());
+  return kept("report " + *id, stamp_of(store), making_model_,
+              [&store, &id] { return report_text(store, *id); });
 }
 
 Result<std::string> ModelViews::model_file(const std::string& name) const {

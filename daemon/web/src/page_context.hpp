@@ -14,6 +14,7 @@
 #include "abbe/web/sessions.hpp"
 #include "http.hpp"
 #include "limited_report.hpp"
+#include "page_places.hpp"
 #include "request_rate.hpp"
 
 namespace abbe::web {
@@ -23,9 +24,15 @@ struct PageContext {
       : options(std::move(given)),
         report(options.report),
         models(options.settings.config.daemon.models_dir()),
-        sessions(options.settings.web.users),
+        sessions(options.settings.web.users,
+                 {.idle = seconds_of(options.settings.web.session_idle)},
+                 [this](const std::string& line) { report.always(line); }),
         replays(options.abbe_program, options.settings.config.recording.dir),
-        feed(options.settings, board, [this] { return pages.load(); }) {}
+        pages(options.settings.web.most_pages),
+        feed(options.settings, board, [this] { return pages.taken(); }) {}
+  static std::chrono::seconds seconds_of(std::chrono::nanoseconds time) {
+    return std::chrono::duration_cast<std::chrono::seconds>(time);
+  }
 
   PageOptions options;
   LimitedReport report;
@@ -34,10 +41,12 @@ struct PageContext {
   ModelViews models;
   Sessions sessions;
   Replays replays;
-  std::atomic<std::size_t> pages{0}, downloads{0};
+  PagePlaces pages;
+  std::atomic<std::size_t> downloads{0};
   std::atomic<int> port{0};
-  std::mutex changing;  // one change of a user at a time reaches abbed
-  DaemonFeed feed;      // last: its thread uses the members above
+  std::timed_mutex changing;  // one change of a user at a time reaches abbed
+  std::atomic<bool> stopping{false};
+  DaemonFeed feed;  // last: its thread uses the members above
 };
 
 /// Cookies are of a computer, not of a port: the name has the port, for two pages on one computer.

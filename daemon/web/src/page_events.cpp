@@ -44,29 +44,38 @@ bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) 
   return true;
 }
 
+/// False, with an answer, if there is no place for the page.
+bool take_place(PageContext& context, const httplib::Request& request,
+                httplib::Response& response) {
+  const auto place = context.pages.take(request.remote_addr);
+  if (place == PagePlaces::Place::Taken) return true;
+  const bool of_address = place == PagePlaces::Place::AllOfAddressTaken;
+  const std::size_t most =
+      of_address ? context.pages.most_of_address() : context.options.settings.web.most_pages;
+  const std::string where = of_address ? " on this computer" : "";
+  context.report.line("pages" + (of_address ? " " + request.remote_addr : ""),
+                      fmt::format("{}: page refused: {} are open{}, the limit ([web] most_pages)",
+                                  peer_of(request), most, where));
+  send_error(response, 503, fmt::format("{} pages are open{}, the limit: close one", most, where));
+  return false;
+}
+
 }  // namespace
 
 void answer_events(PageContext& context, const httplib::Request& request,
                    httplib::Response& response) {
-  const std::size_t most = context.options.settings.web.most_pages;
-  const std::string peer = peer_of(request);
-  if (context.pages.fetch_add(1) >= most) {
-    context.pages.fetch_sub(1);
-    context.report.line("pages", fmt::format("{}: page refused: {} are open, the limit ([web] "
-                                             "most_pages)",
-                                             peer, most));
-    return send_error(response, 503, fmt::format("{} pages are open, the limit: close one", most));
-  }
-
+  if (request.version == "HTTP/1.0")
+    return send_error(response, 505, "the stream of events needs HTTP/1.1");
   const auto stream = std::make_shared<Stream>();
   stream->request.headers = request.headers;
+  if (!take_place(context, request, response)) return;
   response.set_chunked_content_provider(
       "text/event-stream",
       [&context, stream](std::size_t, httplib::DataSink& sink) {
         return send_events(context, *stream, sink);
       },
-      [&context, stream, peer, address = request.remote_addr](bool success) {
-        context.pages.fetch_sub(1);
+      [&context, stream, peer = peer_of(request), address = request.remote_addr](bool success) {
+        context.pages.leave(address);
         const auto patience = context.options.write_time_out;
         if (success || Clock::now() - stream->sent < patience) return;
         context.report.line("unread " + address,

@@ -150,7 +150,11 @@ bool answer_data(PageContext& context, const httplib::Request& request,
 void answer_get(PageContext& context, const httplib::Request& request,
                 httplib::Response& response) {
   if (answer_asset(request.path, response)) return;
-  const auto session = session_of(context, request);
+  // The page marks what it asks although nobody has touched it for a minute. The browser opens the
+  // stream of events again by itself.
+  const bool unattended = request.has_header("X-Unattended") || request.path == "/events";
+  const auto session =
+      session_of(context, request, unattended ? SessionUse::Look : SessionUse::Request);
   if (request.path == "/api/me") return send_json(response, me_json(context, session));
   if (!session && !context.options.settings.web.view_without_login)
     return send_error(response, 401, "log in first");

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <chrono>
-#include <filesystem>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -21,8 +20,8 @@ using daemon::Result;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kStorePatience{10};
-constexpr std::chrono::milliseconds kStorePeriod{100};
+constexpr std::chrono::seconds kStorePatience{10}, kTurnPatience{3};
+constexpr std::chrono::milliseconds kStorePeriod{100}, kTurnPeriod{100};
 constexpr daemon::JsonBounds kBodyBounds{.bytes = kMostRequestBytes, .depth = 8};
 
 /// A request that changes something, the role that it needs, and the request to abbed that it
@@ -41,7 +40,9 @@ Result<json> activation(const json& body) {
 }
 
 Result<json> rollback(const json& body) {
-  return json{{"do", "rollback"}, {"why", body.value("why", std::string{})}};
+  return json{{"do", "rollback"},
+              {"active", body.at("active").get<std::string>()},
+              {"why", body.value("why", std::string{})}};
 }
 
 Result<json> cancellation(const json&) {
@@ -63,9 +64,7 @@ bool from_this_site(const httplib::Request& request) {
   return host != std::string::npos && origin.substr(host + 3) == request.get_header_value("Host");
 }
 
-Result<json> body_of(const httplib::Request& request, const std::string& text) {
-  if (!request.get_header_value("Content-Type").starts_with(kJson))
-    return daemon::fail(ErrorCode::Usage, "the request must be application/json");
+Result<json> body_of(const std::string& text) {
   if (text.empty()) return json::object();
   auto body = daemon::parse_json(text, "request", kBodyBounds);
   if (body && !body->is_object())
@@ -110,10 +109,14 @@ void log_out(PageContext& context, const httplib::Request& request, const WebSes
 }
 
 /// The answer of abbed. A change of the model store that another process delays is asked for again.
-Result<json> ask_abbed(const std::filesystem::path& socket, const json& request) {
+Result<json> ask_abbed(PageContext& context, const json& request) {
+  const auto& socket = context.options.settings.config.control.socket;
   auto answer = daemon::ask_daemon(socket, request);
   const auto until = Clock::now() + kStorePatience;
   while (answer && answer->contains("change") && !answer->contains("id")) {
+    if (context.stopping)
+      return daemon::fail(ErrorCode::Io,
+                          "abbe-web stops; the change may still take place: see History");
     if (Clock::now() > until)
       return daemon::fail(ErrorCode::Io,
                           "the model store has not answered for 10 s; the change may still take "
@@ -124,13 +127,27 @@ Result<json> ask_abbed(const std::filesystem::path& socket, const json& request)
   return answer;
 }
 
+/// Waits until no other change is on its way to abbed. Without ownership: another one takes too
+/// long, or abbe-web stops.
+std::unique_lock<std::timed_mutex> turn_of_a_change(PageContext& context) {
+  const auto until = Clock::now() + kTurnPatience;
+  std::unique_lock lock(context.changing, std::defer_lock);
+  while (!lock.try_lock_for(kTurnPeriod))
+    if (context.stopping || Clock::now() > until) break;
+  return lock;
+}
+
 void change(PageContext& context, const WebSession& session, const Change& asked, const json& body,
             httplib::Response& response) {
   auto request = asked.request(body);
   if (!request) return send_error(response, request.error());
   (*request)["who"] = session.user;
-  const std::lock_guard lock(context.changing);
-  const auto answer = ask_abbed(context.options.settings.config.control.socket, *request);
+  const auto turn = turn_of_a_change(context);
+  if (!turn)
+    return send_error(response, 503,
+                      "another change is not done yet: nothing was changed; try again in some "
+                      "seconds");
+  const auto answer = ask_abbed(context, *request);
   const auto what = (*request)["do"].get<std::string>();
   context.report.always(
       fmt::format("{}: {}: {}", session.user, what, answer ? "done" : answer.error().text));
@@ -185,7 +202,7 @@ void answer_post(PageContext& context, const httplib::Request& request, const st
                     request.path, request.get_header_value("Origin").substr(0, 80)));
     return send_error(response, 403, "refused: the request comes from another site");
   }
-  const auto body = body_of(request, text);
+  const auto body = body_of(text);
   if (!body) return send_error(response, body.error());
 
   try {

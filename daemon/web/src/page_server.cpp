@@ -3,15 +3,18 @@
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 
 #include <algorithm>
-#include <atomic>
+#include <charconv>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include "abbe/web/certificate.hpp"
+#include "accept_loop.hpp"
 #include "limited_server.hpp"
 #include "page_context.hpp"
 #include "responses.hpp"
@@ -27,10 +30,9 @@ using Handling = httplib::Server::HandlerResponse;
 /// Besides one for each open page. More than the connections of one address, so that another one
 /// still gets an answer.
 constexpr std::size_t kThreadsForRequests = LimitedServer::kConnectionsOfAddress + 16;
-constexpr std::chrono::milliseconds kStartPeriod{1};
+constexpr std::chrono::seconds kLongestWait{20};  ///< of a connection for a thread
 constexpr std::size_t kLongestPath = 300;
-constexpr std::size_t kMostHeadBytes = 64 * 1024;
-constexpr int kSendBuffer = 64 * 1024;          ///< limits what waits for a page that does not read
+constexpr int kSendBuffer = 64 * 1024;      ///< limits what waits for a page that does not read
 constexpr std::string_view kApi = "/api/";  ///< requests that change something begin so
 
 /// Of the listening socket; accepted connections inherit them. SO_REUSEPORT, httplib's default,
@@ -57,12 +59,28 @@ bool is_own_name(const std::string& host, const daemon::WebConfig& web) {
          std::ranges::find(web.host_names, name) != web.host_names.end();
 }
 
+/// The announced length; nullopt: none, several or not a number.
+std::optional<std::uint64_t> length_of(const httplib::Request& request) {
+  if (request.get_header_value_count("Content-Length") != 1) return std::nullopt;
+  const std::string text = request.get_header_value("Content-Length");
+  std::uint64_t length = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), length);
+  if (read.ec != std::errc{} || read.ptr != text.data() + text.size()) return std::nullopt;
+  return length;
+}
+
+/// One header for each name: httplib adds its own beside one of the same name.
+void replace_header(httplib::Response& response, const char* name, const char* value) {
+  response.headers.erase(name);
+  response.set_header(name, value);
+}
+
 class HttpPageServer final : public PageServer {
  public:
   HttpPageServer(PageOptions options, TlsContext tls)
       : context_(std::move(options)),
         server_(std::move(tls),
-                {.request_bytes = kMostHeadBytes + kMostRequestBytes,
+                {.body_bytes = kMostRequestBytes + kMostRequestBytes / 2,
                  .request_time = context_.options.request_time,
                  .write_time = context_.options.write_time_out},
                 [this](const std::string& subject, const std::string& line) {
@@ -77,8 +95,10 @@ class HttpPageServer final : public PageServer {
     server_.set_post_routing_handler(
         [](const httplib::Request& request, httplib::Response& response) {
           if (!response.has_header("Content-Security-Policy")) add_security_headers(response);
-          if (request.method != "GET" && request.method != "HEAD")
-            response.set_header("Connection", "close");
+          const bool stays = !response.has_header("Connection") && request.version == "HTTP/1.1";
+          if (stays && !has_body(request)) return;
+          replace_header(response, "Connection", "close");
+          response.headers.erase("Keep-Alive");
         });
     server_.Post("/api/[a-z]+",
                  [this](const httplib::Request& request, httplib::Response& response,
@@ -91,9 +111,12 @@ class HttpPageServer final : public PageServer {
   HttpPageServer(const HttpPageServer&) = delete;
   HttpPageServer& operator=(const HttpPageServer&) = delete;
   ~HttpPageServer() override {
+    context_.stopping = true;
+    context_.models.stop();
+    accepting_.reset();
     context_.board.close();
-    server_.stop();
-    if (thread_.joinable()) thread_.join();
+    server_.end_connections();
+    workers_.reset();
   }
 
   [[nodiscard]] Result<void> listen() {
@@ -109,30 +132,48 @@ class HttpPageServer final : public PageServer {
                                       "not of this computer ([web] address, port)",
                                       web.address, web.port));
     context_.port = port_;
-    server_.let_more_connections_wait();
-    thread_ = std::thread([this] {
-      (void)server_.listen_after_bind();
-      ended_ = true;
-    });
-    // stop() has no effect on a server that does not run yet.
-    while (!server_.is_running() && !ended_) std::this_thread::sleep_for(kStartPeriod);
+    auto workers = WorkerPool::start(
+        kThreadsForRequests + web.most_pages,
+        [this](const std::string& line) { context_.report.line("internal error", line); });
+    if (!workers) return tl::unexpected(workers.error());
+    workers_ = std::move(*workers);
+    const auto report = [this](const std::string& subject, const std::string& line) {
+      context_.report.line(subject, line);
+    };
+    accepting_.emplace(
+        server_.listener(), [this](daemon::FileDescriptor fd) { take(std::move(fd)); }, report);
     return {};
   }
-  [[nodiscard]] bool serving() const override { return !ended_; }
+  [[nodiscard]] std::string fault() const override {
+    const auto now = std::chrono::steady_clock::now();
+    if (auto fault = accepting_->fault(now); !fault.empty()) return fault;
+    const auto wait = std::chrono::duration_cast<std::chrono::seconds>(workers_->longest_wait(now));
+    if (wait >= kLongestWait)
+      return fmt::format("a connection has waited for {} s: all threads are busy", wait.count());
+    return context_.feed.fault(now);
+  }
+  [[nodiscard]] bool ended() const override { return accepting_->ended(); }
   [[nodiscard]] std::uint16_t port() const override { return static_cast<std::uint16_t>(port_); }
 
  private:
   void set_limits() {
     server_.set_socket_options(set_socket_options);
-    server_.set_tcp_nodelay(true);
     server_.set_payload_max_length(kMostRequestBytes);
-    const std::size_t threads = kThreadsForRequests + context_.options.settings.web.most_pages;
-    server_.new_task_queue = [this, threads] {
-      return new WorkerPool(threads, [this] {
-        context_.report.line("waiting", fmt::format("{} connections wait: more than the page needs",
-                                                    WorkerPool::kMostWaiting));
-      });
-    };
+  }
+
+  /// On the thread that accepts.
+  void take(daemon::FileDescriptor fd) {
+    const std::string address = client_address(fd.get());
+    auto place = server_.place_for(address);
+    if (place == nullptr) return;
+    // std::function copies what it holds.
+    const auto kept = std::make_shared<daemon::FileDescriptor>(std::move(fd));
+    if (workers_->enqueue([this, kept, address, place = std::move(place)] {
+          server_.serve_connection(std::move(*kept), address);
+        }))
+      return;
+    context_.report.line("waiting", fmt::format("{}: closed: {} connections wait already", address,
+                                                WorkerPool::kMostWaiting));
   }
 
   Handling before_routing(const httplib::Request& request, httplib::Response& response) {
@@ -159,6 +200,10 @@ class HttpPageServer final : public PageServer {
     }
     if (request.method == "POST") return before_post(request, response);
     if (request.method == "GET" || request.method == "HEAD") {
+      if (has_body(request)) {
+        send_error(response, 400, "a GET or HEAD request has no body");
+        return Handling::Handled;
+      }
       answer_get(context_, request, response);
     } else {
       send_error(response, 405, "only GET, HEAD and POST");
@@ -166,10 +211,25 @@ class HttpPageServer final : public PageServer {
     return Handling::Handled;
   }
 
-  /// httplib reads the body of a request that it does not know, and decompresses it.
+  /// Before httplib reads the body: it would decompress it, and parse multipart/form-data with a
+  /// regular expression and a search whose time grows with the square of the size.
   Handling before_post(const httplib::Request& request, httplib::Response& response) {
     if (request.has_header("Content-Encoding")) {
       send_error(response, 415, "a compressed request is not accepted");
+      return Handling::Handled;
+    }
+    if (!request.get_header_value("Content-Type").starts_with(kJson)) {
+      send_error(response, 415, "the request must be application/json");
+      return Handling::Handled;
+    }
+    const auto length = length_of(request);
+    if (request.has_header("Transfer-Encoding") == request.has_header("Content-Length") ||
+        (request.has_header("Content-Length") && !length)) {
+      send_error(response, 400, "the request needs one Content-Length, or chunks");
+      return Handling::Handled;
+    }
+    if (length && *length > kMostRequestBytes) {
+      refuse_size(request, response);
       return Handling::Handled;
     }
     if (request.path.starts_with(kApi) &&
@@ -188,6 +248,11 @@ class HttpPageServer final : public PageServer {
       return body.size() <= kMostRequestBytes;
     });
     if (whole) return answer_post(context_, request, body, response);
+    if (body.size() > kMostRequestBytes) return refuse_size(request, response);
+    send_error(response, 400, "the body of the request is not complete");
+  }
+
+  void refuse_size(const httplib::Request& request, httplib::Response& response) {
     context_.report.line("large " + request.remote_addr,
                          fmt::format("{}: {} refused: a request of more than {} bytes",
                                      peer_of(request), request.path, kMostRequestBytes));
@@ -212,9 +277,15 @@ class HttpPageServer final : public PageServer {
   PageContext context_;
   LimitedServer server_;
   int port_ = 0;
-  std::atomic<bool> ended_{false};
-  std::thread thread_;
+  std::unique_ptr<WorkerPool> workers_;
+  std::optional<AcceptLoop> accepting_;  // last: its thread uses the members above
 };
+
+/// Who reads the key can pretend to be this page.
+bool others_may_read(const std::filesystem::path& key) {
+  struct stat seen {};
+  return ::stat(key.c_str(), &seen) == 0 && (seen.st_mode & (S_IROTH | S_IWOTH)) != 0;
+}
 
 /// Null without TLS.
 Result<TlsContext> tls_of(const daemon::WebConfig& web) {
@@ -226,6 +297,7 @@ Result<TlsContext> tls_of(const daemon::WebConfig& web) {
       SSL_CTX_use_certificate_chain_file(tls.get(), web.certificate.c_str()) == 1 &&
       SSL_CTX_use_PrivateKey_file(tls.get(), web.key.c_str(), SSL_FILETYPE_PEM) == 1 &&
       SSL_CTX_check_private_key(tls.get()) == 1) {
+    SSL_CTX_set_options(tls.get(), SSL_OP_NO_RENEGOTIATION);  // costs the server a key exchange
     // httplib calls write() again with another buffer that has the same content.
     SSL_CTX_set_mode(tls.get(),
                      SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
@@ -262,6 +334,9 @@ std::optional<WebSession> session_of(PageContext& context, const httplib::Reques
 Result<std::unique_ptr<PageServer>> PageServer::start(PageOptions options) {
   auto tls = tls_of(options.settings.web);
   if (!tls) return tl::unexpected(tls.error());
+  if (const auto& key = options.settings.web.key; others_may_read(key))
+    options.report(fmt::format(
+        "warning: key {}: other users may read it: chgrp abbe-web, chmod 0640", key.string()));
   auto page = std::make_unique<HttpPageServer>(std::move(options), std::move(*tls));
   if (auto listening = page->listen(); !listening) return tl::unexpected(listening.error());
   return page;

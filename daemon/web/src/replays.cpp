@@ -13,6 +13,8 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <exception>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -124,15 +126,29 @@ Result<void> Replays::begin(const std::string& name) {
 
   auto child = start_child({program_.string(), "replay", (folder_ / name).string(), "--json"});
   if (!child) return tl::unexpected(child.error());
-  child_ = child->pid;
+  const pid_t pid = child->pid;
+  try {
+    thread_ =
+        std::thread([this, child = std::move(*child)] { follow(child.output.get(), child.pid); });
+  } catch (const std::system_error& error) {  // TasksMax of the unit
+    ::kill(pid, SIGKILL);
+    (void)::waitpid(pid, nullptr, 0);
+    return daemon::fail(ErrorCode::Io, fmt::format("replay of {}: no thread can be started: {}",
+                                                   name, error.code().message()));
+  }
+  child_ = pid;
   status_ = {{"state", "running"}, {"name", name}};
-  thread_ =
-      std::thread([this, child = std::move(*child)] { follow(child.output.get(), child.pid); });
   return {};
 }
 
 void Replays::follow(int output_fd, pid_t child) {
-  auto result = result_json(all_output(output_fd, child));
+  nlohmann::json result;
+  try {
+    result = result_json(all_output(output_fd, child));
+  } catch (const std::exception& error) {  // for example no memory for the output
+    ::kill(child, SIGKILL);
+    result = {{"state", "failed"}, {"error", error.what()}};
+  }
   // The child remains a zombie until child_ is 0, so that its id is not that of another process.
   siginfo_t ended{};
   while (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) != 0 &&

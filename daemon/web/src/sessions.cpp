@@ -26,6 +26,14 @@ std::string random_token() {
 
 }  // namespace
 
+Sessions::Sessions(const std::filesystem::path& users_file, SessionLimits limits,
+                   std::function<void(const std::string&)> report)
+    : limits_(limits) {
+  if (users_file.empty()) return;
+  users_.emplace(users_file, std::move(report));
+  (void)users_->users();  // reports a fault at the start
+}
+
 Result<void> Sessions::check_failures(const std::string& address, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   std::erase_if(failures_, [&](const auto& f) { return now - f.second.last >= limits_.pause; });
@@ -43,9 +51,9 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
     return daemon::fail(ErrorCode::Refused, "nobody can log in: [web] users names no file");
   const std::lock_guard one_at_a_time(checking_);
   if (const auto may = check_failures(address, now); !may) return tl::unexpected(may.error());
-  const auto users = read_web_users(users_file_);
+  const auto users = users_->users();
   if (!users) return tl::unexpected(users.error());
-  const auto found = find_web_user(*users, user, password);
+  const auto found = find_web_user(**users, user, password);
 
   const std::lock_guard lock(mutex_);
   if (!found) {
@@ -59,8 +67,7 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
   }
   failures_.erase(address);
   remove_ended(now);
-  if (kept_.size() >= limits_.sessions)
-    kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
+  make_place_for(found->name);
   WebSession session{
       .token = random_token(), .csrf = random_token(), .user = found->name, .role = found->role};
   kept_[session.token] = {session, found->hash, now, now};
@@ -81,16 +88,30 @@ std::optional<WebSession> Sessions::find(const std::string& token, Clock::time_p
     hash = found->second.hash;
   }
 
-  const auto users = read_web_users(users_file_);
+  const auto users = users_->users();
   if (!users) return std::nullopt;
-  const auto user = std::ranges::find(*users, session.user, &WebUser::name);
-  if (user == users->end() || user->role != session.role || user->hash != hash) return std::nullopt;
+  const auto user = std::ranges::find(**users, session.user, &WebUser::name);
+  if (user == (*users)->end() || user->role != session.role || user->hash != hash)
+    return std::nullopt;
   return session;
 }
 
 void Sessions::log_out(const std::string& token) {
   const std::lock_guard lock(mutex_);
   kept_.erase(token);
+}
+
+void Sessions::make_place_for(const std::string& user) {
+  std::size_t of_user = 0;
+  auto oldest = kept_.end();
+  for (auto at = kept_.begin(); at != kept_.end(); ++at) {
+    if (at->second.session.user != user) continue;
+    ++of_user;
+    if (oldest == kept_.end() || at->second.begun < oldest->second.begun) oldest = at;
+  }
+  if (of_user >= limits_.of_one_user) kept_.erase(oldest);
+  if (kept_.size() >= limits_.sessions)
+    kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
 }
 
 void Sessions::remove_ended(Clock::time_point now) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <sstream>
 
@@ -117,6 +118,41 @@ Result<std::vector<WebUser>> read_web_users(const std::filesystem::path& file) {
   return tl::unexpected(daemon::Error{
       ErrorCode::BadInput, fmt::format("{}: {} lines cannot be used", file.string(), faults.size()),
       std::move(faults)});
+}
+
+Result<UsersFile::Users> UsersFile::users() {
+  const std::lock_guard lock(mutex_);
+  struct stat seen {};
+  const bool exists = ::stat(file_.c_str(), &seen) == 0;
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  const std::array<std::int64_t, 4> stamp{static_cast<std::int64_t>(seen.st_ino),
+                                          seen.st_ctim.tv_sec * kSecond_ns + seen.st_ctim.tv_nsec,
+                                          seen.st_size, seen.st_mode};
+  // A file may change twice within the resolution of its times.
+  constexpr std::time_t kYoung_s = 2;
+  const bool young = std::time(nullptr) - seen.st_ctim.tv_sec < kYoung_s;
+  if (!exists || young || read_ != stamp) read();
+  read_ = stamp;
+  if (good_ != nullptr) return good_;
+  return tl::unexpected(*fault_);
+}
+
+void UsersFile::read() {
+  auto users = read_web_users(file_);
+  if (users) {
+    if (fault_) report_(fmt::format("{}: can be used again", file_.string()));
+    fault_.reset();
+    good_ = std::make_shared<const std::vector<WebUser>>(std::move(*users));
+    return;
+  }
+  std::string text = users.error().text;
+  for (const std::string& detail : users.error().details) text += "; " + detail;
+  const bool known = fault_ && fault_->text == text;
+  fault_ = daemon::Error{users.error().code, std::move(text), {}};
+  if (!known)
+    report_(fmt::format(
+        "{}: {}", fault_->text,
+        good_ == nullptr ? "nobody can log in" : "the users of the last good file stay"));
 }
 
 std::optional<WebUser> find_web_user(const std::vector<WebUser>& users, const std::string& name,

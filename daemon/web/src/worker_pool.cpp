@@ -1,25 +1,31 @@
 #include "worker_pool.hpp"
 
+#include <fmt/format.h>
+
+#include <exception>
+#include <system_error>
 #include <utility>
 
 namespace abbe::web {
 
-WorkerPool::WorkerPool(std::size_t threads, std::function<void()> full) : full_(std::move(full)) {
-  threads_.reserve(threads);
-  for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
-}
-
-void WorkerPool::enqueue(std::function<void()> serve) {
-  std::unique_lock lock(mutex_);
-  if (waiting_.size() >= kMostWaiting) {
-    full_();
-    changed_.wait(lock, [this] { return stopping_ || waiting_.size() < kMostWaiting; });
+daemon::Result<std::unique_ptr<WorkerPool>> WorkerPool::start(
+    std::size_t threads, std::function<void(const std::string&)> report) {
+  std::unique_ptr<WorkerPool> pool{new WorkerPool(std::move(report))};  // NOLINT: private
+  pool->threads_.reserve(threads);
+  try {
+    for (std::size_t i = 0; i < threads; ++i)
+      pool->threads_.emplace_back([&of = *pool] { of.work(); });
+  } catch (const std::system_error& error) {
+    return daemon::fail(
+        daemon::ErrorCode::Io,
+        fmt::format("start {} threads for connections: {} (TasksMax= of the unit, or the limit of "
+                    "processes of the user)",
+                    threads, error.code().message()));
   }
-  waiting_.push_back(std::move(serve));
-  changed_.notify_all();
+  return pool;
 }
 
-void WorkerPool::shutdown() {
+WorkerPool::~WorkerPool() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
@@ -28,17 +34,43 @@ void WorkerPool::shutdown() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-/// Serves until shutdown() was called and no connection waits.
+bool WorkerPool::enqueue(std::function<void()> serve) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= kMostWaiting) return false;
+    waiting_.push_back({std::move(serve), Clock::now()});
+  }
+  changed_.notify_one();
+  return true;
+}
+
+std::chrono::nanoseconds WorkerPool::longest_wait(Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  if (waiting_.empty()) return {};
+  return now - waiting_.front().since;
+}
+
+/// Serves until the pool ends and no connection waits.
 void WorkerPool::work() {
   for (;;) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
     if (waiting_.empty()) return;
-    const auto serve = std::move(waiting_.front());
+    const Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
-    changed_.notify_all();
     lock.unlock();
-    serve();
+    serve(next.serve);
+  }
+}
+
+/// A connection that throws, for example because memory is short, ends; its thread does not.
+void WorkerPool::serve(const std::function<void()>& task) {
+  try {
+    task();
+  } catch (const std::exception& error) {
+    report_(fmt::format("internal error: {}: the connection is closed", error.what()));
+  } catch (...) {
+    report_("internal error: not a std::exception: the connection is closed");
   }
 }
 

@@ -1,37 +1,55 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
-#include "http.hpp"
+#include "abbe/base/error.hpp"
 
 namespace abbe::web {
 
-/// The threads that serve connections, one each. A connection for which no thread is free waits; at
-/// kMostWaiting the server accepts no further ones until a thread is free, and `full` is called.
-class WorkerPool final : public httplib::TaskQueue {
+/// The threads that serve connections, one each. A connection for which no thread is free waits.
+class WorkerPool {
  public:
+  using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMostWaiting = 64;
 
-  WorkerPool(std::size_t threads, std::function<void()> full);
+  /// Io if the threads cannot be created. `report` receives a line for each task that throws; any
+  /// thread.
+  [[nodiscard]] static daemon::Result<std::unique_ptr<WorkerPool>> start(
+      std::size_t threads, std::function<void(const std::string&)> report);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
-  ~WorkerPool() override = default;
+  /// Serves the connections that wait, and ends the threads.
+  ~WorkerPool();
 
-  void enqueue(std::function<void()> serve) override;
-  void shutdown() override;
+  /// False if kMostWaiting connections wait already; `serve` is then not called.
+  [[nodiscard]] bool enqueue(std::function<void()> serve);
+  /// How long the connection that waits longest has waited; 0: none waits.
+  [[nodiscard]] std::chrono::nanoseconds longest_wait(Clock::time_point now) const;
 
  private:
-  void work();
+  struct Waiting {
+    std::function<void()> serve;
+    Clock::time_point since;
+  };
 
-  std::function<void()> full_;
-  std::mutex mutex_;
+  explicit WorkerPool(std::function<void(const std::string&)> report)
+      : report_(std::move(report)) {}
+  void work();
+  void serve(const std::function<void()>& task);
+
+  std::function<void(const std::string&)> report_;
+  mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
-  std::deque<std::function<void()>> waiting_;
+  std::deque<Waiting> waiting_;
   bool stopping_ = false;
   std::vector<std::thread> threads_;
 };

@@ -89,9 +89,11 @@ struct Web : Spine {
 TEST_F(Web, AUserActivatesAndRollsBackAndTheStoreNamesTheUser) {
   ASSERT_NO_FATAL_FAILURE(start_everything());
   ASSERT_NO_FATAL_FAILURE(log_in());
-  const auto back = post("/api/rollback", {{"why", "a crash"}});
+  const auto back = post("/api/rollback", {{"active", ids_[1]}, {"why", "a crash"}});
   EXPECT_EQ(back["status"], 200) << back;
   EXPECT_EQ(back["body"]["id"], ids_[0]);
+  // The browser repeats a request whose answer was lost.
+  EXPECT_EQ(post("/api/rollback", {{"active", ids_[1]}, {"why", "a crash"}})["status"], 409);
   const auto refused = post("/api/activate", {{"id", ids_[2]}, {"why", "try"}});
   EXPECT_EQ(refused["status"], 409) << refused;
   const auto forced = post("/api/activate", {{"id", ids_[2]}, {"force", true}});

@@ -50,7 +50,8 @@ struct ControlLimits {
 };
 
 /// Serves the socket on its own thread. The handler runs on that thread and must not block for
-/// long.
+/// long. Requests of more than 64 kB are answered on a second thread, one after the other, because
+/// they take longer to read: the handler is called by two threads.
 class ControlServer {
  public:
   using Handler =

@@ -2,6 +2,7 @@
 /// [web] of abbed.toml: the page that abbe-web serves. Not a member of Config, because abbed only
 /// checks this table and does not use it.
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -23,6 +24,8 @@ struct WebConfig {
   /// File of `abbe-web --hash-password`; empty: nobody can log in.
   std::filesystem::path users;
   bool view_without_login = true;
+  /// A session ends after this time without a request of its browser; events are not requests.
+  std::chrono::nanoseconds session_idle = std::chrono::minutes{30};
   double live_hz = 25.0;        ///< rate of the axis positions
   std::size_t most_pages = 16;  ///< pages that receive events at the same time
   [[nodiscard]] bool tls() const noexcept { return !certificate.empty(); }

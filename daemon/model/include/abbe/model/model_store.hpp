@@ -101,9 +101,10 @@ class ModelStore {
   /// if another model is active, or if the same event is recorded already.
   [[nodiscard]] Result<void> add_drift(const std::string& id, const StoreActor& actor);
 
-  /// Activates the model that was active before the present one; returns its id. Refused if there
-  /// was none.
-  [[nodiscard]] Result<std::string> rollback(const StoreActor& actor);
+  /// Activates the model that was active before `active`; returns its id. Refused if another model
+  /// than `active` is active: a request that is repeated because its answer was lost must not go one
+  /// model further back. Refused if no model was active before.
+  [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, const std::string& active);
 
   [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first

@@ -10,7 +10,7 @@
 ///      "plan": {"file": NAME, "text": TOML}, "earlier_m": [[x, y, z], ...]}
 ///     {"do": "cancel", "who": REMARK}
 ///     {"do": "activate", "id": ID, "why": TEXT, "force": false, "who": REMARK}
-///     {"do": "rollback", "why": TEXT, "who": REMARK}
+///     {"do": "rollback", "active": ID, "why": TEXT, "who": REMARK}
 ///     {"do": "change", "number": NUMBER}
 ///     {"do": "touch", "where": true}
 ///     {"do": "touch", "points": [{"way": [[x, y, z], ...], "at_m": [x, y, z],
@@ -34,8 +34,9 @@
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
 /// "status" alone; "calibration" the "request" of the present or last session. "activate" and
 /// "rollback" change the model store, as `abbe model` does; the daemon follows the store. They return
-/// the "change" and, if it is done, the "id" of the active model; until then ask with "change". The
-/// calling thread reads the request and writes the answer. Hub::call() runs the part that needs the
+/// the "change" and, if it is done, the "id" of the active model; until then ask with "change".
+/// "rollback" is refused if another model than "active" is active: a request that is repeated because
+/// its answer was lost does not go one model further back. The calling thread reads the request and writes the answer. Hub::call() runs the part that needs the
 /// hub's thread; the duration of this part does not depend on the size of the request.
 
 #include <chrono>

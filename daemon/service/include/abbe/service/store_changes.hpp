@@ -24,6 +24,11 @@ struct Activation {
   bool force = false;    ///< also a model that the gate refused; needs `why`
 };
 
+struct RollBack {
+  std::string active;    ///< the id of the model that the client takes for the active one
+  std::string who, why;  ///< kept in the store
+};
+
 class StoreChanges {
  public:
   explicit StoreChanges(std::filesystem::path store) : store_(std::move(store)) {}
@@ -31,8 +36,9 @@ class StoreChanges {
   /// Begins a change and returns its number. Usage for a forced activation without reason; Refused
   /// while another change runs.
   [[nodiscard]] Result<std::uint64_t> activate(Activation asked);
-  /// The same for the model that was active before.
-  [[nodiscard]] Result<std::uint64_t> roll_back(std::string who, std::string why);
+  /// The same for the model that was active before `active`; the outcome is Refused if another model
+  /// than `active` is active.
+  [[nodiscard]] Result<std::uint64_t> roll_back(RollBack asked);
 
   /// Waits at most `patience` for the change. The id of the model that is active then, or the Error
   /// of the store; nullopt while the change runs. Usage for another number than the last one.

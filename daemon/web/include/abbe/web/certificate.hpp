@@ -3,14 +3,19 @@
 
 #include <chrono>
 #include <filesystem>
+#include <string>
 
 #include "abbe/base/error.hpp"
 
 namespace abbe::web {
 
+/// In seconds: a certificate may be valid until the year 9999, which nanoseconds cannot express.
 struct CertificateDates {
-  std::chrono::system_clock::time_point from, until;
+  std::chrono::sys_seconds from, until;
 };
+
+/// "2026-11-01"
+[[nodiscard]] std::string day_of(std::chrono::sys_seconds time);
 
 /// The dates of the first certificate of a PEM file. Io or BadInput with the name of the file.
 [[nodiscard]] daemon::Result<CertificateDates> read_certificate(const std::filesystem::path& file);

@@ -10,6 +10,7 @@
 #include <functional>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -41,8 +42,11 @@ class DaemonFeed {
   /// request as abbed received it, lengths in m. Any thread.
   [[nodiscard]] nlohmann::json calibration() const;
 
- private:
   using Clock = std::chrono::steady_clock;
+  /// Why abbed is not asked any more; empty: it is asked, whether it answers or not. Any thread.
+  [[nodiscard]] std::string fault(Clock::time_point now) const;
+
+ private:
   void run();
   void cycle(Clock::time_point now);
   void ask_positions();
@@ -63,7 +67,8 @@ class DaemonFeed {
   bool acquiring_ = false;
   bool request_known_ = false;  ///< of the session path_.session
 
-  mutable std::mutex mutex_;  // of the following members
+  std::atomic<Clock::time_point> cycled_{Clock::now()};  ///< the last cycle began
+  mutable std::mutex mutex_;                             // of the following members
   nlohmann::json status_, request_;
   DrivenPath path_;
   double least_step_m_ = 0.0;

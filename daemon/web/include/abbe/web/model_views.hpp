@@ -1,12 +1,15 @@
 #pragma once
 /// What the page shows of the model store, as JSON. Lengths in mm, errors in um and urad, dates as
-/// RFC 3339. Reads the store at every call, as other processes change it. Thread-safe.
+/// RFC 3339. Other processes change the store: what is kept is used only while the files that it was
+/// made of have the same inode, time and size. Thread-safe.
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "abbe/base/error.hpp"
@@ -17,8 +20,11 @@ class ModelViews {
  public:
   explicit ModelViews(std::filesystem::path store) : store_(std::move(store)) {}
 
+  /// Views that wait for others to be made end with an Error.
+  void stop() noexcept { stopping_ = true; }
+
   /// {"models": [newest first], "events": [newest first]}.
-  [[nodiscard]] daemon::Result<nlohmann::json> history() const;
+  [[nodiscard]] daemon::Result<std::string> history();
   /// A model: what it is based on, error motions with u, field of V with U, validity volume,
   /// residuals before and after, and what it does not know. `id` may be "active". The text is kept
   /// for the models that were asked for last.
@@ -27,15 +33,29 @@ class ModelViews {
   /// {"models": [{"id", "created"}], "values": [{"key", "name", "unit", "value": [], "u": []}]}.
   [[nodiscard]] daemon::Result<std::string> trend();
   /// The report of the model as an HTML page without JavaScript.
-  [[nodiscard]] daemon::Result<std::string> report(const std::string& id) const;
+  [[nodiscard]] daemon::Result<std::string> report(const std::string& id);
   /// The bytes of model.json.
   [[nodiscard]] daemon::Result<std::string> model_file(const std::string& id) const;
 
  private:
+  /// A text, and the stamp of the files that it was made of.
+  struct Kept {
+    std::string stamp, text;
+    std::uint64_t used = 0;  ///< number of the call that used it last
+  };
+  /// The kept text, or the one that `make` makes.
+  [[nodiscard]] daemon::Result<std::string> kept(
+      const std::string& key, const std::string& stamp, std::mutex& one_at_a_time,
+      const std::function<daemon::Result<std::string>()>& make);
+  [[nodiscard]] std::optional<std::string> find_kept(const std::string& key,
+                                                     const std::string& stamp);
+
   std::filesystem::path store_;
-  std::mutex mutex_;  // of the members below
-  std::map<std::string, std::string> views_;
-  std::string trend_, trend_of_;
+  std::atomic<bool> stopping_{false};
+  std::mutex making_model_, making_list_;  // one at a time: each takes much of a processor
+  std::mutex mutex_;                       // of the members below
+  std::map<std::string, Kept> kept_;
+  std::uint64_t calls_ = 0;
 };
 
 }  // namespace abbe::web

@@ -5,7 +5,9 @@
 ///   open pages                 [web] most_pages
 ///   requests of one address    kRequestsPerSecond on average
 ///   a page that does not read  closed after kWriteTimeOut
-///   a request                  kMostRequestBytes, kRequestTime from its first byte to its last
+///   a request                  kMostRequestBytes, kRequestTime from its first byte to its last;
+///                              its lines kMostHeadBytes, kMostHeadLines
+///   an answer                  kSlowestReader_bytes_per_s on average
 ///   connections of one address LimitedServer::kConnectionsOfAddress
 ///
 /// Whatever a browser does, abbed gets the requests of one client: those of DaemonFeed, and one at
@@ -43,8 +45,11 @@ class PageServer {
   [[nodiscard]] static daemon::Result<std::unique_ptr<PageServer>> start(PageOptions options);
   virtual ~PageServer() = default;
   [[nodiscard]] virtual std::uint16_t port() const = 0;
-  /// False once the server cannot accept connections any more.
-  [[nodiscard]] virtual bool serving() const = 0;
+  /// Why browsers cannot reach the page, or why it is not kept up to date; empty: it is served. Any
+  /// thread.
+  [[nodiscard]] virtual std::string fault() const = 0;
+  /// True once the server cannot accept connections any more: only a new start helps.
+  [[nodiscard]] virtual bool ended() const = 0;
 };
 
 }  // namespace abbe::web

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -24,21 +25,24 @@ struct WebSession {
 enum class SessionUse { Request, Look };
 
 struct SessionLimits {
-  std::chrono::seconds idle = std::chrono::hours{1};  ///< without a request
+  std::chrono::seconds idle = std::chrono::minutes{30};  ///< without a request
   std::chrono::seconds total = std::chrono::hours{12};
-  std::size_t sessions = 64;  ///< at this limit the session that was idle longest ends
-  std::size_t failures = 5;   ///< wrong passwords of one address within `pause`
+  std::size_t sessions = 64;    ///< at this limit the session that was idle longest ends
+  std::size_t of_one_user = 8;  ///< at this limit the oldest session of the user ends
+  std::size_t failures = 5;     ///< wrong passwords of one address within `pause`
   std::chrono::seconds pause = std::chrono::minutes{1};
 };
 
 class Sessions {
  public:
   using Clock = std::chrono::steady_clock;
-  explicit Sessions(std::filesystem::path users_file, SessionLimits limits = {})
-      : users_file_(std::move(users_file)), limits_(limits) {}
+  /// `report` receives a line for each fault in the file of users; any thread.
+  explicit Sessions(
+      const std::filesystem::path& users_file, SessionLimits limits = {},
+      std::function<void(const std::string&)> report = [](const std::string&) {});
 
   /// Refused for a wrong name or password, after too many failures of `address`, and if no file of
-  /// users is configured; as read_web_users() if the file cannot be used. One log-in at a time.
+  /// users is configured; as UsersFile::users() if the file cannot be used. One log-in at a time.
   [[nodiscard]] daemon::Result<WebSession> log_in(const std::string& user,
                                                   const std::string& password,
                                                   const std::string& address,
@@ -48,7 +52,7 @@ class Sessions {
   [[nodiscard]] std::optional<WebSession> find(const std::string& token, Clock::time_point now,
                                                SessionUse use = SessionUse::Request);
   void log_out(const std::string& token);
-  [[nodiscard]] bool possible() const noexcept { return !users_file_.empty(); }
+  [[nodiscard]] bool possible() const noexcept { return users_.has_value(); }
 
  private:
   struct Kept {
@@ -63,8 +67,9 @@ class Sessions {
   [[nodiscard]] daemon::Result<void> check_failures(const std::string& address,
                                                     Clock::time_point now);
   void remove_ended(Clock::time_point now);
+  void make_place_for(const std::string& user);
 
-  std::filesystem::path users_file_;
+  std::optional<UsersFile> users_;
   SessionLimits limits_;
   std::mutex checking_;  // a password takes 0.1 s of one processor
   std::mutex mutex_;     // of the members below

@@ -1,0 +1,50 @@
+#include "long_requests.hpp"
+
+#include <unistd.h>
+
+#include <utility>
+
+namespace abbe::daemon {
+
+LongRequests::LongRequests(Answer answer, int done_fd)
+    : answer_(std::move(answer)), done_fd_(done_fd), thread_([this] { run(); }) {}
+
+LongRequests::~LongRequests() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void LongRequests::take(std::uint64_t client, std::string line, ControlPeer peer) {
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back({client, std::move(line), std::move(peer)});
+  }
+  changed_.notify_one();
+}
+
+std::vector<LongRequests::Answered> LongRequests::answered() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(answered_, {});
+}
+
+void LongRequests::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+    if (stopping_) return;
+    const Waiting next = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    std::string line = answer_(next.line, next.peer);
+    lock.lock();
+    answered_.push_back({next.client, std::move(line)});
+    const std::uint64_t one = 1;
+    (void)!::write(done_fd_, &one, sizeof one);
+  }
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,76 @@
+/// What the page shows of a store that other processes change.
+
+#include "abbe/web/model_views.hpp"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "abbe/model/model_store.hpp"
+#include "synthetic_model.hpp"
+#include "web_folder.hpp"
+
+namespace abbe::web {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct ModelViewsTest : test::WebFolder {
+  std::string add(unsigned seed) {
+    auto store = daemon::ModelStore::open(folder_ / "models");
+    const auto id = store->add(daemon::test::synthetic_document(seed), true, {},
+                               {.who = "test", .why = "", .when = {}});
+    EXPECT_TRUE(id);
+    return id.value_or("");
+  }
+  ModelViews views_{folder_ / "models"};
+};
+
+TEST_F(ModelViewsTest, AModelFileThatIsDamagedIsReadAgain) {
+  const std::string id = add(1);
+  ASSERT_TRUE(views_.model(id));
+  EXPECT_THAT(views_.history().value(), HasSubstr("\"fault\":\"\""));
+  write("models/models/" + id + ".json", "{}");
+  EXPECT_FALSE(views_.model(id));
+  const auto history = nlohmann::json::parse(views_.history().value());
+  EXPECT_NE(history["models"][0]["fault"], "");
+}
+
+TEST_F(ModelViewsTest, AModelThatIsAddedIsInHistoryAndTrend) {
+  add(1);
+  EXPECT_EQ(nlohmann::json::parse(views_.trend().value())["models"].size(), 1u);
+  EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 1u);
+  add(2);
+  EXPECT_EQ(nlohmann::json::parse(views_.trend().value())["models"].size(), 2u);
+  EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 2u);
+}
+
+TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {
+  const std::string id = add(1);
+  const std::string before = views_.report(id).value();
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  ASSERT_TRUE(store->activate(id, {.who = "anna", .why = "step gauge passed", .when = {}}));
+  const std::string after = views_.report(id).value();
+  EXPECT_THAT(before, Not(HasSubstr("step gauge passed")));
+  EXPECT_THAT(after, HasSubstr("step gauge passed"));
+}
+
+TEST_F(ModelViewsTest, AtTheEndNothingMoreIsMade) {
+  const std::string kept = add(1), other = add(2);
+  ASSERT_TRUE(views_.model(kept));
+  views_.stop();
+  EXPECT_TRUE(views_.model(kept));
+  EXPECT_FALSE(views_.model(other));
+}
+
+TEST_F(ModelViewsTest, ShowsMoreModelsThanItKeeps) {
+  std::vector<std::string> ids;
+  for (unsigned seed = 1; seed <= 14; ++seed) ids.push_back(add(seed));
+  for (int i = 0; i < 2; ++i)
+    for (const std::string& id : ids)
+      EXPECT_EQ(nlohmann::json::parse(views_.model(id).value())["id"], id);
+}
+
+}  // namespace
+}  // namespace abbe::web

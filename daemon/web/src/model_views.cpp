@@ -175,16 +175,9 @@ Result<std::string> ModelViews::report(const std::string& name) const {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
   if (!id) return tl::unexpected(id.error());
-  auto document = store.load(*id);
-  if (!document) return tl::unexpected(document.error());
-  daemon::ReportSubject subject{.document = std::move(*document)};
-  if (const auto entries = store.list())
-    for (const StoreEntry& entry : *entries)
-      if (entry.id == *id) subject.entry = entry;
-  if (const auto events = store.history())
-    for (const StoreEvent& event : *events)
-      if (event.id == *id) subject.events.push_back(event);
-  return daemon::model_report(subject);
+  const auto subject = daemon::report_subject(store, *id);
+  if (!subject) return tl::unexpected(subject.error());
+  return daemon::model_report(*subject);
 }
 
 Result<std::string> ModelViews::model_file(const std::string& name) const {

@@ -122,7 +122,7 @@ TEST_F(Cli, WritesAReportWhoseFiguresHaveTheDataOfTheModel) {
     EXPECT_TRUE(test::every_figure_has_data(page)) << options;
     EXPECT_EQ(test::maps_of(page).size(), 3u) << options;
     const auto charts = test::charts_of(page);
-    EXPECT_FALSE(test::dataset_of(charts, "as the uncertainties predict").is_null());
+    EXPECT_FALSE(test::dataset_of(charts, "as predicted").is_null());
 
     const auto document = read_model(out / "model.json");
     ASSERT_TRUE(document);

@@ -68,7 +68,7 @@ void add_sigma_counts(HtmlReport& page, const RunFigures& run, const ModelStatis
   const auto below = [sd](double x) { return 0.5 * std::erfc(-x / (sd * std::numbers::sqrt2)); };
 
   Curve bars{.name = "residuals", .x = {}, .y = {}, .dot_every = 0};
-  Curve normal{.name = "as the uncertainties predict", .x = {}, .y = {}, .dot_every = 0};
+  Curve normal{.name = "as predicted", .x = {}, .y = {}, .dot_every = 0};
   for (std::size_t i = 0; i < run.sigma_counts.size(); ++i) {
     const double from = -kMost + width * static_cast<double>(i), to = from + width;
     const auto count = static_cast<double>(run.sigma_counts[i]);

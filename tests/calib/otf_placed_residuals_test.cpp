@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "abbe/calib/otf/blocks.hpp"
 #include "abbe/calib/otf/identify.hpp"
 #include "otf_run.hpp"
 
@@ -32,6 +33,45 @@ TEST(PlacedResiduals, AreAtTheirPlacesOnThePath) {
     EXPECT_EQ(placed[i].after_m, id.solution.residuals.after_m[i]);
     EXPECT_FALSE(placed[i].held_out);
   }
+}
+
+/// Mean time of the valid samples of a block.
+double mean_time_s(const MadeRun& run, const Block& block) {
+  double sum_s = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = block.begin_sample; i < block.end_sample; ++i) {
+    if (!run.samples[i].valid) continue;
+    sum_s += run.samples[i].time_s;
+    ++count;
+  }
+  return sum_s / static_cast<double>(count);
+}
+
+TEST(PlacedResiduals, HaveTheTimeOfTheirBlock) {
+  const MadeRun run = make_run({});
+  const BlockSeries series = *make_blocks(run.samples, run.options);
+  const Observations o = *observe_blocks(series, run.machine, run.path, run.noise, run.options);
+  ASSERT_GT(o.rows.size(), 100u);
+  const Residuals none{.before_m = std::vector<double>(o.rows.size(), 0.0),
+                       .after_m = std::vector<double>(o.rows.size(), 0.0)};
+  for (const Observations& rows : {o, with_basis(o, o.basis)}) {
+    const auto placed = placed_residuals(rows, none);
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      ASSERT_TRUE(placed[i].time_s);
+      EXPECT_NEAR(*placed[i].time_s, mean_time_s(run, series.blocks[o.rows[i].block]), 1e-9);
+      EXPECT_EQ(placed[i].leg, o.rows[i].leg);
+    }
+  }
+}
+
+TEST(PlacedResiduals, OfBlocksWithoutTimesHaveNone) {
+  const MadeRun run = make_run({});
+  BlockSeries series = *make_blocks(run.samples, run.options);
+  series.period_s = 0.0;
+  const Observations o = *observe_blocks(series, run.machine, run.path, run.noise, run.options);
+  const std::vector<double> zeros(o.rows.size(), 0.0);
+  for (const auto& placed : placed_residuals(o, {.before_m = zeros, .after_m = zeros}))
+    EXPECT_FALSE(placed.time_s);
 }
 
 TEST(PlacedResiduals, OfHeldOutRowsGiveTheFiguresOfTheVerdict) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
@@ -21,6 +22,8 @@
 #include "config_tables.hpp"
 #include "evemu_run.hpp"
 #include "recording_fixture.hpp"
+#include "report_again.hpp"
+#include "report_page.hpp"
 #include "warm_scales.hpp"
 
 namespace abbe::daemon {
@@ -414,6 +417,29 @@ TEST_F(EvemuCli, ExplainsInItsReportWhatIsNotEstimable) {
               AllOf(HasSubstr("rotation that touches do not determine"), HasSubstr("shape only"),
                     HasSubstr("Rotations of the positions"), HasSubstr("k_ezz3")));
   EXPECT_THAT(page, ::testing::Not(HasSubstr("http://")));
+}
+
+TEST_F(EvemuCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
+  write("touches.csv", touches_csv());
+  const std::string page = test::expect_same_report_from_store(
+      folder_,
+      "identify evemu --machine machine.toml --touches touches.csv --calibrator calibrator.toml");
+  const auto document = read_model(folder_ / "kept_out/model.json");
+  ASSERT_TRUE(document && document->run);
+  const auto& parts = document->run->parts;
+  ASSERT_EQ(parts.size(), 8u);
+  double squares = 0.0, count = 0.0, largest_m = 0.0;
+  for (const RunFigures::Part& part : parts) {
+    const auto n = static_cast<double>(part.count);
+    count += n;
+    squares += n * part.after_rms_m * part.after_rms_m;
+    largest_m = std::max(largest_m, part.after_max_m);
+  }
+  EXPECT_EQ(count, static_cast<double>(document->statistics.observations));
+  EXPECT_NEAR(std::sqrt(squares / count), document->statistics.after.rms_m, 1e-12);
+  EXPECT_NEAR(largest_m, document->statistics.after.max_abs_m, 1e-15);
+  EXPECT_THAT(page, HasSubstr("their times are not recorded"));
+  EXPECT_TRUE(test::every_figure_has_data(page));
 }
 
 TEST_F(EvemuCli, NamesAPositionThatIsMissing) {

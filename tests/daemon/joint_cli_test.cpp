@@ -17,6 +17,7 @@
 #include "abbe_command.hpp"
 #include "joint_parts.hpp"
 #include "made_run_files.hpp"
+#include "report_again.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -194,6 +195,15 @@ TEST_F(JointCli, PartsThatAgreeGiveAModelThatIsNowhereLessCertain) {
       EXPECT_LE(table["u"].get<double>(), u_of_run.get<double>() * (1.0 + 1e-9));
   EXPECT_THAT(text_of(folder_ / "out/report.html"),
               AllOf(HasSubstr("Do the parts agree?"), HasSubstr("behind"), Not(HasSubstr("src="))));
+}
+
+TEST_F(JointCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
+  write("again.toml", kFrontRun + kBehindRun + kTouchedArray);
+  const std::string page = test::expect_same_report_from_store(
+      folder_, "identify joint --machine machine.toml --parts again.toml");
+  EXPECT_THAT(
+      page, AllOf(HasSubstr("Do the parts agree?"), HasSubstr("Standard uncertainty of each table"),
+                  Not(HasSubstr("<script"))));
 }
 
 TEST_F(JointCli, TheModelHasTheErrorsOfTheMachine) {

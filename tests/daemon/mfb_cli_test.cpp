@@ -14,6 +14,8 @@
 #include "abbe/model/model_document.hpp"
 #include "mfb_folder.hpp"
 #include "model_eval_output.hpp"
+#include "report_again.hpp"
+#include "report_page.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -246,6 +248,25 @@ TEST_F(MfbCli, EstimatesTheDriftOfForwardAndBackwardPasses) {
   }
   EXPECT_EQ(read_model(out("model.json"))->bar->drift.size(), 17u);
   EXPECT_THAT(test::text_of(out("report.html")), HasSubstr("Drift of the machine"));
+}
+
+TEST_F(MfbCli, TheReportOfAKeptModelIsMadeAgainFromTheStore) {
+  const std::string page = test::expect_same_report_from_store(
+      folder_.path(),
+      "identify mfb --machine machine.toml --bar bar.toml --plan plan.toml --points points.csv");
+  const auto document = read_model(folder_.path() / "kept_out/model.json");
+  ASSERT_TRUE(document && document->run && document->bar);
+  const auto& parts = document->run->parts;
+  ASSERT_EQ(parts.size(), document->bar->passes.size());
+  double squares = 0.0, count = 0.0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    EXPECT_EQ(parts[i].name, document->bar->passes[i].measurement);
+    count += static_cast<double>(parts[i].count);
+    squares += static_cast<double>(parts[i].count) * std::pow(parts[i].after_rms_m, 2);
+  }
+  EXPECT_NEAR(std::sqrt(squares / count), document->statistics.after.rms_m, 1e-12);
+  EXPECT_FALSE(document->run->places_m.empty());
+  EXPECT_TRUE(test::every_figure_has_data(page));
 }
 
 }  // namespace

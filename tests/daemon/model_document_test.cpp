@@ -58,6 +58,57 @@ TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
   }
 }
 
+RunFigures figures_of_every_kind() {
+  return {.held_out = "legs",
+          .residuals = {},
+          .part_kind = "leg",
+          .parts = {{"leg \"1\"", 12, 1e-5 / 3, 1e-7 / 3, 1e-6 / 7, std::array{0.1 / 3, 4.5}},
+                    {"leg 2", 1, 1e-5, 1e-7, 1e-7, std::nullopt}},
+          .series = ResidualSeries{3, true, {{0.1 / 3, 1e-7 / 3}, {0.2, -1e-7 / 7}}},
+          .sigma_counts = std::vector<std::size_t>(RunFigures::kSigmaIntervals, 5),
+          .held_out_cells = {{0, 7, 3, 1e-5 / 3, 1e-7 / 3, 1e-6 / 3}},
+          .tables = {{"Title <1>", "why", {"a", "b"}, {{"1", "2"}, {"3", "\u00b5"}}},
+                     {"facts", "", {}, {{"name", "value"}}},
+                     {"empty", "", {"a"}, {}}},
+          .conditions = RunConditions{std::array{293.15, 880.0 / 3}, 100.0 / 3, 0.125 / 3}};
+}
+
+TEST(ModelDocument, KeepsResidualsTablesAndConditionsOfTheRun) {
+  auto document = synthetic_document(1);
+  const auto hash = model_hash(document);
+  document.run = figures_of_every_kind();
+  const auto text = to_json(document);
+  const auto read = parse_model(text, "model.json");
+  ASSERT_TRUE(read) << read.error().text << read.error().details.front();
+  EXPECT_EQ(read->run, document.run);
+  EXPECT_EQ(to_json(*read), text);
+  EXPECT_EQ(model_hash(*read), hash);
+  document.run->conditions = RunConditions{};
+  EXPECT_EQ(parse_model(to_json(document), "model.json")->run, document.run);
+}
+
+TEST(ModelDocument, RefusesDamagedFiguresOfTheRunByName) {
+  auto document = synthetic_document(1);
+  document.run = figures_of_every_kind();
+  const auto text = to_json(document);
+  for (const auto& [what, with] :
+       {std::pair{"\"parts\": [", "\"parts\": [1,"},
+        std::pair{"\"parts\": [", "\"parts\": 1, \"x\": ["},
+        std::pair{"\"count\": 12", "\"count\": -1"}, std::pair{"\"time_s\"", "\"weeks\""},
+        std::pair{"at_after_um\": [", "at_after_um\": [[1],"},
+        std::pair{"sigma_counts\": [5, ", "sigma_counts\": ["},
+        std::pair{"held_out_cells\": [", "held_out_cells\": [[1, 2],"},
+        std::pair{"\"tables\": [", "\"tables\": [1,"},
+        std::pair{"\"columns\": [", "\"columns\": [1, "}, std::pair{"\"rows\": [", "\"rows\": [1,"},
+        std::pair{"temperature_K\": [", "temperature_K\": [1, "},
+        std::pair{"\"duration_s\": ", "\"duration_s\": \"long\", \"x\": "},
+        std::pair{"\"conditions\": ", "\"conditions\": 1, \"x\": "}}) {
+    const auto refused = parse_model(replaced(text, what, with), "model.json");
+    ASSERT_FALSE(refused) << with;
+    EXPECT_THAT(refused.error().details.front(), HasSubstr("run.")) << with;
+  }
+}
+
 TEST(ModelDocument, KeepsTheVersionThatIdentifiedTheModel) {
   const auto document = synthetic_document(1);
   auto text = to_json(document);

@@ -119,7 +119,7 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
 
 TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
   ReportSubject subject = reported(3);
-  EXPECT_THAT(model_report(subject).value(), Not(HasSubstr("along the path")));
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("<p>Not recorded.</p>"));
   subject.document.run = RunFigures{.held_out = "legs",
                                     .held_out_before_m = 12.5e-6,
                                     .held_out_after_m = 0.25e-6,
@@ -135,6 +135,34 @@ TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
                     HasSubstr("<li>the air was not measured</li>")));
 }
 
+TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
+  ReportSubject subject = reported(3);
+  const auto with_run = [](std::vector<RunFigures::Interval> residuals) {
+    return RunFigures{.held_out = "legs", .residuals = std::move(residuals)};
+  };
+  const std::string before_runs = model_report(subject).value();
+  EXPECT_EQ(times(before_runs, "Not recorded."), 2u) << "where was measured, residuals";
+  EXPECT_EQ(times(before_runs, "not recorded"), 3u) << "temperature, feed, duration";
+
+  subject.document.run = with_run({{0.5, 1e-5, 1e-7}});
+  subject.document = parse_model(to_json(subject.document), "model.json").value();
+  const std::string before_parts = model_report(subject).value();
+  EXPECT_EQ(times(before_parts, "Not recorded."), 1u) << "where was measured";
+  EXPECT_THAT(before_parts, HasSubstr("Residuals of the fit along the path, rms, after"));
+  subject.document.run = with_run({});
+  EXPECT_EQ(times(model_report(subject).value(), "Not recorded."), 2u);
+}
+
+TEST(ModelReport, HasTheTablesOfTheMethod) {
+  ReportSubject subject = reported(3);
+  subject.document.run = RunFigures{.residuals = {}};
+  subject.document.run->tables = {{"Parts <1>", "why", {"part", "u"}, {{"front", "0.25 um"}}},
+                                  {"Choice", "", {}, {{"lambda", "0.125"}, {"damaged"}}}};
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<h2>Parts &lt;1&gt;</h2>"), HasSubstr("<td>0.25 um</td>"),
+                    HasSubstr("<th>lambda</th><td>0.125</td>"), Not(HasSubstr("damaged"))));
+}
+
 TEST(ModelReport, EscapesNamesOfMachinePeopleAndFiles) {
   const std::string name = "</td><script>alert(1)</script>\"'&\xff";
   ReportSubject subject = reported(3, false);
@@ -142,6 +170,11 @@ TEST(ModelReport, EscapesNamesOfMachinePeopleAndFiles) {
   subject.document.recording_gap = name;
   subject.document.inputs = {{name, name}};
   subject.entry->reasons = {name};
+  subject.document.run = RunFigures{.notes = {name}, .residuals = {}};
+  subject.document.run->part_kind = name;
+  subject.document.run->parts = {{name, 1, 1e-5, 1e-6, 1e-6, std::nullopt}};
+  subject.document.run->series = ResidualSeries{1, true, {{0.0, 1e-6}}};
+  subject.document.run->tables = {{name, name, {name}, {{name}}}};
   subject.events.front().actor = {name, name, {}};
   CertificateDetails& d = subject.details;
   d.number = d.remark = d.person = d.role = d.machine_serial = d.laboratory.name = name;

@@ -81,7 +81,7 @@ TEST_F(OtfMode, IdentifiesFromFilesWhereTheMachineStood) {
   EXPECT_EQ(model().statistics.observations, 183u);
   EXPECT_LT(model().statistics.after.rms_m, 0.1e-6);
   EXPECT_THAT(test::text_of(folder_ / "out" / "report.html"),
-              AllOf(HasSubstr("standstill calibration"), HasSubstr("otf (standstill), two-step")));
+              HasSubstr("laser tracker (otf, standstill), estimator two-step"));
 }
 
 TEST_F(OtfMode, ErrorsNameFileAndTime) {

@@ -348,6 +348,9 @@ Result<Observations> observe_aligned(const BlockSeries& series, Alignment alignm
   o.samples = series.samples;
   o.lost_samples = series.lost_samples;
   o.blocks = series.blocks.size();
+  if (series.period_s > 0.0) {
+    o.block_s = times_of(series).of_block_s;
+  }
   o.beam_returned = series.beam_returned;
   o.set_aside = series.set_aside;
 

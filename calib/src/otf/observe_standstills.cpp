@@ -190,6 +190,7 @@ Result<Observations> observe_standstills(const Standstills& all, const Machine& 
   o.samples = all.samples;
   o.lost_samples = all.lost_samples;
   o.blocks = all.found.size();
+  o.block_s = times_of(all).of_block_s;
   o.notes = notes_of(*a, all.found, path);
   note_noise(o.notes, all, noise);
   const std::vector<Vector3> u_m = u_of_means_m(all, noise, options.standstill.u_repeatability_m);

@@ -5,6 +5,7 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/report/model_report.hpp"
 #include "daemon_socket.hpp"
 #include "terminal.hpp"
 
@@ -52,24 +54,43 @@ ComparisonModel comparison_model(const std::optional<ModelDocument>& active, con
   return {&active->model, {}};
 }
 
-Result<void> keep(const std::string& store, const ModelDocument& document,
-                  const calib::Verdict& verdict, const std::string& command) {
-  if (store.empty()) return {};
-  auto opened = ModelStore::open(store);
-  if (!opened) return tl::make_unexpected(opened.error());
-  const auto id = opened->add(document, verdict.accepted, verdict.reasons,
-                              {user_name(), command, document.created});
+namespace {
+
+/// The model as the store has it after it was added.
+Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& document,
+                           const calib::Verdict& verdict) {
+  auto store = ModelStore::open(place.keep);
+  if (!store) return tl::make_unexpected(store.error());
+  const auto id = store->add(document, verdict.accepted, verdict.reasons,
+                             {user_name(), place.command, document.created});
   if (!id) return tl::make_unexpected(id.error());
-  return {};
+  return report_subject(*store, *id);
 }
 
-Result<void> write_results(const std::filesystem::path& folder, const ModelDocument& document,
-                           const std::map<std::string, std::string>& more) {
+/// A model that is in no store.
+ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdict) {
+  ReportSubject subject{.document = document};
+  subject.entry = StoreEntry{
+      .id = model_id(document), .accepted = verdict.accepted, .reasons = verdict.reasons};
+  return subject;
+}
+
+}  // namespace
+
+Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
+                            const calib::Verdict& verdict, const ResultFiles& more) {
+  const std::filesystem::path folder = place.out;
   if (auto made = create_folder(folder); !made) return made;
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
   for (const auto& [name, text] : more)
     if (auto done = replace_file(folder / name, text); !done) return done;
-  return {};
+
+  Result<ReportSubject> subject = judged(document, verdict);
+  if (!place.keep.empty()) subject = kept(place, document, verdict);
+  if (!subject) return tl::make_unexpected(subject.error());
+  const auto page = model_report(*subject);
+  if (!page) return tl::make_unexpected(page.error());
+  return replace_file(folder / "report.html", *page);
 }
 
 nlohmann::json verdict_json(const calib::Verdict& verdict) {

@@ -3,7 +3,6 @@
 /// printing the verdict.
 
 #include <CLI/App.hpp>
-#include <filesystem>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -36,16 +35,20 @@ struct ComparisonModel {
 [[nodiscard]] ComparisonModel comparison_model(const std::optional<ModelDocument>& active,
                                                const Config& config);
 
-/// Adds the model to the store and records the user and `command`. Does nothing if `store` is
-/// empty.
-[[nodiscard]] Result<void> keep(const std::string& store, const ModelDocument& document,
-                                const calib::Verdict& verdict, const std::string& command);
+/// Where a result goes, as the options of the command state.
+struct ResultPlace {
+  std::string out;      ///< folder, created if needed
+  std::string keep;     ///< store, or empty
+  std::string command;  ///< recorded in the store as reason, "abbe identify otf"
+};
+/// File name to text.
+using ResultFiles = std::map<std::string, std::string>;
 
-/// Writes model.json and the files `more` (file name to text) into the folder, which is created if
-/// needed. Error Io.
-[[nodiscard]] Result<void> write_results(const std::filesystem::path& folder,
-                                         const ModelDocument& document,
-                                         const std::map<std::string, std::string>& more);
+/// Writes model.json and `more`, adds the model to the store with the user, and writes report.html.
+/// With a store it is the report that `abbe report` makes of the stored model; else it has the
+/// verdict, and states that the model is not active. Error Io, or that of the store.
+[[nodiscard]] Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
+                                          const calib::Verdict& verdict, const ResultFiles& more);
 
 /// Whether the gate accepts the model, the reasons if not, and the notes.
 [[nodiscard]] nlohmann::json verdict_json(const calib::Verdict& verdict);

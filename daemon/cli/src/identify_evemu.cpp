@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -25,9 +24,7 @@
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/methods/evemu/document.hpp"
-#include "abbe/methods/evemu/report.hpp"
 #include "abbe/methods/otf/inputs.hpp"
-#include "abbe/methods/run_figures.hpp"
 #include "abbe/model/model_document.hpp"
 #include "commands.hpp"
 #include "evemu_input.hpp"
@@ -51,10 +48,11 @@ struct IdentifyEvemuArguments {
 struct Outcome {
   Config config;
   std::vector<InputFile> sources;
-  evemu::Observations observations;
-  std::optional<evemu::Solution> solution;
-  calib::Verdict verdict;
+  EvemuCandidate candidate;
   std::string recording_gap;
+
+  [[nodiscard]] const evemu::Solution& solution() const { return candidate.solution; }
+  [[nodiscard]] const calib::Verdict& verdict() const { return candidate.verdict; }
 };
 
 /// `given` is a keyword, or a file with one fold number for each of the 3 rows of every ball, in
@@ -113,9 +111,10 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
     verdict->notes.push_back(fmt::format(
         "the temperature of the array is not known: {}; give it with --artefact-C", missing));
 
-  return Outcome{
-      std::move(input->config), std::move(input->sources), std::move(input->observations),
-      std::move(*solution),     std::move(*verdict),       std::move(input->recording_gap)};
+  return Outcome{std::move(input->config),
+                 std::move(input->sources),
+                 {std::move(input->observations), std::move(*solution), std::move(*verdict)},
+                 std::move(input->recording_gap)};
 }
 
 /// The cross-validation error over lambda and gamma, from which they were chosen; cells that no
@@ -134,15 +133,11 @@ std::string to_surface_csv(const evemu::SparseChoice& choice) {
   return text;
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const ModelDocument& document,
-                           const Outcome& outcome) {
-  std::map<std::string, std::string> files{
-      {"coefficients.csv", to_coefficients_csv(*document.model.polynomials())},
-      {"report.html",
-       evemu_report(document, outcome.observations, *outcome.solution, outcome.verdict)}};
-  if (const auto& choice = outcome.solution->sparse)
+ResultFiles files_of(const ModelDocument& document, const Outcome& outcome) {
+  ResultFiles files{{"coefficients.csv", to_coefficients_csv(*document.model.polynomials())}};
+  if (const auto& choice = outcome.solution().sparse)
     files["cross_validation.csv"] = to_surface_csv(*choice);
-  return write_results(folder, document, files);
+  return files;
 }
 
 double u_rotation_urad(const evemu::Solution& solution) {
@@ -172,13 +167,13 @@ std::string artefact_text(const evemu::ArtefactUncertainty& artefact) {
 
 void print_json(const Outcome& outcome, const ModelDocument& document,
                 const std::filesystem::path& folder) {
-  const auto& s = outcome.solution->statistics;
-  const auto& held_out = outcome.verdict.held_out;
+  const auto& s = outcome.solution().statistics;
+  const auto& held_out = outcome.verdict().held_out;
   nlohmann::json object{{"model", (folder / "model.json").string()},
                         {"id", model_id(document)},
                         {"hash", model_hash(document)},
                         {"estimator", document.estimator},
-                        {"covariance", evemu::name(outcome.solution->covariance)},
+                        {"covariance", evemu::name(outcome.solution().covariance)},
                         {"positions", s.positions},
                         {"balls", s.balls},
                         {"observations", s.observations},
@@ -188,28 +183,28 @@ void print_json(const Outcome& outcome, const ModelDocument& document,
                         {"effective_parameters", s.effective_parameters},
                         {"noise_um", s.s_m * kUmPerM},
                         {"pose_rotation_urad", s.w_rad * kUradPerRad},
-                        {"u_mean_rotation_urad", u_rotation_urad(*outcome.solution)},
-                        {"shape_only", !outcome.solution->rotation.referenced},
+                        {"u_mean_rotation_urad", u_rotation_urad(outcome.solution())},
+                        {"shape_only", !outcome.solution().rotation.referenced},
                         {"residual_rms_before_um", s.before.rms_m * kUmPerM},
                         {"residual_rms_after_um", s.after.rms_m * kUmPerM},
                         {"held_out_rms_before_um", held_out.no_compensation_rms_m * kUmPerM},
                         {"held_out_rms_after_um", held_out.candidate_rms_m * kUmPerM},
-                        {"gate", verdict_json(outcome.verdict)}};
+                        {"gate", verdict_json(outcome.verdict())}};
 
-  if (const auto& artefact = outcome.solution->artefact)
+  if (const auto& artefact = outcome.solution().artefact)
     object["artefact"] = artefact_json(*artefact);
-  if (const auto& choice = outcome.solution->sparse)
+  if (const auto& choice = outcome.solution().sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
   fmt::print("{}\n", object.dump(1));
 }
 
 void print_summary(const Outcome& outcome, const ModelDocument& document,
                    const std::filesystem::path& folder) {
-  const auto& s = outcome.solution->statistics;
+  const auto& s = outcome.solution().statistics;
   fmt::print("model       {}  ({} coefficients, tool and machine \"{}\")\n", model_id(document),
              s.unknowns, document.machine);
   fmt::print("artefact    {} positions, {} ball centres{}\n", s.positions, s.balls,
-             outcome.solution->artefact ? artefact_text(*outcome.solution->artefact) : "");
+             outcome.solution().artefact ? artefact_text(*outcome.solution().artefact) : "");
   fmt::print(
       "solution    {}: {} observations, rank {} of {}, condition {:.3g}, {:.1f} effective "
       "parameters\n",
@@ -217,16 +212,16 @@ void print_summary(const Outcome& outcome, const ModelDocument& document,
   fmt::print("noise       {:.2f} um per ball coordinate, {:.1f} urad per position\n",
              s.s_m * kUmPerM, s.w_rad * kUradPerRad);
 
-  if (const auto& choice = outcome.solution->sparse)
+  if (const auto& choice = outcome.solution().sparse)
     fmt::print("chosen      lambda {:.3g}, gamma {:.3g}{}\n", choice->lambda.back(), choice->gamma,
                choice->curvature < 0.0 ? "; not convex there: other solutions may be close" : "");
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
   fmt::print(
       "rotation    {}, u = {:.1f} urad about Ball1\n",
-      outcome.solution->rotation.referenced ? "referenced" : "that of the blocks: shape only",
-      u_rotation_urad(*outcome.solution));
-  print_verdict(outcome.verdict);
+      outcome.solution().rotation.referenced ? "referenced" : "that of the blocks: shape only",
+      u_rotation_urad(outcome.solution()));
+  print_verdict(outcome.verdict());
   fmt::print("written     {}, coefficients.csv, report.html\n", (folder / "model.json").string());
 }
 
@@ -235,18 +230,16 @@ int run(const IdentifyEvemuArguments& arguments) {
   if (!outcome) return report(outcome.error());
   const auto now =
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  auto document = evemu_document(*outcome->solution, outcome->config, outcome->sources, now);
-  document.run = run_figures(outcome->verdict, "positions");
+  auto document = evemu_document(outcome->candidate, outcome->config, outcome->sources, now);
   document.recording_gap = outcome->recording_gap;
-  if (const auto written = write_outputs(arguments.out, document, *outcome); !written)
-    return report(written.error());
-  if (const auto kept = keep(arguments.keep, document, outcome->verdict, "abbe identify evemu");
-      !kept)
-    return report(kept.error());
+  if (const auto done = write_and_keep({arguments.out, arguments.keep, "abbe identify evemu"},
+                                       document, outcome->verdict(), files_of(document, *outcome));
+      !done)
+    return report(done.error());
   arguments.json ? print_json(*outcome, document, arguments.out)
                  : print_summary(*outcome, document, arguments.out);
 
-  return exit_code(outcome->verdict);
+  return exit_code(outcome->verdict());
 }
 
 void add_options(CLI::App& command, IdentifyEvemuArguments& arguments) {

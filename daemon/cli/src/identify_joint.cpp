@@ -86,24 +86,25 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const Joint
 
   auto document = joint_document(input, *identified.joint, *verdict);
   document.run = run_figures(*verdict, "legs");
-  return JointOutcome{input,
-                      std::move(identified.pairs),
-                      *std::move(identified.joint),
-                      std::move(*contributions),
-                      std::move(*verdict),
-                      std::move(document)};
+  JointOutcome outcome{input,
+                       std::move(identified.pairs),
+                       *std::move(identified.joint),
+                       std::move(*contributions),
+                       std::move(*verdict),
+                       std::move(document)};
+  outcome.document.run->tables = joint_tables(outcome);
+  for (const calib::otf::Observations& run : input.observations)
+    outcome.document.run->places_m.push_back(run.vertices_m);
+  return outcome;
 }
 
 int write_and_print(const IdentifyJointArguments& arguments, const JointOutcome& outcome) {
   const ModelDocument& document = outcome.document;
-  if (const auto written = write_results(
-          arguments.out, document,
-          {{"tables.csv", to_tables_csv(document.model)}, {"report.html", joint_report(outcome)}});
-      !written)
-    return report(written.error());
-  if (const auto kept = keep(arguments.keep, document, outcome.verdict, "abbe identify joint");
-      !kept)
-    return report(kept.error());
+  if (const auto done =
+          write_and_keep({arguments.out, arguments.keep, "abbe identify joint"}, document,
+                         outcome.verdict, {{"tables.csv", to_tables_csv(document.model)}});
+      !done)
+    return report(done.error());
 
   if (arguments.json)
     fmt::print("{}\n", joint_json(outcome, arguments.out).dump(1));

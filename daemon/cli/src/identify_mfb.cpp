@@ -19,8 +19,6 @@
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/mfb/method.hpp"
-#include "abbe/methods/mfb/report.hpp"
-#include "abbe/methods/run_figures.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
@@ -162,17 +160,13 @@ int run(const IdentifyMfbArguments& arguments) {
 
   const auto now =
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
-                               input->sources, now);
-  document.run = run_figures(candidate->verdict, "points");
-  if (const auto written = write_results(arguments.out, document,
-                                         {{"tables.csv", to_tables_csv(document.model)},
-                                          {"report.html", mfb_report(document, *candidate)}});
-      !written)
-    return report(written.error());
-  if (const auto kept = keep(arguments.keep, document, candidate->verdict, "abbe identify mfb");
-      !kept)
-    return report(kept.error());
+  const auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
+                                     input->sources, now);
+  if (const auto done =
+          write_and_keep({arguments.out, arguments.keep, "abbe identify mfb"}, document,
+                         candidate->verdict, {{"tables.csv", to_tables_csv(document.model)}});
+      !done)
+    return report(done.error());
 
   if (arguments.json)
     fmt::print("{}\n", mfb_json(document, *candidate, arguments.out).dump(1));

@@ -18,7 +18,6 @@
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/methods/otf/path_readings.hpp"
-#include "abbe/methods/otf/report.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
 #include "backlash_lines.hpp"
@@ -61,7 +60,6 @@ OtfOutcome outcome_of(OtfCandidate candidate, const Config& config,
   auto document = otf_document(candidate, config, std::move(sources), now());
   const auto& s = candidate.solution.statistics;
   return {std::move(document),
-          std::move(candidate.residuals),
           std::move(candidate.verdict),
           s.blocks,
           s.blocks_used,
@@ -185,13 +183,6 @@ Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
                     run->config, std::move(run->sources));
 }
 
-Result<void> write_outputs(const std::filesystem::path& folder, const OtfOutcome& outcome) {
-  const ModelDocument& document = outcome.document;
-  return write_results(folder, document,
-                       {{"tables.csv", to_tables_csv(document.model, document.backlash)},
-                        {"report.html", otf_report(document, outcome.residuals, outcome.verdict)}});
-}
-
 void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {
   const auto& s = outcome.document.statistics;
   const std::filesystem::path folder = arguments.out;
@@ -280,12 +271,12 @@ int run(const IdentifyOtfArguments& arguments) {
   const auto outcome = identify(arguments, bar);
   bar.clear();
   if (!outcome) return report(outcome.error());
-  if (const auto written = write_outputs(arguments.out, *outcome); !written)
-    return report(written.error());
-  if (const auto kept =
-          keep(arguments.keep, outcome->document, outcome->verdict, "abbe identify otf");
-      !kept)
-    return report(kept.error());
+  const ModelDocument& document = outcome->document;
+  if (const auto done = write_and_keep(
+          {arguments.out, arguments.keep, "abbe identify otf"}, document, outcome->verdict,
+          {{"tables.csv", to_tables_csv(document.model, document.backlash)}});
+      !done)
+    return report(done.error());
   arguments.json ? print_json(*outcome, arguments) : print_summary(*outcome, arguments);
   return exit_code(outcome->verdict);
 }

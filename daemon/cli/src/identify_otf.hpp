@@ -32,7 +32,6 @@ struct IdentifyOtfArguments {
 
 struct OtfOutcome {
   ModelDocument document;
-  std::vector<RunResiduals> residuals;  ///< see OtfCandidate
   calib::Verdict verdict;
   std::size_t blocks = 0, blocks_used = 0;
   calib::otf::RangeOffset range_offset;

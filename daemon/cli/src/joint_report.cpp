@@ -4,9 +4,6 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/lack_of_fit.hpp"
-#include "abbe/methods/otf/report.hpp"
-#include "abbe/report/html_report.hpp"
-#include "abbe/report/model_figures.hpp"
 #include "abbe/report/sections.hpp"
 #include "identified_model.hpp"
 
@@ -80,11 +77,7 @@ nlohmann::json tables_json(const JointOutcome& outcome) {
   return tables;
 }
 
-void add_parts(HtmlReport& page, const JointOutcome& outcome) {
-  page.heading("Parts");
-  page.paragraph(
-      "u: standard uncertainty of V over the nodes, rms, without a rigid motion of the whole "
-      "volume; of the part alone, and of all other parts together.");
+RunFigures::Table parts_table(const JointOutcome& outcome) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t k = 0; k < outcome.input.facts.size(); ++k) {
     const PartFacts& part = outcome.input.facts[k];
@@ -93,24 +86,29 @@ void add_parts(HtmlReport& page, const JointOutcome& outcome) {
                     u_text(share.u_alone_m), u_text(share.u_without_m)});
   }
   rows.push_back({"all parts", "joint", "", "", um_text(u_of_joint_m(outcome), 3), ""});
-  page.table({"part", "method", "files", "observations", "u alone", "u without it"}, rows);
+  return {.title = "Parts",
+          .explanation =
+              "u: standard uncertainty of V over the nodes, rms, without a rigid motion of the "
+              "whole volume; of the part alone, and of all other parts together.",
+          .columns = {"part", "method", "files", "observations", "u alone", "u without it"},
+          .rows = std::move(rows)};
 }
 
-void add_pairs(HtmlReport& page, const JointOutcome& outcome) {
-  page.heading("Do the parts agree?");
-  page.paragraph(
-      "Each pair is tested in all combinations of parameters that both parts determine. p: "
-      "probability of a larger chi-square if both describe the same machine.");
+RunFigures::Table pairs_table(const JointOutcome& outcome) {
   std::vector<std::vector<std::string>> rows;
   for (const PairTest& pair : outcome.pairs)
     rows.push_back({names_of(outcome.input, pair), fmt::format("{:.2f}", pair.all.statistic),
                     fmt::to_string(pair.all.dof), fmt::format("{:.3g}", pair.all.p),
                     fmt::format("{:.3g}", pair.all.limit)});
-  page.table({"pair", "chi-square", "degrees of freedom", "p", "refused below"}, rows);
+  return {.title = "Do the parts agree?",
+          .explanation =
+              "Each pair is tested in all combinations of parameters that both parts determine. p: "
+              "probability of a larger chi-square if both describe the same machine.",
+          .columns = {"pair", "chi-square", "degrees of freedom", "p", "refused below"},
+          .rows = std::move(rows)};
 }
 
-void add_uncertainties(HtmlReport& page, const JointOutcome& outcome) {
-  page.heading("Standard uncertainty of each table");
+RunFigures::Table uncertainties_table(const JointOutcome& outcome) {
   std::vector<std::string> columns{"rms over the nodes"};
   for (const PartFacts& part : outcome.input.facts)
     if (part.own_model) columns.push_back(part.name);
@@ -123,7 +121,10 @@ void add_uncertainties(HtmlReport& page, const JointOutcome& outcome) {
     cells.push_back(fmt::format("{:.3f}", row.joint.u * kUmPerM));
     rows.push_back(std::move(cells));
   }
-  page.table(columns, rows);
+  return {.title = "Standard uncertainty of each table",
+          .explanation = {},
+          .columns = std::move(columns),
+          .rows = std::move(rows)};
 }
 
 }  // namespace
@@ -179,18 +180,8 @@ void print_joint_summary(const JointOutcome& outcome, const std::filesystem::pat
   fmt::print("written     {}, tables.csv, report.html\n", (folder / "model.json").string());
 }
 
-std::string joint_report(const JointOutcome& outcome) {
-  HtmlReport page(fmt::format("{}: joint identification", outcome.document.machine));
-  add_verdict(page, outcome.verdict, "legs", 3);
-  add_parts(page, outcome);
-  add_pairs(page, outcome);
-  add_uncertainties(page, outcome);
-  add_error_tables(page, outcome.document.model);
-  add_volume_maps(page, outcome.document.model);
-  add_model_origin(page, outcome.document, outcome.document.inputs,
-                   {{"rank, condition",
-                     fmt::format("{}, {:.3g}", outcome.joint.rank, outcome.joint.condition)}});
-  return page.text();
+std::vector<RunFigures::Table> joint_tables(const JointOutcome& outcome) {
+  return {parts_table(outcome), pairs_table(outcome), uncertainties_table(outcome)};
 }
 
 }  // namespace abbe::daemon

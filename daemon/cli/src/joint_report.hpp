@@ -1,5 +1,5 @@
 #pragma once
-/// The result of `abbe identify joint` as text, JSON and report.html.
+/// The result of `abbe identify joint` as text, JSON and tables of the report.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -28,7 +28,7 @@ struct JointOutcome {
                                         const std::vector<calib::joint::PairTest>&);
 [[nodiscard]] nlohmann::json joint_json(const JointOutcome&, const std::filesystem::path& folder);
 void print_joint_summary(const JointOutcome&, const std::filesystem::path& folder);
-/// Content of report.html, self-contained.
-[[nodiscard]] std::string joint_report(const JointOutcome&);
+/// For the report: the parts, whether they agree, and the uncertainty of each table.
+[[nodiscard]] std::vector<RunFigures::Table> joint_tables(const JointOutcome&);
 
 }  // namespace abbe::daemon

@@ -25,22 +25,6 @@ struct ReportArguments {
   StoreOption store;
 };
 
-Result<ReportSubject> subject_of_store(const ModelStore& store, const std::string& id) {
-  auto document = store.load(id);
-  if (!document) return tl::make_unexpected(document.error());
-  const auto entries = store.list();
-  if (!entries) return tl::make_unexpected(entries.error());
-  const auto history = store.history();
-  if (!history) return tl::make_unexpected(history.error());
-
-  ReportSubject subject{.document = *std::move(document)};
-  for (const StoreEntry& entry : *entries)
-    if (entry.id == id) subject.entry = entry;
-  for (const StoreEvent& event : *history)
-    if (event.id == id) subject.events.push_back(event);
-  return subject;
-}
-
 /// A model with its verdict, from the store, or a file without one.
 Result<ReportSubject> subject_named(const std::string& name, const ReportArguments& arguments,
                                     const CertificateDetails& details) {
@@ -54,7 +38,7 @@ Result<ReportSubject> subject_named(const std::string& name, const ReportArgumen
     if (!store) return tl::make_unexpected(store.error());
     const auto id = id_named(*store, name);
     if (!id) return tl::make_unexpected(id.error());
-    return subject_of_store(*store, *id);
+    return report_subject(*store, *id);
   }();
   if (subject) subject->details = details;
   return subject;
@@ -74,7 +58,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
       continue;
     }
     if (entry.machine != subject.document.machine) continue;
-    auto model = subject_of_store(*store, entry.id);
+    auto model = report_subject(*store, entry.id);
     if (!model) return tl::make_unexpected(model.error());
     models.push_back(*std::move(model));
   }

@@ -73,10 +73,10 @@ void add_left(HtmlReport& page, const Verification& v) {
 
   page.table({"", "mean", "rms", "largest"},
              {row("without compensation", c.before), row("with the model", c.after)});
-  page.chart(Histogram{"residuals at the measured points",
-                       "um",
-                       {{"without compensation", lengths_um(c.residual_before_m)},
-                        {"with the model", lengths_um(c.residual_after_m)}}});
+  page.plot(Histogram{"residuals at the measured points",
+                      "um",
+                      {{"without compensation", lengths_um(c.residual_before_m)},
+                       {"with the model", lengths_um(c.residual_after_m)}}});
 }
 
 /// Adds a table of the points with the largest residuals, which shows a single wrong row of the
@@ -166,8 +166,8 @@ void add_ratio(HtmlReport& page, const verify::Comparison& c) {
     turned.push_back(g.R_turned);
   }
 
-  page.chart(Histogram{"R_resmag, turned", "R_resmag", {{"turned", turned}}});
-  page.chart(Histogram{"R_resmag, as stated", "R_resmag", {{"as stated", stated}}});
+  page.plot(Histogram{"R_resmag, turned", "R_resmag", {{"turned", turned}}});
+  page.plot(Histogram{"R_resmag, as stated", "R_resmag", {{"as stated", stated}}});
 }
 
 /// The largest number not above `x` (positive) that is 1, 2 or 5 times a power of ten.
@@ -216,7 +216,7 @@ void add_vectors(HtmlReport& page, const Plane& plane, const char* name, double 
         {kMmPerM * g->q_m(plane.right), kMmPerM * g->q_m(plane.up), v(plane.right), v(plane.up)});
   }
 
-  page.chart(chart);
+  page.plot(chart);
 }
 
 /// Adds charts of measured vectors, model and residual in planes normal to z, x and y, as in Fig.

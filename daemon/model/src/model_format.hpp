@@ -10,6 +10,8 @@ namespace abbe::daemon {
 
 inline constexpr std::string_view kModelSchema = "abbe/model/1";
 inline constexpr std::string_view kVersion = ABBE_VERSION;
+/// What the residuals of RunFigures::Series are over.
+inline constexpr std::string_view kOverTime = "time_s", kOverNumber = "number";
 inline constexpr std::string_view kLegendre = "legendre";  ///< basis of a polynomial model
 
 // Shift of the decimal point between SI and the file.

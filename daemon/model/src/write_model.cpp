@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 
@@ -195,6 +196,79 @@ void write_statistics(JsonText& out, const ModelStatistics& s,
       bar ? bar_figures(*bar) : ""));
 }
 
+std::string parts_of(const RunFigures& run) {
+  const auto list = array_of(run.parts, [](const RunFigures::Part& p) {
+    const std::string times =
+        p.time_s ? fmt::format(", \"from_s\": {}, \"to_s\": {}", to_decimal((*p.time_s)[0], 0),
+                               to_decimal((*p.time_s)[1], 0))
+                 : std::string{};
+    return fmt::format(
+        "{{\"name\": {}, \"count\": {}, \"before_rms_um\": {}, \"after_rms_um\": {}, "
+        "\"after_max_um\": {}{}}}",
+        JsonText::quoted(p.name), p.count, to_decimal(p.before_rms_m, kMicroUnit),
+        to_decimal(p.after_rms_m, kMicroUnit), to_decimal(p.after_max_m, kMicroUnit), times);
+  });
+  return fmt::format(",\n    \"part_kind\": {}, \"parts\": {}", JsonText::quoted(run.part_kind),
+                     list);
+}
+
+std::string series_of(const RunFigures::Series& series) {
+  const auto points = array_of(series.points, [](const RunFigures::Series::Point& p) {
+    return fmt::format("[{}, {}]", to_decimal(p.at, 0), to_decimal(p.after_m, kMicroUnit));
+  });
+  return fmt::format(",\n    \"series\": {{\"count\": {}, \"over\": \"{}\", \"at_after_um\": {}}}",
+                     series.count, series.over_time ? kOverTime : kOverNumber, points);
+}
+
+std::string cells_of(const RunFigures& run) {
+  return array_of(run.held_out_cells, [](const RunFigures::HeldOutCell& c) {
+    return fmt::format("[{}, {}, {}, {}, {}, {}]", c.slab, c.cell, c.count,
+                       to_decimal(c.before_m, kMicroUnit), to_decimal(c.after_m, kMicroUnit),
+                       to_decimal(c.sigma_m, kMicroUnit));
+  });
+}
+
+std::string texts_of(const std::vector<std::string>& texts) {
+  std::string all = "[";
+  for (const std::string& text : texts)
+    all.append(all.size() > 1 ? ", " : "").append(JsonText::quoted(text));
+  return all + "]";
+}
+
+std::string tables_of(const RunFigures& run) {
+  return array_of(run.tables, [](const RunFigures::Table& table) {
+    return fmt::format("{{\"title\": {}, \"explanation\": {}, \"columns\": {}, \"rows\": {}}}",
+                       JsonText::quoted(table.title), JsonText::quoted(table.explanation),
+                       texts_of(table.columns), array_of(table.rows, texts_of));
+  });
+}
+
+std::string conditions_of(const RunFigures::Conditions& c) {
+  std::string all;
+  const auto add = [&all](std::string_view key, const std::string& value) {
+    all += fmt::format("{}\"{}\": {}", all.empty() ? "" : ", ", key, value);
+  };
+  if (c.temperature_K) add("temperature_K", numbers(*c.temperature_K, 0));
+  if (c.duration_s) add("duration_s", to_decimal(*c.duration_s, 0));
+  if (c.feed_m_per_s) add("feed_mm_per_s", to_decimal(*c.feed_m_per_s, kMm));
+  return fmt::format(",\n    \"conditions\": {{{}}}", all);
+}
+
+/// The members of "run" that models of earlier versions do not have. One without content is left
+/// out, so that the text of such a model stays as it was.
+std::string further_figures(const RunFigures& run) {
+  std::string all;
+  if (!run.parts.empty()) all += parts_of(run);
+  if (run.series) all += series_of(*run.series);
+  if (!run.sigma_counts.empty())
+    all += fmt::format(",\n    \"sigma_counts\": [{}]", fmt::join(run.sigma_counts, ", "));
+  if (!run.held_out_cells.empty())
+    all += fmt::format(",\n    \"held_out_cells\": {}", cells_of(run));
+  if (!run.tables.empty()) all += fmt::format(",\n    \"tables\": {}", tables_of(run));
+  if (run.conditions) all += conditions_of(*run.conditions);
+  return all;
+}
+
 void write_run(JsonText& out, const RunFigures& run) {
   const auto notes = array_of(run.notes, [](const auto& note) { return JsonText::quoted(note); });
   const auto residuals = array_of(run.residuals, [](const RunFigures::Interval& i) {
@@ -205,9 +279,10 @@ void write_run(JsonText& out, const RunFigures& run) {
   out.key("run");
   out.raw(fmt::format(
       "{{\"held_out\": {}, \"held_out_before_um\": {}, \"held_out_after_um\": {},\n    \"notes\": "
-      "{},\n    \"path_mm_before_um_after_um\": {},\n    \"places_mm\": {}}}",
+      "{},\n    \"path_mm_before_um_after_um\": {},\n    \"places_mm\": {}{}}}",
       JsonText::quoted(run.held_out), to_decimal(run.held_out_before_m, kMicroUnit),
-      to_decimal(run.held_out_after_m, kMicroUnit), notes, residuals, places));
+      to_decimal(run.held_out_after_m, kMicroUnit), notes, residuals, places,
+      further_figures(run)));
 }
 
 void write_tracker_drift(JsonText& out, const TrackerDriftFigures& drift) {

@@ -3,17 +3,12 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "abbe/report/line_plot.hpp"
-#include "chart_configuration.hpp"
-#include "chart_js.hpp"
 #include "markup.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-using nlohmann::json;
 
 /// The page is as wide as the printed one, so that charts need no other size in print.
 constexpr std::string_view kStyle =
@@ -25,8 +20,6 @@ constexpr std::string_view kStyle =
     "table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.1rem .9rem .1rem "
     "0;text-align:left;vertical-align:top}"
     "td{font-variant-numeric:tabular-nums;overflow-wrap:anywhere}th{font-weight:600;color:#57606a}"
-    ".charts{display:flex;flex-wrap:wrap;gap:3mm 2mm;margin:.6rem 0}"
-    ".charts div{width:94mm;height:66mm;break-inside:avoid}.charts .wide{width:190mm;height:62mm}"
     ".maps{width:190mm;display:block;margin:.6rem 0;break-inside:avoid;font-size:11px;fill:#444}"
     ".maps rect{shape-rendering:crispEdges}"
     ".maps .title{font-weight:bold;font-size:12px}.maps .frame{fill:none;stroke:#57606a}"
@@ -42,23 +35,6 @@ constexpr std::string_view kStyle =
     ".signal{display:flex;align-items:center;gap:4mm;font-size:1.1rem;font-weight:600}"
     ".signal svg{width:9mm;height:24mm;flex:none}ul{margin:.3rem 0;padding-left:1.2rem}"
     "@media print{body{margin:0;print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
-
-/// The value as JSON text for a script element. "<" is escaped: "</" would end the element, "<!--"
-/// would change how its end is found.
-std::string for_script(const json& value) {
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
-    if (c == '<') {
-      out += "\\u003c";
-    } else {
-      out += c;
-    }
-  }
-
-  return out;
-}
 
 }  // namespace
 
@@ -92,20 +68,7 @@ void HtmlReport::table(const std::vector<std::string>& columns,
   body_ += "</table>\n";
 }
 
-void HtmlReport::chart(const LineChart& chart) {
-  canvas(for_script(chart_configuration(chart)), chart.wide);
-}
-
-void HtmlReport::chart(const Histogram& histogram) {
-  canvas(for_script(chart_configuration(histogram)), histogram.wide);
-}
-
-void HtmlReport::chart(const VectorChart& chart) {
-  canvas(for_script(chart_configuration(chart)));
-}
-
 void HtmlReport::plot(const LineChart& chart) {
-  // Consecutive plots share a row.
   constexpr std::string_view kEnd = "</div><!-- plots -->\n";
   if (body_.ends_with(kEnd)) {
     body_.resize(body_.size() - kEnd.size());
@@ -114,6 +77,14 @@ void HtmlReport::plot(const LineChart& chart) {
   }
   body_ += svg(chart);
   body_ += kEnd;
+}
+
+void HtmlReport::plot(const Histogram& histogram) {
+  plot(line_chart(histogram));
+}
+
+void HtmlReport::plot(const VectorChart& chart) {
+  plot(line_chart(chart));
 }
 
 void HtmlReport::signal(Signal signal, std::string_view text) {
@@ -156,38 +127,12 @@ void HtmlReport::drawing(const SpaceDrawing& drawing) {
   body_ += svg(drawing);
 }
 
-void HtmlReport::canvas(std::string_view configuration, bool wide) {
-  // Consecutive charts share a row.
-  constexpr std::string_view kEnd = "</div>\n<!-- charts -->\n";
-  if (body_.ends_with(kEnd)) {
-    body_.resize(body_.size() - kEnd.size());
-  } else {
-    body_ += "<div class=\"charts\">\n";
-  }
-  body_ += fmt::format(
-      "<div{3}><canvas "
-      "id=\"chart{0}\"></canvas></div>\n<script>show(\"chart{0}\",{1})</script>\n{2}",
-      charts_, configuration, kEnd, wide ? " class=\"wide\"" : "");
-  ++charts_;
-}
-
 std::string HtmlReport::text() const {
-  // The curves at the edges of an uncertainty band have no name; the filter removes them from the
-  // legend.
-  // A canvas with twice the pixels of the screen is sharp in print.
-  constexpr std::string_view kShow =
-      "if(window.Chart){Chart.defaults.devicePixelRatio=2;Chart.defaults.font.size=11}"
-      "function show(id,c){c.options.plugins.legend={labels:{filter:l=>l.text!=='',"
-      "usePointStyle:false,boxWidth:22,boxHeight:2}};"
-      "new Chart(document.getElementById(id),c)}";
-  const std::string scripts =
-      charts_ > 0 ? fmt::format("<script>{}</script>\n<script>{}</script>\n", chart_js(), kShow)
-                  : std::string{};
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
       "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}</style>\n"
-      "{2}</head>\n<body>\n<h1>{0}</h1>\n{3}</body>\n</html>\n",
-      title_, kStyle, scripts, body_);
+      "</head>\n<body>\n<h1>{0}</h1>\n{2}</body>\n</html>\n",
+      title_, kStyle, body_);
 }
 
 }  // namespace abbe::daemon

@@ -87,6 +87,23 @@ std::string stroke_of(std::size_t number) {
                      kStrokes.at(number % kStrokes.size()));
 }
 
+/// "1.5 2 -" for numbers and points that are not finite.
+std::string data_of(const std::vector<double>& values) {
+  std::string out;
+  for (const double v : values) {
+    if (!out.empty()) out += ' ';
+    out += std::isfinite(v) ? fmt::format("{:.9g}", v) : "-";
+  }
+  return out;
+}
+
+/// Begins the group of a curve, which carries the numbers that the curve shows.
+std::string begin_curve(const Curve& curve) {
+  return fmt::format("<g class=\"curve\" data-name=\"{}\" data-x=\"{}\" data-y=\"{}\"{}>\n",
+                     escaped(curve.name), data_of(curve.x), data_of(curve.y),
+                     has_u(curve) ? fmt::format(" data-u=\"{}\"", data_of(curve.u)) : "");
+}
+
 /// The line through the points (x, y), in pieces between points that are not finite.
 std::string line_of(const PlotPanel& panel, const std::vector<double>& x,
                     const std::vector<double>& y, std::size_t number) {
@@ -204,8 +221,8 @@ std::string svg(const LineChart& chart) {
   out += legend_of(chart, width) + frame_of(panel, chart.y_label, 6, !second);
   for (std::size_t i = 0; i < chart.curves.size(); ++i) out += band_of(panel, chart.curves[i], i);
   for (std::size_t i = 0; i < chart.curves.size(); ++i)
-    out += line_of(panel, chart.curves[i].x, chart.curves[i].y, i) +
-           dots_of(panel, chart.curves[i], i);
+    out += begin_curve(chart.curves[i]) + line_of(panel, chart.curves[i].x, chart.curves[i].y, i) +
+           dots_of(panel, chart.curves[i], i) + "</g>\n";
 
   if (second) {
     const PlotPanel below{panel.left,  panel.top + kPanel + kBetween,

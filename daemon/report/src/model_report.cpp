@@ -31,28 +31,13 @@ void add_held_out(HtmlReport& page, const RunFigures& run) {
          {"with the model", um_text(run.held_out_after_m, 3) + " rms"}});
 }
 
-/// The residuals in the order of the run.
-void add_run_residuals(HtmlReport& page, const RunFigures& run) {
-  if (run.residuals.empty()) return;
-  page.heading("Residuals along the path");
-  Curve before{.name = "before", .x = {}, .y = {}, .dot_every = 0};
-  Curve after{.name = "after", .x = {}, .y = {}, .dot_every = 0};
-  for (const RunFigures::Interval& i : run.residuals) {
-    before.x.push_back(i.at_m);
-    after.x.push_back(i.at_m);
-    before.y.push_back(kUmPerM * i.before_m);
-    after.y.push_back(kUmPerM * i.after_m);
-  }
-  for (const Curve& curve : {before, after})
-    page.plot({.title = fmt::format("Residuals of the fit along the path, rms, {}", curve.name),
-               .x_label = "length of the path, m",
-               .y_label = "um",
-               .curves = {curve}});
-}
-
 /// The path or the places of the artefact, in the box of the model and around it.
 void add_places(HtmlReport& page, const ModelDocument& document, const calib::iso::LineBox& box) {
-  if (!document.run || document.run->places_m.empty()) return;
+  page.heading("Where was measured");
+  if (!document.run || document.run->places_m.empty()) {
+    page.paragraph(kNotRecorded);
+    return;
+  }
   calib::Vector3 low_m = box.low_m, high_m = box.high_m;
   SpaceDrawing drawing{.title = "Where was measured", .box_mm = {}, .lines = {}};
   for (const auto& line : document.run->places_m) {
@@ -66,25 +51,28 @@ void add_places(HtmlReport& page, const ModelDocument& document, const calib::is
   drawing.one_colour = true;
   const auto what = document.method == "otf"     ? "the driven path"
                     : document.method == "evemu" ? "the balls in each position of the array"
+                    : document.method == "joint" ? "the driven paths of its runs"
                                                  : "the bar in each of its positions";
-  page.heading("Where was measured");
   page.paragraph(fmt::format("Scale readings: {}.", what));
   page.drawing(drawing);
 }
 
-void add_passes(HtmlReport& page, const BarFigures& bar) {
-  page.heading("Residuals of the measurements with the bar");
+/// Tables as curves, or coefficients.
+void add_parameters(HtmlReport& page, const calib::VolumetricModel& model) {
+  if (model.tables() != nullptr) {
+    page.heading("Error motions: tables of the model");
+    page.paragraph(
+        "Bands: U = 2 u (k = 2) in the gauge of the model; the legend gives the largest U of each "
+        "table.");
+    for (const LineChart& chart : table_line_charts(model)) page.plot(chart);
+    return;
+  }
+  page.heading("Coefficients of the equivalent model");
+  page.paragraph("Names of Li et al., Table 3.");
   std::vector<std::vector<std::string>> rows;
-  for (const BarFigures::Pass& pass : bar.passes)
-    rows.push_back({pass.measurement, fmt::format("{:.3f}", pass.chi2_per_dof)});
-  page.table({"measurement", "chi-square per degree of freedom"}, rows);
-  if (bar.set_aside.empty()) return;
-  rows.clear();
-  for (const BarFigures::SetAside& t : bar.set_aside)
-    rows.push_back(
-        {fmt::format("{}, {} {} {} k {}", t.measurement, t.feature, t.index, t.side, t.k),
-         um_text(t.residual_m)});
-  page.table({"excluded touch", "residual"}, rows);
+  for (const auto& c : model.polynomials()->named_coefficients())
+    rows.push_back({c.name, fmt::format("{:.6g}", c.value), fmt::format("{:.2g}", c.u), c.unit});
+  page.table({"", "value", "u", "unit"}, rows);
 }
 
 void add_words(HtmlReport& page, const ModelDocument& document) {
@@ -111,7 +99,6 @@ Result<std::string> model_report(const ReportSubject& subject) {
   page.paragraph(box_in_words(values->standard));
   add_fit(page, document.statistics);
   if (document.run) add_held_out(page, *document.run);
-  if (document.bar) add_passes(page, *document.bar);
 
   page.page_break();
   page.begin_columns();
@@ -119,14 +106,17 @@ Result<std::string> model_report(const ReportSubject& subject) {
   page.end_columns();
   page.page_break();
   add_value_curves(page, *values);
-  if (document.run) add_run_residuals(page, *document.run);
-  add_places(page, document, values->standard.box);
   add_field(page, document.model, values->standard.box);
-  if (document.model.tables() != nullptr) {
-    page.heading("Tables of the model");
-    for (const LineChart& chart : table_line_charts(document.model)) page.plot(chart);
-  }
-  add_volume_maps(page, document.model);
+  add_parameters(page, document.model);
+  add_backlash_of(page, document);
+  add_volume_maps(
+      page, document.model,
+      document.run ? document.run->held_out_cells : std::vector<RunFigures::HeldOutCell>{});
+  page.page_break();
+  add_places(page, document, values->standard.box);
+  add_residuals_of(page, document);
+  add_tables_of_method(page, document);
+  page.page_break();
   add_words(page, document);
   add_origin_of(page, subject);
   return page.text();

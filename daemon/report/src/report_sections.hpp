@@ -1,10 +1,15 @@
 #pragma once
 /// Sections of the reports that are made from stored models.
 
+#include <string_view>
+
 #include "abbe/report/html_report.hpp"
 #include "abbe/report/model_report.hpp"
 
 namespace abbe::daemon {
+
+/// In place of a figure that a model of an earlier version does not have.
+inline constexpr std::string_view kNotRecorded = "Not recorded.";
 
 /// The state of a model as a lamp and in words.
 struct VerdictInWords {
@@ -28,6 +33,12 @@ void add_value_curves(HtmlReport& page, const CertifiedValues& values);
 /// V as vectors in the volume.
 void add_field(HtmlReport& page, const calib::VolumetricModel& model,
                const calib::iso::LineBox& box);
+/// Residuals over time and by part of the run, beside their uncertainty.
+void add_residuals_of(HtmlReport& page, const ModelDocument& document);
+/// Forward minus backward, where it depends on the position.
+void add_backlash_of(HtmlReport& page, const ModelDocument& document);
+/// What only the method of the model knows.
+void add_tables_of_method(HtmlReport& page, const ModelDocument& document);
 void add_origin_of(HtmlReport& page, const ReportSubject& subject);
 
 /// Positioning deviation of an axis in um over mm.

@@ -91,8 +91,4 @@ std::vector<LineChart> table_line_charts(const VolumetricModel& model) {
   return charts;
 }
 
-void add_table_charts(HtmlReport& page, const VolumetricModel& model) {
-  for (const LineChart& chart : table_line_charts(model)) page.chart(chart);
-}
-
 }  // namespace abbe::daemon

@@ -107,14 +107,25 @@ ModelMaps maps_of(const calib::VolumetricModel& model) {
   return maps;
 }
 
-double rms(std::span<const LeftError> left, double LeftError::*member) {
-  double squares = 0.0;
-  for (const LeftError& one : left) squares += one.*member * one.*member;
-  return std::sqrt(squares / static_cast<double>(left.size()));
+using Cells = std::span<const RunFigures::HeldOutCell>;
+
+std::size_t observations_of(Cells cells) {
+  std::size_t count = 0;
+  for (const RunFigures::HeldOutCell& cell : cells) count += cell.count;
+  return count;
 }
 
-/// rms of LeftError::after_m in every cell of a slab.
-ValueMaps map_of(std::span<const LeftError> left, const calib::ValidityVolume& volume) {
+/// Of all observations in the cells.
+double rms(Cells cells, double RunFigures::HeldOutCell::*member) {
+  double squares = 0.0;
+  for (const RunFigures::HeldOutCell& cell : cells)
+    squares += static_cast<double>(cell.count) * cell.*member * cell.*member;
+  return std::sqrt(squares / static_cast<double>(observations_of(cells)));
+}
+
+/// HeldOutCell::after_m in every cell of a slab. A cell that the map does not have, in a file that
+/// was changed, is left out.
+ValueMaps map_of(Cells cells, const calib::ValidityVolume& volume) {
   const VolumeCuts cuts = volume_cuts(volume, kMostCellsOfLeftErrors);
   ValueMaps maps = empty_maps(
       cuts, "After: residual of observations to which the model was not fitted, rms", "um");
@@ -122,42 +133,26 @@ ValueMaps map_of(std::span<const LeftError> left, const calib::ValidityVolume& v
     maps.maps[k].title =
         fmt::format("{} from {:.0f} to {:.0f} mm", letter(cuts.across),
                     cuts.slab_edges_m[k] * kMmPerM, cuts.slab_edges_m[k + 1] * kMmPerM);
-  const std::size_t columns = cuts.x_edges_m.size() - 1;
-  std::array<std::vector<double>, 3> squares, counts;
-  for (std::size_t k = 0; k < 3; ++k)
-    squares[k] = counts[k] = std::vector<double>(maps.maps[k].values.size(), 0.0);
-
-  for (const LeftError& one : left) {
-    const std::size_t slab =
-        interval_of(cuts.slab_edges_m, component(one.axis_position_m, cuts.across));
-    const std::size_t cell =
-        interval_of(cuts.x_edges_m, component(one.axis_position_m, cuts.x)) +
-        columns * interval_of(cuts.y_edges_m, component(one.axis_position_m, cuts.y));
-    squares[slab][cell] += one.after_m * one.after_m;
-    counts[slab][cell] += 1.0;
-  }
-
-  for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t i = 0; i < counts[k].size(); ++i)
-      if (counts[k][i] > 0.0)
-        maps.maps[k].values[i] = std::sqrt(squares[k][i] / counts[k][i]) * kUmPerM;
+  for (const RunFigures::HeldOutCell& cell : cells)
+    if (cell.slab < maps.maps.size() && cell.cell < maps.maps[cell.slab].values.size())
+      maps.maps[cell.slab].values[cell.cell] = kUmPerM * cell.after_m;
   return maps;
 }
 
-void add_left_errors(HtmlReport& page, const calib::ValidityVolume& volume,
-                     std::span<const LeftError> left) {
-  page.maps(map_of(left, volume));
+void add_held_out_cells(HtmlReport& page, const calib::ValidityVolume& volume, Cells cells) {
+  page.maps(map_of(cells, volume));
   page.facts(
-      {{"before, rms of one component", um_text(rms(left, &LeftError::before_m), 3)},
-       {"after", um_text(rms(left, &LeftError::after_m), 3)},
-       {"standard uncertainty of these observations", um_text(rms(left, &LeftError::sigma_m), 3)}});
+      {{"before, rms of one component", um_text(rms(cells, &RunFigures::HeldOutCell::before_m), 3)},
+       {"after", um_text(rms(cells, &RunFigures::HeldOutCell::after_m), 3)},
+       {"standard uncertainty of these observations",
+        um_text(rms(cells, &RunFigures::HeldOutCell::sigma_m), 3)}});
   page.paragraph(fmt::format(
       "{} observations, each predicted by a model that was fitted without it. The observations of "
       "a run that are held out together are shown without a rigid motion, which is fitted to these "
       "same observations, before as well as after: errors that look like such a motion are not "
       "contained. The noise of the measurement is contained: with a perfect model the rms would be "
       "about the standard uncertainty of the observations.",
-      left.size()));
+      observations_of(cells)));
 }
 
 }  // namespace
@@ -191,8 +186,43 @@ VolumeCuts volume_cuts(const calib::ValidityVolume& volume, std::size_t most) {
   return cuts;
 }
 
+std::vector<RunFigures::HeldOutCell> held_out_cells(const calib::ValidityVolume& volume,
+                                                    std::span<const LeftError> left) {
+  if (volume.vertices_m().empty()) return {};
+  const VolumeCuts cuts = volume_cuts(volume, kMostCellsOfLeftErrors);
+  const std::size_t columns = cuts.x_edges_m.size() - 1;
+  const std::size_t of_slab = columns * (cuts.y_edges_m.size() - 1);
+  std::vector<RunFigures::HeldOutCell> all(3 * of_slab);
+
+  for (const LeftError& one : left) {  // sums of squares first
+    const std::size_t slab =
+        interval_of(cuts.slab_edges_m, component(one.axis_position_m, cuts.across));
+    const std::size_t cell =
+        interval_of(cuts.x_edges_m, component(one.axis_position_m, cuts.x)) +
+        columns * interval_of(cuts.y_edges_m, component(one.axis_position_m, cuts.y));
+    RunFigures::HeldOutCell& sum = all[slab * of_slab + cell];
+    ++sum.count;
+    sum.before_m += one.before_m * one.before_m;
+    sum.after_m += one.after_m * one.after_m;
+    sum.sigma_m += one.sigma_m * one.sigma_m;
+  }
+
+  std::vector<RunFigures::HeldOutCell> cells;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].count == 0) continue;
+    const auto n = static_cast<double>(all[i].count);
+    cells.push_back({.slab = i / of_slab,
+                     .cell = i % of_slab,
+                     .count = all[i].count,
+                     .before_m = std::sqrt(all[i].before_m / n),
+                     .after_m = std::sqrt(all[i].after_m / n),
+                     .sigma_m = std::sqrt(all[i].sigma_m / n)});
+  }
+  return cells;
+}
+
 void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
-                     std::span<const LeftError> left) {
+                     std::span<const RunFigures::HeldOutCell> held_out) {
   if (model.validity().vertices_m().empty()) return;
   page.heading("Volume before and after");
   const Vector3 tool_mm = model.tool_offsets_m().front() * kMmPerM;
@@ -214,7 +244,7 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
       "be expected. U(V) does not contain errors between the nodes or of a higher degree than the "
       "model has, lack of fit that the residuals do not show, and changes of the machine after the "
       "measurement, for example with temperature.");
-  if (!left.empty()) add_left_errors(page, model.validity(), left);
+  if (observations_of(held_out) > 0) add_held_out_cells(page, model.validity(), held_out);
 }
 
 }  // namespace abbe::daemon

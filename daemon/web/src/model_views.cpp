@@ -171,16 +171,9 @@ Result<std::string> trend_text(const ModelStore& store) {
 }
 
 Result<std::string> report_text(const ModelStore& store, const std::string& id) {
-  auto document = store.load(id);
-  if (!document) return tl::unexpected(document.error());
-  daemon::ReportSubject subject{.document = std::move(*document)};
-  if (const auto entries = store.list())
-    for (const StoreEntry& entry : *entries)
-      if (entry.id == id) subject.entry = entry;
-  if (const auto events = store.history())
-    for (const StoreEvent& event : *events)
-      if (event.id == id) subject.events.push_back(event);
-  return daemon::model_report(subject);
+  const auto subject = daemon::report_subject(store, id);
+  if (!subject) return tl::unexpected(subject.error());
+  return daemon::model_report(*subject);
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "evemu/figures.hpp"
+
 namespace abbe::daemon {
 
 namespace {
@@ -39,6 +41,13 @@ ModelDocument evemu_document(const calib::evemu::Solution& solution, const Confi
           model_statistics(solution.statistics),
           std::move(inputs),
           solution.artefact ? solution.artefact->expansion : std::nullopt};
+}
+
+ModelDocument evemu_document(const EvemuCandidate& candidate, const Config& config,
+                             std::vector<InputFile> inputs, protocol::UtcTime created) {
+  ModelDocument document = evemu_document(candidate.solution, config, std::move(inputs), created);
+  document.run = evemu_figures(candidate);
+  return document;
 }
 
 }  // namespace abbe::daemon

@@ -10,7 +10,6 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/evemu/document.hpp"
-#include "abbe/methods/run_figures.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -73,18 +72,6 @@ RotationPoints reference_of(const json& object) {
     reference.points.push_back(
         {.reading_m = vector_of(p.at("reading_m")), .V_m = vector_of(p.at("V_m"))});
   return reference;
-}
-
-/// The readings of the balls, one polyline for each position of the array.
-std::vector<std::vector<Vector3>> places_of_balls(const evemu::Observations& observations) {
-  std::vector<std::vector<Vector3>> places;
-  std::optional<int> position;
-  for (const evemu::BallError& row : observations.rows) {
-    if (position != row.position) places.emplace_back();
-    position = row.position;
-    places.back().push_back(row.reading_m);
-  }
-  return places;
 }
 
 std::string touches_sha256(std::span<const calib::evemu::Touch> touches) {
@@ -160,10 +147,7 @@ std::vector<InputFile> EvemuMethod::inputs_of(const Run& run) {
 
 ModelDocument EvemuMethod::document_of(const Candidate& candidate, const Config& config,
                                        std::vector<InputFile> inputs, protocol::UtcTime created) {
-  auto document = evemu_document(candidate.solution, config, std::move(inputs), created);
-  document.run = run_figures(candidate.verdict, "positions");
-  document.run->places_m = places_of_balls(candidate.observations);
-  return document;
+  return evemu_document(candidate, config, std::move(inputs), created);
 }
 
 }  // namespace abbe::daemon

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "mfb/figures.hpp"
+
 namespace abbe::daemon {
 
 namespace mfb = calib::mfb;
@@ -110,6 +112,7 @@ ModelDocument mfb_document(const MfbCandidate& candidate, mfb::Estimator estimat
       candidate.found.model, "mfb",   std::string{mfb::name(estimator)}, config.machine.name,
       machine_hash(config),  created, bar_statistics(candidate),         std::move(inputs)};
   document.bar = bar_figures(candidate.found);
+  document.run = mfb_figures(candidate);
   return document;
 }
 

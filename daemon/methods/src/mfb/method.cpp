@@ -14,7 +14,6 @@
 #include "abbe/config/json_vector.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
-#include "abbe/methods/run_figures.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "usable_touch.hpp"
 
@@ -156,14 +155,8 @@ std::vector<InputFile> MfbMethod::inputs_of(const Run& run) {
 
 ModelDocument MfbMethod::document_of(const Candidate& candidate, const Config& config,
                                      std::vector<InputFile> inputs, protocol::UtcTime created) {
-  auto document =
-      mfb_document(candidate, mfb::Options{}.solve.estimator, config, std::move(inputs), created);
-  document.run = run_figures(candidate.verdict, "points");
-  const auto& solution = candidate.found.solution;
-  for (const auto& pose : solution.poses)
-    document.run->places_m.push_back(
-        {pose.origin_m, pose.origin_m + pose.axes * candidate.found.observations.bar.O_m.back()});
-  return document;
+  return mfb_document(candidate, mfb::Options{}.solve.estimator, config, std::move(inputs),
+                      created);
 }
 
 }  // namespace abbe::daemon

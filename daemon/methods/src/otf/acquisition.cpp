@@ -143,6 +143,7 @@ void OtfAcquisition::take(const Snapshot& snapshot) {
     if (stand_since_ == point.time && phase_ == Phase::WaitingAtStart) readings_.forget();
   } else if (phase_ == Phase::Running) {
     if (const auto effect = effect_of(snapshot, options_.environment)) environment_.take(*effect);
+    temperatures_.take(snapshot);
     run(point, q);
     if (phase_ != Phase::Failed) compare_with_path(snapshot, q);
     if (phase_ == Phase::Complete)

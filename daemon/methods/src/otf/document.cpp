@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/methods/run_figures.hpp"
+#include "otf/run_residuals.hpp"
 
 namespace abbe::daemon {
 
@@ -151,6 +152,8 @@ ModelDocument otf_document(const OtfCandidate& candidate, const Config& config,
   document.run->residuals = RmsAlongPath(candidate.residuals).intervals();
   for (const RunResiduals& run : candidate.residuals)
     document.run->places_m.push_back(driven_path(run));
+  add_run_residuals(*document.run, candidate.residuals, document.model.validity(), stands);
+  document.run->conditions->temperature_K = candidate.temperature_K;
   return document;
 }
 

@@ -70,7 +70,7 @@ Result<OtfCandidate> identify_run(const OtfRun& run, const Config& config,
   auto identified = identify_observations(run, config, active, watch);
   if (!identified) return tl::unexpected(identified.error());
   return OtfCandidate{std::move(identified->found.solution), std::move(identified->verdict),
-                      run.mode, std::move(identified->residuals)};
+                      run.mode, std::move(identified->residuals), run.temperature_K};
 }
 
 std::string points_sha256(std::span<const RunPoint> points) {

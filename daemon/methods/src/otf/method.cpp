@@ -69,7 +69,8 @@ OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
           .u_scale = effect.u_scale,
           .u_axis_scale = effect.u_expansion_factor,
           .unmeasured_air = use.unmeasured_air,
-          .mode = acquisition.mode()};
+          .mode = acquisition.mode(),
+          .temperature_K = acquisition.temperature_K()};
 }
 
 Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& config,

@@ -76,6 +76,8 @@ struct Observations {
   std::size_t lost_samples = 0;
   std::size_t blocks = 0;
   std::size_t blocks_used = 0;
+  /// Mean time by Observation::block, tracker's clock. Empty for blocks without times.
+  std::vector<double> block_s{};
   std::size_t clock_unknowns = 0;  ///< kClockUnknowns with scale readings and unknown clocks
   std::vector<std::size_t> beam_returned{};  ///< see BlockSeries
   SetAside set_aside{};

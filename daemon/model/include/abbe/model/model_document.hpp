@@ -16,6 +16,7 @@
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/model/run_figures.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
@@ -73,24 +74,6 @@ struct BarFigures {
   std::vector<Drift> drift;
   std::vector<SetAside> set_aside;
   friend bool operator==(const BarFigures&, const BarFigures&) = default;
-};
-
-/// What a run left when its model was judged, for people.
-struct RunFigures {
-  /// rms of the residuals in one interval of the run, in its order.
-  struct Interval {
-    double at_m = 0.0;  ///< middle of the interval, length of the path from its beginning
-    double before_m = 0.0, after_m = 0.0;
-    friend bool operator==(const Interval&, const Interval&) = default;
-  };
-  std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
-  double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
-  std::vector<std::string> notes;                          ///< of the verdict
-  std::vector<Interval> residuals;                         ///< of a run along a path, else empty
-  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of each
-  /// position of an array, the bar in each of its positions. Absent in models of earlier versions.
-  std::vector<std::vector<calib::Vector3>> places_m{};
-  friend bool operator==(const RunFigures&, const RunFigures&) = default;
 };
 
 /// A model and its origin.

@@ -1,6 +1,6 @@
 #pragma once
-/// Builds an HTML page that explains a result: text, tables and charts. The page is one file and
-/// needs no network: it contains Chart.js if it has a chart(). One thread.
+/// Builds an HTML page that explains a result: text, tables and figures. The page is one file, needs
+/// no network and has no JavaScript: all figures are SVG. One thread.
 
 #include <cstddef>
 #include <optional>
@@ -71,11 +71,10 @@ class HtmlReport {
   void facts(const std::vector<std::pair<std::string, std::string>>&);
   void table(const std::vector<std::string>& columns,
              const std::vector<std::vector<std::string>>& rows);
-  void chart(const LineChart&);
-  void chart(const Histogram&);
-  void chart(const VectorChart&);
-  /// The chart as SVG (line_plot.hpp). A page with such plots only has no JavaScript.
+  /// Consecutive plots share a row.
   void plot(const LineChart&);
+  void plot(const Histogram&);
+  void plot(const VectorChart&);
   /// A traffic light with a text, which also says what the light means.
   void signal(Signal signal, std::string_view text);
   void list(const std::vector<std::string>& items);
@@ -90,10 +89,7 @@ class HtmlReport {
   [[nodiscard]] std::string text() const;
 
  private:
-  void canvas(std::string_view configuration, bool wide = false);
-
   std::string title_, body_;
-  std::size_t charts_ = 0;
 };
 
 }  // namespace abbe::daemon

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "abbe/calib/volumetric_model.hpp"
+#include "abbe/model/run_figures.hpp"
 #include "abbe/report/html_report.hpp"
 
 namespace abbe::daemon {
@@ -24,10 +25,6 @@ struct LeftError {
 /// for a model of polynomials.
 [[nodiscard]] std::vector<LineChart> table_line_charts(const calib::VolumetricModel& model);
 
-/// Adds charts of all tables along their axes with bands of 2 u, as the model interpolates them.
-/// Nothing for a model of polynomials.
-void add_table_charts(HtmlReport& page, const calib::VolumetricModel& model);
-
 /// Three cuts through the validity volume, across the axis of its shortest side.
 struct VolumeCuts {
   calib::Axis across = calib::Axis::Z;
@@ -44,10 +41,15 @@ struct VolumeCuts {
 /// `volume` has vertices.
 [[nodiscard]] VolumeCuts volume_cuts(const calib::ValidityVolume& volume, std::size_t most);
 
+/// rms of `left` in the cells of the cuts that add_volume_maps() draws; cells without observations
+/// are left out. Empty without a volume.
+[[nodiscard]] std::vector<RunFigures::HeldOutCell> held_out_cells(
+    const calib::ValidityVolume& volume, std::span<const LeftError> left);
+
 /// Adds maps of the volume: |V| of the machine without compensation, the expanded uncertainty
-/// U(V) = 2 sqrt(trace cov V), and, if `left` is not empty, the rms of the observations to which
-/// the model was not fitted.
+/// U(V) = 2 sqrt(trace cov V), and, if `held_out` is not empty, the rms of the observations to
+/// which the model was not fitted.
 void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
-                     std::span<const LeftError> left = {});
+                     std::span<const RunFigures::HeldOutCell> held_out = {});
 
 }  // namespace abbe::daemon

@@ -21,7 +21,11 @@ struct ReportSubject {
   CertificateDetails details{};
 };
 
-/// DataInsufficient if the model has no validity volume.
+/// A model of the store with its verdict and its events.
+[[nodiscard]] Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id);
+
+/// The report of every method, from what the store has. DataInsufficient if the model has no
+/// validity volume.
 [[nodiscard]] Result<std::string> model_report(const ReportSubject& subject);
 
 /// Two models side by side. DataInsufficient if they are not valid for a common tool and volume.

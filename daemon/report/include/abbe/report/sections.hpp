@@ -2,12 +2,10 @@
 /// Sections that the reports of several methods have in common.
 
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
-#include "abbe/calib/gate.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/report/html_report.hpp"
 
@@ -15,11 +13,6 @@ namespace abbe::daemon {
 
 /// "12.35 um".
 [[nodiscard]] std::string um_text(double length_m, int decimals = 2);
-
-/// Adds the verdict of the gate and the values on which it is based. `held_out`: name of the groups
-/// of observations that were excluded from the fit, "legs" or "positions".
-void add_verdict(HtmlReport& page, const calib::Verdict& verdict, std::string_view held_out,
-                 int decimals = 2);
 
 /// Adds the origin of a model, the additional rows `more`, and the input files of this report.
 void add_model_origin(HtmlReport& page, const ModelDocument& document,

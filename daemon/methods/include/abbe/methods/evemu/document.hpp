@@ -6,12 +6,18 @@
 #include "abbe/base/input_file.hpp"
 #include "abbe/calib/evemu/solve.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/methods/evemu/identification.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
 
 [[nodiscard]] ModelDocument evemu_document(const calib::evemu::Solution& solution,
                                            const Config& config, std::vector<InputFile> inputs,
+                                           protocol::UtcTime created);
+
+/// The same with what the run left: verdict, residuals, places of the balls (RunFigures).
+[[nodiscard]] ModelDocument evemu_document(const EvemuCandidate& candidate, const Config& config,
+                                           std::vector<InputFile> inputs,
                                            protocol::UtcTime created);
 
 }  // namespace abbe::daemon

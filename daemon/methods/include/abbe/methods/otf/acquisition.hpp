@@ -18,6 +18,7 @@
 #include "abbe/base/axis_position.hpp"
 #include "abbe/calib/otf/path_index.hpp"
 #include "abbe/calib/otf/run.hpp"
+#include "abbe/methods/temperature_range.hpp"
 #include "abbe/pipeline/acquisition_phase.hpp"
 #include "abbe/pipeline/environment_use.hpp"
 #include "abbe/pipeline/vertex_readings.hpp"
@@ -156,6 +157,10 @@ class OtfAcquisition {
   [[nodiscard]] std::vector<AxisPosition> release_path() { return std::exchange(path_m_, {}); }
   [[nodiscard]] const AcquisitionOptions& options() const noexcept { return options_; }
   [[nodiscard]] calib::otf::Mode mode() const noexcept { return mode_; }  ///< of the request
+  /// Lowest and highest temperature of the run; nullopt: not measured.
+  [[nodiscard]] const std::optional<std::array<double, 2>>& temperature_K() const {
+    return temperatures_.range_K();
+  }
   /// Mean over the run of the effect of the environment (temperatures of the scales, air).
   [[nodiscard]] EnvironmentEffect environment() const { return environment_.mean(); }
 
@@ -188,6 +193,7 @@ class OtfAcquisition {
   std::chrono::nanoseconds longest_stand_{};  // at the first vertex, before the run
   RunPoints points_;
   MeanEffect environment_;
+  TemperatureRange temperatures_;
   VertexReadings readings_{options_.reading_tolerance_m};
   // time and readings at the last point with axis positions
   std::optional<std::pair<protocol::HostTime, calib::Vector3>> before_q_;

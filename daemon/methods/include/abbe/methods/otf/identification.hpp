@@ -33,6 +33,8 @@ struct OtfRun {
   /// corrected. nullopt: the air was measured.
   std::optional<std::string> unmeasured_air;
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
+  /// Lowest and highest temperature during the run; nullopt: not measured.
+  std::optional<std::array<double, 2>> temperature_K{};
 };
 
 using RunResiduals = std::vector<calib::otf::PlacedResidual>;
@@ -42,6 +44,7 @@ struct OtfCandidate {
   calib::Verdict verdict;
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   std::vector<RunResiduals> residuals{};  ///< one element, or one per run of several targets
+  std::optional<std::array<double, 2>> temperature_K{};  ///< OtfRun::temperature_K
 
   [[nodiscard]] const calib::VolumetricModel& model() const { return solution.model; }
 };

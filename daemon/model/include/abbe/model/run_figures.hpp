@@ -1,0 +1,92 @@
+#pragma once
+/// What a run left when its model was identified, for the report. It is in model.json, so that the
+/// report can be made again at any time, and not in the hash of the model. Every part may be absent:
+/// models of earlier versions have less.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "abbe/calib/geometry.hpp"
+
+namespace abbe::daemon {
+
+/// Residuals of the fit in the order of the run. Of more than kMostPoints the smallest and the
+/// largest of each interval are kept.
+struct ResidualSeries {
+  static constexpr std::size_t kMostPoints = 2000;
+  struct Point {
+    double at = 0.0;  ///< s from the beginning of the run, or number of the residual, from 1
+    double after_m = 0.0;
+    friend bool operator==(const Point&, const Point&) = default;
+  };
+  std::size_t count = 0;  ///< of all residuals
+  bool over_time = false;
+  std::vector<Point> points;
+  friend bool operator==(const ResidualSeries&, const ResidualSeries&) = default;
+};
+
+struct RunConditions {
+  std::optional<std::array<double, 2>> temperature_K{};  ///< lowest and highest of the run
+  std::optional<double> duration_s{};
+  std::optional<double> feed_m_per_s{};  ///< median over the legs
+  friend bool operator==(const RunConditions&, const RunConditions&) = default;
+};
+
+struct RunFigures {
+  using Series = ResidualSeries;
+  using Conditions = RunConditions;
+  /// rms of the residuals in one interval of the run, in its order.
+  struct Interval {
+    double at_m = 0.0;  ///< middle of the interval, length of the path from its beginning
+    double before_m = 0.0, after_m = 0.0;
+    friend bool operator==(const Interval&, const Interval&) = default;
+  };
+  /// Residuals of one part of the run: a leg, a position of the artefact, a measurement.
+  struct Part {
+    std::string name;
+    std::size_t count = 0;  ///< of residuals; a vector counts as three
+    double before_rms_m = 0.0, after_rms_m = 0.0, after_max_m = 0.0;  ///< max: of absolute values
+    /// First and last time, from the beginning of the run; nullopt: there are no times.
+    std::optional<std::array<double, 2>> time_s{};
+    friend bool operator==(const Part&, const Part&) = default;
+  };
+  /// rms of observations to which the model was not fitted, in one cell of the map of the volume.
+  struct HeldOutCell {
+    std::size_t slab = 0, cell = 0;  ///< report/model_figures.hpp
+    std::size_t count = 0;
+    double before_m = 0.0, after_m = 0.0, sigma_m = 0.0;
+    friend bool operator==(const HeldOutCell&, const HeldOutCell&) = default;
+  };
+  /// What only one method knows, as text for people.
+  struct Table {
+    std::string title, explanation;
+    std::vector<std::string> columns;
+    std::vector<std::vector<std::string>> rows;
+    friend bool operator==(const Table&, const Table&) = default;
+  };
+  /// Counts of residuals / standard uncertainty in equal intervals from -kMostSigmas to
+  /// kMostSigmas; larger values are in the outer intervals.
+  static constexpr double kMostSigmas = 5.0;
+  static constexpr std::size_t kSigmaIntervals = 40;
+
+  std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
+  double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
+  std::vector<std::string> notes;                          ///< of the verdict
+  std::vector<Interval> residuals;                         ///< of a run along a path, else empty
+  /// Where was measured, polylines of scale readings: the driven path of each run, the balls of each
+  /// position of an array, the bar in each of its positions.
+  std::vector<std::vector<calib::Vector3>> places_m{};
+  std::string part_kind{};  ///< "leg", "position", "measurement"
+  std::vector<Part> parts{};
+  std::optional<Series> series{};
+  std::vector<std::size_t> sigma_counts{};  ///< kSigmaIntervals of them, or none
+  std::vector<HeldOutCell> held_out_cells{};
+  std::vector<Table> tables{};
+  std::optional<Conditions> conditions{};
+  friend bool operator==(const RunFigures&, const RunFigures&) = default;
+};
+
+}  // namespace abbe::daemon

@@ -37,7 +37,8 @@ volatile sig_atomic_t stop_requested = 0;
 
 struct Options {
   std::string peer = "127.0.0.1";
-  std::uint16_t peer_port = 0, local_port = 0;
+  std::uint16_t peer_port = 0, local_port = 0, simulator_port = 0;
+  std::uint32_t servo_period_ns = 1'000'000;
   int channel = 0;
   std::uint32_t every = 5;
   EncoderBusOptions bus;
@@ -83,13 +84,13 @@ class SamplerStream {
   bool attached_ = false;
 };
 
-/// A UDP socket on `local_port`, connected to abbed; -1: refused.
-int open_socket(const Options& options) {
+/// A UDP socket on `local_port`, connected to `peer_port` of `peer_name`; -1: refused.
+int open_socket(std::uint16_t local_port, const std::string& peer_name, std::uint16_t peer_port) {
   sockaddr_in local{}, peer{};
   local.sin_family = peer.sin_family = AF_INET;
-  local.sin_port = htons(options.local_port);
-  peer.sin_port = htons(options.peer_port);
-  if (::inet_pton(AF_INET, options.peer.c_str(), &peer.sin_addr) != 1) return -1;
+  local.sin_port = htons(local_port);
+  peer.sin_port = htons(peer_port);
+  if (::inet_pton(AF_INET, peer_name.c_str(), &peer.sin_addr) != 1) return -1;
   // To a peer on this computer the socket is on loopback, too.
   if ((ntohl(peer.sin_addr.s_addr) >> 24) == 127) local.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
 
@@ -112,13 +113,16 @@ int run(const Options& options) {
         options.channel, kColumns);
     return kIo;
   }
-  const int fd = open_socket(options);
+  const int fd = open_socket(options.local_port, options.peer, options.peer_port);
   if (fd < 0) {
     std::fprintf(stderr, "abbe-linuxcnc-encoder: no UDP socket from port %u to %s:%u: %s\n",
                  unsigned{options.local_port}, options.peer.c_str(), unsigned{options.peer_port},
                  std::strerror(errno));
     return kIo;
   }
+
+  const int simulator =
+      options.simulator_port == 0 ? -1 : open_socket(0, "127.0.0.1", options.simulator_port);
 
   Decimation decimation(options.every);
   std::vector<ServoSample> samples;
@@ -127,6 +131,10 @@ int run(const Options& options) {
   stream.read(samples);  // those of the time before the start are discarded
   while (stop_requested == 0) {
     stream.read(samples);
+    for (const ServoSample& sample : simulator < 0 ? std::vector<ServoSample>{} : samples) {
+      const auto record = abbe::protocol::encode(position_record(sample, options.servo_period_ns));
+      (void)::send(simulator, record.data(), record.size(), MSG_DONTWAIT);
+    }
     if (const auto due = decimation.choose(samples)) {
       const auto datagram = encoder_datagram(*due, sequence++, options.bus);
       // Without a receiver the datagram is lost, as on a bus without a listener.
@@ -136,6 +144,7 @@ int run(const Options& options) {
   }
 
   ::close(fd);
+  if (simulator >= 0) ::close(simulator);
   std::fprintf(
       stderr, "abbe-linuxcnc-encoder: %llu cycles sent, %llu omitted because they were late\n",
       static_cast<unsigned long long>(sent), static_cast<unsigned long long>(decimation.late()));
@@ -165,6 +174,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--every", options.every, "send every n-th servo cycle")
       ->check(CLI::Range(1U, 100U))
+      ->capture_default_str();
+  app.add_option("--simulator-port", options.simulator_port,
+                 "UDP port of abbe-sim on this computer ([sim.control] port), whose machine then "
+                 "follows every servo cycle; 0: none")
+      ->capture_default_str();
+  app.add_option("--servo-period-ns", options.servo_period_ns,
+                 "SERVO_PERIOD of the control, for --simulator-port")
+      ->check(CLI::Range(100'000U, 100'000'000U))
       ->capture_default_str();
   app.add_option("--first-node", options.bus.first_node, "node of joint 0; the others follow")
       ->check(CLI::Range(1, 125))

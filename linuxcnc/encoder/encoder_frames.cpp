@@ -42,6 +42,17 @@ std::vector<std::byte> encoder_datagram(const ServoSample& sample, std::uint8_t 
   return {bytes.begin(), bytes.end()};
 }
 
+protocol::PositionRecord position_record(const ServoSample& sample, std::uint32_t period_ns) {
+  protocol::PositionRecord record{
+      .homed = sample.homed, .cycle = sample.number, .period_ns = period_ns, .position_m = {}};
+  for (std::size_t joint = 0; joint < kEncoderJoints; ++joint) {
+    const double reading_m = 1e-3 * sample.reading_mm(joint);
+    record.homed = record.homed && std::isfinite(reading_m);
+    record.position_m[joint] = std::isfinite(reading_m) ? reading_m : 0.0;
+  }
+  return record;
+}
+
 std::optional<ServoSample> Decimation::choose(std::span<const ServoSample> read) {
   std::optional<ServoSample> due;
   for (const ServoSample& sample : read) {

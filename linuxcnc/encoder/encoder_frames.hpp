@@ -10,6 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "abbe/protocol/position_record.hpp"
+
 namespace abbe::linuxcnc {
 
 inline constexpr std::size_t kEncoderJoints = 3;
@@ -38,6 +40,10 @@ struct EncoderBusOptions {
 [[nodiscard]] std::vector<std::byte> encoder_datagram(const ServoSample& sample,
                                                       std::uint8_t sequence,
                                                       const EncoderBusOptions& options);
+
+/// What abbe-sim receives of every servo cycle. A reading that is not finite counts as not homed.
+[[nodiscard]] protocol::PositionRecord position_record(const ServoSample& sample,
+                                                       std::uint32_t period_ns);
 
 /// Chooses which samples are sent: every n-th, and only the newest of those read together. abbed
 /// dates a SYNC by its arrival, so a sample that waited must not be sent as if it were new.

@@ -11,6 +11,7 @@ namespace abbe::sim {
 Ports ports_of(Simulation& simulation, const std::string& can_interface) {
   Ports ports;
   if (simulation.tracker()) ports.tracker = simulation.tracker()->port();
+  if (simulation.control()) ports.control = simulation.control()->port();
   ports.can_interface = can_interface;
   if (simulation.bus() && can_interface.empty()) ports.can = simulation.bus()->port();
   for (const ModbusServer& server : simulation.environment())
@@ -23,6 +24,7 @@ Ports ports_of(Simulation& simulation, const std::string& can_interface) {
 Result<void> announce_ports(const Ports& ports, const std::string& path) {
   std::string lines;
   if (ports.tracker) lines += fmt::format("tracker_port={}\n", *ports.tracker);
+  if (ports.control) lines += fmt::format("control_port={}\n", *ports.control);
   if (!ports.can_interface.empty()) lines += fmt::format("can_interface={}\n", ports.can_interface);
   if (ports.can) lines += fmt::format("can_port={}\n", *ports.can);
 
@@ -42,6 +44,8 @@ Result<void> announce_ports(const Ports& ports, const std::string& path) {
   }
 
   if (ports.tracker) fmt::print("tracker: emScon on 127.0.0.1:{}\n", *ports.tracker);
+  if (ports.control)
+    fmt::print("control: position records on 127.0.0.1:{} (UDP)\n", *ports.control);
   if (ports.can) fmt::print("encoders: CAN over UDP on 127.0.0.1:{}\n", *ports.can);
   if (!ports.can_interface.empty()) fmt::print("encoders: CAN on {}\n", ports.can_interface);
   for (const NamedPlace& place : ports.environment) fmt::print("{}: {}\n", place.name, place.where);

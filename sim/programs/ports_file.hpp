@@ -3,7 +3,7 @@
 /// devices listen. The lines of the file can be read by a shell and by a TOML reader; a device that
 /// does not exist has no line:
 ///
-///   tracker_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N
+///   tracker_port=N, control_port=N, can_port=N or can_interface=NAME, usbip_port=N, cmm_port=N
 
 #include <cstdint>
 #include <optional>
@@ -25,6 +25,7 @@ struct NamedPlace {
 
 struct Ports {
   std::optional<std::uint16_t> tracker;
+  std::optional<std::uint16_t> control;  ///< UDP, position records
   std::optional<std::uint16_t> can;
   std::vector<NamedPlace> environment;
   std::vector<std::uint16_t> usbip;  ///< one per counter card

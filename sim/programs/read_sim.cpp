@@ -48,6 +48,14 @@ void read_path(TomlSection section, const std::string& file, SetupDraft& draft) 
   section.refuse_unknown_keys();
 }
 
+void read_control(TomlSection section, SimulationSetup& simulation) {
+  if (!section.present()) return;
+  std::uint16_t port = 0;
+  section.port("port", port);
+  simulation.control_port = port;
+  section.refuse_unknown_keys();
+}
+
 void read_probe(TomlSection section, SimulationSetup& simulation) {
   if (!section.present()) return;
   TouchedSurface surface;
@@ -77,6 +85,7 @@ void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
   read_truth(sim.child("truth"), file, draft);
   read_thermal(sim.child("thermal"), simulation.truth.thermal);
   read_path(sim.child("path"), file, draft);
+  read_control(sim.child("control"), simulation);
   read_sim_tracker(sim.child("tracker"), draft);
   TomlSection encoder = sim.child("encoder");
   encoder.port("port", simulation.bus->port);

@@ -38,6 +38,7 @@ class ProgressDisplay {
     client_ = client;
     const VirtualMachine& machine = simulation.machine();
 
+    if (machine.follows_a_control()) return follow(*simulation.control(), now);
     if (machine.started() && !announced_start_) {
       announced_start_ = true;
       fmt::print(stderr, "{}machine: {} legs, {:.0f} s ({:.0f} s of wall-clock time)\n", bar_end(),
@@ -54,6 +55,25 @@ class ProgressDisplay {
   }
 
  private:
+  /// Reports the first position, and lost records at most once in 5 s.
+  void follow(const ControlPort& control, HostTime now) {
+    constexpr std::chrono::seconds kBetweenReports{5};
+    const FollowedMotion::Counts counts = control.motion()->counts();
+    if (counts.not_homed > 0 && !announced_not_homed_ && counts.received == 0)
+      fmt::print(stderr, "control: its axes are not homed; the machine stands\n");
+    announced_not_homed_ = counts.not_homed > 0;
+    if (counts.received > 0 && !announced_start_)
+      fmt::print(stderr, "control: the machine follows its positions\n");
+    announced_start_ = counts.received > 0;
+    const std::uint64_t faults = counts.lost + counts.restarts + control.not_records();
+    if (faults == reported_faults_ || now - reported_at_ < kBetweenReports) return;
+    reported_faults_ = faults;
+    reported_at_ = now;
+    fmt::print(stderr,
+               "control: {} records lost of {}, {} restarts, {} datagrams that are no record\n",
+               counts.lost, counts.received + counts.lost, counts.restarts, control.not_records());
+  }
+
   void draw(const VirtualMachine& machine, HostTime now) {
     const double share =
         std::clamp(ns_to_seconds(now - *machine.started()) / machine.path().duration_s(), 0.0, 1.0);
@@ -72,6 +92,9 @@ class ProgressDisplay {
   double speed_;
   bool terminal_ = isatty(STDERR_FILENO) == 1;
   bool client_ = false;
+  bool announced_not_homed_ = false;
+  std::uint64_t reported_faults_ = 0;
+  HostTime reported_at_{};
   bool announced_start_ = false;
   bool announced_end_ = false;
   int drawn_ = -1;

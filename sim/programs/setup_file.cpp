@@ -85,6 +85,26 @@ Result<void> make_truth(SetupDraft& draft) {
   return {};
 }
 
+/// With a control the machine stands in the middle of its travel until the first position arrives.
+void stand_in_the_middle(SimulationSetup& simulation) {
+  Eigen::Vector3d middle_m;
+  for (const Axis axis : kAxes) {
+    const AxisRange& range = simulation.truth.axis(axis).range;
+    middle_m[static_cast<Eigen::Index>(axis)] = 0.5 * (range.min_m + range.max_m);
+  }
+  simulation.path.vertices = {{middle_m}};
+}
+
+/// A machine that follows a control has its motion from there, in real time.
+Result<void> check_control(const SetupDraft& draft) {
+  const std::string file = "[sim.control]";
+  if (!draft.path_file.empty())
+    return bad_input(file + ": the machine follows the control; leave [sim.path] file out");
+  if (draft.setup.speed != 1.0)
+    return bad_input(file + ": a control runs in real time; speed must be 1");
+  return {};
+}
+
 Result<void> make_path(const SetupDraft& draft, PathPlan& path) {
   if (draft.path_file.empty()) return usage_error("no path: give --path FILE or [sim.path] file");
   const auto text = read_file(draft.path_file);
@@ -137,7 +157,10 @@ Result<LoadedSetup> load_setup(const SetupChoices& choices) {
   apply_choices(choices, draft);
   if (const auto made = make_truth(draft); !made) return tl::unexpected(made.error());
 
-  if (choices.needs_path) {
+  if (simulation.control_port) {
+    if (const auto checked = check_control(draft); !checked) return tl::unexpected(checked.error());
+    stand_in_the_middle(simulation);
+  } else if (choices.needs_path) {
     if (const auto made = make_path(draft, simulation.path); !made)
       return tl::unexpected(made.error());
   }

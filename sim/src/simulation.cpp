@@ -5,8 +5,10 @@
 
 namespace abbe::sim {
 
-Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup)
-    : machine_(std::move(truth), std::move(path)),
+Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup,
+                       std::optional<ControlPort> control)
+    : control_(std::move(control)),
+      machine_(std::move(truth), std::move(path), control_ ? control_->motion() : nullptr),
       start_when_streaming_(setup.start_when_streaming),
       held_(setup.held),
       standstill_(setup.standstill),
@@ -18,7 +20,14 @@ Simulation::Simulation(TruthMachine truth, PathMotion path, const SimulationSetu
 Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setup, HostTime now) {
   auto path = PathMotion::plan(setup.path);
   if (!path) return tl::unexpected(path.error());
-  std::unique_ptr<Simulation> simulation(new Simulation(setup.truth, std::move(*path), setup));
+  std::optional<ControlPort> control;
+  if (setup.control_port) {
+    auto opened = ControlPort::open(*setup.control_port);
+    if (!opened) return tl::unexpected(opened.error());
+    control.emplace(std::move(*opened));
+  }
+  std::unique_ptr<Simulation> simulation(
+      new Simulation(setup.truth, std::move(*path), setup, std::move(control)));
 
   if (setup.tracker) {
     auto tracker = TrackerServer::open(
@@ -64,13 +73,14 @@ Result<std::unique_ptr<Simulation>> Simulation::open(const SimulationSetup& setu
 
   simulation->edges_s_.insert(simulation->edges_s_.end(), setup.edges_s.begin(),
                               setup.edges_s.end());
-  if (!setup.start_when_streaming && !setup.held)
+  if (!setup.start_when_streaming && !setup.held && !setup.control_port)
     simulation->machine_.start(now + setup.standstill);
 
   return simulation;
 }
 
 void Simulation::poll(HostTime now) {
+  if (control_) control_->poll(now);
   if (tracker_) tracker_->poll(now);
   start_machine(now);
   touch(now);
@@ -92,7 +102,12 @@ HostTime Simulation::next_bus_due() const {
 }
 
 void Simulation::start_machine(HostTime now) {
-  if (machine_.started() || !start_when_streaming_ || held_) return;
+  if (machine_.started()) return;
+  if (control_) {
+    if (const auto first = control_->motion()->first()) machine_.start(*first);
+    return;
+  }
+  if (!start_when_streaming_ || held_) return;
   if (tracker_) {
     if (const auto streaming = tracker_->device().first_stream())
       machine_.start(*streaming + standstill_);
@@ -147,6 +162,7 @@ HostTime Simulation::next_due() const {
 }
 
 void Simulation::add_poll_fds(std::vector<pollfd>& fds) const {
+  if (control_) fds.push_back({control_->fd(), POLLIN, 0});
   if (tracker_) tracker_->add_poll_fds(fds);
   if (bus_ && !bus_apart_) fds.push_back({bus_->fd(), POLLIN, 0});
   for (const ModbusServer& server : environment_) server.add_poll_fds(fds);

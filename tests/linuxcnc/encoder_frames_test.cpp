@@ -74,6 +74,29 @@ TEST(EncoderFrames, AReadingThatCannotBeEncodedIsMissing) {
   }
 }
 
+TEST(PositionRecordOfASample, HasTheReadingOfEachJoint) {
+  ServoSample sample = sample_at(1.5, -2.0, -100.0);
+  sample.number = 4711;
+  const auto record = abbe::linuxcnc::position_record(sample, 1'000'000);
+  EXPECT_TRUE(record.homed);
+  EXPECT_EQ(record.cycle, 4711u);
+  EXPECT_EQ(record.period_ns, 1'000'000u);
+  for (std::size_t joint = 0; joint < 3; ++joint)
+    EXPECT_NEAR(record.position_m[joint], 1e-3 * sample.reading_mm(joint), 1e-15);
+  EXPECT_NEAR(record.position_m[2], -0.1, 1e-12);
+  EXPECT_EQ(abbe::protocol::decode_position_record(abbe::protocol::encode(record)), record);
+}
+
+TEST(PositionRecordOfASample, WithoutAReadingIsNotHomed) {
+  ServoSample sample = sample_at(1.0, 2.0, 3.0);
+  sample.homed = false;
+  EXPECT_FALSE(abbe::linuxcnc::position_record(sample, 1'000'000).homed);
+  const auto record = abbe::linuxcnc::position_record(
+      sample_at(1.0, std::numeric_limits<double>::quiet_NaN(), 3.0), 1'000'000);
+  EXPECT_FALSE(record.homed);
+  EXPECT_TRUE(abbe::protocol::decode_position_record(abbe::protocol::encode(record)));
+}
+
 TEST(Decimation, SendsEveryNthSampleAndNeverALateOne) {
   Decimation decimation(5);
   int sent = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// The complete simulation: machine, tracker, encoder bus, counter cards, measuring machine and
+/// The complete simulation: machine, the control that it follows, tracker, encoder bus, counter cards, measuring machine and
 /// scheduled faults, stepped together. poll(now) does what is due, never blocks and reads no clock;
 /// a program passes real time, a test any time. Not thread-safe. Exception: with `bus_apart`
 /// another thread may poll the encoder bus.
@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "abbe/sim/control_port.hpp"
 #include "abbe/sim/counter_card_setup.hpp"
 #include "abbe/sim/encoder_bus.hpp"
 #include "abbe/sim/fault_timetable.hpp"
@@ -34,6 +35,9 @@ struct SimulationSetup {
   std::chrono::nanoseconds standstill = std::chrono::seconds{2};
   std::optional<TrackerOptions> tracker;
   std::uint16_t tracker_port = 0;
+  /// UDP port of the position records of a control, which the machine then follows instead of
+  /// `path`; 0: the kernel chooses it. nullopt: no control.
+  std::optional<std::uint16_t> control_port;
   std::optional<EncoderBusOptions> bus;
   std::vector<EncoderNodeOptions> nodes;
   /// Period of the SYNC that the machine's control sends to nodes configured by it; 0: the control
@@ -73,6 +77,7 @@ class Simulation {
 
   [[nodiscard]] VirtualMachine& machine() { return machine_; }
   [[nodiscard]] const VirtualMachine& machine() const { return machine_; }
+  [[nodiscard]] const std::optional<ControlPort>& control() const { return control_; }
   [[nodiscard]] std::optional<TrackerServer>& tracker() { return tracker_; }
   [[nodiscard]] std::optional<EncoderBus>& bus() { return bus_; }
   [[nodiscard]] const std::vector<ModbusServer>& environment() const { return environment_; }
@@ -83,12 +88,14 @@ class Simulation {
   }
 
  private:
-  Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup);
+  Simulation(TruthMachine truth, PathMotion path, const SimulationSetup& setup,
+             std::optional<ControlPort> control);
   void start_machine(HostTime now);
   void touch(HostTime now);
   void inject_environment(const Fault& fault, HostTime now);
   void inject(const ScheduledFault& next, HostTime now);
 
+  std::optional<ControlPort> control_;
   VirtualMachine machine_;
   bool start_when_streaming_;
   bool held_;

@@ -1,13 +1,16 @@
 #pragma once
-/// A TruthMachine that moves along its path: the scale readings and the target position at any host
-/// time. Until the time set by start() it stands at the first vertex of the path. Thread-safe.
+/// A TruthMachine that moves along its path, or follows a control: the scale readings and the target
+/// position at any host time. Until the time set by start() it stands at the first vertex of the
+/// path; with a control that has sent no position it stands there, too. Thread-safe.
 
 #include <atomic>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
+#include "abbe/sim/followed_motion.hpp"
 #include "abbe/sim/path_motion.hpp"
 #include "abbe/sim/sim_clock.hpp"
 #include "abbe/sim/truth_machine.hpp"
@@ -16,8 +19,10 @@ namespace abbe::sim {
 
 class VirtualMachine {
  public:
-  VirtualMachine(TruthMachine truth, PathMotion path)
-      : truth_(std::move(truth)), path_(std::move(path)) {}
+  /// `followed`: the motion of a control; nullptr: the machine drives `path`.
+  VirtualMachine(TruthMachine truth, PathMotion path,
+                 std::shared_ptr<const FollowedMotion> followed = nullptr)
+      : truth_(std::move(truth)), path_(std::move(path)), followed_(std::move(followed)) {}
 
   /// The motion begins at `at`; only the first call has an effect.
   void start(HostTime at) {
@@ -37,7 +42,13 @@ class VirtualMachine {
   }
 
   /// Scale readings q, m.
-  [[nodiscard]] AxisMotion motion(HostTime at) const { return path_.at(elapsed_s(at)); }
+  [[nodiscard]] AxisMotion motion(HostTime at) const {
+    if (followed_) {
+      if (const auto motion = followed_->at(at)) return *motion;
+    }
+    return path_.at(elapsed_s(at));
+  }
+  [[nodiscard]] bool follows_a_control() const { return followed_ != nullptr; }
   /// The true position of the target, machine coordinates, m.
   [[nodiscard]] Eigen::Vector3d target_m(HostTime at) const {
     const AxisMotion m = motion(at);
@@ -58,6 +69,7 @@ class VirtualMachine {
 
   TruthMachine truth_;
   PathMotion path_;
+  std::shared_ptr<const FollowedMotion> followed_;
   std::atomic<std::int64_t> start_{kNever};  ///< ns of HostTime
 };
 

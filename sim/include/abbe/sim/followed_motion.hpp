@@ -1,0 +1,63 @@
+#pragma once
+/// The motion of a machine that follows a control: axis positions that arrive as position records
+/// (abbe/protocol/position_record.hpp), one for each servo cycle.
+///
+/// The time of a record follows from the number of its cycle: cycle x period + offset. The offset is
+/// the smallest difference between arrival and cycle x period, so that a record that arrives late
+/// does not delay the machine. Between two records the position is linear; after the newest one it
+/// goes on for at most 20 ms, then the machine stands. Records are kept for 2 s. Thread-safe.
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+
+#include "abbe/protocol/position_record.hpp"
+#include "abbe/sim/path_motion.hpp"
+#include "abbe/sim/sim_clock.hpp"
+
+namespace abbe::sim {
+
+class FollowedMotion {
+ public:
+  /// A record that is not homed, not newer than the newest one, or of a control that started again
+  /// (its cycle or period does not continue those before) is handled as follows: not homed: it is
+  /// counted, the machine keeps its position; older: discarded; started again: the records before
+  /// are forgotten.
+  void add(const protocol::PositionRecord& record, HostTime arrival);
+
+  /// nullopt before the first record of a homed control.
+  [[nodiscard]] std::optional<AxisMotion> at(HostTime at) const;
+  [[nodiscard]] std::optional<HostTime> first() const;  ///< time of the first record
+
+  struct Counts {
+    std::uint64_t received = 0;   ///< homed
+    std::uint64_t not_homed = 0;  ///< received before the control was homed
+    std::uint64_t lost = 0;       ///< missing between the numbers of two records
+    std::uint64_t restarts = 0;
+  };
+  [[nodiscard]] Counts counts() const;
+
+ private:
+  struct Place {
+    std::int64_t cycle;
+    Eigen::Vector3d q_m;
+    std::array<int, 3> direction;
+  };
+  [[nodiscard]] HostTime time_of(const Place& place) const;
+  [[nodiscard]] bool continues(const protocol::PositionRecord& record, std::int64_t cycle,
+                               HostTime arrival) const;
+  void restart(const protocol::PositionRecord& record);
+
+  mutable std::mutex mutex_;
+  std::deque<Place> places_;  ///< ascending cycles
+  std::chrono::nanoseconds period_{0}, offset_{0};
+  std::uint32_t newest_number_ = 0;
+  std::int64_t newest_cycle_ = 0;  ///< counted on beyond 32 bits
+  std::optional<HostTime> first_;
+  Counts counts_;
+};
+
+}  // namespace abbe::sim

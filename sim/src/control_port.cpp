@@ -1,0 +1,34 @@
+#include "abbe/sim/control_port.hpp"
+
+#include <sys/socket.h>
+
+#include <array>
+
+namespace abbe::sim {
+
+Result<ControlPort> ControlPort::open(std::uint16_t port) {
+  auto socket = bind_udp(port);
+  if (!socket) return tl::unexpected(socket.error());
+  // For the records of a second, which a sender that was stopped sends at once.
+  constexpr int kBytes = 1 << 20;
+  ::setsockopt(socket->get(), SOL_SOCKET, SO_RCVBUF, &kBytes, sizeof kBytes);
+  return ControlPort(std::move(*socket));
+}
+
+void ControlPort::poll(HostTime now) {
+  // One byte more than a record, so that a longer datagram is not taken for one.
+  std::array<std::byte, protocol::kPositionRecordBytes + 1> buffer{};
+  for (;;) {
+    const ssize_t size = ::recv(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
+    if (size < 0) return;
+    const auto record =
+        protocol::decode_position_record(std::span(buffer).first(static_cast<std::size_t>(size)));
+    if (record) {
+      motion_->add(*record, now);
+    } else {
+      ++not_records_;
+    }
+  }
+}
+
+}  // namespace abbe::sim

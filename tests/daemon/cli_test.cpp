@@ -128,8 +128,8 @@ TEST_F(Cli, WritesAReportWhoseFiguresHaveTheDataOfTheModel) {
     ASSERT_TRUE(document);
     for (const auto& p : document->model.parameters()) {
       if (!p.position_m || *p.position_m > -0.059) continue;  // the first node of each table
-      EXPECT_NEAR(test::dataset_of(charts, p.name)["data"][0]["y"].get<double>(), 1e6 * p.value,
-                  1e-6)
+      EXPECT_NEAR(test::dataset_of(charts, p.name + ",")["data"][0]["y"].get<double>(),
+                  1e6 * p.value, 1e-6)
           << p.name << options;
     }
   }

@@ -72,7 +72,7 @@ inline nlohmann::json dataset_of(const std::vector<nlohmann::json>& charts,
 inline std::vector<std::vector<double>> maps_of(std::string_view page) {
   constexpr std::string_view kValue = "data-v=\"";
   std::vector<std::vector<double>> rows;
-  for (std::size_t at = 0; (at = page.find("<svg class=\"maps", at)) != std::string_view::npos;) {
+  for (std::size_t at = 0; (at = page.find("<svg class=\"maps\"", at)) != std::string_view::npos;) {
     const std::size_t end = page.find("</svg>", at);
     auto& values = rows.emplace_back();
     while ((at = page.find(kValue, at)) < end) {

@@ -121,7 +121,7 @@ class Labels {
 std::string svg(const SpaceDrawing& drawing) {
   const View view(drawing);
   std::string out = fmt::format(
-      "<svg class=\"maps\" viewBox=\"0 0 {} {:.1f}\" role=\"img\">\n<title>{}</title>\n",
+      "<svg class=\"maps drawing\" viewBox=\"0 0 {} {:.1f}\" role=\"img\">\n<title>{}</title>\n",
       kDrawingWidth, view.height(), escaped(drawing.title));
   out += text_beside({0.5 * kDrawingWidth, 14.0}, 0.0, 0.0, drawing.title,
                      " class=\"title\" text-anchor=\"middle\"");

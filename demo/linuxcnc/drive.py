@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Drives the LinuxCNC of the demo: homes, runs the path without and with the correction, then with
-faults. The number of the phase is in the signal `phase`, which is recorded with the positions.
+"""Drives the LinuxCNC of the demo: homes, drives the path of the calibration as a G-code program, then
+the path that is measured without and with the correction, then faults, and last the calibration of the
+machine that has changed. The number of the phase is in the signal `phase`, which is recorded with the positions.
 
 Prints one line for each phase. Exit code 1: LinuxCNC did not do what it was told."""
 import json
@@ -16,13 +17,16 @@ FEED = 6000  # mm/min, 100 mm/s
 HALF_STEP_NM = 5.1  # of the encoders in positions.toml.in, with rounding
 # The machine moves to the start, then the part that is measured.
 PATHS = {
-    "line": ("G1 X-250 Y-200 Z-350", "G1 X250 Y200 Z-50"),
-    "arc": ("G1 X150 Y0 Z-200", "G3 X150 Y0 I-150 J0"),
-    "helix": ("G1 X120 Y40 Z-320", "G3 X120 Y40 I-120 J0 Z-80 P3"),
+    "line": ("G1 X-125 Y-100 Z-175", "G1 X125 Y100 Z-25"),
+    "arc": ("G1 X75 Y0 Z-100", "G3 X75 Y0 I-75 J0"),
+    "helix": ("G1 X60 Y20 Z-160", "G3 X60 Y20 I-60 J0 Z-40 P3"),
 }
+CALIBRATION_FEED = 6000  # mm/min
+STANDSTILL_S = 2.0       # before the calibration, at its first vertex
+DWELL_S = 0.2            # at each vertex
 PHASES = {"without": 10, "with": 20}  # line, arc and helix: + 1, 2, 3
 FAULTS = {"abbe-dds killed": 31, "NaN": 32, "machine off": 33, "model not ACTIVE": 34,
-          "feeder killed": 35}
+          "model DRIFT": 36, "feeder killed": 35}
 
 command = status = None  # of a running LinuxCNC; evaluate.py reads the names of the phases only
 
@@ -122,8 +126,7 @@ def write_request(name):
 
 def compare_positions():
     """What abbed reads from its encoders, at standstill, against the joint positions with correction."""
-    write_request("read-positions")
-    status = json.load(open("status.json"))
+    status = abbe_status()
     stream = next(s for s in status["streams"] if s["name"] == "encoder")
     reading_mm = [hal.get_value("joint.%d.pos-cmd" % j) + hal.get_value("abbe-correction.%d.applied" % j)
                   for j in range(3)]
@@ -134,6 +137,66 @@ def compare_positions():
                   % (stream["rate_hz"], stream["gaps"], stream["samples"], off_nm, HALF_STEP_NM))
     if off_nm > HALF_STEP_NM:
         fail("abbed reads %s m, the joints are at %s mm" % (status["position_m"], reading_mm))
+
+
+def abbe_status():
+    if os.path.exists("read-positions.done"):
+        os.remove("read-positions.done")
+    write_request("read-positions")
+    return json.load(open("status.json"))
+
+
+def vertices_mm():
+    lines = [line.split(",")[:3] for line in open("path.csv") if line[0] not in "#x"]
+    return [[float(v) for v in line] for line in lines]
+
+
+def calibrate(name):
+    """abbed calibrates while LinuxCNC drives the path, a program with an exact stop at each vertex."""
+    path = vertices_mm()
+    with open("path.ngc", "w") as out:
+        out.write("G21 G90 G61 F%g\n" % CALIBRATION_FEED)
+        for vertex in path[1:]:
+            out.write("G1 X%.6f Y%.6f Z%.6f\nG4 P%g\n" % (*vertex, DWELL_S))
+        out.write("M2\n")
+    enable(False)
+    move("G1 X%.6f Y%.6f Z%.6f" % tuple(path[0]))
+    open("calibrate-" + name, "w").close()
+    wait_until("abbed is ready for the path",
+               lambda: (abbe_status().get("session") or {}).get("state") == "warming", 60)
+    time.sleep(STANDSTILL_S)
+    command.mode(linuxcnc.MODE_AUTO)
+    command.wait_complete()
+    command.program_open(os.path.abspath("path.ngc"))
+    command.auto(linuxcnc.AUTO_RUN, 0)
+    time.sleep(1.0)
+    wait_until("the path is driven", lambda: status.poll() or status.interp_state == linuxcnc.INTERP_IDLE,
+               600)
+    wait_until("abbed has seen the end of the path",
+               lambda: abbe_status()["session"]["state"] != "acquiring", 30)
+    move("G1 X0 Y0 Z-100")  # the path ends at the edge of the volume
+    print("drive: %d vertices of the calibration driven" % len(path), flush=True)
+
+
+def wait_for_calibration(name):
+    """The exit code of abbe calibrate."""
+    wait_until("the calibration has ended", lambda: os.path.exists("calibrate-%s.done" % name), 200)
+    return int(open("calibrate-%s.done" % name).read())
+
+
+def feeder_said(text):
+    return text in open("feeder.log").read()
+
+
+def model_drifts():
+    """The calibration that drove before this circle shows that the machine has changed."""
+    wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"), 100)
+    time.sleep(0.5)
+    if not feeder_said("ModelState is DRIFT"):
+        fail("the correction is off, but not because the model drifted: see feeder.log")
+    wait_for_calibration("changed")
+    write_request("activate-newest")
+    wait_until("the correction of the new model is active", active, 60)
 
 
 def not_a_number():
@@ -153,10 +216,10 @@ def machine_off():
 
 
 def model_not_active():
-    write_request("stop-machine")
+    write_request("stop-encoder")
     wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"))
     time.sleep(0.5)
-    write_request("continue-machine")
+    write_request("continue-encoder")
 
 
 def feeder_killed():
@@ -169,18 +232,21 @@ def feeder_killed():
 
 ACTIONS = {"abbe-dds killed": lambda: (write_request("kill-dds"), time.sleep(2.5)),
            "NaN": not_a_number, "machine off": machine_off, "model not ACTIVE": model_not_active,
-           "feeder killed": feeder_killed}
+           "model DRIFT": model_drifts, "feeder killed": feeder_killed}
 
 
 def fault(name):
     """Happens while the machine drives circles in the volume."""
+    if name == "model DRIFT":
+        write_request("change-machine")
+        calibrate("changed")
     if not hal.get_value("motion.motion-enabled"):
         machine_on()
     command.mode(linuxcnc.MODE_MDI)
     command.wait_complete()
-    move("G1 X150 Y0 Z-200")
+    move("G1 X75 Y0 Z-100")
     switch_on()
-    mdi("G3 X150 Y0 I-150 J0 P9")
+    mdi("G3 X75 Y0 I-75 J0 P60")
     time.sleep(1.0)
     phase(FAULTS[name])
     ACTIONS[name]()
@@ -202,6 +268,9 @@ def main():
     with open("offsets.txt", "w") as out:
         out.write(" ".join("%.9f" % o for o in offsets) + "\n")
 
+    calibrate("first")
+    if wait_for_calibration("first") != 0:
+        fail("the calibration was refused")
     wait_until("the feeder has a valid correction", lambda: hal.get_value("abbe-feeder.valid"), 60)
     enable(False)
     drive_path(PHASES["without"])

@@ -1,5 +1,6 @@
 // The calibration under way: state, path or artefact, what was noticed, and how to begin one.
 
+import { ask } from "./ask.js";
 import { fixed, h, list, table } from "./dom.js";
 import { get, listen, post, state } from "./server.js";
 import { message } from "./main.js";
@@ -222,9 +223,10 @@ function controls() {
     for (const [name, field] of Object.entries(fields)) request[name] = await field.read();
     await post("api/calibrate", request);
   }, begun[method.value]);
-  const cancel = () => {
-    if (confirm("Cancel the running calibration?"))
-      attempt(() => post("api/cancel"), "The calibration is cancelled.");
+  const cancel = async () => {
+    const sure = await ask({ title: "Cancel the running calibration?", yes: "Cancel the calibration",
+      lines: ["What is recorded stays in its recording."] });
+    if (sure !== null) await attempt(() => post("api/cancel"), "The calibration is cancelled.");
   };
   return h("section", {}, h("h2", {}, "New calibration"),
     h("label", { for: "method" }, "Method"), method, place,

@@ -1,5 +1,6 @@
 // Models with verdicts, events, trends; activation and roll-back.
 
+import { ask } from "./ask.js";
 import { draw } from "./charts.js";
 import { h, list, table, when } from "./dom.js";
 import { message } from "./main.js";
@@ -17,19 +18,24 @@ async function change(path, body, done, again) {
   await again().catch((error) => message(error.message));
 }
 
-function activate(model, again) {
-  const why = prompt(model.accepted
-    ? `Reason for activating ${model.id} (for the record):`
-    : `The gate refused ${model.id}. Reason for activating it nevertheless (required):`);
+async function activate(model, active, again) {
+  const why = await ask({ title: `Activate ${model.id}?`, yes: "Activate",
+    lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
+      `Then: ${model.id}, added ${when(model.added)}.`,
+      ...(model.accepted ? [] : ["The gate refused this model: it may make the machine worse."])],
+    reason: "Reason, for the record", required: !model.accepted });
   if (why === null) return;
-  change("api/activate", { id: model.id, why, force: !model.accepted },
+  await change("api/activate", { id: model.id, why, force: !model.accepted },
     `${model.id} is activated; abbed follows within a second.`, again);
 }
 
 // `active`: the model that the page shows as active. The request is refused if it is another one by now.
-function rollBack(active, again) {
-  const why = prompt("Reason for going back to the model that was active before (for the record):");
-  if (why !== null) change("api/rollback", { active, why }, "Rolled back.", again);
+async function rollBack(active, again) {
+  const why = await ask({ title: "Roll back?", yes: "Roll back",
+    lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
+      "Then: the model that was active before it."],
+    reason: "Reason, for the record" });
+  if (why !== null) await change("api/rollback", { active: active?.id ?? "", why }, "Rolled back.", again);
 }
 
 function verdict(model) {
@@ -41,11 +47,12 @@ function verdict(model) {
 }
 
 function modelTable(models, again) {
+  const active = models.find((m) => m.active);
   return table("models", ["model", "added (UTC)", "method", "machine", "verdict", "change"], models.map((m) => [
     m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), when(m.added), m.method,
     m.machine, verdict(m),
     mayActivate() && !m.active && !m.fault
-      ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, again) }, "Activate") : ""]));
+      ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, active, again) }, "Activate") : ""]));
 }
 
 function eventTable(events) {
@@ -88,7 +95,7 @@ export async function show(place) {
     tables.replaceChildren(h("h2", {}, "Models"),
       models.length ? modelTable(models, fill) : h("p", {}, "The store has no models yet."),
       mayActivate()
-        ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active)?.id ?? "", fill) }, "Roll back"))
+        ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active), fill) }, "Roll back"))
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
       h("h2", {}, "Events"), eventTable(events));
   };

@@ -1,4 +1,5 @@
-// One model: error motions with bands, the field in space, residuals, what it does not know.
+// One model, or one beside another: error motions with bands, the field in space, residuals, what it
+// does not know. Address: #model/ID or #model/ID/OTHER.
 
 import { draw } from "./charts.js";
 import { facts, fixed, h, list, table, when } from "./dom.js";
@@ -37,11 +38,58 @@ function unknowns(model) {
       list(model.not_in_the_uncertainty)));
 }
 
-function values(model) {
-  return model.values.map((group) => h("details", {},
-    h("summary", {}, group.name), h("p", { class: "weak" }, group.explanation),
-    table(group.name, ["", { title: "value", number: true }, { title: "U (k = 2)", number: true }, "unit"],
-      group.values.map((v) => [h("th", { scope: "row" }, v.name), v.value || "not estimable", v.U, v.value ? v.unit : v.why]))));
+/** The values of the standards; of two models beside each other. */
+function values(model, other) {
+  const text = (v) => (v ? v.value || "not estimable" : "-");
+  const number = (title) => ({ title, number: true });
+  return model.values.map((group) => {
+    const others = other?.values.find((g) => g.name === group.name)?.values ?? [];
+    const beside = (v) => others.find((o) => o.name === v.name);
+    const columns = ["", number(other ? model.id : "value"), number("U (k = 2)"),
+      ...(other ? [number(other.id), number("U (k = 2)")] : []), "unit"];
+    return h("details", {}, h("summary", {}, group.name), h("p", { class: "weak" }, group.explanation),
+      table(group.name, columns, group.values.map((v) => [h("th", { scope: "row" }, v.name), text(v), v.U,
+        ...(other ? [text(beside(v)), beside(v)?.U ?? ""] : []), v.value ? v.unit : v.why])));
+  });
+}
+
+/** The value of a curve between its nodes; undefined outside them. */
+function valueAt(curve, y, x) {
+  const i = curve.x.findIndex((node) => node >= x - 1e-9);
+  if (i < 0 || x < curve.x[0] - 1e-9) return undefined;
+  if (i === 0) return y[0];
+  const part = Math.min((x - curve.x[i - 1]) / (curve.x[i] - curve.x[i - 1]), 1);
+  return y[i - 1] + part * (y[i] - y[i - 1]);
+}
+
+/** "EXX" of "EXX, U <= 0.19". */
+const motionOf = (curve) => curve.name.split(",")[0];
+
+/** The curve of the same error motion of another model. */
+const counterpart = (curve, other) =>
+  other.charts.flatMap((c) => c.curves).find((c) => motionOf(c) === motionOf(curve));
+
+/** Each error motion of both models in one chart. */
+function together(model, other) {
+  return model.charts.flatMap((chart) => chart.curves.map((curve) => {
+    const beside = counterpart(curve, other);
+    const named = (c, id) => ({ ...c, name: `${motionOf(c)} of ${id}` });
+    return { ...chart, title: motionOf(curve),
+      curves: [named(curve, model.id), ...(beside ? [named(beside, other.id)] : [])] };
+  }));
+}
+
+/** Model minus other, with the uncertainty of both as if they were independent. */
+function difference(model, other) {
+  return model.charts.map((chart) => ({ ...chart, y_label: chart.y_label.replace("error", "difference"),
+    curves: chart.curves.flatMap((curve) => {
+      const beside = counterpart(curve, other);
+      if (!beside) return [];
+      const nodes = curve.x.map((x, i) => [x, curve.y[i] - valueAt(beside, beside.y, x),
+        Math.hypot(curve.u[i], valueAt(beside, beside.u, x))]).filter(([, y]) => Number.isFinite(y));
+      return nodes.length === 0 ? [] : [{ name: motionOf(curve), x: nodes.map((n) => n[0]), y: nodes.map((n) => n[1]),
+        u: nodes.map((n) => n[2]) }];
+    }) })).filter((chart) => chart.curves.length > 0);
 }
 
 /** The chart with U = 2 u in place of the error. */
@@ -50,11 +98,16 @@ function ofU(chart) {
     curves: chart.curves.map((c) => ({ name: c.name, x: c.x, y: c.u.map((u) => 2 * u) })) };
 }
 
-/** Error motions with bands, or U alone, which a narrow band does not show. */
-async function motionView(place, model) {
+/** Error motions with bands, or U alone, which a narrow band does not show; of two models together, or
+ * their difference. */
+async function motionView(place, model, other) {
   const choice = h("select", { id: "motion-choice" },
+    other ? [h("option", { value: "together" }, "both models, each with its band of U (k = 2)"),
+      h("option", { value: "difference" }, `${model.id} minus ${other.id}`)] : null,
     h("option", { value: "error" }, "error with its band of U (k = 2)"),
     h("option", { value: "U" }, "U (k = 2) alone"));
+  const charts_of = { together: () => together(model, other), difference: () => difference(model, other),
+    error: () => [...model.charts, ...alongPath(model)], U: () => model.charts.map(ofU) };
   const charts = h("div", { class: "charts" });
   place.append(model.charts.length > 0
     ? h("div", { class: "tools" }, h("label", { for: "motion-choice" }, "Show"), choice)
@@ -64,8 +117,7 @@ async function motionView(place, model) {
     ends.forEach((end) => end());
     ends = [];
     charts.replaceChildren();
-    const motions = choice.value === "U" ? model.charts.map(ofU) : model.charts;
-    for (const chart of [...motions, ...alongPath(model)]) ends.push(await draw(charts, chart));
+    for (const chart of charts_of[choice.value]()) ends.push(await draw(charts, chart));
   };
   choice.addEventListener("change", show);
   await show();
@@ -78,6 +130,28 @@ function scaleOf(field) {
   const diagonal = Math.hypot(...field.high_mm.map((x, i) => x - field.low_mm[i]));
   const longest = Math.max(...lengths, 1e-9);
   return { longest, factor: kLongest * diagonal / longest };
+}
+
+/** V of `field` minus V of `other` at the places that both have. */
+function fieldDifference(field, other) {
+  const key = (v) => v.at_mm.map((x) => x.toFixed(3)).join();
+  const theirs = new Map(other.vectors.map((v) => [key(v), v]));
+  return { ...field, vectors: field.vectors.filter((v) => theirs.has(key(v))).map((v) => {
+    const beside = theirs.get(key(v));
+    return { ...v, V_um: v.V_um.map((x, i) => x - beside.V_um[i]), U_um: Math.hypot(v.U_um, beside.U_um) };
+  }) };
+}
+
+/** The field of the model, or its difference to that of another one. */
+async function spaceView(place, model, other) {
+  if (!other?.field || !model.field) return fieldView(place, model.field);
+  const field = fieldDifference(model.field, other.field);
+  if (field.vectors.length === 0) {
+    place.append(h("p", {}, "The two models have different volumes: their fields have no place in common."));
+    return () => {};
+  }
+  place.append(h("p", {}, `V of ${model.id} minus V of ${other.id}. U: of both, as if they were independent.`));
+  return fieldView(place, field);
 }
 
 /** The field of V, or the spheres of U that remain after compensation, at the same scale. */
@@ -121,23 +195,27 @@ async function fieldView(place, field) {
   return () => space.end();
 }
 
-/** Options for the models of the store; the one that is shown is chosen. */
-async function chooser(id) {
+/** Options for the models of the store; the one that is shown, and the one beside it, are chosen. */
+async function chooser(id, beside) {
   const models = (await get("api/history")).models.filter((m) => !m.fault);
   if (models.length === 0) return null;
   const active = models.find((m) => m.active);
   const shown = id === "active" ? (active ?? models[0]).id : id;
-  const select = h("select", { id: "model-choice" }, models.map((m) =>
-    h("option", { value: m.id, selected: m.id === shown },
-      `${m.id}, ${when(m.added)}, ${m.active ? "active" : m.accepted ? "accepted" : "refused"}`)));
-  select.addEventListener("change", () => { location.hash = `model/${select.value}`; });
+  const option = (m, chosen) => h("option", { value: m.id, selected: m.id === chosen },
+    `${m.id}, ${when(m.added)}, ${m.active ? "active" : m.accepted ? "accepted" : "refused"}`);
+  const select = h("select", { id: "model-choice" }, models.map((m) => option(m, shown)));
+  const compare = h("select", { id: "compare-choice" }, h("option", { value: "" }, "no other model"),
+    models.filter((m) => m.id !== shown).map((m) => option(m, beside)));
+  const go = () => { location.hash = ["model", select.value, compare.value].filter((part) => part).join("/"); };
+  select.addEventListener("change", () => { if (compare.value === select.value) compare.value = ""; go(); });
+  compare.addEventListener("change", go);
   const state = (m) => m && `${m.id}${m.active}${m.accepted}`;
   const changed = async () => {
     const { models: now } = await get("api/history");
     return state(now.find((m) => m.id === shown)) !== state(models.find((m) => m.id === shown)) ||
       (id === "active" && now.find((m) => m.active)?.id !== active?.id);
   };
-  return { select, shown, changed, noneActive: id === "active" && !active };
+  return { select, compare, shown, changed, noneActive: id === "active" && !active };
 }
 
 function origin(model) {
@@ -151,30 +229,33 @@ function origin(model) {
 }
 
 export async function show(place) {
-  const choice = await chooser(location.hash.split("/")[1] ?? "active");
+  const [, id, beside] = location.hash.split("/");
+  const choice = await chooser(id ?? "active", beside);
   if (choice === null) {
     place.append(h("p", {}, "The store has no models yet: run a calibration."));
     return () => {};
   }
-  const model = await get(`api/models/${choice.shown}`);
+  const [model, other] = await Promise.all([get(`api/models/${choice.shown}`),
+    choice.compare.value ? get(`api/models/${choice.compare.value}`) : null]);
   const notice = h("p", { class: "warn", role: "status" },
     choice.noneActive ? "No model is active; the newest one is shown." : "");
   place.append(notice,
     h("div", { class: "tools" }, h("label", { for: "model-choice" }, "Model"), choice.select,
+      h("label", { for: "compare-choice" }, "Compare with"), choice.compare,
       h("a", { href: `reports/${choice.shown}`, target: "_blank" }, "Report to print"),
       h("a", { href: `models/${choice.shown}`, download: "model.json" }, "model.json")),
     origin(model), ...residuals(model), h("h2", {}, "The error in space"));
   const space = h("div");
   const motions = h("div");
   place.append(space, h("h2", {}, "Error motions"), motions, unknowns(model),
-    h("h2", {}, "Values of the standards"), ...values(model));
+    h("h2", {}, "Values of the standards"), ...values(model, other));
 
   const ends = [listen("store", async () => {
     if (await choice.changed().catch(() => false))
       notice.textContent = "The models have changed since this view was opened: open it again.";
-  }), await motionView(motions, model)];
+  }), await motionView(motions, model, other)];
   try {
-    ends.push(await fieldView(space, model.field));
+    ends.push(await spaceView(space, model, other));
   } catch (error) {
     space.append(h("p", { class: "warn" }, `This browser draws no 3-D view: ${error.message}`));
   }

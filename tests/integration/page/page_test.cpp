@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "abbe/base/file_descriptor.hpp"
+#include "abbe/model/model_store.hpp"
 #include "abbe/web/web_users.hpp"
 #include "bar_run.hpp"
+#include "synthetic_model.hpp"
 #include "touching_run.hpp"
 
 namespace abbe::test {
@@ -146,6 +148,22 @@ TEST_F(PageOnTheFly, APageThatReadsNoEventsIsClosedByName) {
   EXPECT_TRUE(eventually([this] {
     return web_->err().find("the page does not read its events: closed") != std::string::npos;
   })) << web_->err();
+}
+
+TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
+  {
+    auto store = daemon::ModelStore::open(file("data/models"));
+    ASSERT_TRUE(store) << store.error().text;
+    const daemon::StoreActor actor{.who = "test", .why = "", .when = {}};
+    for (const unsigned seed : {3U, 4U}) {
+      const auto added = store->add(daemon::test::synthetic_document(seed), true, {}, actor);
+      ASSERT_TRUE(added) << added.error().text;
+      if (seed == 3U) ASSERT_TRUE(store->activate(*added, actor));
+    }
+  }
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  browse("compare.mjs", {kPassword});
+  expect_browser_ends_well();
 }
 
 struct PageBallArray : Page<TouchingRun> {};

@@ -7,7 +7,6 @@ const [url, out, calibrator, password] = process.argv.slice(2);
 
 await withPage(url, out, async (context) => {
   const { page } = context;
-  page.on("dialog", (dialog) => dialog.accept("test of the page"));
   await logIn(context, "calibrate", password);
   await goTo(context, "calibration");
   await page.select("#method", "evemu");

@@ -1,13 +1,12 @@
 // A calibration with a Multi-Feature Bar is begun by clicking; the places of the bar are drawn, with
 // the first one marked.   bar.mjs URL FOLDER BAR.TOML PLAN.TOML PASSWORD
 
-import { chooseFile, clickButton, goTo, logIn, screenshot, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, chooseFile, clickButton, goTo, logIn, screenshot, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, bar, plan, password] = process.argv.slice(2);
 
 await withPage(url, out, async (context) => {
   const { page } = context;
-  page.on("dialog", (dialog) => dialog.accept());
   await logIn(context, "calibrate", password);
   await goTo(context, "calibration");
   await page.select("#method", "mfb");
@@ -18,6 +17,7 @@ await withPage(url, out, async (context) => {
   await page.waitForSelector(".space canvas");
   await screenshot(context, "bar-begun");
   await clickButton(context, "Cancel the calibration");
+  await answerQuestion(context, "Cancel the calibration");
   await waitForText(context, "cancelled", "#message");
   return [];
 });

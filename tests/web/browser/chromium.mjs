@@ -77,6 +77,15 @@ export async function clickButton({ page }, text) {
   if (!clicked) throw new Error(`there is no button "${text}"`);
 }
 
+/** Answers the question of the page with the button `yes`, and a reason if it asks for one. */
+export async function answerQuestion({ page }, yes, reason = null) {
+  await page.waitForSelector("dialog.ask[open]");
+  if (reason !== null) await page.type("dialog.ask input[name=reason]", reason);
+  const said = await page.$eval("dialog.ask button[value=yes]", (b) => b.innerText);
+  if (said !== yes) throw new Error(`the question offers "${said}", not "${yes}"`);
+  await page.click("dialog.ask button[value=yes]");
+}
+
 export async function logIn(context, user, password) {
   await context.page.click("#log-in");
   await context.page.type("input[name=user]", user);

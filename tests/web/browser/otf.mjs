@@ -2,13 +2,12 @@
 // roll-back and replay.   otf.mjs URL FOLDER PATH.CSV PASSWORD
 // Prints "BEGUN" when the machine may move.
 
-import { chooseFile, clickButton, goTo, logIn, say, screenshot, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, chooseFile, clickButton, goTo, logIn, say, screenshot, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, path, password] = process.argv.slice(2);
 
 await withPage(url, out, async (context) => {
   const { page } = context;
-  page.on("dialog", (dialog) => dialog.accept("test of the page"));
   await goTo(context, "calibration");
   await waitForText(context, "log in with the role calibrate", "#view");
   await logIn(context, "administer", password);
@@ -33,6 +32,8 @@ await withPage(url, out, async (context) => {
   await waitForText(context, "active", "#view");
   await screenshot(context, "otf-history");
   await clickButton(context, "Roll back");
+  await waitForText(context, "Active now: ", "dialog.ask");
+  await answerQuestion(context, "Roll back", "test of the page");
   // There is no earlier model: the message of abbed is shown. Chromium reports the status 409.
   await page.waitForFunction(() => document.getElementById("message").innerText !== "");
   const message = await page.$eval("#message", (m) => m.innerText);

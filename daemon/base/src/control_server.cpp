@@ -144,7 +144,7 @@ class Server final : public ControlServer {
       if (waits[2].revents != 0) take_long_answers();
       std::size_t i = 3;
       for (auto c = clients_.begin(); c != clients_.end(); ++i)
-        c = cycle(*c, waits[i].revents) ? std::next(c) : clients_.erase(c);
+        c = cycle(*c, waits[i].revents) ? std::next(c) : erase(c);
       close_idle(Clock::now());
       if ((waits[1].revents & POLLIN) != 0) accept_some();
     }
@@ -225,7 +225,12 @@ class Server final : public ControlServer {
         *longest_idle,
         fmt::format("closed for a newer connection: at most {} are open, {} of one user",
                     limits_.connections, limits_.of_one_user));
-    clients_.erase(longest_idle);
+    erase(longest_idle);
+  }
+
+  std::list<Client>::iterator erase(std::list<Client>::iterator c) {
+    if (c->long_request) long_.forget(c->number);
+    return clients_.erase(c);
   }
 
   void close_idle(Clock::time_point now) {
@@ -254,8 +259,11 @@ class Server final : public ControlServer {
       if (end < kLongRequest) {
         c.outbox += line_of(answer(c.inbox.substr(0, end), c.peer));
       } else {
-        c.long_request = true;
-        long_.take(c.number, c.inbox.substr(0, end), c.peer);
+        c.long_request = long_.take(c.number, c.inbox.substr(0, end), c.peer);
+        if (!c.long_request)
+          c.outbox += line_of(refusal({ErrorCode::Refused,
+                                       "control socket: other long requests are waiting for their "
+                                       "answers: send this one again later"}));
       }
       c.active = Clock::now();
       c.inbox.erase(0, end + 1);

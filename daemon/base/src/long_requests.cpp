@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <new>
 #include <utility>
 
 namespace abbe::daemon {
@@ -18,12 +19,19 @@ LongRequests::~LongRequests() {
   thread_.join();
 }
 
-void LongRequests::take(std::uint64_t client, std::string line, ControlPeer peer) {
+bool LongRequests::take(std::uint64_t client, std::string line, ControlPeer peer) {
   {
     const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= kMostWaiting) return false;
     waiting_.push_back({client, std::move(line), std::move(peer)});
   }
   changed_.notify_one();
+  return true;
+}
+
+void LongRequests::forget(std::uint64_t client) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(waiting_, [client](const Waiting& w) { return w.client == client; });
 }
 
 std::vector<LongRequests::Answered> LongRequests::answered() {
@@ -39,7 +47,12 @@ void LongRequests::run() {
     const Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
-    std::string line = answer_(next.line, next.peer);
+    std::string line;
+    try {
+      line = answer_(next.line, next.peer);
+    } catch (const std::bad_alloc&) {
+      line = "\n";  // measuring continues
+    }
     lock.lock();
     answered_.push_back({next.client, std::move(line)});
     const std::uint64_t one = 1;

@@ -14,7 +14,8 @@
 namespace abbe::daemon {
 
 /// Answers long requests of the control socket on a thread of its own, one after the other: a path
-/// of 10^5 vertices takes a part of a second, for which no other client would get an answer. The
+/// of 10^5 vertices takes a part of a second, for which no other client would get an answer. At most
+/// kMostWaiting wait; the request of a client that has left is not carried out any more. The
 /// functions are for one thread.
 class LongRequests {
  public:
@@ -24,13 +25,19 @@ class LongRequests {
     std::string line;
   };
 
-  /// `answer` runs on the thread of the object; afterwards `done_fd`, an eventfd, is signalled.
+  static constexpr std::size_t kMostWaiting = 4;  ///< of up to 4 MB each
+
+  /// `answer` runs on the thread of the object; afterwards `done_fd`, an eventfd, is signalled. The
+  /// answer to a request for which memory is missing is an empty line.
   LongRequests(Answer answer, int done_fd);
   LongRequests(const LongRequests&) = delete;
   LongRequests& operator=(const LongRequests&) = delete;
   ~LongRequests();  ///< waits for the request that is being answered; the others are discarded
 
-  void take(std::uint64_t client, std::string line, ControlPeer peer);
+  /// False if too many requests wait.
+  [[nodiscard]] bool take(std::uint64_t client, std::string line, ControlPeer peer);
+  /// The client has left: its request is not carried out, unless it is being answered.
+  void forget(std::uint64_t client);
   [[nodiscard]] std::vector<Answered> answered();
 
  private:

@@ -124,6 +124,13 @@ int run(const Options& options) {
   const int simulator =
       options.simulator_port == 0 ? -1 : open_socket(0, "127.0.0.1", options.simulator_port);
 
+  if (options.simulator_port != 0 && simulator < 0) {
+    std::fprintf(stderr, "abbe-linuxcnc-encoder: no UDP socket to the simulator, port %u: %s\n",
+                 unsigned{options.simulator_port}, std::strerror(errno));
+    ::close(fd);
+    return kIo;
+  }
+
   Decimation decimation(options.every);
   std::vector<ServoSample> samples;
   std::uint8_t sequence = 0;

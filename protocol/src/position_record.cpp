@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x50424241;  // "ABBP"
 constexpr std::uint16_t kVersion = 1, kHomed = 1;
+constexpr std::uint32_t kShortest_ns = 10'000, kLongest_ns = 100'000'000;
 
 }  // namespace
 
@@ -36,7 +37,8 @@ std::optional<PositionRecord> decode_position_record(std::span<const std::byte> 
 
   const bool sound =
       in.ok() && in.remaining() == 0 && magic == kMagic && version == kVersion &&
-      (flags & ~kHomed) == 0 && record.period_ns != 0 &&
+      (flags & ~kHomed) == 0 && record.period_ns >= kShortest_ns &&
+      record.period_ns <= kLongest_ns &&
       std::ranges::all_of(record.position_m, [](double p_m) { return std::isfinite(p_m); });
   return sound ? std::optional(record) : std::nullopt;
 }

@@ -16,15 +16,16 @@ Result<ControlPort> ControlPort::open(std::uint16_t port) {
 }
 
 void ControlPort::poll(HostTime now) {
+  constexpr int kMost = 1000;  // a sender that never pauses must not stop the simulation
   // One byte more than a record, so that a longer datagram is not taken for one.
   std::array<std::byte, protocol::kPositionRecordBytes + 1> buffer{};
-  for (;;) {
+  for (int i = 0; i < kMost; ++i) {
     const ssize_t size = ::recv(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT);
     if (size < 0) return;
     const auto record =
         protocol::decode_position_record(std::span(buffer).first(static_cast<std::size_t>(size)));
     if (record) {
-      motion_->add(*record, now);
+      motion_->add(*record, now, i == 0);
     } else {
       ++not_records_;
     }

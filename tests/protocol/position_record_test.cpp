@@ -13,7 +13,8 @@ constexpr PositionRecord kRecord{
 
 TEST(PositionRecord, ReturnsWhatWasWritten) {
   EXPECT_EQ(decode_position_record(encode(kRecord)), kRecord);
-  EXPECT_EQ(decode_position_record(encode({.period_ns = 1})), PositionRecord{.period_ns = 1});
+  EXPECT_EQ(decode_position_record(encode({.period_ns = 10'000})),
+            PositionRecord{.period_ns = 10'000});
 }
 
 TEST(PositionRecord, HasTheDocumentedBytes) {
@@ -39,8 +40,10 @@ TEST(PositionRecord, RefusesEverythingElse) {
     EXPECT_FALSE(decode_position_record(wrong)) << changed;
   }
   PositionRecord record = kRecord;
-  record.period_ns = 0;
-  EXPECT_FALSE(decode_position_record(encode(record)));
+  for (const std::uint32_t period_ns : {0U, 9'999U, 100'000'001U, 0xffffffffU}) {
+    record.period_ns = period_ns;
+    EXPECT_FALSE(decode_position_record(encode(record))) << period_ns;
+  }
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     record = kRecord;

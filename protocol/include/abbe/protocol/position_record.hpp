@@ -6,7 +6,7 @@
 ///   4       uint16   version, 1
 ///   6       uint16   1: the axes are homed; 0: the positions mean nothing
 ///   8       uint32   number of the servo cycle; consecutive records have consecutive numbers
-///   12      uint32   servo period, ns
+///   12      uint32   servo period, ns, 10 us to 100 ms
 ///   16      float64  scale readings of X, Y, Z, m
 ///
 /// A control sends it to abbe-sim, whose machine then follows the control. Pure, allocation-free.
@@ -30,7 +30,7 @@ struct PositionRecord {
 };
 
 [[nodiscard]] std::array<std::byte, kPositionRecordBytes> encode(const PositionRecord& record);
-/// nullopt: another size, magic or version, a period of 0, or a position that is not finite.
+/// nullopt: another size, magic or version, another period, or a position that is not finite.
 [[nodiscard]] std::optional<PositionRecord> decode_position_record(
     std::span<const std::byte> datagram);
 

@@ -4,8 +4,9 @@
 ///
 /// The time of a record follows from the number of its cycle: cycle x period + offset. The offset is
 /// the smallest difference between arrival and cycle x period, so that a record that arrives late
-/// does not delay the machine. Between two records the position is linear; after the newest one it
-/// goes on for at most 20 ms, then the machine stands. Records are kept for 2 s. Thread-safe.
+/// does not delay the machine. It grows by 100 ppm, so that it follows a control whose period is
+/// longer than it says. Between two records the position is linear; after the newest one it goes on
+/// for 20 ms, then the machine stands there. Records are kept for 2 s. Thread-safe.
 
 #include <array>
 #include <chrono>
@@ -24,9 +25,11 @@ class FollowedMotion {
  public:
   /// A record that is not homed, not newer than the newest one, or of a control that started again
   /// (its cycle or period does not continue those before) is handled as follows: not homed: it is
-  /// counted, the machine keeps its position; older: discarded; started again: the records before
-  /// are forgotten.
-  void add(const protocol::PositionRecord& record, HostTime arrival);
+  /// counted, the machine stands; older: discarded; started again, or homed again: the records
+  /// before are forgotten.
+  /// `dated`: `arrival` may be used for the offset. False for the second and all further records of
+  /// one reading of the socket, which may have arrived after the clock was read.
+  void add(const protocol::PositionRecord& record, HostTime arrival, bool dated = true);
 
   /// nullopt before the first record of a homed control.
   [[nodiscard]] std::optional<AxisMotion> at(HostTime at) const;
@@ -56,6 +59,7 @@ class FollowedMotion {
   std::chrono::nanoseconds period_{0}, offset_{0};
   std::uint32_t newest_number_ = 0;
   std::int64_t newest_cycle_ = 0;  ///< counted on beyond 32 bits
+  bool homed_ = false;             ///< the newest record was
   std::optional<HostTime> first_;
   Counts counts_;
 };

@@ -7,7 +7,8 @@ import { h } from "./dom.js";
  * field for a reason; without it there is none. Returns the reason ("" without a field), or null if
  * the change is not wanted. */
 export function ask({ title, lines = [], reason = null, required = false, yes }) {
-  const field = reason === null ? null : h("input", { name: "reason", maxlength: 500, required, autocomplete: "off" });
+  const field = reason === null ? null : h("input", { name: "reason", maxlength: 500, required,
+    pattern: required ? ".*\\S.*" : null, autocomplete: "off" });
   const form = h("form", { method: "dialog" }, h("h2", { id: "ask-title" }, title),
     lines.map((line) => h("p", {}, line)),
     field ? h("label", {}, `${reason} `, field) : null,

@@ -151,11 +151,12 @@ async function spaceView(place, model, other) {
     return () => {};
   }
   place.append(h("p", {}, `V of ${model.id} minus V of ${other.id}. U: of both, as if they were independent.`));
-  return fieldView(place, field);
+  return fieldView(place, field, { before: "difference of V", after: "U (k = 2) of the difference" });
 }
 
 /** The field of V, or the spheres of U that remain after compensation, at the same scale. */
-async function fieldView(place, field) {
+async function fieldView(place, field, words = { before: "before: V, the error without compensation",
+  after: "after: U (k = 2), what remains uncertain" }) {
   if (!field || field.vectors.length === 0) {
     place.append(h("p", {}, "The model has no validity volume."));
     return () => {};
@@ -163,8 +164,7 @@ async function fieldView(place, field) {
   const { longest, factor } = scaleOf(field);
   const largestU = Math.max(...field.vectors.map((v) => v.U_um));
   const choice = h("select", { id: "field-choice" },
-    h("option", { value: "before" }, "before: V, the error without compensation"),
-    h("option", { value: "after" }, "after: U (k = 2), what remains uncertain"),
+    h("option", { value: "before" }, words.before), h("option", { value: "after" }, words.after),
     h("option", { value: "both" }, "both, at the same scale"));
   const hull = h("input", { type: "checkbox", id: "field-hull", checked: true });
   place.append(h("div", { class: "tools" },

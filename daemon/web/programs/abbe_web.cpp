@@ -108,7 +108,9 @@ class Health {
   /// Empty: the page is served without a remark.
   void report(const std::string& state) {
     const auto now = std::chrono::steady_clock::now();
-    if (state == state_ && (state.empty() || now < next_)) return;
+    // A longer duration, such as "for 21 s", is no other state.
+    const bool same = without_digits(state) == without_digits(state_);
+    if (same && (state.empty() || now < next_)) return;
     if (!state.empty() || !state_.empty())
       log_line(state.empty() ? "the page is served again" : state);
     abbe::daemon::notify_status(state.empty() ? "serving" : state);
@@ -117,6 +119,11 @@ class Health {
   }
 
  private:
+  static std::string without_digits(std::string text) {
+    std::erase_if(text, [](char c) { return c >= '0' && c <= '9'; });
+    return text;
+  }
+
   std::string state_;
   std::chrono::steady_clock::time_point next_;
 };
@@ -202,7 +209,7 @@ int main(int argc, char** argv) {
   }
 
   try {
-    return user.empty() ? serve(file) : hash_password(user, role);
+    return hash->count() == 0 ? serve(file) : hash_password(user, role);
   } catch (const std::exception& e) {
     log_line(fmt::format("internal error: {}", e.what()));
     return kInternal;

@@ -65,7 +65,7 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
     failures.last = now;
     return daemon::fail(ErrorCode::Refused, "wrong name or password");
   }
-  failures_.erase(address);
+  // The failures stay: whoever has one password must not try others without limit.
   remove_ended(now);
   make_place_for(found->name);
   WebSession session{

@@ -41,6 +41,8 @@ async function comparison(context) {
   if (await page.evaluate(() => location.hash) !== `#model/${shown}/${other}`)
     faults.push(`the address does not name both models: ${await page.evaluate(() => location.hash)}`);
   const labels = () => page.$$eval(".chart canvas", (all) => all.map((c) => c.getAttribute("aria-label")));
+  // The charts are drawn one after the other.
+  await page.waitForFunction(() => document.querySelectorAll(".chart canvas").length >= 14);
   const both = await labels();
   if (!both.every((label) => label.includes(`of ${shown}`) && label.includes(`of ${other}`)))
     faults.push(`a chart does not show both models: ${both.join(" | ")}`);

@@ -174,7 +174,6 @@ fault(lambda: abbe.Subscription(program="no-such-program"))
       seen.out,
       AllOf(HasSubstr("io: read missing.json"), HasSubstr("model.json: is not an MCAP file"),
             HasSubstr("usage: points_m: must be an array of N x 3 numbers"),
-
             HasSubstr("io: connect /no/such/socket"), HasSubstr("io: start no-such-program")));
   EXPECT_EQ(std::count(seen.out.begin(), seen.out.end(), '\n'), 6);
 }

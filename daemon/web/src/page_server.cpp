@@ -30,7 +30,9 @@ using Handling = httplib::Server::HandlerResponse;
 /// Besides one for each open page. More than the connections of one address, so that another one
 /// still gets an answer.
 constexpr std::size_t kThreadsForRequests = LimitedServer::kConnectionsOfAddress + 16;
-constexpr std::chrono::seconds kLongestWait{20};  ///< of a connection for a thread
+/// Of a connection for a thread, after which the watchdog restarts the page. Longer than the slowest
+/// client may read an answer: clients that fill all threads must not end the sessions of the others.
+constexpr std::chrono::minutes kLongestWait{5};
 constexpr std::size_t kLongestPath = 300;
 constexpr int kSendBuffer = 64 * 1024;      ///< limits what waits for a page that does not read
 constexpr std::string_view kApi = "/api/";  ///< requests that change something begin so

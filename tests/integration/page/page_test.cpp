@@ -158,7 +158,9 @@ TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
     for (const unsigned seed : {3U, 4U}) {
       const auto added = store->add(daemon::test::synthetic_document(seed), true, {}, actor);
       ASSERT_TRUE(added) << added.error().text;
-      if (seed == 3U) ASSERT_TRUE(store->activate(*added, actor));
+      if (seed == 3U) {
+        ASSERT_TRUE(store->activate(*added, actor));
+      }
     }
   }
   ASSERT_NO_FATAL_FAILURE(start_everything());

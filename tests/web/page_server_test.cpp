@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -36,7 +37,6 @@ using test::get_request;
 using test::kPassword;
 using ::testing::AllOf;
 using ::testing::Contains;
-using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -165,15 +165,19 @@ TEST_F(PageServerTest, AChangeDoesNotWaitForeverForAnotherOneNorDoesTheEnd) {
   ASSERT_NO_FATAL_FAILURE(start());
   const auto in = log_in("administer");
   const json id{{"id", "0123456789abcdef"}};
-  std::vector<int> statuses(2);
+  std::array<std::atomic<int>, 2> statuses{};
   std::vector<std::thread> users;
-  for (int& status : statuses)
-    users.emplace_back([&] { status = post(in.headers, "/api/activate", id); });
+  for (std::atomic<int>& status : statuses)
+    users.emplace_back([&in, &id, &status, port = page_->port()] {
+      httplib::Client client{"127.0.0.1", port};
+      const auto answer = client.Post("/api/activate", in.headers, id.dump(), "application/json");
+      status = answer ? answer->status : -1;
+    });
   // One of them waits for the store, which never answers; the other one for its turn.
   while (statuses[0] == 0 && statuses[1] == 0) std::this_thread::sleep_for(10ms);
   page_.reset();
   for (std::thread& user : users) user.join();
-  EXPECT_THAT(statuses, Each(503));
+  for (const std::atomic<int>& status : statuses) EXPECT_EQ(status, 503);
 }
 
 TEST_F(PageServerTest, AnAnswerOfAbbedWithoutPositionsIsAnEventWithoutPositions) {

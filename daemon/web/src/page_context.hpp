@@ -44,7 +44,7 @@ struct PageContext {
   PagePlaces pages;
   std::atomic<std::size_t> downloads{0};
   std::atomic<int> port{0};
-  std::timed_mutex changing;  // one change of a user at a time reaches abbed
+  std::mutex changing;  // one change of a user at a time reaches abbed
   std::atomic<bool> stopping{false};
   DaemonFeed feed;  // last: its thread uses the members above
 };

@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "abbe/web/client_network.hpp"
 #include "page_fixture.hpp"
 
 namespace abbe::web {
@@ -52,6 +53,23 @@ TEST_F(PageLimitsTest, AFloodOfRequestsIsRefusedByName) {
   }
   EXPECT_GT(refused, 50);
   EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: more than 40 requests/s: refused")));
+  // The connection ends with the refusal: a request that was sent with the refused one gets none.
+  std::string many;
+  for (int i = 0; i < 100; ++i) many += get_request("/api/me");
+  const std::string answers = all_of(connection(page_->port(), many));
+  EXPECT_EQ(count_of(answers, "HTTP/1.1 429 "), 1u) << answers;
+  EXPECT_THAT(answers, HasSubstr("Retry-After: 2\r\n"));
+  EXPECT_THAT(answers, ::testing::EndsWith("too many requests\"}"));
+}
+
+TEST(ClientNetwork, IsTheAddressOrTheNetworkOfIpv6) {
+  EXPECT_EQ(client_network("192.0.2.7"), "192.0.2.7");
+  EXPECT_EQ(client_network("2001:db8:0:1:2:3:4:5"), "2001:db8:0:1::/64");
+  EXPECT_EQ(client_network("2001:db8:0:1:ffff::9"), client_network("2001:db8:0:1::8"));
+  EXPECT_NE(client_network("2001:db8:0:2::9"), client_network("2001:db8:0:1::9"));
+  EXPECT_EQ(client_network("::1"), "::/64");
+  EXPECT_EQ(client_network("::ffff:192.0.2.7"), "192.0.2.7");
+  EXPECT_EQ(client_network(""), "");
 }
 
 TEST_F(PageLimitsTest, APageTooManyIsRefusedByName) {
@@ -87,6 +105,8 @@ TEST_F(PageLimitsTest, ARangeIsAnsweredWithTheWholeAndNothingBesideIt) {
       const auto answer = client.Get(path, {{"Range", range}});
       ASSERT_TRUE(answer) << range << path;
       EXPECT_EQ(answer->body, without) << range << path;
+      EXPECT_NE(answer->status, 206) << range << path;
+      EXPECT_FALSE(answer->has_header("Content-Range")) << range << path;
     }
   }
 }
@@ -314,6 +334,19 @@ TEST_F(PageLimitsTest, ManyConnectionsOfOneAddressLeaveAnotherItsAnswer) {
       connection(page_->port(), get_request("/api/me", "Connection: close\r\n"), "127.0.0.2");
   EXPECT_THAT(all_of(other), HasSubstr(" 200 "));
   EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: more than 48 connections: closed")));
+}
+
+// Of each address fewer than its limit, together more than there are threads.
+TEST_F(PageLimitsTest, SilentConnectionsOfSeveralAddressesEndWhileAnotherWaits) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n", kWriteTimeOut, 1h));
+  std::vector<daemon::FileDescriptor> silent;
+  for (const char* const address : {"127.0.0.1", "127.0.0.2"})
+    for (int i = 0; i < 45; ++i) silent.push_back(connection(page_->port(), "GET / HT", address));
+  const auto other =
+      connection(page_->port(), get_request("/api/me", "Connection: close\r\n"), "127.0.0.3");
+  EXPECT_THAT(all_of(other), HasSubstr(" 200 "));
+  EXPECT_THAT(log(),
+              Contains(HasSubstr("silent or slow for 2000 ms while other connections wait")));
 }
 
 TEST_F(PageLimitsTest, DownloadsThatNobodyReadsEndAndOthersGoOn) {

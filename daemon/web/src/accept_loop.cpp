@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <utility>
@@ -66,8 +67,17 @@ void AcceptLoop::run() {
     try {
       cycle();
     } catch (const std::exception& error) {
-      report_("accept", fmt::format("internal error: {}: a connection is closed", error.what()));
+      report_error(error);
     }
+  }
+}
+
+/// Also without memory for the line.
+void AcceptLoop::report_error(const std::exception& error) noexcept {
+  try {
+    report_("accept", fmt::format("internal error: {}: a connection is closed", error.what()));
+  } catch (const std::exception&) {
+    std::fputs("abbe-web: accept: internal error without memory: a connection is closed\n", stderr);
   }
 }
 
@@ -75,7 +85,8 @@ void AcceptLoop::cycle() {
   std::array<pollfd, 2> waits{pollfd{listener_, POLLIN, 0}, pollfd{wake_.get(), POLLIN, 0}};
   const int ready = ::poll(waits.data(), waits.size(), kCycle_ms);
   if (ready == 0) set_fault({});  // the clients of the last error have left
-  if (ready <= 0 || waits[0].revents == 0) return;
+  if (ready < 0) return wait_failed(errno);
+  if (ready == 0 || waits[0].revents == 0) return;
 
   daemon::FileDescriptor fd{::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)};
   if (!fd) return accept_failed(errno);
@@ -93,6 +104,16 @@ void AcceptLoop::accept_failed(int error) {
   ended_ = ends;
   pollfd wake{wake_.get(), POLLIN, 0};
   if (!ends) (void)::poll(&wake, 1, kPauseAfterError_ms);
+}
+
+/// poll() itself fails, for example without memory in the kernel: the pause is a sleep.
+void AcceptLoop::wait_failed(int error) {
+  if (error == EINTR) return;
+  std::this_thread::sleep_for(std::chrono::milliseconds{kPauseAfterError_ms});
+  std::string fault =
+      fmt::format("connections cannot be waited for: poll: {}: trying again", std::strerror(error));
+  report_("accept", fault);
+  set_fault(std::move(fault));
 }
 
 void AcceptLoop::set_fault(std::string fault) {

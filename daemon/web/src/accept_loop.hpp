@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -21,7 +22,8 @@ class AcceptLoop {
   using Report = std::function<void(const std::string& subject, const std::string& line)>;
 
   /// `listener`: a listening socket, which must exist as long as the loop; it becomes non-blocking.
-  /// `take` receives each connection, and must not wait. `report`: as of LimitedReport.
+  /// `take` receives each connection, and must not wait. `report`: as of LimitedReport. Throws
+  /// std::system_error if the thread cannot be created.
   AcceptLoop(int listener, Take take, Report report);
   AcceptLoop(const AcceptLoop&) = delete;
   AcceptLoop& operator=(const AcceptLoop&) = delete;
@@ -36,6 +38,8 @@ class AcceptLoop {
   void run();
   void cycle();
   void accept_failed(int error);
+  void wait_failed(int error);
+  void report_error(const std::exception& error) noexcept;
   void set_fault(std::string fault);
 
   int listener_;

@@ -16,7 +16,7 @@
 namespace abbe::web {
 namespace {
 
-constexpr std::chrono::milliseconds kWaitStep{200};  ///< between two looks at `stopping`
+constexpr std::chrono::milliseconds kWaitStep{200};  ///< between two looks at ConnectionWatch
 
 using ReadName = int(int, sockaddr*, socklen_t*);  ///< ::getpeername or ::getsockname
 
@@ -45,8 +45,8 @@ std::string client_address(int fd) {
 }
 
 ConnectionStream::ConnectionStream(int fd, SSL_CTX* tls, ConnectionLimits limits,
-                                   std::function<bool()> stopping)
-    : fd_(fd), limits_(limits), stopping_(std::move(stopping)) {
+                                   ConnectionWatch watch)
+    : fd_(fd), limits_(limits), watch_(std::move(watch)) {
   (void)::fcntl(fd_, F_SETFL, ::fcntl(fd_, F_GETFL) | O_NONBLOCK);
   if (tls == nullptr) return;
   tls_.reset(SSL_new(tls));
@@ -58,15 +58,23 @@ ConnectionStream::~ConnectionStream() {
   ERR_clear_error();  // the next connection of this thread would take an error for its own
 }
 
-bool ConnectionStream::wait(short events, Clock::time_point until) const {
+bool ConnectionStream::wait(short events, Clock::time_point until,
+                            Clock::time_point until_if_crowded) const {
   for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
-    if (left.count() <= 0 || stopping_()) return false;
+    crowded_out_ = until_if_crowded < until && watch_.crowded();
+    const auto end = crowded_out_ ? until_if_crowded : until;
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    if (left.count() <= 0 || watch_.stopping()) return false;
     pollfd polled{.fd = fd_, .events = events, .revents = 0};
     const int ready = ::poll(&polled, 1, static_cast<int>(std::min(left, kWaitStep).count()));
     if (ready > 0) return true;
     if (ready < 0 && errno != EINTR) return false;
   }
+}
+
+/// For more of a request, or of the handshake before the first one.
+bool ConnectionStream::wait_for_client(short events) const {
+  return wait(events, request_since_ + limits_.request_time, request_since_ + kCrowdedTime);
 }
 
 short ConnectionStream::event_for(int tls_result) const {
@@ -83,22 +91,22 @@ short ConnectionStream::event_for(int tls_result) const {
 
 bool ConnectionStream::accept() {
   if (!tls_) return false;
-  const auto until = Clock::now() + limits_.request_time;
   for (;;) {
     const int done = SSL_accept(tls_.get());
     if (done == 1) return true;
     const short event = event_for(done);
-    if (event == 0 || !wait(event, until)) return false;
+    if (event == 0 || !wait_for_client(event)) return false;
   }
 }
 
 bool ConnectionStream::wait_for_request(std::chrono::milliseconds time_out) {
   if (at_ < filled_ || (tls_ && SSL_pending(tls_.get()) > 0)) return true;
-  return wait(POLLIN, Clock::now() + time_out);
+  const auto until = Clock::now() + time_out;
+  return wait(POLLIN, until, until);
 }
 
 bool ConnectionStream::read_head() {
-  request_until_ = Clock::now() + limits_.request_time;
+  request_since_ = Clock::now();
   sent_ = 0;
   waited_ = {};
   std::copy(buffer_.data() + at_, buffer_.data() + filled_, buffer_.data());
@@ -141,7 +149,7 @@ bool ConnectionStream::check_head(std::size_t end) {
 }
 
 bool ConnectionStream::is_readable() const {
-  return at_ < filled_ || wait(POLLIN, request_until_);
+  return at_ < filled_ || wait_for_client(POLLIN);
 }
 
 bool ConnectionStream::is_writable() const {
@@ -151,11 +159,12 @@ bool ConnectionStream::is_writable() const {
 bool ConnectionStream::wait_for_reader(short events) const {
   const auto begin = Clock::now();
   const auto for_sent = std::chrono::seconds{sent_ / kSlowestReader_bytes_per_s};
-  const auto most = std::min<std::chrono::nanoseconds>(limits_.write_time,
-                                                       limits_.write_time + for_sent - waited_);
-  const bool ready = wait(events, begin + most);
+  const auto end = [&](std::chrono::milliseconds time) {
+    return begin + std::min<std::chrono::nanoseconds>(time, time + for_sent - waited_);
+  };
+  const bool ready = wait(events, end(limits_.write_time), end(kCrowdedTime));
   waited_ += Clock::now() - begin;
-  if (!ready && !stopping_()) fault_ = Fault::SlowReader;
+  if (!ready && !watch_.stopping()) fault_ = crowded_out_ ? Fault::Crowded : Fault::SlowReader;
   return ready;
 }
 
@@ -191,8 +200,8 @@ ssize_t ConnectionStream::receive(char* to, std::size_t size) {
       if (errno != EAGAIN && errno != EINTR) return -1;
     }
     if (event == 0) return -1;
-    if (wait(event, request_until_)) continue;
-    if (!stopping_()) fault_ = Fault::SlowRequest;
+    if (wait_for_client(event)) continue;
+    if (!watch_.stopping()) fault_ = crowded_out_ ? Fault::Crowded : Fault::SlowRequest;
     return -1;
   }
 }

@@ -23,8 +23,18 @@ inline constexpr std::size_t kMostHeadBytes = 32 * 1024, kMostHeadLines = 100;
 /// A client that reads slower than this on average does not get the whole answer.
 inline constexpr std::size_t kSlowestReader_bytes_per_s = 4096;
 
+/// While connections wait for a thread, a request, and the reader of an answer, get this time instead
+/// of that of ConnectionLimits: silent clients of several addresses cannot keep all threads.
+inline constexpr std::chrono::milliseconds kCrowdedTime{2000};
+
 /// Numeric address of the client of a connection; empty if it has left.
 [[nodiscard]] std::string client_address(int fd);
+
+/// What a connection looks at while it waits.
+struct ConnectionWatch {
+  std::function<bool()> stopping;  ///< ends all waiting
+  std::function<bool()> crowded;   ///< connections wait for a thread
+};
 
 /// One connection of a browser, with or without TLS. Reads at most the bytes and the time of one
 /// request, and waits for a slow reader for a limited time; httplib itself has no limit of the lines
@@ -32,11 +42,10 @@ inline constexpr std::size_t kSlowestReader_bytes_per_s = 4096;
 class ConnectionStream final : public httplib::Stream {
  public:
   using Clock = std::chrono::steady_clock;
-  enum class Fault { None, LongHead, LongBody, SlowRequest, SlowReader };
+  enum class Fault { None, LongHead, LongBody, SlowRequest, SlowReader, Crowded };
 
-  /// Does not close `fd`, which becomes non-blocking. `tls`: null without TLS. `stopping`: ends all
-  /// waiting.
-  ConnectionStream(int fd, SSL_CTX* tls, ConnectionLimits limits, std::function<bool()> stopping);
+  /// Does not close `fd`, which becomes non-blocking. `tls`: null without TLS.
+  ConnectionStream(int fd, SSL_CTX* tls, ConnectionLimits limits, ConnectionWatch watch);
   ConnectionStream(const ConnectionStream&) = delete;
   ConnectionStream& operator=(const ConnectionStream&) = delete;
   ~ConnectionStream() override;
@@ -62,8 +71,10 @@ class ConnectionStream final : public httplib::Stream {
   struct FreeTls {
     void operator()(SSL* tls) const { SSL_free(tls); }
   };
-  /// Waits for poll events, in short steps because of `stopping`.
-  [[nodiscard]] bool wait(short events, Clock::time_point until) const;
+  /// Waits for poll events, in short steps because of ConnectionWatch.
+  [[nodiscard]] bool wait(short events, Clock::time_point until,
+                          Clock::time_point until_if_crowded) const;
+  [[nodiscard]] bool wait_for_client(short events) const;
   /// The event that TLS needs before it can go on; 0: it failed.
   [[nodiscard]] short event_for(int tls_result) const;
   /// At most `size` bytes from the client; 0: it has left, -1: a fault.
@@ -76,13 +87,14 @@ class ConnectionStream final : public httplib::Stream {
   int fd_;
   std::unique_ptr<SSL, FreeTls> tls_;
   ConnectionLimits limits_;
-  std::function<bool()> stopping_;
+  ConnectionWatch watch_;
   std::array<char, kMostHeadBytes> buffer_{};
   std::size_t at_ = 0, filled_ = 0;  ///< unread: buffer_[at_] to buffer_[filled_ - 1]
   std::size_t left_ = 0;             ///< bytes of this request that may still be read
-  Clock::time_point request_until_{};
+  Clock::time_point request_since_ = Clock::now();
   std::size_t sent_ = 0;                        ///< bytes of the answer
   mutable std::chrono::nanoseconds waited_{0};  ///< for the client to read the answer
+  mutable bool crowded_out_ = false;            ///< the last wait() ended early
   mutable Fault fault_ = Fault::None;           ///< is_writable() of httplib is const
 };
 

@@ -10,6 +10,9 @@
 #include <string_view>
 #include <utility>
 
+#include "abbe/web/client_network.hpp"
+#include "abbe/web/page_server.hpp"
+
 namespace abbe::web {
 namespace {
 
@@ -21,7 +24,9 @@ constexpr std::chrono::milliseconds kDiscardTime{1000}, kDiscardStep{200};
 /// Answers a head that httplib does not get to see.
 void refuse_head(ConnectionStream& stream) {
   const bool is_long = stream.fault() == ConnectionStream::Fault::LongHead;
-  if (!is_long && stream.fault() != ConnectionStream::Fault::SlowRequest) return;
+  if (!is_long && stream.fault() != ConnectionStream::Fault::SlowRequest &&
+      stream.fault() != ConnectionStream::Fault::Crowded)
+    return;
   const std::string_view status =
       is_long ? "431 Request Header Fields Too Large" : "408 Request Timeout";
   const std::string answer =
@@ -31,9 +36,8 @@ void refuse_head(ConnectionStream& stream) {
 
 }  // namespace
 
-LimitedServer::LimitedServer(TlsContext tls, ConnectionLimits limits,
-                             std::function<void(const std::string&, const std::string&)> report)
-    : tls_(std::move(tls)), limits_(limits), report_(std::move(report)) {
+LimitedServer::LimitedServer(TlsContext tls, ConnectionLimits limits, Calls calls)
+    : tls_(std::move(tls)), limits_(limits), calls_(std::move(calls)) {
   set_keep_alive_max_count(kRequestsOfConnection);  // stated in answers
   set_keep_alive_timeout(kBetweenRequests.count());
 }
@@ -49,42 +53,51 @@ int LimitedServer::listener() {
 }
 
 std::shared_ptr<void> LimitedServer::place_for(const std::string& address) {
+  const std::string network = client_network(address);
+  const auto leave = [this, network](void*) {
+    const std::lock_guard leaving(mutex_);
+    const auto at = connections_.find(network);
+    if (at != connections_.end() && --at->second == 0) connections_.erase(at);
+  };
+  bool has_place = false;
   {
     const std::lock_guard lock(mutex_);
-    std::size_t& open = connections_[address];
-    if (open < kConnectionsOfAddress) {
-      ++open;
-      return {this, [this, address](void*) {
-                const std::lock_guard leaving(mutex_);
-                const auto at = connections_.find(address);
-                if (at != connections_.end() && --at->second == 0) connections_.erase(at);
-              }};
-    }
+    std::size_t& open = connections_[network];
+    has_place = open < kConnectionsOfAddress;
+    if (has_place) ++open;
   }
-  report_("connections " + address,
-          fmt::format("{}: more than {} connections: closed", address, kConnectionsOfAddress));
+  // Without the lock: std::shared_ptr calls `leave` if it finds no memory for itself.
+  if (has_place) return {this, leave};
+  calls_.report("connections " + network, fmt::format("{}: more than {} connections: closed",
+                                                      network, kConnectionsOfAddress));
   return nullptr;
 }
 
-void LimitedServer::serve_connection(daemon::FileDescriptor fd, const std::string& address) {
+void LimitedServer::serve_connection(daemon::FileDescriptor fd, const std::string& address,
+                                     const std::function<bool()>& crowded) {
   const unsigned vanished_ms = kVanished.count();
   const int without_delay = 1;
   (void)::setsockopt(fd.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &vanished_ms, sizeof vanished_ms);
   (void)::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &without_delay, sizeof without_delay);
   bool unread = false;
   {
-    ConnectionStream stream(fd.get(), tls_.get(), limits_, [this] { return stopping_.load(); });
-    if (!tls_ || stream.accept()) unread = serve(stream);
+    ConnectionStream stream(fd.get(), tls_.get(), limits_,
+                            {[this] { return stopping_.load(); }, crowded});
+    if (!tls_ || stream.accept()) unread = serve(stream, address);
     report_fault(stream, address);
   }
   if (unread) discard_input(fd.get());
 }
 
-bool LimitedServer::serve(ConnectionStream& stream) {
+bool LimitedServer::serve(ConnectionStream& stream, const std::string& address) {
   for (std::size_t n = 1; n <= kRequestsOfConnection; ++n) {
     if (!stream.wait_for_request(kBetweenRequests)) return false;
     if (!stream.read_head()) {
       refuse_head(stream);
+      return true;
+    }
+    if (!calls_.admits(client_network(address))) {
+      refuse_rate(stream, address);
       return true;
     }
     bool closed = false, unread = true;  // also if the request cannot be parsed
@@ -94,6 +107,18 @@ bool LimitedServer::serve(ConnectionStream& stream) {
     if (!served || closed || unread) return unread;
   }
   return false;
+}
+
+/// Before the request is parsed. The connection ends: a flood keeps no thread.
+void LimitedServer::refuse_rate(ConnectionStream& stream, const std::string& address) {
+  constexpr std::string_view kBody = R"({"error":"too many requests"})";
+  const std::string answer = fmt::format(
+      "HTTP/1.1 429 Too Many Requests\r\nConnection: close\r\nRetry-After: 2\r\n"
+      "Cache-Control: no-store\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{}",
+      kBody.size(), kBody);
+  (void)stream.write(answer.data(), answer.size());
+  calls_.report("rate " + client_network(address),
+                fmt::format("{}: more than {} requests/s: refused", address, kRequestsPerSecond));
 }
 
 void LimitedServer::discard_input(int fd) const {
@@ -111,20 +136,29 @@ void LimitedServer::report_fault(const ConnectionStream& stream, const std::stri
   using Fault = ConnectionStream::Fault;
   switch (stream.fault()) {
     case Fault::LongHead:
-      return report_("large " + address,
-                     fmt::format("{}: a request with more than {} bytes or {} lines before its "
-                                 "body: closed",
-                                 address, kMostHeadBytes, kMostHeadLines));
+      return calls_.report(
+          "large " + address,
+          fmt::format("{}: a request with more than {} bytes or {} lines before its "
+                      "body: closed",
+                      address, kMostHeadBytes, kMostHeadLines));
     case Fault::LongBody:
-      return report_("large " + address, fmt::format("{}: a request of more than {} bytes: closed",
-                                                     address, limits_.body_bytes));
+      return calls_.report(
+          "large " + address,
+          fmt::format("{}: a request of more than {} bytes: closed", address, limits_.body_bytes));
     case Fault::SlowRequest:
-      return report_("slow " + address, fmt::format("{}: a request took longer than {} ms: closed",
-                                                    address, limits_.request_time.count()));
+      return calls_.report("slow " + address,
+                           fmt::format("{}: a request took longer than {} ms: closed", address,
+                                       limits_.request_time.count()));
     case Fault::SlowReader:
-      return report_("unread " + address,
-                     fmt::format("{}: an answer is not read, or by less than {} bytes/s: closed",
-                                 address, kSlowestReader_bytes_per_s));
+      return calls_.report(
+          "unread " + address,
+          fmt::format("{}: an answer is not read, or by less than {} bytes/s: closed", address,
+                      kSlowestReader_bytes_per_s));
+    case Fault::Crowded:
+      return calls_.report("crowded " + client_network(address),
+                           fmt::format("{}: silent or slow for {} ms while other connections wait "
+                                       "for a thread: closed",
+                                       address, kCrowdedTime.count()));
     case Fault::None:
       return;
   }

@@ -31,9 +31,16 @@ class LimitedServer final : public httplib::Server {
   static constexpr std::size_t kRequestsOfConnection = 200;
   static constexpr std::chrono::seconds kBetweenRequests{1};
 
-  /// `tls`: null without TLS. `report`: a subject, as in LimitedReport, and a line. Any thread.
-  LimitedServer(TlsContext tls, ConnectionLimits limits,
-                std::function<void(const std::string&, const std::string&)> report);
+  /// What the server calls, from any thread.
+  struct Calls {
+    /// A subject, as in LimitedReport, and a line.
+    std::function<void(const std::string&, const std::string&)> report;
+    /// False if a client (client_network()) sends too many requests.
+    std::function<bool(const std::string& network)> admits;
+  };
+
+  /// `tls`: null without TLS.
+  LimitedServer(TlsContext tls, ConnectionLimits limits, Calls calls);
   LimitedServer(const LimitedServer&) = delete;
   LimitedServer& operator=(const LimitedServer&) = delete;
   ~LimitedServer() override;
@@ -44,15 +51,18 @@ class LimitedServer final : public httplib::Server {
   /// Ends all waiting of open connections.
   void end_connections() { stopping_ = true; }
 
-  /// A place for a connection of `address`, which its destructor gives back; null if the address has
-  /// kConnectionsOfAddress already. Any thread.
+  /// A place for a connection of `address`, which its destructor gives back; null if its network
+  /// (client_network()) has kConnectionsOfAddress already. Any thread.
   [[nodiscard]] std::shared_ptr<void> place_for(const std::string& address);
-  /// Serves the requests of a connection, and closes it. Any thread.
-  void serve_connection(daemon::FileDescriptor fd, const std::string& address);
+  /// Serves the requests of a connection, and closes it. `crowded`: of ConnectionWatch. Any thread.
+  void serve_connection(daemon::FileDescriptor fd, const std::string& address,
+                        const std::function<bool()>& crowded);
 
  private:
   /// True if input of the client may be unread.
-  [[nodiscard]] bool serve(ConnectionStream& stream);
+  [[nodiscard]] bool serve(ConnectionStream& stream, const std::string& address);
+  /// Answers a request that admits() refuses.
+  void refuse_rate(ConnectionStream& stream, const std::string& address);
   void report_fault(const ConnectionStream& stream, const std::string& address);
   /// Reads what the client still sends: after close() with unread input the kernel would discard the
   /// answer (RFC 9112, 9.6).
@@ -60,10 +70,10 @@ class LimitedServer final : public httplib::Server {
 
   TlsContext tls_;
   ConnectionLimits limits_;
-  std::function<void(const std::string&, const std::string&)> report_;
+  Calls calls_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
-  std::map<std::string, std::size_t> connections_;  ///< open ones by address; of mutex_
+  std::map<std::string, std::size_t> connections_;  ///< open ones by network; of mutex_
 };
 
 /// A request that announces a body.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -182,9 +183,14 @@ Result<std::string> ModelViews::kept(const std::string& key, const std::string& 
                                      std::mutex& one_at_a_time,
                                      const std::function<Result<std::string>()>& make) {
   if (auto known = find_kept(key, stamp)) return std::move(*known);
-  const std::lock_guard one(one_at_a_time);
+  const auto turn = turn_of(one_at_a_time);
   if (auto known = find_kept(key, stamp)) return std::move(*known);  // made meanwhile
   if (stopping_) return daemon::fail(daemon::ErrorCode::Io, "abbe-web stops");
+  if (!turn)
+    return daemon::fail(daemon::ErrorCode::Io,
+                        fmt::format("{}: other views have been made for {} s: try again in some "
+                                    "seconds",
+                                    key, kPatience.count()));
   auto text = make();
   if (!text) return text;
   const std::lock_guard lock(mutex_);
@@ -192,6 +198,16 @@ Result<std::string> ModelViews::kept(const std::string& key, const std::string& 
     kept_.erase(std::ranges::min_element(kept_, {}, [](const auto& k) { return k.second.used; }));
   kept_[key] = {stamp, *text, ++calls_};
   return text;
+}
+
+std::unique_lock<std::mutex> ModelViews::turn_of(std::mutex& one_at_a_time) const {
+  constexpr std::chrono::milliseconds kPeriod{20};
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  std::unique_lock lock(one_at_a_time, std::defer_lock);
+  // ThreadSanitizer of g++ 12 does not know the lock with a time-out of std::timed_mutex.
+  while (!lock.try_lock() && !stopping_ && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(kPeriod);
+  return lock;
 }
 
 std::optional<std::string> ModelViews::find_kept(const std::string& key, const std::string& stamp) {
@@ -204,7 +220,7 @@ std::optional<std::string> ModelViews::find_kept(const std::string& key, const s
 
 Result<std::string> ModelViews::history() {
   const ModelStore store{store_};
-  return kept("history", stamp_of(store), making_list_, [&store] { return history_text(store); });
+  return kept("history", stamp_of(store), making_history_, [&store] { return history_text(store); });
 }
 
 Result<std::string> ModelViews::model(const std::string& name) {
@@ -221,7 +237,7 @@ Result<std::string> ModelViews::model(const std::string& name) {
 
 Result<std::string> ModelViews::trend() {
   const ModelStore store{store_};
-  return kept("trend", stamp_of(store), making_list_, [&store] { return trend_text(store); });
+  return kept("trend", stamp_of(store), making_trend_, [&store] { return trend_text(store); });
 }
 
 Result<std::string> ModelViews::report(const std::string& name) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 
+#include "abbe/web/client_network.hpp"
 #include "page_context.hpp"
 #include "responses.hpp"
 
@@ -16,6 +17,7 @@ constexpr std::chrono::milliseconds kHeartbeat{1000};
 
 /// The stream of one page.
 struct Stream {
+  PagePlaces::Held place;
   EventBoard::Reader reader;
   httplib::Request request;  ///< with the cookie
   Clock::time_point sent = Clock::now();
@@ -45,9 +47,9 @@ bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) 
 }
 
 /// False, with an answer, if there is no place for the page.
-bool take_place(PageContext& context, const httplib::Request& request,
-                httplib::Response& response) {
-  const auto place = context.pages.take(request.remote_addr);
+bool take_place(PageContext& context, const httplib::Request& request, httplib::Response& response,
+                PagePlaces::Held& held) {
+  const auto place = context.pages.take(client_network(request.remote_addr), held);
   if (place == PagePlaces::Place::Taken) return true;
   const bool of_address = place == PagePlaces::Place::AllOfAddressTaken;
   const std::size_t most =
@@ -68,14 +70,13 @@ void answer_events(PageContext& context, const httplib::Request& request,
     return send_error(response, 505, "the stream of events needs HTTP/1.1");
   const auto stream = std::make_shared<Stream>();
   stream->request.headers = request.headers;
-  if (!take_place(context, request, response)) return;
+  if (!take_place(context, request, response, stream->place)) return;
   response.set_chunked_content_provider(
       "text/event-stream",
       [&context, stream](std::size_t, httplib::DataSink& sink) {
         return send_events(context, *stream, sink);
       },
       [&context, stream, peer = peer_of(request), address = request.remote_addr](bool success) {
-        context.pages.leave(address);
         const auto patience = context.options.write_time_out;
         if (success || Clock::now() - stream->sent < patience) return;
         context.report.line("unread " + address,

@@ -8,6 +8,7 @@
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/web/client_network.hpp"
 #include "calibration_task.hpp"
 #include "page_context.hpp"
 #include "responses.hpp"
@@ -81,7 +82,7 @@ void log_in(PageContext& context, const httplib::Request& request, const json& b
             httplib::Response& response) {
   const auto user = body.at("user").get<std::string>();
   const auto session = context.sessions.log_in(user, body.at("password").get<std::string>(),
-                                               request.remote_addr, Clock::now());
+                                               client_network(request.remote_addr), Clock::now());
   if (!session) {
     context.report.line("log in " + request.remote_addr,
                         fmt::format("{}: log in as \"{}\" refused: {}", peer_of(request),

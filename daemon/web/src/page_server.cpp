@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "abbe/web/certificate.hpp"
@@ -33,6 +34,8 @@ constexpr std::size_t kThreadsForRequests = LimitedServer::kConnectionsOfAddress
 /// Of a connection for a thread, after which the watchdog restarts the page. Longer than the slowest
 /// client may read an answer: clients that fill all threads must not end the sessions of the others.
 constexpr std::chrono::minutes kLongestWait{5};
+/// Of a connection for a thread, after which silent and slow clients get only kCrowdedTime.
+constexpr std::chrono::milliseconds kCrowdedAfter{500};
 constexpr std::size_t kLongestPath = 300;
 constexpr int kSendBuffer = 64 * 1024;      ///< limits what waits for a page that does not read
 constexpr std::string_view kApi = "/api/";  ///< requests that change something begin so
@@ -85,9 +88,12 @@ class HttpPageServer final : public PageServer {
                 {.body_bytes = kMostRequestBytes + kMostRequestBytes / 2,
                  .request_time = context_.options.request_time,
                  .write_time = context_.options.write_time_out},
-                [this](const std::string& subject, const std::string& line) {
-                  context_.report.line(subject, line);
-                }) {
+                {.report = [this](const std::string& subject,
+                                  const std::string& line) { context_.report.line(subject, line); },
+                 .admits =
+                     [this](const std::string& network) {
+                       return context_.rate.take(network, std::chrono::steady_clock::now());
+                     }}) {
     set_limits();
     server_.set_pre_routing_handler(
         [this](const httplib::Request& request, httplib::Response& response) {
@@ -142,8 +148,15 @@ class HttpPageServer final : public PageServer {
     const auto report = [this](const std::string& subject, const std::string& line) {
       context_.report.line(subject, line);
     };
-    accepting_.emplace(
-        server_.listener(), [this](daemon::FileDescriptor fd) { take(std::move(fd)); }, report);
+    try {
+      accepting_.emplace(
+          server_.listener(), [this](daemon::FileDescriptor fd) { take(std::move(fd)); }, report);
+    } catch (const std::system_error& error) {
+      return daemon::fail(ErrorCode::Io,
+                          fmt::format("start the thread that accepts connections: {} (TasksMax= of "
+                                      "the unit, or the limit of processes of the user)",
+                                      error.code().message()));
+    }
     return {};
   }
   [[nodiscard]] std::string fault() const override {
@@ -170,8 +183,10 @@ class HttpPageServer final : public PageServer {
     if (place == nullptr) return;
     // std::function copies what it holds.
     const auto kept = std::make_shared<daemon::FileDescriptor>(std::move(fd));
-    if (workers_->enqueue([this, kept, address, place = std::move(place)] {
-          server_.serve_connection(std::move(*kept), address);
+    if (workers_->enqueue([this, kept, address, place = std::move(place)](const WorkerPool& pool) {
+          server_.serve_connection(std::move(*kept), address, [&pool] {
+            return pool.longest_wait(WorkerPool::Clock::now()) > kCrowdedAfter;
+          });
         }))
       return;
     context_.report.line("waiting", fmt::format("{}: closed: {} connections wait already", address,
@@ -180,14 +195,6 @@ class HttpPageServer final : public PageServer {
 
   Handling before_routing(const httplib::Request& request, httplib::Response& response) {
     add_security_headers(response);
-    if (!context_.rate.take(request.remote_addr, std::chrono::steady_clock::now())) {
-      context_.report.line("rate " + request.remote_addr,
-                           fmt::format("{}: more than {} requests/s: refused", request.remote_addr,
-                                       kRequestsPerSecond));
-      response.set_header("Retry-After", "2");
-      send_error(response, 429, "too many requests");
-      return Handling::Handled;
-    }
     if (!is_own_name(request.get_header_value("Host"), context_.options.settings.web)) {
       const std::string host = request.get_header_value("Host").substr(0, 80);
       context_.report.line("host", fmt::format("{}: refused: \"{}\" is not a name of this page "

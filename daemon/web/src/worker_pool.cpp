@@ -34,7 +34,7 @@ WorkerPool::~WorkerPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-bool WorkerPool::enqueue(std::function<void()> serve) {
+bool WorkerPool::enqueue(Serve serve) {
   {
     const std::lock_guard lock(mutex_);
     if (waiting_.size() >= kMostWaiting) return false;
@@ -64,9 +64,9 @@ void WorkerPool::work() {
 }
 
 /// A connection that throws, for example because memory is short, ends; its thread does not.
-void WorkerPool::serve(const std::function<void()>& task) {
+void WorkerPool::serve(const Serve& task) {
   try {
-    task();
+    task(*this);
   } catch (const std::exception& error) {
     report_(fmt::format("internal error: {}: the connection is closed", error.what()));
   } catch (...) {

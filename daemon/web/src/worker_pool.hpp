@@ -19,6 +19,8 @@ namespace abbe::web {
 class WorkerPool {
  public:
   using Clock = std::chrono::steady_clock;
+  /// Serves a connection; gets the pool, whose longest_wait() tells whether others wait.
+  using Serve = std::function<void(const WorkerPool&)>;
   static constexpr std::size_t kMostWaiting = 64;
 
   /// Io if the threads cannot be created. `report` receives a line for each task that throws; any
@@ -31,20 +33,20 @@ class WorkerPool {
   ~WorkerPool();
 
   /// False if kMostWaiting connections wait already; `serve` is then not called.
-  [[nodiscard]] bool enqueue(std::function<void()> serve);
+  [[nodiscard]] bool enqueue(Serve serve);
   /// How long the connection that waits longest has waited; 0: none waits.
   [[nodiscard]] std::chrono::nanoseconds longest_wait(Clock::time_point now) const;
 
  private:
   struct Waiting {
-    std::function<void()> serve;
+    Serve serve;
     Clock::time_point since;
   };
 
   explicit WorkerPool(std::function<void(const std::string&)> report)
       : report_(std::move(report)) {}
   void work();
-  void serve(const std::function<void()>& task);
+  void serve(const Serve& task);
 
   std::function<void(const std::string&)> report_;
   mutable std::mutex mutex_;  // of the members below

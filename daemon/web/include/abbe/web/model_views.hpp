@@ -4,6 +4,7 @@
 /// made of have the same inode, time and size. Thread-safe.
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -18,6 +19,9 @@ namespace abbe::web {
 
 class ModelViews {
  public:
+  /// Of a request for a view, while another one is made.
+  static constexpr std::chrono::seconds kPatience{10};
+
   explicit ModelViews(std::filesystem::path store) : store_(std::move(store)) {}
 
   /// Views that wait for others to be made end with an Error.
@@ -43,17 +47,20 @@ class ModelViews {
     std::string stamp, text;
     std::uint64_t used = 0;  ///< number of the call that used it last
   };
-  /// The kept text, or the one that `make` makes.
+  /// The kept text, or the one that `make` makes. Io if another view takes longer than kPatience.
   [[nodiscard]] daemon::Result<std::string> kept(
       const std::string& key, const std::string& stamp, std::mutex& one_at_a_time,
       const std::function<daemon::Result<std::string>()>& make);
+  /// Without ownership: others take longer than kPatience, or stop() was called.
+  [[nodiscard]] std::unique_lock<std::mutex> turn_of(std::mutex& one_at_a_time) const;
   [[nodiscard]] std::optional<std::string> find_kept(const std::string& key,
                                                      const std::string& stamp);
 
   std::filesystem::path store_;
   std::atomic<bool> stopping_{false};
-  std::mutex making_model_, making_list_;  // one at a time: each takes much of a processor
-  std::mutex mutex_;                       // of the members below
+  // One at a time, because each takes much of a processor.
+  std::mutex making_model_, making_history_, making_trend_;
+  std::mutex mutex_;  // of the members below
   std::map<std::string, Kept> kept_;
   std::uint64_t calls_ = 0;
 };

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/sha256.hpp"
 #include "abbe/web/certificate.hpp"
 #include "page_fixture.hpp"
 
@@ -130,6 +131,65 @@ TEST_F(PageServerTest, EventsEndWhenTheirUserLogsOut) {
   EXPECT_EQ(first, 'H');  // of HTTP
   EXPECT_EQ(post(in.headers, "/api/logout", json::object()), 200);
   EXPECT_THAT(all_of(events), HasSubstr(" 200 "));  // and then the end
+}
+
+TEST_F(PageServerTest, TheConfigurationHasTheHashOfItsFile) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  const auto hash = [this] {
+    return json::parse(browser().Get("/api/configuration")->body).value("sha256", "");
+  };
+  const std::string before = hash();
+  EXPECT_EQ(before, daemon::sha256_hex_of_file(folder_ / "abbed.toml").value());
+  write("abbed.toml", "[machine]\n");  // faults do not hide it
+  EXPECT_NE(hash(), before);
+  EXPECT_EQ(hash(), daemon::sha256_hex_of_file(folder_ / "abbed.toml").value());
+}
+
+TEST_F(PageServerTest, ADownloadGoesOnAfterABreak) {
+  std::filesystem::create_directories(folder_ / "data/recordings");
+  std::string bytes;
+  for (int i = 0; bytes.size() < 300'000; ++i) bytes += fmt::format("{},", i);
+  write("data/recordings/a.mcap", bytes);
+  ASSERT_NO_FATAL_FAILURE(start());
+  auto client = browser();
+  std::string first, etag;
+  (void)client.Get(
+      "/recordings/a.mcap",
+      [&](const httplib::Response& answer) {
+        etag = answer.get_header_value("ETag");
+        return answer.status == 200 && answer.get_header_value("Accept-Ranges") == "bytes";
+      },
+      [&](const char* part, std::size_t size) {
+        first.append(part, size);
+        return first.size() < 100'000;
+      });
+  ASSERT_GE(first.size(), 100'000u);
+  ASSERT_LT(first.size(), bytes.size());
+
+  const auto rest_of = [&](const std::string& range, const std::string& if_range) {
+    return browser().Get("/recordings/a.mcap", {{"Range", range}, {"If-Range", if_range}});
+  };
+  const std::string range = fmt::format("bytes={}-", first.size());
+  const auto rest = rest_of(range, etag);
+  ASSERT_TRUE(rest);
+  EXPECT_EQ(rest->status, 206);
+  EXPECT_EQ(rest->get_header_value("Content-Range"),
+            fmt::format("bytes {}-{}/{}", first.size(), bytes.size() - 1, bytes.size()));
+  EXPECT_EQ(first + rest->body, bytes);
+
+  const auto beyond = rest_of(fmt::format("bytes={}-", bytes.size()), etag);
+  EXPECT_EQ(beyond->status, 416);
+  EXPECT_EQ(beyond->get_header_value("Content-Range"), fmt::format("bytes */{}", bytes.size()));
+  EXPECT_EQ(rest_of("bytes=0-1,5-6", etag)->body, bytes) << "several ranges: the whole";
+
+  write("data/recordings/a.mcap", bytes + "more");  // another recording of the same name
+  const auto other = rest_of(range, etag);
+  EXPECT_EQ(other->status, 200);
+  EXPECT_EQ(other->body, bytes + "more");
+  write("data/recordings/b.mcap.part", bytes);  // still grows
+  const auto running = browser().Get("/recordings/b.mcap.part", {{"Range", range}});
+  EXPECT_EQ(running->status, 200);
+  EXPECT_FALSE(running->has_header("ETag"));
 }
 
 TEST_F(PageServerTest, ARecordingWithAForgedNameIsNotServed) {

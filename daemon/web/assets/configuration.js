@@ -4,8 +4,9 @@ import { facts, h, list } from "./dom.js";
 import { get } from "./server.js";
 
 export async function show(place) {
-  const { file, understood, warnings, faults } = await get("api/configuration");
+  const { file, sha256, understood, warnings, faults } = await get("api/configuration");
   place.append(h("h2", {}, `Configuration ${file}`));
+  if (sha256) place.append(h("p", {}, "SHA-256 of the file: ", h("code", {}, sha256)));
   if (faults) {
     place.append(h("p", { class: "bad" }, "The file has faults:"), list(faults));
     return;

@@ -139,10 +139,9 @@ bool ConnectionStream::check_head(std::size_t end) {
       fault_ = Fault::LongHead;
       return false;
     }
-    // httplib matches ranges with std::regex, whose recursion grows with the text. The page answers
-    // no ranges: the header gets a name that httplib does not know.
     constexpr std::string_view kRange = "range";
-    if (::strncasecmp(rest.data(), kRange.data(), kRange.size()) == 0) buffer_[begin] = 'x';
+    if (::strncasecmp(rest.data(), kRange.data(), kRange.size()) == 0)
+      buffer_[begin] = kRangeHeader[0];
     begin += size;
   }
   return true;

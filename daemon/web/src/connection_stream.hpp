@@ -20,6 +20,9 @@ struct ConnectionLimits {
 
 /// Limits of the lines of a request (its head). Each header costs some 100 bytes of memory.
 inline constexpr std::size_t kMostHeadBytes = 32 * 1024, kMostHeadLines = 100;
+/// The header Range under the name that a handler sees: httplib matches it with std::regex, whose
+/// recursion grows with the text, and does not check the end of a range.
+inline constexpr const char* kRangeHeader = "xange";
 /// A client that reads slower than this on average does not get the whole answer.
 inline constexpr std::size_t kSlowestReader_bytes_per_s = 4096;
 

@@ -23,7 +23,7 @@ using TlsContext = std::unique_ptr<SSL_CTX, FreeTlsContext>;
 
 /// A server of httplib with limits of its own for connections: httplib reads lines and chunked
 /// bodies without a limit of size or total time, and ends after an error of accept(). Requests for
-/// ranges are answered with the whole: httplib 0.11 does not check the end of a range. A connection
+/// ranges are answered with the whole, except of a recording (kRangeHeader). A connection
 /// ends after a request with a body, because a body that was refused may be unread.
 class LimitedServer final : public httplib::Server {
  public:

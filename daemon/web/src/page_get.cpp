@@ -6,9 +6,12 @@
 #include <string>
 #include <utility>
 
+#include "abbe/base/sha256.hpp"
 #include "abbe/config/check_config.hpp"
 #include "abbe/web/recording_list.hpp"
 #include "assets.hpp"
+#include "byte_range.hpp"
+#include "connection_stream.hpp"
 #include "page_context.hpp"
 #include "responses.hpp"
 
@@ -53,6 +56,7 @@ json me_json(PageContext& context, const std::optional<WebSession>& session) {
 json configuration_json(const PageContext& context) {
   const auto& file = context.options.config_file;
   json out{{"file", file.string()}};
+  if (const auto hash = daemon::sha256_hex_of_file(file)) out["sha256"] = *hash;
   const auto checked =
       daemon::check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
   if (!checked) {
@@ -76,10 +80,34 @@ void answer_report(PageContext& context, const std::string& id, httplib::Respons
   send_text(response, 200, std::move(*text), "text/html; charset=utf-8");
 }
 
+/// The part of the recording that the request asks for, and the headers that state it. A download that
+/// broke off goes on with the rest, unless the recording is another one by now.
+RangeAnswer range_of(const httplib::Request& request, const OpenRecording& file,
+                     httplib::Response& response) {
+  if (file.etag.empty()) return {};
+  response.set_header("Accept-Ranges", "bytes");
+  response.set_header("ETag", file.etag);
+  const bool is_other =
+      request.has_header("If-Range") && request.get_header_value("If-Range") != file.etag;
+  if (request.method != "GET" || is_other || request.get_header_value_count(kRangeHeader) != 1)
+    return {};
+  const RangeAnswer range = range_answer(request.get_header_value(kRangeHeader), file.bytes);
+  if (range.part)
+    response.set_header("Content-Range",
+                        fmt::format("bytes {}-{}/{}", range.part->first,
+                                    range.part->first + range.part->bytes - 1, file.bytes));
+  if (range.beyond_end) response.set_header("Content-Range", fmt::format("bytes */{}", file.bytes));
+  return range;
+}
+
 void answer_download(PageContext& context, const httplib::Request& request, const std::string& name,
                      httplib::Response& response) {
   auto opened = open_recording(context.options.settings.config.recording.dir, name);
   if (!opened) return send_error(response, 404, opened.error().text);
+  const RangeAnswer range = range_of(request, *opened, response);
+  if (range.beyond_end)
+    return send_error(response, 416,
+                      fmt::format("recording {}: it has {} bytes", name, opened->bytes));
   if (context.downloads.fetch_add(1) >= kMostDownloads) {
     context.downloads.fetch_sub(1);
     context.report.line("downloads", fmt::format("{}: download of {} refused: {} are running",
@@ -93,12 +121,14 @@ void answer_download(PageContext& context, const httplib::Request& request, cons
   }
   const auto file = std::make_shared<OpenRecording>(std::move(*opened));
   response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", name));
+  const ByteRange sent = range.part.value_or(ByteRange{0, file->bytes});
+  response.status = range.part ? 206 : 200;
   response.set_content_provider(
-      file->bytes, "application/octet-stream",
-      [file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+      sent.bytes, "application/octet-stream",
+      [file, first = sent.first](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
         std::string part(std::min<std::size_t>(length, 1u << 16), '\0');
         const ssize_t n =
-            ::pread(file->fd.get(), part.data(), part.size(), static_cast<off_t>(offset));
+            ::pread(file->fd.get(), part.data(), part.size(), static_cast<off_t>(first + offset));
         return n > 0 && sink.write(part.data(), static_cast<std::size_t>(n));
       },
       [&context](bool) { context.downloads.fetch_sub(1); });

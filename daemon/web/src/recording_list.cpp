@@ -77,13 +77,17 @@ Result<OpenRecording> open_recording(const fs::path& folder, const std::string& 
   OpenRecording opened{
       .fd = daemon::FileDescriptor{::open((folder / name).c_str(),
                                           O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)},
-      .bytes = 0};
+      .bytes = 0,
+      .etag = {}};
   struct stat seen {};
   if (!opened.fd || ::fstat(opened.fd.get(), &seen) != 0)
     return daemon::fail(ErrorCode::Io, fmt::format("recording {}: {}", name, std::strerror(errno)));
   if (!S_ISREG(seen.st_mode))
     return daemon::fail(ErrorCode::Io, fmt::format("recording {}: not a file", name));
   opened.bytes = static_cast<std::uint64_t>(seen.st_size);
+  if (name.ends_with(kFinished))
+    opened.etag = fmt::format("\"{:x}-{:x}-{:x}.{:x}\"", seen.st_ino, seen.st_size,
+                              seen.st_mtim.tv_sec, seen.st_mtim.tv_nsec);
   return opened;
 }
 

@@ -17,6 +17,9 @@ namespace abbe::web {
 struct OpenRecording {
   daemon::FileDescriptor fd;
   std::uint64_t bytes = 0;
+  /// Strong ETag ([RFC 9110] 8.8.3): the same only for the same bytes. Empty while the recording
+  /// runs.
+  std::string etag;
 };
 /// Usage unless `name` is the name of a recording (no folders); Io if there is no such file.
 [[nodiscard]] daemon::Result<OpenRecording> open_recording(const std::filesystem::path& folder,

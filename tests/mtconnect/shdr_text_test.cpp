@@ -29,6 +29,17 @@ TEST(ShdrText, EscapesAPipeAsDocumented) {
   EXPECT_EQ(shdr_field("a|b"), R"("a\|b")");
 }
 
+/// cppagent 2.2.0.17 was seen to show nothing after a line with this word.
+TEST(ShdrText, BeginsNoDocumentInSeveralLines) {
+  const std::string word = "--multiline--";
+  for (const std::string& text : {word, "a " + word + " b", word + "multiline--",
+                                  "-" + word + "|" + word, "\"" + word + "0FED"}) {
+    EXPECT_EQ(shdr_field(text).find(word), std::string::npos) << text;
+    EXPECT_EQ(read_back(text), text);
+  }
+  EXPECT_EQ(shdr_code(word).find(word), std::string::npos);
+}
+
 TEST(ShdrText, IsNotQuotedWithoutNeed) {
   EXPECT_EQ(shdr_field("C:\\data \"x\""), "C:\\data \"x\"");
 }

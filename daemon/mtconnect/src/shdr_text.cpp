@@ -29,6 +29,10 @@ std::size_t utf8_length(std::string_view text) {
   return continues(1) && continues(2) && continues(3) && !overlong && !beyond ? 4 : 0;
 }
 
+// Where this stands in a line, an agent keeps it and all lines that follow, until one repeats what
+// begins here: a document in several lines [cppagent, README, "Assets"].
+constexpr std::string_view kMultiline = "--multiline--";
+
 bool is_control(char c) {
   return static_cast<std::uint8_t>(c) < 0x20 || c == 0x7F;
 }
@@ -62,12 +66,15 @@ std::string without_outer_spaces(const std::string& text) {
 
 std::string shdr_field(std::string_view text) {
   const std::string plain = without_outer_spaces(printable(text));
-  if (plain.find('|') == std::string::npos && !plain.starts_with('"')) return plain;
+  const std::string_view view = plain;
+  if (view.find('|') == view.npos && view.find(kMultiline) == view.npos && !view.starts_with('"'))
+    return plain;
 
   std::string quoted = "\"";
-  for (const char c : plain) {
-    if (c == '|' || c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const bool second_of_multiline = i > 0 && view.substr(i - 1).starts_with(kMultiline);
+    if (view[i] == '|' || view[i] == '"' || view[i] == '\\' || second_of_multiline) quoted += '\\';
+    quoted += view[i];
   }
   return quoted + '"';
 }

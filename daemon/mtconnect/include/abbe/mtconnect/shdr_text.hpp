@@ -20,6 +20,8 @@ inline constexpr std::size_t kLongestText = 1000;
 ///   "?".
 /// - A text with "|", or with a quotation mark at its beginning, is enclosed in quotation marks,
 ///   with a backslash before "|", quotation marks and backslashes.
+/// - So is a text with "--multiline--", with a backslash after its first character: with this word
+///   in a line the agent would wait for a document in several lines and show nothing that follows.
 [[nodiscard]] std::string shdr_field(std::string_view text);
 
 /// A native code. The agent takes a part behind ":" for the condition's id, so ":" becomes "_".

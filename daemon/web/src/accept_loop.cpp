@@ -10,10 +10,11 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <exception>
 #include <utility>
+
+#include "internal_error.hpp"
 
 namespace abbe::web {
 namespace {
@@ -67,17 +68,9 @@ void AcceptLoop::run() {
     try {
       cycle();
     } catch (const std::exception& error) {
-      report_error(error);
+      report_internal_error([this](const std::string& line) { report_("accept", line); },
+                            error.what(), "a connection is closed");
     }
-  }
-}
-
-/// Also without memory for the line.
-void AcceptLoop::report_error(const std::exception& error) noexcept {
-  try {
-    report_("accept", fmt::format("internal error: {}: a connection is closed", error.what()));
-  } catch (const std::exception&) {
-    std::fputs("abbe-web: accept: internal error without memory: a connection is closed\n", stderr);
   }
 }
 
@@ -99,8 +92,7 @@ void AcceptLoop::accept_failed(int error) {
   const bool ends = ends_listening(error);
   std::string fault = fmt::format("connections cannot be accepted: {}{}", std::strerror(error),
                                   ends ? "" : ": trying again");
-  report_("accept", fault);
-  set_fault(std::move(fault));
+  report_fault(std::move(fault));
   ended_ = ends;
   pollfd wake{wake_.get(), POLLIN, 0};
   if (!ends) (void)::poll(&wake, 1, kPauseAfterError_ms);
@@ -110,8 +102,11 @@ void AcceptLoop::accept_failed(int error) {
 void AcceptLoop::wait_failed(int error) {
   if (error == EINTR) return;
   std::this_thread::sleep_for(std::chrono::milliseconds{kPauseAfterError_ms});
-  std::string fault =
-      fmt::format("connections cannot be waited for: poll: {}: trying again", std::strerror(error));
+  report_fault(fmt::format("connections cannot be waited for: poll: {}: trying again",
+                           std::strerror(error)));
+}
+
+void AcceptLoop::report_fault(std::string fault) {
   report_("accept", fault);
   set_fault(std::move(fault));
 }

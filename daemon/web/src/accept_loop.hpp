@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <exception>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -39,7 +38,7 @@ class AcceptLoop {
   void cycle();
   void accept_failed(int error);
   void wait_failed(int error);
-  void report_error(const std::exception& error) noexcept;
+  void report_fault(std::string fault);
   void set_fault(std::string fault);
 
   int listener_;

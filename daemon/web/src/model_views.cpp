@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/report/model_report.hpp"
+#include "lock_within.hpp"
 #include "model_json.hpp"
 
 namespace abbe::web {
@@ -183,7 +183,7 @@ Result<std::string> ModelViews::kept(const std::string& key, const std::string& 
                                      std::mutex& one_at_a_time,
                                      const std::function<Result<std::string>()>& make) {
   if (auto known = find_kept(key, stamp)) return std::move(*known);
-  const auto turn = turn_of(one_at_a_time);
+  const auto turn = lock_within(one_at_a_time, kPatience, stopping_);
   if (auto known = find_kept(key, stamp)) return std::move(*known);  // made meanwhile
   if (stopping_) return daemon::fail(daemon::ErrorCode::Io, "abbe-web stops");
   if (!turn)
@@ -200,16 +200,6 @@ Result<std::string> ModelViews::kept(const std::string& key, const std::string& 
   return text;
 }
 
-std::unique_lock<std::mutex> ModelViews::turn_of(std::mutex& one_at_a_time) const {
-  constexpr std::chrono::milliseconds kPeriod{20};
-  const auto until = std::chrono::steady_clock::now() + kPatience;
-  std::unique_lock lock(one_at_a_time, std::defer_lock);
-  // ThreadSanitizer of g++ 12 does not know the lock with a time-out of std::timed_mutex.
-  while (!lock.try_lock() && !stopping_ && std::chrono::steady_clock::now() < until)
-    std::this_thread::sleep_for(kPeriod);
-  return lock;
-}
-
 std::optional<std::string> ModelViews::find_kept(const std::string& key, const std::string& stamp) {
   const std::lock_guard lock(mutex_);
   const auto known = kept_.find(key);
@@ -220,7 +210,8 @@ std::optional<std::string> ModelViews::find_kept(const std::string& key, const s
 
 Result<std::string> ModelViews::history() {
   const ModelStore store{store_};
-  return kept("history", stamp_of(store), making_history_, [&store] { return history_text(store); });
+  return kept("history", stamp_of(store), making_history_,
+              [&store] { return history_text(store); });
 }
 
 Result<std::string> ModelViews::model(const std::string& name) {

@@ -80,58 +80,68 @@ void answer_report(PageContext& context, const std::string& id, httplib::Respons
   send_text(response, 200, std::move(*text), "text/html; charset=utf-8");
 }
 
-/// The part of the recording that the request asks for, and the headers that state it. A download that
-/// broke off goes on with the rest, unless the recording is another one by now.
-RangeAnswer range_of(const httplib::Request& request, const OpenRecording& file,
-                     httplib::Response& response) {
-  if (file.etag.empty()) return {};
-  response.set_header("Accept-Ranges", "bytes");
-  response.set_header("ETag", file.etag);
+/// The part of the recording that the request asks for. A download that broke off goes on with the
+/// rest, unless the recording is another one by now.
+RangeAnswer range_of(const httplib::Request& request, const OpenRecording& file) {
   const bool is_other =
       request.has_header("If-Range") && request.get_header_value("If-Range") != file.etag;
-  if (request.method != "GET" || is_other || request.get_header_value_count(kRangeHeader) != 1)
+  if (file.etag.empty() || request.method != "GET" || is_other ||
+      request.get_header_value_count(kRangeHeader) != 1)
     return {};
-  const RangeAnswer range = range_answer(request.get_header_value(kRangeHeader), file.bytes);
-  if (range.part)
-    response.set_header("Content-Range",
-                        fmt::format("bytes {}-{}/{}", range.part->first,
-                                    range.part->first + range.part->bytes - 1, file.bytes));
-  if (range.beyond_end) response.set_header("Content-Range", fmt::format("bytes */{}", file.bytes));
-  return range;
+  return range_answer(request.get_header_value(kRangeHeader), file.bytes);
+}
+
+/// One of the downloads that run at the same time, until it ends; null: kMostDownloads run.
+std::shared_ptr<void> place_for_download(PageContext& context) {
+  if (context.downloads.fetch_add(1) < kMostDownloads)
+    return {&context.downloads, [](auto* downloads) { downloads->fetch_sub(1); }};
+  context.downloads.fetch_sub(1);
+  return nullptr;
+}
+
+void send_recording(httplib::Response& response, OpenRecording opened,
+                    const std::optional<ByteRange>& part, std::shared_ptr<void> place) {
+  if (!opened.etag.empty()) {
+    response.set_header("Accept-Ranges", "bytes");
+    response.set_header("ETag", opened.etag);
+  }
+  if (opened.bytes == 0) return send_text(response, 200, {}, "application/octet-stream");
+
+  const ByteRange sent = part.value_or(ByteRange{0, opened.bytes});
+  if (part)
+    response.set_header("Content-Range", fmt::format("bytes {}-{}/{}", sent.first,
+                                                     sent.first + sent.bytes - 1, opened.bytes));
+  response.status = part ? 206 : 200;
+  const auto file = std::make_shared<OpenRecording>(std::move(opened));
+  response.set_content_provider(
+      sent.bytes, "application/octet-stream",
+      [file, place = std::move(place), first = sent.first](std::size_t offset, std::size_t length,
+                                                           httplib::DataSink& sink) {
+        std::string bytes(std::min<std::size_t>(length, 1u << 16), '\0');
+        const ssize_t n =
+            ::pread(file->fd.get(), bytes.data(), bytes.size(), static_cast<off_t>(first + offset));
+        return n > 0 && sink.write(bytes.data(), static_cast<std::size_t>(n));
+      });
 }
 
 void answer_download(PageContext& context, const httplib::Request& request, const std::string& name,
                      httplib::Response& response) {
   auto opened = open_recording(context.options.settings.config.recording.dir, name);
   if (!opened) return send_error(response, 404, opened.error().text);
-  const RangeAnswer range = range_of(request, *opened, response);
-  if (range.beyond_end)
+  const RangeAnswer range = range_of(request, *opened);
+  if (range.beyond_end) {
+    response.set_header("Content-Range", fmt::format("bytes */{}", opened->bytes));
     return send_error(response, 416,
                       fmt::format("recording {}: it has {} bytes", name, opened->bytes));
-  if (context.downloads.fetch_add(1) >= kMostDownloads) {
-    context.downloads.fetch_sub(1);
+  }
+  auto place = place_for_download(context);
+  if (place == nullptr) {
     context.report.line("downloads", fmt::format("{}: download of {} refused: {} are running",
                                                  peer_of(request), name, kMostDownloads));
     return send_error(response, 503, "too many downloads are running: try again later");
   }
-
-  if (opened->bytes == 0) {
-    context.downloads.fetch_sub(1);
-    return send_text(response, 200, {}, "application/octet-stream");
-  }
-  const auto file = std::make_shared<OpenRecording>(std::move(*opened));
   response.set_header("Content-Disposition", fmt::format("attachment; filename=\"{}\"", name));
-  const ByteRange sent = range.part.value_or(ByteRange{0, file->bytes});
-  response.status = range.part ? 206 : 200;
-  response.set_content_provider(
-      sent.bytes, "application/octet-stream",
-      [file, first = sent.first](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
-        std::string part(std::min<std::size_t>(length, 1u << 16), '\0');
-        const ssize_t n =
-            ::pread(file->fd.get(), part.data(), part.size(), static_cast<off_t>(first + offset));
-        return n > 0 && sink.write(part.data(), static_cast<std::size_t>(n));
-      },
-      [&context](bool) { context.downloads.fetch_sub(1); });
+  send_recording(response, std::move(*opened), range.part, std::move(place));
 }
 
 /// The part of the path behind `prefix`; nullopt if it has another beginning.

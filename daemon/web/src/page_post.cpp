@@ -10,6 +10,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/web/client_network.hpp"
 #include "calibration_task.hpp"
+#include "lock_within.hpp"
 #include "page_context.hpp"
 #include "responses.hpp"
 
@@ -22,7 +23,7 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kStorePatience{10}, kTurnPatience{3};
-constexpr std::chrono::milliseconds kStorePeriod{100}, kTurnPeriod{20};
+constexpr std::chrono::milliseconds kStorePeriod{100};
 constexpr daemon::JsonBounds kBodyBounds{.bytes = kMostRequestBytes, .depth = 8};
 
 /// A request that changes something, the role that it needs, and the request to abbed that it
@@ -128,19 +129,6 @@ Result<json> ask_abbed(PageContext& context, const json& request) {
   return answer;
 }
 
-/// Waits until no other change is on its way to abbed. Without ownership: another one takes too
-/// long, or abbe-web stops.
-std::unique_lock<std::mutex> turn_of_a_change(PageContext& context) {
-  const auto until = Clock::now() + kTurnPatience;
-  std::unique_lock lock(context.changing, std::defer_lock);
-  // ThreadSanitizer of g++ 12 does not know the lock with a time-out of std::timed_mutex.
-  while (!lock.try_lock()) {
-    if (context.stopping || Clock::now() > until) break;
-    std::this_thread::sleep_for(kTurnPeriod);
-  }
-  return lock;
-}
-
 void change(PageContext& context, const WebSession& session, const Change& asked, const json& body,
             httplib::Response& response) {
   auto request = asked.request(body);
@@ -149,7 +137,7 @@ void change(PageContext& context, const WebSession& session, const Change& asked
   const auto what = (*request)["do"].get<std::string>();
   std::unique_lock<std::mutex> turn;
   if (what != "cancel") {  // the end of a calibration waits for nothing
-    turn = turn_of_a_change(context);
+    turn = lock_within(context.changing, kTurnPatience, context.stopping);
     if (!turn)
       return send_error(response, 503,
                         "another change is not done yet: nothing was changed; try again in some "

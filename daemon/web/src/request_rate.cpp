@@ -5,16 +5,16 @@
 namespace abbe::web {
 namespace {
 
-constexpr std::size_t kMostAddresses = 4096;
+constexpr std::size_t kMostNetworks = 4096;
 
 }  // namespace
 
-bool RequestRate::take(const std::string& address, Clock::time_point now) {
+bool RequestRate::take(const std::string& network, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  if (buckets_.size() >= kMostAddresses) forget_full_ones(now);
-  if (buckets_.size() >= kMostAddresses && !buckets_.contains(address)) return false;
+  if (buckets_.size() >= kMostNetworks) forget_full_ones(now);
+  if (buckets_.size() >= kMostNetworks && !buckets_.contains(network)) return false;
 
-  Bucket& bucket = buckets_.try_emplace(address, Bucket{at_once_, now}).first->second;
+  Bucket& bucket = buckets_.try_emplace(network, Bucket{at_once_, now}).first->second;
   const double elapsed_s = std::chrono::duration<double>(now - bucket.at).count();
   bucket.left = std::min(at_once_, bucket.left + per_second_ * elapsed_s);
   bucket.at = now;

@@ -7,14 +7,14 @@
 
 namespace abbe::web {
 
-/// Limits the requests of each address: `at_once` at any time, `per_second` on average (token
+/// Limits the requests of each client (client_network()): `at_once` at any time, `per_second` on average (token
 /// bucket). Thread-safe.
 class RequestRate {
  public:
   using Clock = std::chrono::steady_clock;
   RequestRate(double per_second, double at_once) : per_second_(per_second), at_once_(at_once) {}
   /// False if the request exceeds the limit.
-  [[nodiscard]] bool take(const std::string& address, Clock::time_point now);
+  [[nodiscard]] bool take(const std::string& network, Clock::time_point now);
 
  private:
   struct Bucket {

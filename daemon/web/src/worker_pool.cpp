@@ -6,6 +6,8 @@
 #include <system_error>
 #include <utility>
 
+#include "internal_error.hpp"
+
 namespace abbe::web {
 
 daemon::Result<std::unique_ptr<WorkerPool>> WorkerPool::start(
@@ -68,9 +70,9 @@ void WorkerPool::serve(const Serve& task) {
   try {
     task(*this);
   } catch (const std::exception& error) {
-    report_(fmt::format("internal error: {}: the connection is closed", error.what()));
+    report_internal_error(report_, error.what(), "the connection is closed");
   } catch (...) {
-    report_("internal error: not a std::exception: the connection is closed");
+    report_internal_error(report_, "not a std::exception", "the connection is closed");
   }
 }
 

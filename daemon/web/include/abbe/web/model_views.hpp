@@ -51,8 +51,6 @@ class ModelViews {
   [[nodiscard]] daemon::Result<std::string> kept(
       const std::string& key, const std::string& stamp, std::mutex& one_at_a_time,
       const std::function<daemon::Result<std::string>()>& make);
-  /// Without ownership: others take longer than kPatience, or stop() was called.
-  [[nodiscard]] std::unique_lock<std::mutex> turn_of(std::mutex& one_at_a_time) const;
   [[nodiscard]] std::optional<std::string> find_kept(const std::string& key,
                                                      const std::string& stamp);
 

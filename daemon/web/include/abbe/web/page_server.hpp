@@ -9,6 +9,9 @@
 ///                              its lines kMostHeadBytes, kMostHeadLines
 ///   an answer                  kSlowestReader_bytes_per_s on average
 ///   connections of one address LimitedServer::kConnectionsOfAddress
+///   silence or a slow reader   kCrowdedTime while connections wait for a thread
+///
+/// One address is an IPv4 address or the network of an IPv6 address (client_network()).
 ///
 /// Whatever a browser does, abbed gets the requests of one client: those of DaemonFeed, and one at
 /// a time of logged-in users.

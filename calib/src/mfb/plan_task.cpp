@@ -77,13 +77,13 @@ char side_of(const PlanTask& task, const PlannedPosition& position, std::size_t 
 }  // namespace
 
 Stylus stylus_of(const Vector3& tool_offset_m, const KinematicChain& chain) {
-  constexpr double kBeside_m = 20e-3;
+  constexpr double kFromAxis_m = 20e-3;
   const auto ram = static_cast<Eigen::Index>(index(chain.order_w_to_t()[2]));
   Vector3 across_m = tool_offset_m;
   across_m(ram) = 0.0;
 
   Eigen::Index k = ram;
-  if (across_m.norm() >= kBeside_m) {
+  if (across_m.norm() >= kFromAxis_m) {
     across_m.cwiseAbs().maxCoeff(&k);
   }
   const double sign = tool_offset_m(k) > 0.0 ? 1.0 : -1.0;

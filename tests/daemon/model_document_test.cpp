@@ -70,7 +70,10 @@ RunFigures figures_of_every_kind() {
           .tables = {{"Title <1>", "why", {"a", "b"}, {{"1", "2"}, {"3", "\u00b5"}}},
                      {"facts", "", {}, {{"name", "value"}}},
                      {"empty", "", {"a"}, {}}},
-          .conditions = RunConditions{std::array{293.15, 880.0 / 3}, 100.0 / 3, 0.125 / 3}};
+          .conditions = RunConditions{
+              std::array{293.15, 880.0 / 3}, 100.0 / 3, 0.125 / 3,
+              std::array{protocol::UtcTime{std::chrono::nanoseconds{1'715'934'600'123'456'789}},
+                         protocol::UtcTime{std::chrono::nanoseconds{1'715'934'700'000'000'001}}}}};
 }
 
 TEST(ModelDocument, KeepsResidualsTablesAndConditionsOfTheRun) {
@@ -102,6 +105,8 @@ TEST(ModelDocument, RefusesDamagedFiguresOfTheRunByName) {
         std::pair{"\"columns\": [", "\"columns\": [1, "}, std::pair{"\"rows\": [", "\"rows\": [1,"},
         std::pair{"temperature_K\": [", "temperature_K\": [1, "},
         std::pair{"\"duration_s\": ", "\"duration_s\": \"long\", \"x\": "},
+        std::pair{"measured_utc\": [", "measured_utc\": [1, "},
+        std::pair{"measured_utc\": [\"2024", "measured_utc\": [\"2025"},
         std::pair{"\"conditions\": ", "\"conditions\": 1, \"x\": "}}) {
     const auto refused = parse_model(replaced(text, what, with), "model.json");
     ASSERT_FALSE(refused) << with;

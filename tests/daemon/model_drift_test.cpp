@@ -230,6 +230,19 @@ TEST_F(DriftingMachine, RaisesDriftBeforeTheNewModelIsActive) {
               HasSubstr("drift since the active model: EC0Y changed by"));
 }
 
+TEST_F(DriftingMachine, AModelKeepsWhenItWasMeasured) {
+  configure("");
+  const protocol::UtcOffset utc{};
+  const auto before = utc.to_utc(now_);
+  (void)calibrate();
+  const auto document = store().load(model().model->id).value();
+  const auto [first, last] = document.run->conditions->measured.value();
+  EXPECT_GT(first, before);
+  EXPECT_LT(last, document.created);
+  EXPECT_NEAR(std::chrono::duration<double>(last - first).count(),
+              *document.run->conditions->duration_s, 1.0);
+}
+
 TEST_F(DriftingMachine, AnUnchangedMachineRaisesNone) {
   configure("");
   (void)calibrate();

@@ -214,10 +214,46 @@ TEST(TrendReport, IsInTheOrderOfTimeAndLeavesRefusedModelsOutOfTheCharts) {
   const std::string page = trend_report(models).value();
   EXPECT_LT(page.find(model_id(models[2].document)), page.find(model_id(models[1].document)));
   EXPECT_LT(page.find(model_id(models[1].document)), page.find(model_id(models[0].document)));
-  EXPECT_THAT(page, AllOf(HasSubstr("Models: 3."), HasSubstr("<td>red</td>")));
+  EXPECT_THAT(page, AllOf(HasSubstr("Models: 3."), HasSubstr("<td>red</td>"),
+                          HasSubstr("<td>identified 2024-05-17T08:30</td>")));
   const auto plots = page.substr(page.find("class=\"plots\""));
   EXPECT_EQ(times(plots, "<circle"), 2u * (3 + 3 + 4)) << "two models in ten curves";
   EXPECT_FALSE(trend_report({}));
+}
+
+RunFigures measured_at(protocol::UtcTime first, protocol::UtcTime last) {
+  RunFigures run{.residuals = {}};
+  run.conditions = RunConditions{.measured = std::array{first, last}};
+  return run;
+}
+
+/// A recording that is identified again later: the date of the measurement is that of the recording.
+TEST(ModelReport, StatesWhenWasMeasuredAndWhenItWasIdentified) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>identified (UTC)</th><td>2024-05-17T08:30:00."),
+                    Not(HasSubstr("measured (UTC)"))));
+  const auto day = std::chrono::hours(24);
+  const auto last = subject.document.created - 15 * day;
+  subject.document.run = measured_at(last - std::chrono::minutes(20), last);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>measured (UTC)</th><td>2024-05-02T08:10:00Z to "
+                              "2024-05-02T08:30:00Z</td>"),
+                    HasSubstr("<th>identified (UTC)</th><td>2024-05-17T08:30:00.")));
+  EXPECT_THAT(comparison_report(subject, reported(4)).value(),
+              AllOf(HasSubstr("<td>measured 2024-05-02T08:10:00Z to 2024-05-02T08:30:00Z</td>"),
+                    HasSubstr("<td>identified 2024-05-17T08:30:00Z; when it was measured is not "
+                              "recorded</td>")));
+}
+
+TEST(TrendReport, OrdersModelsByTheirMeasurementNotByTheirIdentification) {
+  ReportSubject earlier = reported(3), later = reported(4);
+  earlier.document.run = measured_at(later.document.created - std::chrono::hours(48),
+                                     later.document.created - std::chrono::hours(47));
+  earlier.document.created += std::chrono::hours(24);
+  const std::string page = trend_report({later, earlier}).value();
+  EXPECT_LT(page.find(model_id(earlier.document)), page.find(model_id(later.document)));
+  EXPECT_THAT(page, HasSubstr("<td>2024-05-15T09:30</td>"));
 }
 
 TEST(LinePlot, HasASecondPanelWhereTheBandsAreNarrow) {

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/utc_text.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -166,6 +168,18 @@ std::vector<RunFigures::Table> read_tables(ModelReader& in, const ModelJson& run
   return tables;
 }
 
+/// First and last observation.
+std::optional<std::array<protocol::UtcTime, 2>> read_measured(ModelReader& in,
+                                                              const ModelJson& list) {
+  const std::string path = "run.conditions.measured_utc";
+  const auto texts = read_texts(in, list, path);
+  const auto first = texts.size() == 2 ? utc_from_text(texts[0]) : std::nullopt;
+  const auto last = texts.size() == 2 ? utc_from_text(texts[1]) : std::nullopt;
+  if (first && last && *first <= *last) return std::array{*first, *last};
+  in.fault(path, "must be [first, last], UTC times such as 2024-05-17T08:30:00.000000000Z");
+  return std::nullopt;
+}
+
 std::optional<RunFigures::Conditions> read_conditions(ModelReader& in, const ModelJson& run) {
   const std::string path = "run.conditions";
   if (!run.is_object() || !run.contains("conditions")) return std::nullopt;
@@ -186,6 +200,8 @@ std::optional<RunFigures::Conditions> read_conditions(ModelReader& in, const Mod
     conditions.duration_s = in.number_of(entry, path, "duration_s", 0);
   if (entry.contains("feed_mm_per_s"))
     conditions.feed_m_per_s = in.number_of(entry, path, "feed_mm_per_s", kMm);
+  if (entry.contains("measured_utc"))
+    conditions.measured = read_measured(in, entry.at("measured_utc"));
   return conditions;
 }
 

@@ -251,6 +251,8 @@ std::string conditions_of(const RunFigures::Conditions& c) {
   if (c.temperature_K) add("temperature_K", numbers(*c.temperature_K, 0));
   if (c.duration_s) add("duration_s", to_decimal(*c.duration_s, 0));
   if (c.feed_m_per_s) add("feed_mm_per_s", to_decimal(*c.feed_m_per_s, kMm));
+  if (c.measured)
+    add("measured_utc", texts_of({to_text((*c.measured)[0]), to_text((*c.measured)[1])}));
   return fmt::format(",\n    \"conditions\": {{{}}}", all);
 }
 

@@ -78,10 +78,9 @@ void write_state(XmlText& out, const ReportSubject& subject, State state) {
   write_name(out, "State of the machine");
   out.element("dcc:status", state == State::AsFound ? "beforeAdjustment" : "afterAdjustment");
   out.open("dcc:data");
-  write_contents(
-      out, "dcc:text",
-      {fmt::format("measured {} (UTC), tool offsets {}", to_text(subject.document.created),
-                   tools_in_words(subject.document.model))});
+  write_contents(out, "dcc:text",
+                 {fmt::format("{} (UTC), tool offsets {}", when_in_words(subject.document),
+                              tools_in_words(subject.document.model))});
   out.close();
   out.close();
 }

@@ -102,7 +102,10 @@ Facts facts_of(const ReportSubject& subject) {
   facts.emplace_back("model", fmt::format("{}, hash {}", model_id(document), model_hash(document)));
   facts.emplace_back("hash of the machine configuration", document.machine_hash);
   facts.emplace_back("method", method_in_words(document));
-  facts.emplace_back("measured (UTC)", to_text(document.created));
+  if (const auto measured = measured_of(document))
+    facts.emplace_back("measured (UTC)", fmt::format("{} to {}", to_seconds((*measured)[0]),
+                                                     to_seconds((*measured)[1])));
+  facts.emplace_back("identified (UTC)", to_text(document.created));
   add_if(facts, "measurement from, to", joined({d.begin_date, d.end_date}));
   add_if(facts, "operator", operator_of(subject));
   add_if(facts, "laboratory", joined({contact_text(d.laboratory), d.laboratory_code}));

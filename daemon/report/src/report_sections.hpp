@@ -1,6 +1,9 @@
 #pragma once
 /// Sections of the reports that are made from stored models.
 
+#include <array>
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include "abbe/report/html_report.hpp"
@@ -10,6 +13,17 @@ namespace abbe::daemon {
 
 /// In place of a figure that a model of an earlier version does not have.
 inline constexpr std::string_view kNotRecorded = "Not recorded.";
+
+/// First and last observation of the run; nullopt: the model does not have them, as one that was
+/// identified from files.
+[[nodiscard]] std::optional<std::array<protocol::UtcTime, 2>> measured_of(const ModelDocument&);
+/// "measured 2024-05-17T08:00:00Z to 2024-05-17T08:30:00Z", else "identified ...; when it was
+/// measured is not recorded". UTC.
+[[nodiscard]] std::string when_in_words(const ModelDocument& document);
+/// The end of the measurement, else the time of the identification.
+[[nodiscard]] protocol::UtcTime time_of(const ModelDocument& document);
+/// "2024-05-17T08:30:00Z"
+[[nodiscard]] std::string to_seconds(protocol::UtcTime time);
 
 /// The state of a model as a lamp and in words.
 struct VerdictInWords {

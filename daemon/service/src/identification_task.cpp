@@ -74,6 +74,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   const auto created = utc.to_utc(state->now);
   auto document = document_of(*candidate, *config, std::move(inputs), created);
   document.recording_gap = std::move(recording.gap);
+  add_measured(document, observed(run), utc);
   auto id = model_id(document);
   auto why = fmt::format("calibrate {}", method_of(*candidate));
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/calib/geometry.hpp"
+#include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
 
@@ -32,6 +33,8 @@ struct RunConditions {
   std::optional<std::array<double, 2>> temperature_K{};  ///< lowest and highest of the run
   std::optional<double> duration_s{};
   std::optional<double> feed_m_per_s{};  ///< median over the legs
+  /// First and last observation; nullopt: the observations have no date, as in files.
+  std::optional<std::array<protocol::UtcTime, 2>> measured{};
   friend bool operator==(const RunConditions&, const RunConditions&) = default;
 };
 

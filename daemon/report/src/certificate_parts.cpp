@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "abbe/base/utc_text.hpp"
+#include <algorithm>
+
 #include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
 
@@ -112,10 +113,13 @@ std::string calibration_of(const EquipmentDetails& e) {
   return text;
 }
 
-void write_equipment(XmlText& out, const std::vector<EquipmentDetails>& equipment) {
-  if (equipment.empty()) return;
+void write_equipment(XmlText& out, const std::vector<EquipmentDetails>& all, State state) {
+  const auto use = state == State::AsFound ? EquipmentUse::AsFound : EquipmentUse::AsLeft;
+  const auto of_state = [use](const EquipmentDetails& e) { return is_used(e, use); };
+  if (std::ranges::none_of(all, of_state)) return;
   out.open("dcc:measuringEquipments");
-  for (const EquipmentDetails& e : equipment) {
+  for (const EquipmentDetails& e : all) {
+    if (!of_state(e)) continue;
     out.open("dcc:measuringEquipment");
     write_name(out, e.name);
     if (const std::string calibration = calibration_of(e); !xml_text(calibration).empty())
@@ -222,7 +226,7 @@ void write_measurement_result(XmlText& out, const ReportSubject& subject,
   out.open("dcc:usedSoftware");
   write_software(out);
   out.close();
-  write_equipment(out, details.equipment);
+  write_equipment(out, details.equipment, state);
   write_conditions(out, subject, state, details);
   write_values(out, values);
   write_meta_data(out, subject);

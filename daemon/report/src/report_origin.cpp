@@ -111,9 +111,10 @@ Facts facts_of(const ReportSubject& subject) {
   add_if(facts, "laboratory", joined({contact_text(d.laboratory), d.laboratory_code}));
   add_if(facts, "customer", contact_text(d.customer));
   for (const EquipmentDetails& e : d.equipment)
-    facts.emplace_back("equipment",
-                       joined({e.name, e.manufacturer, e.model, e.serial, e.certificate,
-                               e.valid_until.empty() ? "" : "valid until " + e.valid_until}));
+    if (is_used(e, EquipmentUse::AsFound))
+      facts.emplace_back("equipment",
+                         joined({e.name, e.manufacturer, e.model, e.serial, e.certificate,
+                                 e.valid_until.empty() ? "" : "valid until " + e.valid_until}));
   add_conditions(facts, subject);
   add_if(facts, "remark", d.remark);
   facts.emplace_back(

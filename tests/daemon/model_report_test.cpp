@@ -153,6 +153,20 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   EXPECT_EQ(times(model_report(subject).value(), "Not recorded."), 2u);
 }
 
+/// Its statistics are those of the held-out test: rms only, no samples.
+TEST(ModelReport, OfAJointModelDoesNotPresentTheHeldOutTestAsResidualsOfAFit) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<td>before the fit</td>"), HasSubstr("<td>1000, 3 lost</td>")));
+  subject.document.method = subject.document.estimator = "joint";
+  subject.document.run =
+      RunFigures{.held_out = "legs", .held_out_before_m = 12.5e-6, .residuals = {}};
+  const std::string page = model_report(subject).value();
+  EXPECT_THAT(page, AllOf(Not(HasSubstr("before the fit")), Not(HasSubstr(" lost</td>")),
+                          Not(HasSubstr("sigma0")), HasSubstr("held-out legs: rms and mean square"),
+                          HasSubstr("no residuals of its own"), HasSubstr("12.500 um rms")));
+}
+
 TEST(ModelReport, HasTheTablesOfTheMethod) {
   ReportSubject subject = reported(3);
   subject.document.run = RunFigures{.residuals = {}};

@@ -126,13 +126,18 @@ Facts facts_of(const ReportSubject& subject) {
 
 Facts statistics_of(const ModelDocument& document) {
   const ModelStatistics& s = document.statistics;
-  return {
-      {"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
-      {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
-                                   s.unknowns, s.rank, s.condition)},
-      {"sigma0, chi-square per degree of freedom",
-       fmt::format("{:.3f}, {:.3f}", s.sigma0, s.chi2_per_dof)},
-      {"variance factor (multiplies the covariance)", fmt::format("{:.3f}", s.variance_factor)}};
+  Facts facts;
+  if (!is_joint(document))
+    facts.emplace_back("samples", fmt::format("{}, {} lost", s.samples, s.lost_samples));
+  facts.emplace_back("observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}",
+                                                 s.observations, s.unknowns, s.rank, s.condition));
+  facts.emplace_back(is_joint(document) ? "held-out legs: rms and mean square of residuals divided "
+                                          "by their uncertainty"
+                                        : "sigma0, chi-square per degree of freedom",
+                     fmt::format("{:.3f}, {:.3f}", s.sigma0, s.chi2_per_dof));
+  facts.emplace_back("variance factor (multiplies the covariance)",
+                     fmt::format("{:.3f}", s.variance_factor));
+  return facts;
 }
 
 }  // namespace

@@ -203,6 +203,10 @@ LineChart backlash_chart(const std::vector<calib::otf::Backlash>& backlash, cali
 
 void add_residuals_of(HtmlReport& page, const ModelDocument& document) {
   page.heading("Residuals over time and by part of the run");
+  if (is_joint(document)) {
+    page.paragraph(kResidualsOfParts);
+    return;
+  }
   const bool has_parts = document.run && document.run->series && !document.run->parts.empty();
   if (!document.run || (!has_parts && document.run->residuals.empty())) {
     page.paragraph(kNotRecorded);

@@ -25,6 +25,14 @@ inline constexpr std::string_view kNotRecorded = "Not recorded.";
 /// "2024-05-17T08:30:00Z"
 [[nodiscard]] std::string to_seconds(protocol::UtcTime time);
 
+/// A joint model is combined from its parts: it has no residuals of its own, and its statistics are
+/// those of the held-out test.
+[[nodiscard]] inline bool is_joint(const ModelDocument& document) {
+  return document.method == "joint";
+}
+inline constexpr std::string_view kResidualsOfParts =
+    "A joint model has no residuals of its own; the models of its parts have them.";
+
 /// The state of a model as a lamp and in words.
 struct VerdictInWords {
   Signal signal = Signal::Unlit;

@@ -167,6 +167,24 @@ TEST(ModelReport, OfAJointModelDoesNotPresentTheHeldOutTestAsResidualsOfAFit) {
                           HasSubstr("no residuals of its own"), HasSubstr("12.500 um rms")));
 }
 
+TEST(ModelReport, OfAnUpdateStatesWhoseResidualsItHas) {
+  ReportSubject subject = reported(3);
+  subject.document.run = RunFigures{.residuals = {{0.5, 1e-5, 1e-7}}, .of_model = "00c0ffee"};
+  subject.document = parse_model(to_json(subject.document), "model.json").value();
+  const std::string page = model_report(subject).value();
+  EXPECT_EQ(times(page, "those of the model of the run alone, 00c0ffee"), 3u)
+      << "figures, residuals, statistics";
+}
+
+TEST(ModelReport, StatesAGapOfTheRecordingOnce) {
+  ReportSubject subject = reported(3);
+  subject.document.recording_gap = "the disk was full";
+  subject.document.run =
+      RunFigures{.notes = {cannot_be_checked("the disk was full")}, .residuals = {}};
+  EXPECT_EQ(times(model_report(subject).value(), "<li>no replay can check this model"), 2u)
+      << "in the notes, and in what the uncertainty does not contain";
+}
+
 TEST(ModelReport, HasTheTablesOfTheMethod) {
   ReportSubject subject = reported(3);
   subject.document.run = RunFigures{.residuals = {}};

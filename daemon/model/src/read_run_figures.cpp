@@ -211,21 +211,23 @@ std::optional<RunFigures> read_run_figures(ModelReader& in) {
   const std::string path = "run";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
   const ModelJson& run = in.root().at(path);
+  const auto optional_text = [&](const char* key) {
+    return run.is_object() && run.contains(key) ? in.text_of(run, path, key) : std::string{};
+  };
   return RunFigures{.held_out = in.text_of(run, path, "held_out"),
                     .held_out_before_m = in.number_of(run, path, "held_out_before_um", kMicroUnit),
                     .held_out_after_m = in.number_of(run, path, "held_out_after_um", kMicroUnit),
                     .notes = read_notes(in, in.find(run, path, "notes")),
                     .residuals = read_intervals(in, in.find(run, path, kResiduals)),
                     .places_m = read_places(in, run),
-                    .part_kind = run.is_object() && run.contains("part_kind")
-                                     ? in.text_of(run, path, "part_kind")
-                                     : std::string{},
+                    .part_kind = optional_text("part_kind"),
                     .parts = read_parts(in, run),
                     .series = read_series(in, run),
                     .sigma_counts = read_sigma_counts(in, run),
                     .held_out_cells = read_cells(in, run),
                     .tables = read_tables(in, run),
-                    .conditions = read_conditions(in, run)};
+                    .conditions = read_conditions(in, run),
+                    .of_model = optional_text("of_model")};
 }
 
 }  // namespace abbe::daemon

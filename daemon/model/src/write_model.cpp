@@ -268,6 +268,8 @@ std::string further_figures(const RunFigures& run) {
     all += fmt::format(",\n    \"held_out_cells\": {}", cells_of(run));
   if (!run.tables.empty()) all += fmt::format(",\n    \"tables\": {}", tables_of(run));
   if (run.conditions) all += conditions_of(*run.conditions);
+  if (!run.of_model.empty())
+    all += fmt::format(",\n    \"of_model\": {}", JsonText::quoted(run.of_model));
   return all;
 }
 

@@ -18,6 +18,7 @@ void add_fit(HtmlReport& page, const ModelDocument& document) {
     page.paragraph(kResidualsOfParts);
     return;
   }
+  if (const std::string whose = whose_residuals(document); !whose.empty()) page.paragraph(whose);
   const ModelStatistics& s = document.statistics;
   const auto row = [](const char* what, const ResidualFigures& f) {
     return std::vector<std::string>{what, um_text(f.mean_abs_m, 3), um_text(f.rms_m, 3),

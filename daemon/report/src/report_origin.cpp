@@ -145,6 +145,8 @@ Facts statistics_of(const ModelDocument& document) {
 void add_origin_of(HtmlReport& page, const ReportSubject& subject) {
   page.heading("Origin and conditions");
   page.facts(facts_of(subject));
+  if (const std::string whose = whose_residuals(subject.document); !whose.empty())
+    page.paragraph(whose);
   page.facts(statistics_of(subject.document));
   std::vector<std::vector<std::string>> rows;
   for (const InputFile& input : subject.document.inputs) rows.push_back({input.name, input.sha256});

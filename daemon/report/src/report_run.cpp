@@ -201,6 +201,14 @@ LineChart backlash_chart(const std::vector<calib::otf::Backlash>& backlash, cali
 
 }  // namespace
 
+std::string whose_residuals(const ModelDocument& document) {
+  if (!document.run || document.run->of_model.empty()) return {};
+  return fmt::format(
+      "This model is an update of the model before it with a run. Residuals, statistics and the "
+      "test with what was excluded from the fit are those of the model of the run alone, {}.",
+      document.run->of_model);
+}
+
 void add_residuals_of(HtmlReport& page, const ModelDocument& document) {
   page.heading("Residuals over time and by part of the run");
   if (is_joint(document)) {
@@ -213,6 +221,7 @@ void add_residuals_of(HtmlReport& page, const ModelDocument& document) {
     return;
   }
   const RunFigures& run = *document.run;
+  if (const std::string whose = whose_residuals(document); !whose.empty()) page.paragraph(whose);
   page.paragraph("What the model does not explain of the observations to which it was fitted.");
   if (has_parts) add_series(page, *run.series);
   add_along_path(page, run);

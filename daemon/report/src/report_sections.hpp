@@ -33,6 +33,10 @@ inline constexpr std::string_view kNotRecorded = "Not recorded.";
 inline constexpr std::string_view kResidualsOfParts =
     "A joint model has no residuals of its own; the models of its parts have them.";
 
+/// Of an update (`[drift] continuous`): whose residuals and statistics are reported. Empty: those of
+/// the model itself.
+[[nodiscard]] std::string whose_residuals(const ModelDocument& document);
+
 /// The state of a model as a lamp and in words.
 struct VerdictInWords {
   Signal signal = Signal::Unlit;

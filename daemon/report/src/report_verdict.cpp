@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
@@ -34,8 +36,10 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
         break;
     }
   }
-  if (!subject.document.recording_gap.empty())
-    notes.push_back(cannot_be_checked(subject.document.recording_gap));
+  if (const auto& gap = subject.document.recording_gap; !gap.empty()) {
+    const std::string note = cannot_be_checked(gap);  // of a run of abbed it is among its notes
+    if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
+  }
   return notes;
 }
 

@@ -89,6 +89,9 @@ struct RunFigures {
   std::vector<HeldOutCell> held_out_cells{};
   std::vector<Table> tables{};
   std::optional<Conditions> conditions{};
+  /// Id of the model that was fitted to the run, if it is not this one but was only used to update
+  /// it: residuals, held-out test and statistics are those of that model.
+  std::string of_model{};
   friend bool operator==(const RunFigures&, const RunFigures&) = default;
 };
 

@@ -244,12 +244,50 @@ TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
                                                "2026-11-20")));
 }
 
+/// A run with a tracker whose sensors were read.
+void add_recorded_conditions(ReportSubject& subject) {
+  RunConditions& conditions = *subject.document.run->conditions;
+  conditions.temperature_K = std::array{293.65, 294.45};
+  conditions.duration_s = 123.4;
+  conditions.feed_m_per_s = 2.4 / 60.0;
+}
+
 TEST(CalibrationCertificate, StatesConditionsOnlyOfTheMeasurementThatHadThem) {
-  const std::string text =
-      calibration_certificate(certified_subject(3), certified_subject(4, 8)).value();
+  ReportSubject left = certified_subject(4, 8);
+  add_recorded_conditions(left);
+  const std::string text = calibration_certificate(certified_subject(3), left).value();
+  EXPECT_EQ(schema_faults(text), "");
   const std::string as_left = text.substr(text.find(">As left<"));
-  EXPECT_THAT(text, HasSubstr(">20.400<"));
-  EXPECT_THAT(as_left, AllOf(Not(HasSubstr(">20.400<")), HasSubstr("State of the machine")));
+  EXPECT_THAT(text, AllOf(HasSubstr(">20.40<"), HasSubstr(">2500<")));
+  EXPECT_THAT(as_left, AllOf(Not(HasSubstr(">20.40<")), HasSubstr("State of the machine"),
+                             HasSubstr(">20.50<"), HasSubstr(">21.30<"), HasSubstr(">2400<")));
+}
+
+TEST(CalibrationCertificate, HasTheConditionsAndTheSoftwareOfTheReport) {
+  ReportSubject subject = certified_subject(3);
+  subject.details.temperature_C = subject.details.u_temperature_K = std::nullopt;
+  subject.details.feed_mm_per_min.reset();
+  subject.details.humidity_percent = 45.5;
+  add_recorded_conditions(subject);
+  subject.document.artefact = calib::Expansion{11.5e-6, 0.5e-6, 293.4, 0.15};
+  subject.document.run->conditions->bar_temperature_K = std::array{293.25, 293.75};
+  subject.document.software = "0.0.7-earlier";
+  const std::string page = model_report(subject).value();
+  const std::string text = calibration_certificate(subject).value();
+  EXPECT_EQ(schema_faults(text), "");
+  EXPECT_THAT(page, AllOf(HasSubstr("<td>20.50 to 21.30 C, lowest and highest value of all "
+                                    "sensors</td>"),
+                          HasSubstr("<td>20.25 \u00b1 0.30 C (k = 2), corrected with 11.50 um/(m "
+                                    "K)</td>"),
+                          HasSubstr("<td>20.10 to 20.60 C, lowest and highest value as used"),
+                          HasSubstr("<td>45.5 %</td>"), HasSubstr("<td>2400 mm/min, median"),
+                          HasSubstr("<td>123.4 s, from the first to the last"),
+                          HasSubstr("abbe 0.0.7-earlier")));
+  for (const char* const value :
+       {"20.50", "21.30", "20.25", "0.30", "20.10", "20.60", "45.5", "2400", "123.4"})
+    EXPECT_THAT(text, HasSubstr(fmt::format(">{}<", value)));
+  EXPECT_THAT(text.substr(text.find("<dcc:usedSoftware>")), HasSubstr(">0.0.7-earlier<"));
+  EXPECT_THAT(text.substr(0, text.find("<dcc:coreData>")), Not(HasSubstr("0.0.7-earlier")));
 }
 
 TEST(CalibrationCertificate, StaysValidWithHostileTexts) {

@@ -73,7 +73,7 @@ RunFigures figures_of_every_kind() {
                  {"empty", "", {"a"}, {}}},
       .conditions =
           RunConditions{
-              std::array{293.15, 880.0 / 3}, 100.0 / 3, 0.125 / 3,
+              std::array{293.15, 880.0 / 3}, std::array{291.0, 877.0 / 3}, 100.0 / 3, 0.125 / 3,
               std::array{protocol::UtcTime{std::chrono::nanoseconds{1'715'934'600'123'456'789}},
                          protocol::UtcTime{std::chrono::nanoseconds{1'715'934'700'000'000'001}}}},
       .of_model = "00c0ffee"};
@@ -106,7 +106,8 @@ TEST(ModelDocument, RefusesDamagedFiguresOfTheRunByName) {
         std::pair{"held_out_cells\": [", "held_out_cells\": [[1, 2],"},
         std::pair{"\"tables\": [", "\"tables\": [1,"},
         std::pair{"\"columns\": [", "\"columns\": [1, "}, std::pair{"\"rows\": [", "\"rows\": [1,"},
-        std::pair{"temperature_K\": [", "temperature_K\": [1, "},
+        std::pair{"\"temperature_K\": [", "\"temperature_K\": [1, "},
+        std::pair{"bar_temperature_K\": [", "bar_temperature_K\": [1, "},
         std::pair{"\"duration_s\": ", "\"duration_s\": \"long\", \"x\": "},
         std::pair{"measured_utc\": [", "measured_utc\": [1, "},
         std::pair{"measured_utc\": [\"2024", "measured_utc\": [\"2025"},

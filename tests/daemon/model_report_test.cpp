@@ -142,7 +142,7 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   };
   const std::string before_runs = model_report(subject).value();
   EXPECT_EQ(times(before_runs, "Not recorded."), 2u) << "where was measured, residuals";
-  EXPECT_EQ(times(before_runs, "not recorded"), 3u) << "temperature, feed, duration";
+  EXPECT_EQ(times(before_runs, "not recorded"), 3u) << "temperature, feed, measuring time";
 
   subject.document.run = with_run({{0.5, 1e-5, 1e-7}});
   subject.document = parse_model(to_json(subject.document), "model.json").value();
@@ -183,6 +183,29 @@ TEST(ModelReport, StatesAGapOfTheRecordingOnce) {
       RunFigures{.notes = {cannot_be_checked("the disk was full")}, .residuals = {}};
   EXPECT_EQ(times(model_report(subject).value(), "<li>no replay can check this model"), 2u)
       << "in the notes, and in what the uncertainty does not contain";
+}
+
+TEST(ModelReport, TheTemperatureOfTheBallArrayIsNotThatOfSensors) {
+  ReportSubject subject = reported(3);
+  subject.document.method = "evemu";
+  subject.document.artefact = calib::Expansion{11.5e-6, 0.5e-6, 293.65, 0.1};
+  subject.document.run = RunFigures{.residuals = {}};
+  subject.document.run->conditions =  // as earlier versions wrote it
+      RunConditions{.temperature_K = std::array{293.65, 293.65}};
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>temperature</th><td>not recorded</td>"),
+                    HasSubstr("<th>temperature of the ball array</th><td>20.50 \u00b1 0.20 C")));
+}
+
+TEST(ModelReport, TheTimeOfSeveralRunsHasNoPauses) {
+  ReportSubject subject = reported(3);
+  subject.document.run = RunFigures{.residuals = {}, .places_m = {{{-0.2, 0.1, -0.3}}}};
+  subject.document.run->conditions = RunConditions{.duration_s = 100.0};
+  EXPECT_THAT(model_report(subject).value(),
+              HasSubstr("<td>100.0 s, from the first to the last observation</td>"));
+  subject.document.run->places_m.push_back({{0.2, 0.1, -0.3}});
+  EXPECT_THAT(model_report(subject).value(),
+              HasSubstr("<td>100.0 s, sum of the runs, without the pauses between them</td>"));
 }
 
 TEST(ModelReport, HasTheTablesOfTheMethod) {

@@ -189,13 +189,15 @@ std::optional<RunFigures::Conditions> read_conditions(ModelReader& in, const Mod
     in.fault(path, "must be an object");
     return conditions;
   }
-  if (entry.contains("temperature_K")) {
-    const auto range = in.numbers(entry.at("temperature_K"), path + ".temperature_K", 0);
-    if (range.size() == 2)
-      conditions.temperature_K = {range[0], range[1]};
-    else
-      in.fault(path + ".temperature_K", "must be [lowest, highest]");
-  }
+  const auto range = [&](const std::string& key) -> std::optional<std::array<double, 2>> {
+    if (!entry.contains(key)) return std::nullopt;
+    const auto values = in.numbers(entry.at(key), path + "." + key, 0);
+    if (values.size() == 2) return std::array{values[0], values[1]};
+    in.fault(path + "." + key, "must be [lowest, highest]");
+    return std::nullopt;
+  };
+  conditions.temperature_K = range("temperature_K");
+  conditions.bar_temperature_K = range("bar_temperature_K");
   if (entry.contains("duration_s"))
     conditions.duration_s = in.number_of(entry, path, "duration_s", 0);
   if (entry.contains("feed_mm_per_s"))

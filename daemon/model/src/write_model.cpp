@@ -249,6 +249,7 @@ std::string conditions_of(const RunFigures::Conditions& c) {
     all += fmt::format("{}\"{}\": {}", all.empty() ? "" : ", ", key, value);
   };
   if (c.temperature_K) add("temperature_K", numbers(*c.temperature_K, 0));
+  if (c.bar_temperature_K) add("bar_temperature_K", numbers(*c.bar_temperature_K, 0));
   if (c.duration_s) add("duration_s", to_decimal(*c.duration_s, 0));
   if (c.feed_m_per_s) add("feed_mm_per_s", to_decimal(*c.feed_m_per_s, kMm));
   if (c.measured)

@@ -110,7 +110,7 @@ void write_administrative_data(XmlText& out, const ReportSubject& subject,
                                const ReportSubject* as_left) {
   out.open("dcc:administrativeData");
   out.open("dcc:dccSoftware");
-  write_software(out);
+  write_software(out, ABBE_VERSION);
   out.close();
   write_core_data(out, subject, measurement_days(subject, as_left));
   write_item(out, subject);

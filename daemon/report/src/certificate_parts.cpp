@@ -6,6 +6,7 @@
 
 #include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
+#include "stated_conditions.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -61,24 +62,30 @@ void write_values(XmlText& out, const CertifiedValues& values) {
   out.close();
 }
 
-void write_condition(XmlText& out, std::string_view name, State state, double value,
-                     std::string_view unit, std::string_view U) {
+/// `name`, `description` and the status of a condition; to be closed after its data.
+void open_condition(XmlText& out, std::string_view name, std::string_view description,
+                    State state) {
   out.open("dcc:influenceCondition");
   write_name(out, name);
+  if (!description.empty()) write_contents(out, "dcc:description", {std::string(description)});
   out.element("dcc:status", state == State::AsFound ? "beforeAdjustment" : "afterAdjustment");
   out.open("dcc:data");
-  out.open("dcc:quantity");
-  write_real(out, name, fmt::format("{:.3f}", value), unit, U);
-  out.close();
+}
+
+void write_condition(XmlText& out, const StatedCondition& condition, State state) {
+  if (condition.numbers.empty()) return;
+  open_condition(out, condition.name, condition.origin, state);
+  for (const StatedCondition::Number& number : condition.numbers) {
+    out.open("dcc:quantity");
+    write_real(out, number.label, number.value, condition.dsi_unit, number.U);
+    out.close();
+  }
   out.close();
   out.close();
 }
 
 void write_state(XmlText& out, const ReportSubject& subject, State state) {
-  out.open("dcc:influenceCondition");
-  write_name(out, "State of the machine");
-  out.element("dcc:status", state == State::AsFound ? "beforeAdjustment" : "afterAdjustment");
-  out.open("dcc:data");
+  open_condition(out, "State of the machine", "", state);
   write_contents(out, "dcc:text",
                  {fmt::format("{} (UTC), tool offsets {}", when_in_words(subject.document),
                               tools_in_words(subject.document.model))});
@@ -86,22 +93,14 @@ void write_state(XmlText& out, const ReportSubject& subject, State state) {
   out.close();
 }
 
+/// The details state the conditions of the measurement as found.
 void write_conditions(XmlText& out, const ReportSubject& subject, State state,
-                      const CertificateDetails& d) {
+                      const CertificateDetails& details) {
   out.open("dcc:influenceConditions");
   write_state(out, subject, state);
-  if (state == State::AsLeft) {  // the details state the conditions of the other measurement
-    out.close();
-    return;
-  }
-  if (d.temperature_C)
-    write_condition(out, "temperature", state, *d.temperature_C, "\\degreecelsius",
-                    d.u_temperature_K ? fmt::format("{:.3f}", 2.0 * *d.u_temperature_K) : "");
-  if (d.humidity_percent)
-    write_condition(out, "humidity", state, *d.humidity_percent, "\\percent", "");
-  if (d.feed_mm_per_min)
-    write_condition(out, "feed", state, *d.feed_mm_per_min, "\\milli\\metre\\minute\\tothe{-1}",
-                    "");
+  for (const StatedCondition& condition : stated_conditions(
+           subject.document, state == State::AsFound ? details : CertificateDetails{}))
+    write_condition(out, condition, state);
   out.close();
 }
 
@@ -202,10 +201,10 @@ void write_contact(XmlText& out, std::string_view element, const Contact& contac
   out.close();
 }
 
-void write_software(XmlText& out) {
+void write_software(XmlText& out, std::string_view release) {
   out.open("dcc:software");
   write_name(out, "abbe");
-  out.element("dcc:release", ABBE_VERSION);
+  out.element("dcc:release", xml_text(release).empty() ? std::string_view(ABBE_VERSION) : release);
   out.element("dcc:type", "application");
   out.close();
 }
@@ -224,7 +223,7 @@ void write_measurement_result(XmlText& out, const ReportSubject& subject,
   write_name(out, state == State::AsFound ? "As found" : "As left");
   write_method(out, subject.document);
   out.open("dcc:usedSoftware");
-  write_software(out);
+  write_software(out, subject.document.software);
   out.close();
   write_equipment(out, details.equipment, state);
   write_conditions(out, subject, state, details);

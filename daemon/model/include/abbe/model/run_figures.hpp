@@ -31,6 +31,8 @@ struct ResidualSeries {
 
 struct RunConditions {
   std::optional<std::array<double, 2>> temperature_K{};  ///< lowest and highest of the run
+  /// Lowest and highest temperature of a bar, as used in its measurements.
+  std::optional<std::array<double, 2>> bar_temperature_K{};
   std::optional<double> duration_s{};
   std::optional<double> feed_m_per_s{};  ///< median over the legs
   /// First and last observation; nullopt: the observations have no date, as in files.

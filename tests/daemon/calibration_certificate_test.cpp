@@ -176,6 +176,15 @@ TEST(CalibrationCertificate, AcceptsLocalDaysBesideThoseOfUtc) {
   EXPECT_FALSE(calibration_certificate(subject)) << "22:00 in the east is the 17th";
 }
 
+/// dcc:norm states that the measurement followed the standard.
+TEST(CalibrationCertificate, NamesNoStandardWhoseTestWasNotMade) {
+  const std::string text = calibration_certificate(certified_subject(3)).value();
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("<dcc:norm>ISO 230-1</dcc:norm>"),
+                    Not(HasSubstr("<dcc:norm>ISO 230-2")), Not(HasSubstr("<dcc:norm>ISO 230-6")),
+                    HasSubstr("computed from the identified model")));
+}
+
 TEST(CalibrationCertificate, OfATravelModelIsValid) {
   ReportSubject subject = certified_subject(3);
   subject.document.model = test::synthetic_travel_model(3);

@@ -8,6 +8,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/report/line_plot.hpp"
+#include "report_page.hpp"
 #include "synthetic_model.hpp"
 
 namespace abbe::daemon {
@@ -206,6 +207,44 @@ TEST(ModelReport, TheTimeOfSeveralRunsHasNoPauses) {
   subject.document.run->places_m.push_back({{0.2, 0.1, -0.3}});
   EXPECT_THAT(model_report(subject).value(),
               HasSubstr("<td>100.0 s, sum of the runs, without the pauses between them</td>"));
+}
+
+/// The page with as many residuals in each interval; of 200 observations, 160 degrees of freedom.
+std::string page_with_sigma_counts(const std::string& method, std::optional<double> freedom) {
+  ReportSubject subject = reported(3);
+  subject.document.method = method;
+  subject.document.statistics.degrees_of_freedom = freedom;
+  subject.document.run = RunFigures{.residuals = {}};
+  RunFigures& run = *subject.document.run;
+  run.part_kind = "measurement";
+  run.parts = {{"m1", 200, 1e-5, 1e-6, 1e-6, std::nullopt}};
+  run.series = ResidualSeries{1, false, {{1.0, 1e-6}}};
+  run.sigma_counts = std::vector<std::size_t>(RunFigures::kSigmaIntervals, 5);
+  subject.document = parse_model(to_json(subject.document), "model.json").value();
+  return model_report(subject).value();
+}
+
+/// A fit of a bar has unknowns with a prior (rank 70), which take only a part of a freedom.
+TEST(ModelReport, PredictsTheResidualsFromTheDegreesOfFreedom) {
+  const auto chart = test::chart_named(page_with_sigma_counts("mfb", 160.0),
+                                       "Residuals in standard uncertainties");
+  const auto predicted = test::dataset_of({chart}, "as predicted");
+  ASSERT_FALSE(predicted.is_null());
+  // 200 values, sd = sqrt(160 / 200), in the interval from 0 to 0.25.
+  const double expected = 100.0 * std::erf(0.25 / std::sqrt(2.0 * 0.8));
+  EXPECT_NEAR(predicted["data"][RunFigures::kSigmaIntervals / 2]["y"].get<double>(), expected,
+              1e-4);
+}
+
+TEST(ModelReport, PredictsNoResidualsWithoutTheDegreesOfFreedomOrFromEstimatedNoise) {
+  const auto has_prediction = [](const std::string& page) {
+    return !test::dataset_of(test::charts_of(page), "as predicted").is_null();
+  };
+  EXPECT_FALSE(has_prediction(page_with_sigma_counts("mfb", std::nullopt))) << "earlier version";
+  EXPECT_TRUE(has_prediction(page_with_sigma_counts("otf", std::nullopt))) << "has no priors";
+  const std::string array = page_with_sigma_counts("evemu", 160.0);
+  EXPECT_FALSE(has_prediction(array));
+  EXPECT_THAT(array, HasSubstr("no predicted distribution"));
 }
 
 TEST(ModelReport, HasTheTablesOfTheMethod) {

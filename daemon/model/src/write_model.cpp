@@ -189,10 +189,13 @@ void write_statistics(JsonText& out, const ModelStatistics& s,
       "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": "
       "{},\n"
       "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
-      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}}}",
+      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}{}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
       to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.variance_factor, 0),
       residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason),
+      s.degrees_of_freedom
+          ? fmt::format(", \"degrees_of_freedom\": {}", to_decimal(*s.degrees_of_freedom, 0))
+          : "",
       bar ? bar_figures(*bar) : ""));
 }
 

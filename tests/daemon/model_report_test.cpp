@@ -340,6 +340,21 @@ TEST(ModelReport, StatesWhenWasMeasuredAndWhenItWasIdentified) {
                               "recorded</td>")));
 }
 
+TEST(ModelReport, NamesEquipmentWhoseCalibrationHadExpired) {
+  ReportSubject subject = reported(3);
+  subject.details.equipment = {{"laser tracker", "", "", "", "", "2024-05-16"},
+                               {"probe", "", "", "", "", "2024-05-17"},
+                               {"thermometer", "", "", "", "", ""}};
+  EXPECT_THAT(
+      model_report(subject).value(),
+      AllOf(HasSubstr("<li>equipment &quot;laser tracker&quot;: its calibration was valid "
+                      "until 2024-05-16, the model was identified 2024-05-17</li>"),
+            Not(HasSubstr("equipment &quot;probe")), Not(HasSubstr("equipment &quot;thermo"))));
+  const auto last = subject.document.created - std::chrono::hours(48);
+  subject.document.run = measured_at(last - std::chrono::minutes(20), last);
+  EXPECT_THAT(model_report(subject).value(), Not(HasSubstr("its calibration was valid until")));
+}
+
 TEST(TrendReport, OrdersModelsByTheirMeasurementNotByTheirIdentification) {
   ReportSubject earlier = reported(3), later = reported(4);
   earlier.document.run = measured_at(later.document.created - std::chrono::hours(48),

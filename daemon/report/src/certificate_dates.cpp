@@ -17,12 +17,6 @@ using namespace std::chrono_literals;
 // Local time is between UTC - 12 h and UTC + 14 h.
 constexpr auto kMostBehindUtc = 12h, kMostAheadOfUtc = 14h;
 
-/// "2024-05-17"
-std::string day_of(protocol::UtcTime time) {
-  constexpr std::size_t kDate = 10;
-  return to_seconds(time).substr(0, kDate);
-}
-
 std::optional<std::string> first_day(const ReportSubject& subject) {
   const auto measured = measured_of(subject.document);
   return measured ? std::optional(day_of((*measured)[0])) : std::nullopt;
@@ -68,6 +62,11 @@ void compare_equipment(const std::vector<EquipmentDetails>& equipment, Equipment
 }
 
 }  // namespace
+
+std::string day_of(protocol::UtcTime time) {
+  constexpr std::size_t kDate = 10;
+  return to_seconds(time).substr(0, kDate);
+}
 
 MeasurementDays measurement_days(const ReportSubject& as_found, const ReportSubject* as_left) {
   const CertificateDetails& d = as_found.details;

@@ -10,6 +10,9 @@
 
 namespace abbe::daemon {
 
+/// "2024-05-17", UTC
+[[nodiscard]] std::string day_of(protocol::UtcTime time);
+
 /// First and last day of all measurements of a certificate: those of the details, else those of the
 /// models. Empty: not known.
 struct MeasurementDays {

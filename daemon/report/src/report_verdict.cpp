@@ -4,6 +4,7 @@
 
 #include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
+#include "certificate_dates.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -40,7 +41,21 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
     const std::string note = cannot_be_checked(gap);  // of a run of abbed it is among its notes
     if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
   }
+  add_expired_equipment(subject, notes);
   return notes;
+}
+
+/// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
+/// that does not have this day, on the day of its identification.
+void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
+  const std::string end = measurement_days(subject, nullptr).end;
+  const std::string day = end.empty() ? day_of(subject.document.created) : end;
+  for (const EquipmentDetails& e : subject.details.equipment)
+    if (is_used(e, EquipmentUse::AsFound) && !e.valid_until.empty() && e.valid_until < day)
+      notes.push_back(
+          fmt::format("equipment \"{}\": its calibration was valid until {}, the model "
+                      "was {} {}",
+                      e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
 bool has_drifted(const ReportSubject& subject) {

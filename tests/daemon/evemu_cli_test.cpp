@@ -17,6 +17,7 @@
 
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/model/model_store.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"
@@ -154,6 +155,18 @@ TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
                               1e6 * std::sqrt(e.cov_V_m2(2, 2))));
   std::getline(lines, line);
   EXPECT_THAT(line, ::testing::EndsWith(",0"));
+}
+
+TEST_F(EvemuCli, KeepsNoModelWhoseReportCannotBeWritten) {
+  fs::create_directories(folder_ / "out/report.html");  // a folder in place of the file
+  const std::string identify =
+      "identify evemu --machine machine.toml --errors errors.csv --keep kept -o ";
+  const auto ran = abbe(identify + "out");
+  EXPECT_EQ(ran.exit, 4) << ran.out;
+  EXPECT_THAT(ran.err, HasSubstr("report.html"));
+  EXPECT_TRUE(ModelStore::open(folder_ / "kept")->list()->empty());
+  EXPECT_EQ(abbe(identify + "other").exit, kRefused);
+  EXPECT_EQ(ModelStore::open(folder_ / "kept")->list()->size(), 1u);
 }
 
 TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {

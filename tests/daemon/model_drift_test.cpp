@@ -242,8 +242,9 @@ TEST_F(DriftingMachine, AModelKeepsWhenItWasMeasured) {
   const auto [first, last] = document.run->conditions->measured.value();
   EXPECT_GT(first, before);
   EXPECT_LT(last, document.created);
+  // The standstills before and after the path (0.4 s each) have no residuals.
   EXPECT_NEAR(std::chrono::duration<double>(last - first).count(),
-              *document.run->conditions->duration_s, 1.0);
+              *document.run->conditions->duration_s, 2.0);
 }
 
 TEST_F(DriftingMachine, AnUnchangedMachineRaisesNone) {

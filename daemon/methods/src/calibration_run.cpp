@@ -43,11 +43,11 @@ ObservedTimes observed(const CalibrationRun& run) {
   return std::visit([](const auto& of_method) { return of_method.observed; }, run);
 }
 
-void add_measured(ModelDocument& document, const ObservedTimes& observed, protocol::UtcOffset utc) {
-  if (!observed || !document.run) return;
+void add_measured(ModelDocument& document, const ObservedTimes& times, protocol::UtcOffset utc) {
+  if (!times || !document.run) return;
   auto& conditions = document.run->conditions;
   if (!conditions) conditions.emplace();
-  const auto [first, last] = *observed;
+  const auto [first, last] = *times;
   conditions->measured = {utc.to_utc(first), utc.to_utc(last)};
   if (!conditions->duration_s)
     conditions->duration_s = std::chrono::duration<double>(last - first).count();

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "abbe/base/units.hpp"
-#include "abbe/base/utc_text.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"

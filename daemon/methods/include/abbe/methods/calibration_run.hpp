@@ -42,6 +42,6 @@ using ObservedTimes = std::optional<std::array<protocol::HostTime, 2>>;
 
 /// Adds when was measured to the conditions of the document, and the duration where the method did
 /// not. `utc`: offset of the host clock of the run. Nothing is added for times that are not known.
-void add_measured(ModelDocument& document, const ObservedTimes& observed, protocol::UtcOffset utc);
+void add_measured(ModelDocument& document, const ObservedTimes& times, protocol::UtcOffset utc);
 
 }  // namespace abbe::daemon

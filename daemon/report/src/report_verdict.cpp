@@ -15,6 +15,19 @@ std::string who_and_when(const StoreEvent& event) {
                      event.actor.why.empty() ? "" : ": ", event.actor.why);
 }
 
+/// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
+/// that does not have this day, on the day of its identification.
+void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
+  const std::string end = measurement_days(subject, nullptr).end;
+  const std::string day = end.empty() ? day_of(subject.document.created) : end;
+  for (const EquipmentDetails& e : subject.details.equipment)
+    if (is_used(e, EquipmentUse::AsFound) && !e.valid_until.empty() && e.valid_until < day)
+      notes.push_back(
+          fmt::format("equipment \"{}\": its calibration was valid until {}, the model "
+                      "was {} {}",
+                      e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
+}
+
 /// What happened to the model in the store, apart from its verdict.
 std::vector<std::string> notes_of(const ReportSubject& subject) {
   std::vector<std::string> notes;
@@ -43,19 +56,6 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
   }
   add_expired_equipment(subject, notes);
   return notes;
-}
-
-/// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
-/// that does not have this day, on the day of its identification.
-void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
-  const std::string end = measurement_days(subject, nullptr).end;
-  const std::string day = end.empty() ? day_of(subject.document.created) : end;
-  for (const EquipmentDetails& e : subject.details.equipment)
-    if (is_used(e, EquipmentUse::AsFound) && !e.valid_until.empty() && e.valid_until < day)
-      notes.push_back(
-          fmt::format("equipment \"{}\": its calibration was valid until {}, the model "
-                      "was {} {}",
-                      e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
 bool has_drifted(const ReportSubject& subject) {

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "abbe/calib/mfb/points_of_interest.hpp"
 #include "simulated_bar.hpp"
 
@@ -324,6 +326,84 @@ TEST(BarCalibration, WrongPlansAreRefused) {
   s = good;
   s.gauge.u_m = -1e-7;
   EXPECT_FALSE(s.calibrated());
+}
+
+/// Whether the calibration is refused, or has a note, with this text.
+void expect_named(const Simulated& s, const char* text) {
+  const auto found = s.calibrated();
+  if (found) {
+    EXPECT_THAT(found->notes, testing::Contains(HasSubstr(text)));
+  } else {
+    EXPECT_THAT(found.error().text, HasSubstr(text));
+  }
+}
+
+TEST(BarCalibration, MistakesOnTheShopFloorAreNamed) {
+  const Simulated good = simulated(usual(7));
+  EXPECT_THAT(calibrated(good).notes, testing::IsEmpty());
+
+  Simulated s = good;
+  s.gauge.faces[4].readings_m[1].x() += 5e-6;  // moves the mean of the face by 1 um
+  expect_named(s, "face 5, run 2: ");
+  s = good;
+  for (Vector3& reading_m : s.gauge.faces[4].readings_m) {
+    reading_m.x() += 3e-6;  // dirt
+  }
+  expect_named(s, "face 5: its E_XX is about");
+  s = good;  // another gauge of the same kind
+  for (std::size_t k = 1; k < s.gauge.faces.size(); ++k) {
+    s.gauge.faces[k].distance_m += (k * k * k % 7 - 3.0) * 1e-6;
+  }
+  expect_named(s, "the distances of another gauge");
+  s = good;  // from the other end
+  std::reverse(s.gauge.faces.begin(), s.gauge.faces.end());
+  for (calib::mfb::GaugeFace& face : s.gauge.faces) {
+    face.distance_m = good.gauge.faces.back().distance_m - face.distance_m;
+  }
+  expect_named(s, "begin at the face near hole 1");
+  s = good;
+  s.passes[2] = s.passes[0];
+  expect_named(s, "N2: its touches are those of N1");
+  s = good;  // other blocks
+  for (calib::mfb::Touch& touch : s.passes[3]) {
+    touch.reading_m.z() += 2e-3;
+  }
+  expect_named(s, "R2: the bar lay 1.9");
+}
+
+TEST(BarCalibration, WrongUnitsAreNamed) {
+  const Simulated good = simulated(usual(7));
+  Simulated s = good;
+  for (calib::mfb::GaugeFace& face : s.gauge.faces) {
+    for (Vector3& reading_m : face.readings_m) {
+      reading_m *= 1e3;
+    }
+  }
+  expect_named(s, "another face, unit or temperature");
+  s = good;
+  for (calib::mfb::Touch& touch : s.passes[1]) {
+    touch.reading_m *= 1e3;
+  }
+  expect_named(s, "R1: ");
+}
+
+TEST(BarCalibration, TemperaturesThatAreNotStatedAreNoted) {
+  const Simulated good = simulated(usual(7));
+  Simulated s = good;
+  s.gauge.expansion.reset();
+  expect_named(s, "the step gauge has no thermal expansion");
+  s = good;
+  s.nominal.expansion.reset();
+  expect_named(s, "the bar has no thermal expansion");
+  s = good;
+  s.gauge.u_temperature_K = 0.0;
+  expect_named(s, "step gauge has no u_temperature");
+  s = good;
+  s.gauge.temperature_K += 48.0;  // 68 F, as C
+  expect_named(s, "another face, unit or temperature");
+  s = good;
+  s.gauge.temperature_K += 8.0;
+  expect_named(s, "um per m: check the temperature");
 }
 
 /// The touches of one pass of the simulator, grouped by feature.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "abbe/calib/mfb/reversal.hpp"
@@ -109,6 +110,22 @@ Result<void> check_origin(const StepGauge& gauge) {
                          ": the origin is the centre of the tip, reading plus tool offset"));
 }
 
+/// A pass that was copied has no scatter.
+Result<void> check_distinct(const Plan& plan, std::span<const PassTouches> touches) {
+  const auto same = [](const Touch& a, const Touch& b) { return a.reading_m == b.reading_m; };
+  for (std::size_t m = 1; m < touches.size(); ++m) {
+    for (std::size_t before = 0; before < m; ++before) {
+      const PassTouches &a = touches[before], &b = touches[m];
+      if (!a.empty() && std::equal(a.begin(), a.end(), b.begin(), b.end(), same)) {
+        return failure(ErrorCode::BadInput,
+                       message(plan.measurements[m].name, ": its touches are those of ",
+                               plan.measurements[before].name, ": measure every pass"));
+      }
+    }
+  }
+  return {};
+}
+
 /// The covariances of x of the points, apart from that of the repeats.
 struct PositioningCovariances {
   Eigen::MatrixXd gauge_m2, abbe_m2, temperature_m2;
@@ -203,12 +220,49 @@ void note_abbe_error(BarCalibration& found, const StepGauge& gauge) {
                                 kUmPerM * largest_m, " um to u(x)"));
 }
 
-void add_notes(BarCalibration& found, const StepGauge& gauge) {
+/// What the files do not state about the temperatures, and what that costs.
+void note_temperatures(BarCalibration& found, const StepGauge& gauge, const TouchNoise& noise) {
+  const auto without_expansion = [&](std::string_view what) {
+    found.notes.push_back(message(what,
+                                  " has no thermal expansion: its lengths are not corrected "
+                                  "to 20 C, and the uncertainty does not contain this"));
+  };
+  const auto exact = [&](std::string_view what) {
+    found.notes.push_back(
+        message("the temperature of the ", what, " has no u_temperature: it counts as exact"));
+  };
+  if (!found.bar.expansion) {
+    without_expansion("the bar");
+  } else if (!(noise.u_temperature_K > 0.0)) {
+    exact("bar");
+  }
+  if (!gauge.expansion) {
+    without_expansion("the step gauge");
+  } else if (!(gauge.u_temperature_K > 0.0)) {
+    exact("step gauge");
+  }
+}
+
+/// An E_XX that no measuring machine has: a wrong temperature, scale or unit.
+void note_scale(BarCalibration& found) {
+  constexpr double kMost = 50e-6;
+  const double length_m = found.bar.O_m.back().x();
+  const double scale = found.machine_m.back().x() / length_m;
+  if (std::abs(scale) > kMost) {
+    found.notes.push_back(message("E_XX of the machine is ", kUmPerM * scale,
+                                  " um per m: check the temperature of the step gauge and the "
+                                  "expansion of the scales"));
+  }
+}
+
+void add_notes(BarCalibration& found, const StepGauge& gauge, const Plan& plan) {
   note_abbe_error(found, gauge);
   if (gauge.faces.front().readings_m.size() < 2) {
     found.notes.emplace_back(
         "the step gauge was measured once: its repeatability is not in the uncertainty");
   }
+  note_temperatures(found, gauge, plan.noise);
+  note_scale(found);
   if (!found.bar.pattern.has_signature()) {
     found.notes.emplace_back(
         "the bar has no shifted holes: a bar that lies turned is not recognised");
@@ -232,6 +286,9 @@ Result<MeasuredPasses> measured_passes(const Bar& nominal, const Plan& plan,
   Result<Observations> o = observe(nominal, plan, touches, *machine, limits);
   if (!o) {
     return tl::unexpected(o.error());
+  }
+  if (Result<void> distinct = check_distinct(plan, touches); !distinct) {
+    return tl::unexpected(distinct.error());
   }
   Result<BarLine> line = line_of_bar(*o);
   if (!line) {
@@ -337,7 +394,8 @@ Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
     found.notes.insert(found.notes.end(), notes.begin(), notes.end());
   };
   append(notes_of_line(passes->observed, passes->line, most_angle_rad(gauge, passes->line)));
-  add_notes(found, gauge);
+  append(measured->x.notes);
+  add_notes(found, gauge, plan);
   return found;
 }
 

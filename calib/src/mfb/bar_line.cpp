@@ -94,7 +94,21 @@ std::string angle_text(const Matrix3& axes, const Vector3& direction) {
 
 std::vector<std::string> notes_of_line(const Observations& o, const BarLine& line,
                                        double alignment_rad) {
+  constexpr double kMostBeside_m = 1e-3, kMostTurned_rad = 2e-3;
   std::vector<std::string> notes;
+  for (const PassObservation& pass : o.passes) {
+    const BarPose& pose = o.positions[pass.position].pose;
+    const Vector3 beside_m = part_across(line.axes, middle_of(pose, o.bar) - line.middle_m);
+    const double turned_rad = part_across(line.axes, pose.axes.col(0)).norm();
+    if (beside_m.norm() > kMostBeside_m || turned_rad > kMostTurned_rad) {
+      notes.push_back(message(
+          o.plan.measurements[pass.measurement].name, ": the bar lay ", kMmPerM * beside_m.norm(),
+          " mm and ", angle_text(line.axes, pose.axes.col(0)),
+          " from the mean of all passes: other blocks, or it moved; the rotations of the machine "
+          "act on this distance, and it is not in the uncertainty"));
+    }
+  }
+
   const Vector3 planned = o.plan.measurements.front().bar_x.normalized();
   if (part_across(line.axes, planned).norm() > alignment_rad) {
     notes.push_back(message("bar_x of the plan is ", angle_text(line.axes, planned),

@@ -32,7 +32,8 @@ struct BarLine {
 /// BadInput: bar_x of a measurement is more than 20 mrad from the machine axis of the first.
 [[nodiscard]] Result<BarLine> line_of_bar(const Observations&);
 
-/// A plan whose bar_x is more than `alignment_rad` from the bar.
+/// Passes whose bar lay elsewhere than in the others, and a plan whose bar_x is more than
+/// `alignment_rad` from the bar.
 [[nodiscard]] std::vector<std::string> notes_of_line(const Observations&, const BarLine&,
                                                      double alignment_rad);
 

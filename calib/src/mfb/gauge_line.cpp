@@ -1,11 +1,13 @@
 #include "mfb/gauge_line.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "elementary.hpp"
+#include "median.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
@@ -104,19 +106,53 @@ Vector3 direction_of(const StepGauge& gauge, const std::vector<Vector3>& face_m)
   return slope.normalized();
 }
 
-/// Standard deviation of one reading along the line; 0 without repeats.
-double deviation_of_runs(const StepGauge& gauge, const GaugeLine& line) {
+/// Residuals of the runs of all faces along the line, from the mean of their face.
+struct RunResiduals {
+  std::size_t face = 0, run = 0;  ///< of the largest one
+  double largest_m = 0.0;
+  double usual_m = 0.0;  ///< standard deviation from the median, which an outlier does not change
+  double s_m = 0.0;      ///< standard deviation from the squares; 0 without repeats
+};
+
+RunResiduals run_residuals(const StepGauge& gauge, const GaugeLine& line) {
+  RunResiduals out;
+  std::vector<double> all_m;
   double squares = 0.0;
-  std::size_t degrees_of_freedom = 0;
   for (std::size_t k = 0; k < gauge.faces.size(); ++k) {
-    for (const Vector3& reading_m : gauge.faces[k].readings_m) {
-      const double off_m = line.direction.dot(reading_m - line.face_m[k]);
+    const auto& readings_m = gauge.faces[k].readings_m;
+    for (std::size_t r = 0; r < readings_m.size(); ++r) {
+      const double off_m = std::abs(line.direction.dot(readings_m[r] - line.face_m[k]));
       squares += off_m * off_m;
+      all_m.push_back(off_m);
+      if (off_m > out.largest_m) {
+        out.face = k;
+        out.run = r;
+        out.largest_m = off_m;
+      }
     }
-    degrees_of_freedom += gauge.faces[k].readings_m.size() - 1;
   }
-  return degrees_of_freedom == 0 ? 0.0
-                                 : std::sqrt(squares / static_cast<double>(degrees_of_freedom));
+
+  const auto readings = static_cast<double>(all_m.size());
+  const double degrees_of_freedom = readings - static_cast<double>(gauge.faces.size());
+  if (degrees_of_freedom > 0.0) {
+    out.s_m = std::sqrt(squares / degrees_of_freedom);
+    out.usual_m = kMadToSigma * median(all_m) * std::sqrt(readings / degrees_of_freedom);
+  }
+  return out;
+}
+
+/// A false trigger or dirt in one run moves the mean of its face.
+Result<void> check_runs(const RunResiduals& runs) {
+  constexpr double kWorse = 8.0, kSmall_m = 1e-6;
+  if (runs.largest_m <= std::max(kWorse * runs.usual_m, kSmall_m)) {
+    return {};
+  }
+  return failure(ErrorCode::BadInput,
+                 message("step gauge, face ", runs.face + 1, ", run ", runs.run + 1, ": ",
+                         kUmPerM * runs.largest_m, " um from the mean of its face, usual are ",
+                         kUmPerM * runs.usual_m,
+                         " um: dirt or a false trigger; measure the gauge again, or leave out this "
+                         "run of all faces"));
 }
 
 /// Row: weights of the faces in the value at `at_m`, linear between the faces.
@@ -129,6 +165,74 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
   weights(i - 1) = 1.0 - u;
   weights(i) = u;
   return weights;
+}
+
+/// Weights of the faces in the polynomial through `four` of them, at face `at`.
+Eigen::Vector4d lagrange_weights(const StepGauge& gauge, const std::array<std::size_t, 4>& four,
+                                 std::size_t at) {
+  Eigen::Vector4d weights = Eigen::Vector4d::Ones();
+  for (std::size_t i = 0; i < four.size(); ++i) {
+    for (std::size_t k = 0; k < four.size(); ++k) {
+      if (k != i) {
+        weights(static_cast<Eigen::Index>(i)) *=
+            (gauge.faces[at].distance_m - gauge.faces[four[k]].distance_m) /
+            (gauge.faces[four[i]].distance_m - gauge.faces[four[k]].distance_m);
+      }
+    }
+  }
+  return weights;
+}
+
+/// E of each face from the cubic through four faces around it, divided by the standard deviation
+/// that this has for independent errors of standard deviation 1. An error of the machine that is
+/// smooth over five faces does not show. Empty below 5 faces.
+std::vector<double> roughness_m(const StepGauge& gauge, const Eigen::VectorXd& E_m) {
+  constexpr std::size_t kWindow = 5;
+  const std::size_t faces = gauge.faces.size();
+  std::vector<double> out;
+  for (std::size_t k = 0; faces >= kWindow && k < faces; ++k) {
+    const std::size_t first = std::min(k < 2 ? 0 : k - 2, faces - kWindow);
+    std::array<std::size_t, 4> four{};
+    for (std::size_t i = 0, face = first; i < four.size(); ++i, ++face) {
+      if (face == k) {
+        ++face;
+      }
+      four[i] = face;
+    }
+    const Eigen::Vector4d weights = lagrange_weights(gauge, four, k);
+    double off_m = E_m(static_cast<Eigen::Index>(k));
+    for (std::size_t i = 0; i < four.size(); ++i) {
+      off_m -= weights(static_cast<Eigen::Index>(i)) * E_m(static_cast<Eigen::Index>(four[i]));
+    }
+    out.push_back(std::abs(off_m) / std::sqrt(1.0 + weights.squaredNorm()));
+  }
+  return out;
+}
+
+std::vector<std::string> notes_of_faces(const StepGauge& gauge, const GaugeLine& line,
+                                        const Eigen::VectorXd& E_m) {
+  const std::vector<double> rough_m = roughness_m(gauge, E_m);
+  if (rough_m.empty()) {
+    return {};
+  }
+  constexpr double kRougher = 4.0, kWorse = 6.0, kRough_m = 0.3e-6, kSmall_m = 0.5e-6;
+  const auto runs = static_cast<double>(gauge.faces.front().readings_m.size());
+  const double expected_m = root_sum_of_squares(gauge.u_m, line.s_m / std::sqrt(runs));
+  std::vector<double> sorted_m = rough_m;
+  const double usual_m = kMadToSigma * median(sorted_m);
+  if (usual_m > std::max(kRougher * expected_m, kRough_m)) {
+    return {message("step gauge: from face to face E_XX scatters by ", kUmPerM * usual_m,
+                    " um, stated u and repeatability explain ", kUmPerM * expected_m,
+                    " um: the distances of another gauge, a gauge measured from its other end, or "
+                    "an error of the machine with a short period")};
+  }
+  const auto worst = std::max_element(rough_m.begin(), rough_m.end());
+  if (*worst > std::max(kWorse * std::max(usual_m, expected_m), kSmall_m)) {
+    return {message("step gauge, face ", worst - rough_m.begin() + 1, ": its E_XX is about ",
+                    kUmPerM * *worst,
+                    " um beside those of the faces around it: dirt, or a wrong distance")};
+  }
+  return {};
 }
 
 /// Relative standard uncertainty of all distances at the temperature of the gauge.
@@ -154,8 +258,11 @@ Result<GaugeLine> line_of_gauge(const StepGauge& gauge) {
   }
   line.direction = direction_of(gauge, line.face_m);
 
-  line.s_m = deviation_of_runs(gauge, line);
-  return check_distances(gauge, line).map([&] { return line; });
+  const RunResiduals runs = run_residuals(gauge, line);
+  line.s_m = runs.s_m;
+  return check_runs(runs).and_then([&] { return check_distances(gauge, line); }).map([&] {
+    return line;
+  });
 }
 
 double u_of_alignment(const StepGauge& gauge) {
@@ -230,7 +337,8 @@ Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const GaugeLine
   const Eigen::MatrixXd of_faces_m2 = variance_m2.asDiagonal().toDenseMatrix() +
                                       u_rad * u_rad * beside_m * beside_m.transpose() +
                                       u_length * u_length * distance_m * distance_m.transpose();
-  return Positioning{weights * E_faces_m, weights * of_faces_m2 * weights.transpose()};
+  return Positioning{weights * E_faces_m, weights * of_faces_m2 * weights.transpose(),
+                     notes_of_faces(gauge, line, E_faces_m)};
 }
 
 Eigen::MatrixXd abbe_covariance_m2(double beside_m, double u_rotation_rad,

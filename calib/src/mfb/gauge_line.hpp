@@ -29,7 +29,8 @@ struct GaugeLine {
   }
 };
 
-/// BadInput: invalid values of the gauge, or a face whose readings do not fit its distance.
+/// BadInput: invalid values of the gauge, a face whose readings do not fit its distance, a reading
+/// far from the other runs of its face.
 [[nodiscard]] Result<GaugeLine> line_of_gauge(const StepGauge& gauge);
 
 /// Standard uncertainty of each of the two angles between the gauge and the line of its touches.
@@ -47,6 +48,7 @@ struct Positioning {
   Eigen::VectorXd E_m;
   /// of calibration, alignment, temperature and repeatability of the gauge
   Eigen::MatrixXd covariance_m2;
+  std::vector<std::string> notes;  ///< faces that do not fit the others
 };
 
 /// BadInput: holes beyond the first or last face.

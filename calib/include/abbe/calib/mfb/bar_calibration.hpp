@@ -78,10 +78,11 @@ struct BarCalibration {
 
 /// Errors of check() and observe(), with the name of the measurement; errors of
 /// calibrate_by_reversal(). BadInput: a bar that is planned more than 20 mrad from a machine axis or
-/// not parallel in all passes, a position with two passes, a gauge with invalid values, one that does
-/// not reach over the bar, touches on a line that is not along the bar. NotApplicable: the gauge lies
-/// more than 1 mm beside the bar and u_rotation_rad is absent. `notes` state what could not be checked
-/// or does not fit.
+/// not parallel in all passes, a position with two passes, two passes with the same readings; a gauge
+/// with invalid values, one that does not reach over the bar, a run that does not fit the others of
+/// its face, touches on a line that is not along the bar. NotApplicable: the gauge lies more than 1
+/// mm beside the bar and u_rotation_rad is absent. `notes` state what could not be checked or does
+/// not fit.
 [[nodiscard]] Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
                                                    std::span<const PassTouches> touches,
                                                    const StepGauge& gauge,

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 
+#include <array>
+#include <chrono>
 #include <cstdlib>
 #include <map>
 
@@ -35,8 +37,16 @@ CertificateDetails certificate_details() {
   return d;
 }
 
-ReportSubject certified_subject(unsigned seed) {
-  return {.document = test::synthetic_document(seed), .details = certificate_details()};
+/// Measured on 2024-05-17, or this number of days later, from 8:00 to 8:30 UTC.
+ReportSubject certified_subject(unsigned seed, int days_later = 0) {
+  using protocol::UtcTime;
+  ReportSubject subject{.document = test::synthetic_document(seed),
+                        .details = certificate_details()};
+  const UtcTime last{std::chrono::seconds{1'715'934'600} + days_later * std::chrono::hours{24}};
+  subject.document.run = RunFigures{.residuals = {}};
+  subject.document.run->conditions =
+      RunConditions{.measured = std::array{last - std::chrono::minutes{30}, last}};
+  return subject;
 }
 
 /// What xmllint says of a certificate; empty: it is valid.
@@ -85,10 +95,94 @@ TEST(CalibrationCertificate, IsValidAgainstTheSchema) {
                                HasSubstr("after an adjustment was not measured")));
   EXPECT_EQ(*as_found, calibration_certificate(certified_subject(3)).value());
 
-  const auto both = calibration_certificate(certified_subject(3), certified_subject(4));
+  const auto both = calibration_certificate(certified_subject(3), certified_subject(4, 8));
   EXPECT_EQ(schema_faults(both.value()), "");
   EXPECT_THAT(*both, AllOf(HasSubstr(">As found<"), HasSubstr(">As left<"),
                            HasSubstr("afterAdjustment"), HasSubstr("2026-0117")));
+}
+
+TEST(CalibrationCertificate, ContainsTheDaysOfBothMeasurements) {
+  const ReportSubject as_found = certified_subject(3), as_left = certified_subject(4, 8);
+  const std::string text = calibration_certificate(as_found, as_left).value();
+  EXPECT_THAT(text, AllOf(HasSubstr("<dcc:beginPerformanceDate>2024-05-17<"),
+                          HasSubstr("<dcc:endPerformanceDate>2024-05-25<")));
+  EXPECT_THAT(text.substr(text.find(">As left<")),
+              HasSubstr("measured 2024-05-25T08:00:00Z to 2024-05-25T08:30:00Z (UTC)"));
+  EXPECT_THAT(calibration_certificate(as_found).value(),
+              HasSubstr("<dcc:endPerformanceDate>2024-05-17<"));
+}
+
+TEST(CalibrationCertificate, DatesBeforeTheMeasurementAsLeftAreNamed) {
+  ReportSubject as_found = certified_subject(3);
+  as_found.details.end_date = "2024-05-18";
+  as_found.details.issue_date = "2024-05-18";
+  as_found.details.equipment.front().valid_until = "2024-05-18";
+  EXPECT_TRUE(calibration_certificate(as_found)) << "alone";
+  as_found.details.equipment.push_back({"probe", "", "", "", "", "2024-05-18"});
+  as_found.details.equipment.back().use = EquipmentUse::AsLeft;
+  auto refused = calibration_certificate(as_found, certified_subject(4, 8));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("end_date: 2024-05-18 is before as left ended, "
+                                               "2024-05-25")));
+
+  as_found.details.end_date = "2024-05-25";
+  refused = calibration_certificate(as_found, certified_subject(4, 8));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("issue_date: 2024-05-18 is before the end"),
+                                     HasSubstr("\"probe\": its calibration was valid until "
+                                               "2024-05-18, as left ended 2024-05-25")));
+  refused = calibration_certificate(certified_subject(3, 8), certified_subject(4));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("--as-left: measured 2024-05-17T08:00:00Z")));
+}
+
+TEST(CalibrationCertificate, StatesEquipmentWithTheMeasurementItWasUsedFor) {
+  ReportSubject as_found = certified_subject(3);
+  as_found.details.equipment.push_back({"probe", "", "", "", ""});
+  as_found.details.equipment.back().use = EquipmentUse::AsLeft;
+  const std::string text = calibration_certificate(as_found, certified_subject(4, 8)).value();
+  EXPECT_EQ(schema_faults(text), "");
+  const auto left = text.find(">As left<");
+  EXPECT_THAT(text.substr(0, left), AllOf(HasSubstr(">laser tracker<"), Not(HasSubstr(">probe<"))));
+  EXPECT_THAT(text.substr(left), AllOf(Not(HasSubstr(">laser tracker<")), HasSubstr(">probe<")));
+  EXPECT_THAT(model_report(as_found).value(), Not(HasSubstr("<td>probe</td>")));
+}
+
+/// A model from files does not know when it was measured, and was perhaps identified much later.
+TEST(CalibrationCertificate, OfAModelWithoutTimesNeedsTheDaysOfTheMeasurement) {
+  ReportSubject subject = certified_subject(3);
+  subject.document.run.reset();
+  const auto refused = calibration_certificate(subject);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("certificate.begin_date: the model does not have"),
+                                     HasSubstr("certificate.end_date: the model does not have")));
+  subject.details.begin_date = "2024-05-01";
+  subject.details.end_date = subject.details.issue_date = "2024-05-02";
+  EXPECT_EQ(schema_faults(calibration_certificate(subject).value()), "");
+}
+
+/// Dates of the details are local: up to 14 h before, 12 h behind UTC.
+TEST(CalibrationCertificate, AcceptsLocalDaysBesideThoseOfUtc) {
+  ReportSubject subject = certified_subject(3);  // 2024-05-17, 8:00 to 8:30 UTC
+  subject.details.begin_date = subject.details.end_date = "2024-05-16";
+  EXPECT_TRUE(calibration_certificate(subject)) << "20:00 in the west";
+  subject.details.begin_date = subject.details.end_date = "2024-05-15";
+  EXPECT_FALSE(calibration_certificate(subject));
+  subject.details.begin_date = subject.details.end_date = "2024-05-18";
+  EXPECT_FALSE(calibration_certificate(subject)) << "22:00 in the east is the 17th";
+}
+
+/// dcc:norm states that the measurement followed the standard.
+TEST(CalibrationCertificate, NamesNoStandardWhoseTestWasNotMade) {
+  const std::string text = calibration_certificate(certified_subject(3)).value();
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("<dcc:norm>ISO 230-1</dcc:norm>"),
+                    Not(HasSubstr("<dcc:norm>ISO 230-2")), Not(HasSubstr("<dcc:norm>ISO 230-6")),
+                    HasSubstr("computed from the identified model")));
 }
 
 TEST(CalibrationCertificate, OfATravelModelIsValid) {
@@ -145,6 +239,7 @@ TEST(CalibrationCertificate, NamesEverythingThatIsMissing) {
 
 TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
   ReportSubject subject = certified_subject(3);
+  subject.document.run.reset();
   subject.details.begin_date = "2026-11-25";
   subject.details.end_date = "2026-11-24";
   subject.details.issue_date = "2026-11-23";
@@ -158,12 +253,50 @@ TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
                                                "2026-11-20")));
 }
 
+/// A run with a tracker whose sensors were read.
+void add_recorded_conditions(ReportSubject& subject) {
+  RunConditions& conditions = *subject.document.run->conditions;
+  conditions.temperature_K = std::array{293.65, 294.45};
+  conditions.duration_s = 123.4;
+  conditions.feed_m_per_s = 2.4 / 60.0;
+}
+
 TEST(CalibrationCertificate, StatesConditionsOnlyOfTheMeasurementThatHadThem) {
-  const std::string text =
-      calibration_certificate(certified_subject(3), certified_subject(4)).value();
+  ReportSubject left = certified_subject(4, 8);
+  add_recorded_conditions(left);
+  const std::string text = calibration_certificate(certified_subject(3), left).value();
+  EXPECT_EQ(schema_faults(text), "");
   const std::string as_left = text.substr(text.find(">As left<"));
-  EXPECT_THAT(text, HasSubstr(">20.400<"));
-  EXPECT_THAT(as_left, AllOf(Not(HasSubstr(">20.400<")), HasSubstr("State of the machine")));
+  EXPECT_THAT(text, AllOf(HasSubstr(">20.40<"), HasSubstr(">2500<")));
+  EXPECT_THAT(as_left, AllOf(Not(HasSubstr(">20.40<")), HasSubstr("State of the machine"),
+                             HasSubstr(">20.50<"), HasSubstr(">21.30<"), HasSubstr(">2400<")));
+}
+
+TEST(CalibrationCertificate, HasTheConditionsAndTheSoftwareOfTheReport) {
+  ReportSubject subject = certified_subject(3);
+  subject.details.temperature_C = subject.details.u_temperature_K = std::nullopt;
+  subject.details.feed_mm_per_min.reset();
+  subject.details.humidity_percent = 45.5;
+  add_recorded_conditions(subject);
+  subject.document.artefact = calib::Expansion{11.5e-6, 0.5e-6, 293.4, 0.15};
+  subject.document.run->conditions->bar_temperature_K = std::array{293.25, 293.75};
+  subject.document.software = "0.0.7-earlier";
+  const std::string page = model_report(subject).value();
+  const std::string text = calibration_certificate(subject).value();
+  EXPECT_EQ(schema_faults(text), "");
+  EXPECT_THAT(page, AllOf(HasSubstr("<td>20.50 to 21.30 C, lowest and highest value of all "
+                                    "sensors</td>"),
+                          HasSubstr("<td>20.25 \u00b1 0.30 C (k = 2), corrected with 11.50 um/(m "
+                                    "K)</td>"),
+                          HasSubstr("<td>20.10 to 20.60 C, lowest and highest value as used"),
+                          HasSubstr("<td>45.5 %</td>"), HasSubstr("<td>2400 mm/min, median"),
+                          HasSubstr("<td>123.4 s, from the first to the last"),
+                          HasSubstr("abbe 0.0.7-earlier")));
+  for (const char* const value :
+       {"20.50", "21.30", "20.25", "0.30", "20.10", "20.60", "45.5", "2400", "123.4"})
+    EXPECT_THAT(text, HasSubstr(fmt::format(">{}<", value)));
+  EXPECT_THAT(text.substr(text.find("<dcc:usedSoftware>")), HasSubstr(">0.0.7-earlier<"));
+  EXPECT_THAT(text.substr(0, text.find("<dcc:coreData>")), Not(HasSubstr("0.0.7-earlier")));
 }
 
 TEST(CalibrationCertificate, StaysValidWithHostileTexts) {

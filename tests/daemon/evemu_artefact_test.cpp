@@ -168,6 +168,7 @@ TEST_F(WarmArray, IsNamedInEveryResult) {
   ASSERT_TRUE(document) << document.error().details.front();
   EXPECT_EQ(to_json(*document), text);
   EXPECT_EQ(document->artefact->u_temperature_K, 0.5);
+  EXPECT_FALSE(document->run->conditions->temperature_K) << "no sensor was read";
   EXPECT_THAT(text_of(folder_ / "out/report.html"),
               AllOf(HasSubstr("24.000 C, u = 0.500 K"), HasSubstr("1.000046000")));
   EXPECT_THAT(ran.out, Not(HasSubstr("taken as 20 C")));

@@ -17,6 +17,7 @@
 
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/model/model_store.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe_command.hpp"
 #include "config_tables.hpp"
@@ -156,6 +157,18 @@ TEST_F(EvemuCli, EvaluatesWhatItIdentified) {
   EXPECT_THAT(line, ::testing::EndsWith(",0"));
 }
 
+TEST_F(EvemuCli, KeepsNoModelWhoseReportCannotBeWritten) {
+  fs::create_directories(folder_ / "out/report.html");  // a folder in place of the file
+  const std::string identify =
+      "identify evemu --machine machine.toml --errors errors.csv --keep kept -o ";
+  const auto ran = abbe(identify + "out");
+  EXPECT_EQ(ran.exit, 4) << ran.out;
+  EXPECT_THAT(ran.err, HasSubstr("report.html"));
+  EXPECT_TRUE(ModelStore::open(folder_ / "kept")->list()->empty());
+  EXPECT_EQ(abbe(identify + "other").exit, kRefused);
+  EXPECT_EQ(ModelStore::open(folder_ / "kept")->list()->size(), 1u);
+}
+
 TEST_F(EvemuCli, WritesModelsThatReadBackToTheSameBits) {
   ASSERT_EQ(abbe("identify evemu --machine machine.toml --errors errors.csv -o out").exit,
             kRefused);
@@ -231,6 +244,16 @@ TEST_F(EvemuCli, IdentifiesFromARecordingAsFromTheTouchesInIt) {
   // covariance alone.
   EXPECT_NEAR(recorded["residual_rms_after_um"].get<double>(),
               read["residual_rms_after_um"].get<double>(), 1e-3);
+  // Touches of a recording have times, those of a file do not.
+  const auto measured = read_model(folder_ / "out/model.json")->run->conditions->measured.value();
+  const auto utc = example_info().utc_offset;
+  EXPECT_EQ(measured[0], utc.to_utc(protocol::HostTime{std::chrono::seconds{1001}}));
+  const auto count = std::ssize(tests::evemu::touches_in_order(touches(), positions));
+  EXPECT_EQ(measured[1] - measured[0], std::chrono::seconds{count - 1});
+  EXPECT_FALSE(read_model(folder_ / "again/model.json")->run->conditions->measured);
+  EXPECT_THAT(text_of(folder_ / "out/report.html"), HasSubstr("<th>measured (UTC)</th>"));
+  EXPECT_THAT(text_of(folder_ / "again/report.html"),
+              AllOf(HasSubstr("<th>identified (UTC)</th>"), Not(HasSubstr("measured (UTC)"))));
   const auto inputs = nlohmann::json::parse(text_of(folder_ / "out/model.json"))["inputs"].dump();
   EXPECT_THAT(inputs,
               AllOf(HasSubstr("run.mcap"), HasSubstr("calibrator.toml"), HasSubstr("touches")));

@@ -53,6 +53,16 @@ TEST_F(CliExport, StatesSignHashAndLoss) {
   EXPECT_FALSE(leaves_temporary_files());
 }
 
+TEST_F(CliExport, StatesTheValidityInTheFileAndWhereItIsNot) {
+  const auto etalon = abbe("model.json --to etalon -o errors.txt");
+  ASSERT_EQ(etalon.exit, 0) << etalon.err;
+  EXPECT_THAT(etalon.out, HasSubstr("the validity volume, except as a comment"));
+  EXPECT_THAT(file("errors.txt"), HasSubstr("valid for X "));
+  const auto linuxcnc = abbe("model.json --to linuxcnc-comp -o compensation");
+  ASSERT_EQ(linuxcnc.exit, 0) << linuxcnc.err;
+  EXPECT_THAT(linuxcnc.out, HasSubstr("the validity volume: beyond the nodes"));
+}
+
 TEST_F(CliExport, WritesTheReportBesideFilesWithoutComments) {
   const auto ran = abbe("travel.json --to linuxcnc-comp -o compensation");
   ASSERT_EQ(ran.exit, 0) << ran.err;

@@ -163,6 +163,27 @@ TEST_P(EveryFormat, KeepsHostileNamesInOneComment) {
   EXPECT_TRUE(proof) << proof.error().text;
 }
 
+/// Files without comments have it in export.txt beside them.
+TEST_P(EveryFormat, StatesItsOriginAndValidityWhereItHasComments) {
+  auto made = made_export(GetParam(), test::synthetic_model(3));
+  made.options.origin = {.model_hash = "00c0ffee",
+                         .machine = "mill",
+                         .volume = "X -300 to 300 mm",
+                         .tool = "20, -15, -120 mm",
+                         .direction = ""};
+  std::string text;
+  for (const auto& file : write_export(made.facts->format, made.held, made.options).value())
+    text += file.text;
+  for (const char* const stated :
+       {"abbe export of model 00c0ffee", "machine: mill",
+        "valid for X -300 to 300 mm, tool offset 20, -15, -120 mm", "sign: "}) {
+    EXPECT_EQ(text.find(stated) != std::string::npos, made.facts->comments) << stated;
+  }
+  const bool none =
+      std::string(GetParam()) == "linuxcnc-comp" || std::string(GetParam()) == "heidenhain-com";
+  EXPECT_EQ(made.facts->comments, !none);
+}
+
 INSTANTIATE_TEST_SUITE_P(Exports, EveryFormat,
                          ::testing::Values("isg-csv", "etalon", "linuxcnc-comp", "siemens-cec",
                                            "siemens-lec", "heidenhain-com", "csv-grid"));

@@ -217,7 +217,9 @@ TEST_F(MfbCli, WritesAModelThatEveryToolMayUse) {
   EXPECT_EQ(abbe("model show out/model.json").exit, 0);
   const auto compared = abbe("model compare out/model.json out/model.json");
   EXPECT_EQ(compared.exit, 0) << compared.err;
-  EXPECT_THAT(test::text_of(out("report.html")), HasSubstr("Multi-Feature Bar"));
+  EXPECT_THAT(test::text_of(out("report.html")),
+              ::testing::AllOf(HasSubstr("Multi-Feature Bar"),
+                               HasSubstr("<th>temperature of the bar</th>")));
 }
 
 TEST_F(MfbCli, ChecksTheUncertaintyWithTrialsOnRequest) {

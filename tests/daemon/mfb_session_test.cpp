@@ -132,6 +132,19 @@ TEST_F(MfbSession, ARestartOfTheCardEndsTheRunAndTheTouchesCanBeContinued) {
   EXPECT_EQ(acquisition(again).points(), 20u);
 }
 
+TEST_F(MfbSession, KnowsWhenItWasMeasuredUnlessItContinuesAnEarlierSession) {
+  MfbAcquisition a = acquisition();
+  const auto readings_m = planned_readings_m(20);
+  for (std::uint32_t i = 0; i < 20; ++i) a.take(bar_touch_at(readings_m[i], i + 1));
+  EXPECT_THAT(a.release().observed.value(), ElementsAre(kMfbFrom + 1s, kMfbFrom + 20s));
+
+  MfbRequest request = reference_request();
+  request.earlier_m = {readings_m.begin(), readings_m.begin() + 5};
+  MfbAcquisition continued = acquisition(request);
+  for (std::uint32_t i = 5; i < 20; ++i) continued.take(bar_touch_at(readings_m[i], i + 1));
+  EXPECT_EQ(continued.release().observed, std::nullopt);
+}
+
 TEST_F(MfbSession, EarlierTouchesOfAnotherBarAreRefused) {
   MfbRequest request = reference_request();
   request.earlier_m = planned_readings_m(5);

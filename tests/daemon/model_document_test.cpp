@@ -59,18 +59,24 @@ TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
 }
 
 RunFigures figures_of_every_kind() {
-  return {.held_out = "legs",
-          .residuals = {},
-          .part_kind = "leg",
-          .parts = {{"leg \"1\"", 12, 1e-5 / 3, 1e-7 / 3, 1e-6 / 7, std::array{0.1 / 3, 4.5}},
-                    {"leg 2", 1, 1e-5, 1e-7, 1e-7, std::nullopt}},
-          .series = ResidualSeries{3, true, {{0.1 / 3, 1e-7 / 3}, {0.2, -1e-7 / 7}}},
-          .sigma_counts = std::vector<std::size_t>(RunFigures::kSigmaIntervals, 5),
-          .held_out_cells = {{0, 7, 3, 1e-5 / 3, 1e-7 / 3, 1e-6 / 3}},
-          .tables = {{"Title <1>", "why", {"a", "b"}, {{"1", "2"}, {"3", "\u00b5"}}},
-                     {"facts", "", {}, {{"name", "value"}}},
-                     {"empty", "", {"a"}, {}}},
-          .conditions = RunConditions{std::array{293.15, 880.0 / 3}, 100.0 / 3, 0.125 / 3}};
+  return {
+      .held_out = "legs",
+      .residuals = {},
+      .part_kind = "leg",
+      .parts = {{"leg \"1\"", 12, 1e-5 / 3, 1e-7 / 3, 1e-6 / 7, std::array{0.1 / 3, 4.5}},
+                {"leg 2", 1, 1e-5, 1e-7, 1e-7, std::nullopt}},
+      .series = ResidualSeries{3, true, {{0.1 / 3, 1e-7 / 3}, {0.2, -1e-7 / 7}}},
+      .sigma_counts = std::vector<std::size_t>(RunFigures::kSigmaIntervals, 5),
+      .held_out_cells = {{0, 7, 3, 1e-5 / 3, 1e-7 / 3, 1e-6 / 3}},
+      .tables = {{"Title <1>", "why", {"a", "b"}, {{"1", "2"}, {"3", "\u00b5"}}},
+                 {"facts", "", {}, {{"name", "value"}}},
+                 {"empty", "", {"a"}, {}}},
+      .conditions =
+          RunConditions{
+              std::array{293.15, 880.0 / 3}, std::array{291.0, 877.0 / 3}, 100.0 / 3, 0.125 / 3,
+              std::array{protocol::UtcTime{std::chrono::nanoseconds{1'715'934'600'123'456'789}},
+                         protocol::UtcTime{std::chrono::nanoseconds{1'715'934'700'000'000'001}}}},
+      .of_model = "00c0ffee"};
 }
 
 TEST(ModelDocument, KeepsResidualsTablesAndConditionsOfTheRun) {
@@ -100,8 +106,11 @@ TEST(ModelDocument, RefusesDamagedFiguresOfTheRunByName) {
         std::pair{"held_out_cells\": [", "held_out_cells\": [[1, 2],"},
         std::pair{"\"tables\": [", "\"tables\": [1,"},
         std::pair{"\"columns\": [", "\"columns\": [1, "}, std::pair{"\"rows\": [", "\"rows\": [1,"},
-        std::pair{"temperature_K\": [", "temperature_K\": [1, "},
+        std::pair{"\"temperature_K\": [", "\"temperature_K\": [1, "},
+        std::pair{"bar_temperature_K\": [", "bar_temperature_K\": [1, "},
         std::pair{"\"duration_s\": ", "\"duration_s\": \"long\", \"x\": "},
+        std::pair{"measured_utc\": [", "measured_utc\": [1, "},
+        std::pair{"measured_utc\": [\"2024", "measured_utc\": [\"2025"},
         std::pair{"\"conditions\": ", "\"conditions\": 1, \"x\": "}}) {
     const auto refused = parse_model(replaced(text, what, with), "model.json");
     ASSERT_FALSE(refused) << with;

@@ -228,6 +228,23 @@ TEST_F(DriftingMachine, RaisesDriftBeforeTheNewModelIsActive) {
   EXPECT_NE(model().model->id, first);
   EXPECT_THAT(service_->status().reason,
               HasSubstr("drift since the active model: EC0Y changed by"));
+  const auto kept = store().load(model().model->id).value();
+  EXPECT_THAT(kept.run->notes,
+              ::testing::Contains(HasSubstr("drift since the active model: EC0Y changed by")));
+}
+
+TEST_F(DriftingMachine, AModelKeepsWhenItWasMeasured) {
+  configure("");
+  const protocol::UtcOffset utc{};
+  const auto before = utc.to_utc(now_);
+  (void)calibrate();
+  const auto document = store().load(model().model->id).value();
+  const auto [first, last] = document.run->conditions->measured.value();
+  EXPECT_GT(first, before);
+  EXPECT_LT(last, document.created);
+  // The standstills before and after the path (0.4 s each) have no residuals.
+  EXPECT_NEAR(std::chrono::duration<double>(last - first).count(),
+              *document.run->conditions->duration_s, 2.0);
 }
 
 TEST_F(DriftingMachine, AnUnchangedMachineRaisesNone) {
@@ -269,6 +286,13 @@ TEST_F(DriftingMachine, ARunUpdatesTheActiveModelAndNamesBothParents) {
   EXPECT_EQ(previous.name, "previous model " + first);
   EXPECT_EQ(previous.sha256, model_hash(store().load(first).value()));
   EXPECT_THAT(document.inputs.at(document.inputs.size() - 2).name, HasSubstr("run, model "));
+  // The residuals are those of the model of the run, which is stored beside the update.
+  const std::string of_run = document.run->of_model;
+  EXPECT_EQ(document.inputs.at(document.inputs.size() - 2).name, "run, model " + of_run);
+  EXPECT_EQ(store().load(of_run)->statistics, document.statistics);
+  EXPECT_FALSE(store().load(of_run)->run->held_out_cells.empty());
+  EXPECT_TRUE(document.run->held_out_cells.empty());
+  EXPECT_THAT(document.run->notes, ::testing::Contains(HasSubstr("was updated with the run")));
   EXPECT_LT(document.model.parameters().back().u, store().load(first)->model.parameters().back().u);
 }
 

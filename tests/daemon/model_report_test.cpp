@@ -8,6 +8,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/report/line_plot.hpp"
+#include "report_page.hpp"
 #include "synthetic_model.hpp"
 
 namespace abbe::daemon {
@@ -142,7 +143,7 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   };
   const std::string before_runs = model_report(subject).value();
   EXPECT_EQ(times(before_runs, "Not recorded."), 2u) << "where was measured, residuals";
-  EXPECT_EQ(times(before_runs, "not recorded"), 3u) << "temperature, feed, duration";
+  EXPECT_EQ(times(before_runs, "not recorded"), 3u) << "temperature, feed, measuring time";
 
   subject.document.run = with_run({{0.5, 1e-5, 1e-7}});
   subject.document = parse_model(to_json(subject.document), "model.json").value();
@@ -151,6 +152,99 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   EXPECT_THAT(before_parts, HasSubstr("Residuals of the fit along the path, rms, after"));
   subject.document.run = with_run({});
   EXPECT_EQ(times(model_report(subject).value(), "Not recorded."), 2u);
+}
+
+/// Its statistics are those of the held-out test: rms only, no samples.
+TEST(ModelReport, OfAJointModelDoesNotPresentTheHeldOutTestAsResidualsOfAFit) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<td>before the fit</td>"), HasSubstr("<td>1000, 3 lost</td>")));
+  subject.document.method = subject.document.estimator = "joint";
+  subject.document.run =
+      RunFigures{.held_out = "legs", .held_out_before_m = 12.5e-6, .residuals = {}};
+  const std::string page = model_report(subject).value();
+  EXPECT_THAT(page, AllOf(Not(HasSubstr("before the fit")), Not(HasSubstr(" lost</td>")),
+                          Not(HasSubstr("sigma0")), HasSubstr("held-out legs: rms and mean square"),
+                          HasSubstr("no residuals of its own"), HasSubstr("12.500 um rms")));
+}
+
+TEST(ModelReport, OfAnUpdateStatesWhoseResidualsItHas) {
+  ReportSubject subject = reported(3);
+  subject.document.run = RunFigures{.residuals = {{0.5, 1e-5, 1e-7}}, .of_model = "00c0ffee"};
+  subject.document = parse_model(to_json(subject.document), "model.json").value();
+  const std::string page = model_report(subject).value();
+  EXPECT_EQ(times(page, "those of the model of the run alone, 00c0ffee"), 3u)
+      << "figures, residuals, statistics";
+}
+
+TEST(ModelReport, StatesAGapOfTheRecordingOnce) {
+  ReportSubject subject = reported(3);
+  subject.document.recording_gap = "the disk was full";
+  subject.document.run =
+      RunFigures{.notes = {cannot_be_checked("the disk was full")}, .residuals = {}};
+  EXPECT_EQ(times(model_report(subject).value(), "<li>no replay can check this model"), 2u)
+      << "in the notes, and in what the uncertainty does not contain";
+}
+
+TEST(ModelReport, TheTemperatureOfTheBallArrayIsNotThatOfSensors) {
+  ReportSubject subject = reported(3);
+  subject.document.method = "evemu";
+  subject.document.artefact = calib::Expansion{11.5e-6, 0.5e-6, 293.65, 0.1};
+  subject.document.run = RunFigures{.residuals = {}};
+  subject.document.run->conditions =  // as earlier versions wrote it
+      RunConditions{.temperature_K = std::array{293.65, 293.65}};
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>temperature</th><td>not recorded</td>"),
+                    HasSubstr("<th>temperature of the ball array</th><td>20.50 \u00b1 0.20 C")));
+}
+
+TEST(ModelReport, TheTimeOfSeveralRunsHasNoPauses) {
+  ReportSubject subject = reported(3);
+  subject.document.run = RunFigures{.residuals = {}, .places_m = {{{-0.2, 0.1, -0.3}}}};
+  subject.document.run->conditions = RunConditions{.duration_s = 100.0};
+  EXPECT_THAT(model_report(subject).value(),
+              HasSubstr("<td>100.0 s, from the first to the last observation</td>"));
+  subject.document.run->places_m.push_back({{0.2, 0.1, -0.3}});
+  EXPECT_THAT(model_report(subject).value(),
+              HasSubstr("<td>100.0 s, sum of the runs, without the pauses between them</td>"));
+}
+
+/// The page with as many residuals in each interval; of 200 observations, 160 degrees of freedom.
+std::string page_with_sigma_counts(const std::string& method, std::optional<double> freedom) {
+  ReportSubject subject = reported(3);
+  subject.document.method = method;
+  subject.document.statistics.degrees_of_freedom = freedom;
+  subject.document.run = RunFigures{.residuals = {}};
+  RunFigures& run = *subject.document.run;
+  run.part_kind = "measurement";
+  run.parts = {{"m1", 200, 1e-5, 1e-6, 1e-6, std::nullopt}};
+  run.series = ResidualSeries{1, false, {{1.0, 1e-6}}};
+  run.sigma_counts = std::vector<std::size_t>(RunFigures::kSigmaIntervals, 5);
+  subject.document = parse_model(to_json(subject.document), "model.json").value();
+  return model_report(subject).value();
+}
+
+/// A fit of a bar has unknowns with a prior (rank 70), which take only a part of a freedom.
+TEST(ModelReport, PredictsTheResidualsFromTheDegreesOfFreedom) {
+  const auto chart = test::chart_named(page_with_sigma_counts("mfb", 160.0),
+                                       "Residuals in standard uncertainties");
+  const auto predicted = test::dataset_of({chart}, "as predicted");
+  ASSERT_FALSE(predicted.is_null());
+  // 200 values, sd = sqrt(160 / 200), in the interval from 0 to 0.25.
+  const double expected = 100.0 * std::erf(0.25 / std::sqrt(2.0 * 0.8));
+  EXPECT_NEAR(predicted["data"][RunFigures::kSigmaIntervals / 2]["y"].get<double>(), expected,
+              1e-4);
+}
+
+TEST(ModelReport, PredictsNoResidualsWithoutTheDegreesOfFreedomOrFromEstimatedNoise) {
+  const auto has_prediction = [](const std::string& page) {
+    return !test::dataset_of(test::charts_of(page), "as predicted").is_null();
+  };
+  EXPECT_FALSE(has_prediction(page_with_sigma_counts("mfb", std::nullopt))) << "earlier version";
+  EXPECT_TRUE(has_prediction(page_with_sigma_counts("otf", std::nullopt))) << "has no priors";
+  const std::string array = page_with_sigma_counts("evemu", 160.0);
+  EXPECT_FALSE(has_prediction(array));
+  EXPECT_THAT(array, HasSubstr("no predicted distribution"));
 }
 
 TEST(ModelReport, HasTheTablesOfTheMethod) {
@@ -214,10 +308,61 @@ TEST(TrendReport, IsInTheOrderOfTimeAndLeavesRefusedModelsOutOfTheCharts) {
   const std::string page = trend_report(models).value();
   EXPECT_LT(page.find(model_id(models[2].document)), page.find(model_id(models[1].document)));
   EXPECT_LT(page.find(model_id(models[1].document)), page.find(model_id(models[0].document)));
-  EXPECT_THAT(page, AllOf(HasSubstr("Models: 3."), HasSubstr("<td>red</td>")));
+  EXPECT_THAT(page, AllOf(HasSubstr("Models: 3."), HasSubstr("<td>red</td>"),
+                          HasSubstr("<td>identified 2024-05-17T08:30</td>")));
   const auto plots = page.substr(page.find("class=\"plots\""));
   EXPECT_EQ(times(plots, "<circle"), 2u * (3 + 3 + 4)) << "two models in ten curves";
   EXPECT_FALSE(trend_report({}));
+}
+
+RunFigures measured_at(protocol::UtcTime first, protocol::UtcTime last) {
+  RunFigures run{.residuals = {}};
+  run.conditions = RunConditions{.measured = std::array{first, last}};
+  return run;
+}
+
+/// A recording that is identified again later: the date of the measurement is that of the recording.
+TEST(ModelReport, StatesWhenWasMeasuredAndWhenItWasIdentified) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>identified (UTC)</th><td>2024-05-17T08:30:00."),
+                    Not(HasSubstr("measured (UTC)"))));
+  const auto day = std::chrono::hours(24);
+  const auto last = subject.document.created - 15 * day;
+  subject.document.run = measured_at(last - std::chrono::minutes(20), last);
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("<th>measured (UTC)</th><td>2024-05-02T08:10:00Z to "
+                              "2024-05-02T08:30:00Z</td>"),
+                    HasSubstr("<th>identified (UTC)</th><td>2024-05-17T08:30:00.")));
+  EXPECT_THAT(comparison_report(subject, reported(4)).value(),
+              AllOf(HasSubstr("<td>measured 2024-05-02T08:10:00Z to 2024-05-02T08:30:00Z</td>"),
+                    HasSubstr("<td>identified 2024-05-17T08:30:00Z; when it was measured is not "
+                              "recorded</td>")));
+}
+
+TEST(ModelReport, NamesEquipmentWhoseCalibrationHadExpired) {
+  ReportSubject subject = reported(3);
+  subject.details.equipment = {{"laser tracker", "", "", "", "", "2024-05-16"},
+                               {"probe", "", "", "", "", "2024-05-17"},
+                               {"thermometer", "", "", "", "", ""}};
+  EXPECT_THAT(
+      model_report(subject).value(),
+      AllOf(HasSubstr("<li>equipment &quot;laser tracker&quot;: its calibration was valid "
+                      "until 2024-05-16, the model was identified 2024-05-17</li>"),
+            Not(HasSubstr("equipment &quot;probe")), Not(HasSubstr("equipment &quot;thermo"))));
+  const auto last = subject.document.created - std::chrono::hours(48);
+  subject.document.run = measured_at(last - std::chrono::minutes(20), last);
+  EXPECT_THAT(model_report(subject).value(), Not(HasSubstr("its calibration was valid until")));
+}
+
+TEST(TrendReport, OrdersModelsByTheirMeasurementNotByTheirIdentification) {
+  ReportSubject earlier = reported(3), later = reported(4);
+  earlier.document.run = measured_at(later.document.created - std::chrono::hours(48),
+                                     later.document.created - std::chrono::hours(47));
+  earlier.document.created += std::chrono::hours(24);
+  const std::string page = trend_report({later, earlier}).value();
+  EXPECT_LT(page.find(model_id(earlier.document)), page.find(model_id(later.document)));
+  EXPECT_THAT(page, HasSubstr("<td>2024-05-15T09:30</td>"));
 }
 
 TEST(LinePlot, HasASecondPanelWhereTheBandsAreNarrow) {

@@ -103,6 +103,12 @@ TEST_F(OtfMode, OfARecordedRequestIsUsedByTheReplay) {
       folder_, fmt::format("identify otf --recording '{}' -o out", recording.string()));
   ASSERT_EQ(ran.exit, 0) << ran.out << ran.err;
   EXPECT_EQ(model().mode, "standstill");
+
+  // The recording begins at 100 s of 1970, its offset to UTC is 0.
+  const auto [first, last] = model().run->conditions->measured.value();
+  EXPECT_GE(first, protocol::UtcTime{std::chrono::seconds{100}});
+  EXPECT_LT(last, protocol::UtcTime{std::chrono::hours{1}});
+  EXPECT_LT(first, last);
 }
 
 }  // namespace

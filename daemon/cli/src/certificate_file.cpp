@@ -65,6 +65,11 @@ void read_equipment(Section& root, CertificateDetails& out) {
     section.get("serial", e.serial);
     section.get("certificate", e.certificate);
     read_date(section, "valid_until", e.valid_until);
+    section.get_word(
+        "used", e.use,
+        std::vector<std::pair<std::string_view, EquipmentUse>>{{"as-found", EquipmentUse::AsFound},
+                                                               {"as-left", EquipmentUse::AsLeft},
+                                                               {"both", EquipmentUse::Both}});
     section.close();
   }
 }

@@ -178,6 +178,8 @@ Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   const auto entered = inputs_of(*run);
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
   input.recording_gap = recording->reader.damage();
+  input.observed = run->observed;
+  input.utc = recording->reader.info().utc_offset;
   input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
                            calib::Verdict& verdict) { judge_recording(*reader, verdict); };
 

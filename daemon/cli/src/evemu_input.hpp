@@ -12,6 +12,7 @@
 #include "abbe/calib/evemu/observe.hpp"
 #include "abbe/calib/gate.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/acquisition.hpp"
 
 namespace abbe::daemon {
@@ -36,6 +37,8 @@ struct EvemuInput {
   /// refuses the model if the recording is damaged
   std::function<void(calib::Verdict&)> judge_source = [](calib::Verdict&) {};
   std::string recording_gap{};
+  ObservedTimes observed{};   ///< of the recording; nullopt for files
+  protocol::UtcOffset utc{};  ///< of the host clock of the recording
 };
 
 /// From the recording if one is named, else from the files; shows progress on a terminal. Io,

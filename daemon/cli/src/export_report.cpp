@@ -94,7 +94,8 @@ std::vector<std::string> not_held_by(const FormatFacts& facts, const calib::Volu
                                      bool direction_given) {
   std::vector<std::string> sentences{
       "the uncertainty of the model",
-      "the validity volume: beyond the nodes the control keeps the last value",
+      fmt::format("the validity volume{}: beyond the nodes the control keeps the last value",
+                  facts.comments ? ", except as a comment" : ""),
       "the state of the model: after a change of the machine the control continues to correct"};
   if (facts.holds != HeldPart::Errors)
     sentences.emplace_back("other tools: the file is for one tool offset");

@@ -67,6 +67,12 @@ Result<ReportSubject> kept(const ResultPlace& place, const ModelDocument& docume
   return report_subject(*store, *id);
 }
 
+Result<void> write_report(const std::filesystem::path& folder, const ReportSubject& subject) {
+  const auto page = model_report(subject);
+  if (!page) return tl::make_unexpected(page.error());
+  return replace_file(folder / "report.html", *page);
+}
+
 /// A model that is in no store.
 ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdict) {
   ReportSubject subject{.document = document};
@@ -85,12 +91,12 @@ Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& docum
   for (const auto& [name, text] : more)
     if (auto done = replace_file(folder / name, text); !done) return done;
 
-  Result<ReportSubject> subject = judged(document, verdict);
-  if (!place.keep.empty()) subject = kept(place, document, verdict);
+  // Before the store: a model that cannot be reported is not kept, and the error says so.
+  if (auto done = write_report(folder, judged(document, verdict)); !done) return done;
+  if (place.keep.empty()) return {};
+  const auto subject = kept(place, document, verdict);
   if (!subject) return tl::make_unexpected(subject.error());
-  const auto page = model_report(*subject);
-  if (!page) return tl::make_unexpected(page.error());
-  return replace_file(folder / "report.html", *page);
+  return write_report(folder, *subject);
 }
 
 nlohmann::json verdict_json(const calib::Verdict& verdict) {

@@ -23,6 +23,7 @@
 #include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/evemu/judge.hpp"
 #include "abbe/config/calib_error.hpp"
+#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/evemu/document.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/model/model_document.hpp"
@@ -50,6 +51,8 @@ struct Outcome {
   std::vector<InputFile> sources;
   EvemuCandidate candidate;
   std::string recording_gap;
+  ObservedTimes observed;
+  protocol::UtcOffset utc;
 
   [[nodiscard]] const evemu::Solution& solution() const { return candidate.solution; }
   [[nodiscard]] const calib::Verdict& verdict() const { return candidate.verdict; }
@@ -114,7 +117,9 @@ Result<Outcome> identify(const IdentifyEvemuArguments& arguments) {
   return Outcome{std::move(input->config),
                  std::move(input->sources),
                  {std::move(input->observations), std::move(*solution), std::move(*verdict)},
-                 std::move(input->recording_gap)};
+                 std::move(input->recording_gap),
+                 input->observed,
+                 input->utc};
 }
 
 /// The cross-validation error over lambda and gamma, from which they were chosen; cells that no
@@ -232,6 +237,7 @@ int run(const IdentifyEvemuArguments& arguments) {
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
   auto document = evemu_document(outcome->candidate, outcome->config, outcome->sources, now);
   document.recording_gap = outcome->recording_gap;
+  add_measured(document, outcome->observed, outcome->utc);
   if (const auto done = write_and_keep({arguments.out, arguments.keep, "abbe identify evemu"},
                                        document, outcome->verdict(), files_of(document, *outcome));
       !done)

@@ -15,6 +15,7 @@
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
@@ -47,6 +48,8 @@ struct MfbInput {
   MfbTask task;
   std::vector<InputFile> sources;
   std::vector<std::string> against_pass{};
+  ObservedTimes observed{};   ///< of the recording; nullopt for files
+  protocol::UtcOffset utc{};  ///< of the host clock of the recording
 };
 
 /// The machine as it was configured, for the readings of the file `points`.
@@ -87,6 +90,8 @@ Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   input.task.bar = std::move(run->bar);
   input.task.plan = std::move(run->plan);
   input.task.passes = std::move(run->passes);
+  input.observed = run->observed;
+  input.utc = recording->reader.info().utc_offset;
   return input;
 }
 
@@ -160,8 +165,9 @@ int run(const IdentifyMfbArguments& arguments) {
 
   const auto now =
       std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  const auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
-                                     input->sources, now);
+  auto document = mfb_document(*candidate, input->task.options.solve.estimator, input->config,
+                               input->sources, now);
+  add_measured(document, input->observed, input->utc);
   if (const auto done =
           write_and_keep({arguments.out, arguments.keep, "abbe identify mfb"}, document,
                          candidate->verdict, {{"tables.csv", to_tables_csv(document.model)}});

@@ -15,12 +15,18 @@
 namespace abbe::daemon {
 namespace {
 
+struct RecordedCandidate {
+  OtfCandidate candidate;
+  ObservedTimes observed;
+};
+
 /// The last run of the recording in which the whole path was driven.
-Result<OtfCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
+Result<RecordedCandidate> last_complete_run(ReplayReport replayed, const std::string& file) {
   std::string why = replayed.calibrations.empty() ? "no calibration was requested" : "";
   for (auto c = replayed.calibrations.rbegin(); c != replayed.calibrations.rend(); ++c) {
     if (c->outcome && *c->outcome) {
-      if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome)) return std::move(*otf);
+      if (auto* otf = std::get_if<OtfCandidate>(&**c->outcome))
+        return RecordedCandidate{std::move(*otf), c->observed};
       continue;
     }
     if (why.empty()) why = c->outcome ? c->outcome->error().text : c->ended.reason;
@@ -89,10 +95,11 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
       recording->reader, recording->config,
       {.active = other.model, .progress = [&bar](double share) { bar.show("replaying", share); }});
   if (!replayed) return tl::make_unexpected(replayed.error());
-  auto candidate = last_complete_run(std::move(*replayed), arguments.recording);
-  if (!candidate) return tl::make_unexpected(candidate.error());
-  other.add_note(candidate->verdict);
-  auto outcome = outcome_of(std::move(*candidate), recording->config, {recording->source});
+  auto recorded = last_complete_run(std::move(*replayed), arguments.recording);
+  if (!recorded) return tl::make_unexpected(recorded.error());
+  other.add_note(recorded->candidate.verdict);
+  auto outcome = outcome_of(std::move(recorded->candidate), recording->config, {recording->source});
+  add_measured(outcome.document, recorded->observed, recording->reader.info().utc_offset);
   outcome.document.recording_gap = recording->reader.damage();
 
   return outcome;

@@ -146,8 +146,8 @@ void add_report(CLI::App& parent, int& exit) {
       "report",
       "Write the report of a model as HTML that prints on A4: verdict, volumetric error, values "
       "of\n"
-      "ISO 230-1, 230-2 and 230-6 with uncertainty, what is not known, origin. The same model\n"
-      "gives the same bytes at any time.");
+      "ISO 230-1, 230-2 and 230-6 with uncertainty, what is not known, origin. The same model,\n"
+      "state of the store and details give the same bytes at any time.");
   command
       ->add_option("MODEL", arguments->model,
                    "model id, the beginning of an id (at least 4 characters), \"active\", or the "

@@ -1,6 +1,7 @@
 #include "abbe/exports/write_export.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "abbe/base/units.hpp"
 #include "writers.hpp"
@@ -18,6 +19,18 @@ std::string printable(std::string_view text) {
   std::string out;
   for (const char c : text) out += c >= ' ' && c <= '~' ? c : '?';
   return out;
+}
+
+/// One line each.
+std::vector<std::string> statements_of(const ExportOrigin& origin, std::string_view sign) {
+  std::vector<std::string> all{fmt::format("abbe export of model {}", origin.model_hash),
+                               fmt::format("machine: {}", printable(origin.machine)),
+                               fmt::format("valid for {}, tool offset {}", printable(origin.volume),
+                                           printable(origin.tool))};
+  if (!origin.direction.empty())
+    all.push_back(fmt::format("direction of travel: {}", printable(origin.direction)));
+  all.emplace_back(sign);
+  return all;
 }
 
 Result<void> check_nodes(const FormatFacts& facts, const calib::GridAxes& nodes_m) {
@@ -75,13 +88,14 @@ std::string sign_text(int positive_moves) {
 
 std::string origin_comment(const ExportOrigin& origin, std::string_view mark,
                            std::string_view sign) {
-  std::string text = fmt::format("{} abbe export of model {}\n", mark, origin.model_hash);
-  text += fmt::format("{} machine: {}\n", mark, printable(origin.machine));
-  text += fmt::format("{} valid for {}, tool offset {}\n", mark, printable(origin.volume),
-                      printable(origin.tool));
-  if (!origin.direction.empty())
-    text += fmt::format("{} direction of travel: {}\n", mark, printable(origin.direction));
-  return text + fmt::format("{} {}\n", mark, sign);
+  std::string text;
+  for (const std::string& statement : statements_of(origin, sign))
+    text += fmt::format("{} {}\n", mark, statement);
+  return text;
+}
+
+std::string origin_in_one_line(const ExportOrigin& origin, std::string_view sign) {
+  return fmt::format("{}", fmt::join(statements_of(origin, sign), "; "));
 }
 
 Result<std::vector<ExportFile>> write_export(ExportFormat format, const HeldCorrection& held,

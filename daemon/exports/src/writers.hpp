@@ -24,6 +24,8 @@ using ExportFiles = std::vector<ExportFile>;
 /// The origin as comment lines, each after `mark`.
 [[nodiscard]] std::string origin_comment(const ExportOrigin&, std::string_view mark,
                                          std::string_view sign);
+/// The same in one line, without mark.
+[[nodiscard]] std::string origin_in_one_line(const ExportOrigin&, std::string_view sign);
 /// Sign of the file in words.
 [[nodiscard]] std::string sign_text(int positive_moves);
 

@@ -1,5 +1,6 @@
 #include "abbe/methods/calibration_run.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace abbe::daemon {
@@ -36,6 +37,20 @@ ModelDocument document_of(const Candidate& candidate, const Config& config,
   return Methods::visit(candidate, [&](auto method, const auto& c) {
     return method.document_of(c, config, std::move(inputs), created);
   });
+}
+
+ObservedTimes observed(const CalibrationRun& run) {
+  return std::visit([](const auto& of_method) { return of_method.observed; }, run);
+}
+
+void add_measured(ModelDocument& document, const ObservedTimes& times, protocol::UtcOffset utc) {
+  if (!times || !document.run) return;
+  auto& conditions = document.run->conditions;
+  if (!conditions) conditions.emplace();
+  const auto [first, last] = *times;
+  conditions->measured = {utc.to_utc(first), utc.to_utc(last)};
+  if (!conditions->duration_s)
+    conditions->duration_s = std::chrono::duration<double>(last - first).count();
 }
 
 }  // namespace abbe::daemon

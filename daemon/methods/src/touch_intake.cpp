@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace abbe::daemon {
@@ -29,6 +30,13 @@ std::string TouchIntake::refuse(const Snapshot& touch, std::string_view fault,
   if (++refused_in_a_row_ < rules_.most_refused) return {};
   return fmt::format("{} successive touches could not be used; the last one: {}", refused_in_a_row_,
                      fault);
+}
+
+void TouchIntake::usable(const Snapshot& touch) noexcept {
+  refused_in_a_row_ = 0;
+  const HostTime at = touch.head.time;
+  observed_ = observed_ ? std::array{std::min((*observed_)[0], at), std::max((*observed_)[1], at)}
+                        : std::array{at, at};
 }
 
 std::string TouchIntake::pause(HostTime now) const {

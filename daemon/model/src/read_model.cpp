@@ -165,6 +165,8 @@ ModelStatistics read_statistics(ModelReader& in) {
   s.before = read_residuals(in, *statistics, "before");
   s.after = read_residuals(in, *statistics, "after");
   s.iterations = static_cast<int>(in.count_of(*statistics, path, "iterations"));
+  if (statistics->is_object() && statistics->contains("degrees_of_freedom"))
+    s.degrees_of_freedom = in.number_of(*statistics, path, "degrees_of_freedom", 0);
   const ModelJson* stop = in.find(*statistics, path, "stop_reason");
   if (stop != nullptr && stop->is_string()) s.stop_reason = stop->get<std::string>();
 

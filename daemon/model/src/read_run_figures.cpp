@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/utc_text.hpp"
+
 namespace abbe::daemon {
 namespace {
 
@@ -166,6 +168,18 @@ std::vector<RunFigures::Table> read_tables(ModelReader& in, const ModelJson& run
   return tables;
 }
 
+/// First and last observation.
+std::optional<std::array<protocol::UtcTime, 2>> read_measured(ModelReader& in,
+                                                              const ModelJson& list) {
+  const std::string path = "run.conditions.measured_utc";
+  const auto texts = read_texts(in, list, path);
+  const auto first = texts.size() == 2 ? utc_from_text(texts[0]) : std::nullopt;
+  const auto last = texts.size() == 2 ? utc_from_text(texts[1]) : std::nullopt;
+  if (first && last && *first <= *last) return std::array{*first, *last};
+  in.fault(path, "must be [first, last], UTC times such as 2024-05-17T08:30:00.000000000Z");
+  return std::nullopt;
+}
+
 std::optional<RunFigures::Conditions> read_conditions(ModelReader& in, const ModelJson& run) {
   const std::string path = "run.conditions";
   if (!run.is_object() || !run.contains("conditions")) return std::nullopt;
@@ -175,17 +189,21 @@ std::optional<RunFigures::Conditions> read_conditions(ModelReader& in, const Mod
     in.fault(path, "must be an object");
     return conditions;
   }
-  if (entry.contains("temperature_K")) {
-    const auto range = in.numbers(entry.at("temperature_K"), path + ".temperature_K", 0);
-    if (range.size() == 2)
-      conditions.temperature_K = {range[0], range[1]};
-    else
-      in.fault(path + ".temperature_K", "must be [lowest, highest]");
-  }
+  const auto range = [&](const std::string& key) -> std::optional<std::array<double, 2>> {
+    if (!entry.contains(key)) return std::nullopt;
+    const auto values = in.numbers(entry.at(key), path + "." + key, 0);
+    if (values.size() == 2) return std::array{values[0], values[1]};
+    in.fault(path + "." + key, "must be [lowest, highest]");
+    return std::nullopt;
+  };
+  conditions.temperature_K = range("temperature_K");
+  conditions.bar_temperature_K = range("bar_temperature_K");
   if (entry.contains("duration_s"))
     conditions.duration_s = in.number_of(entry, path, "duration_s", 0);
   if (entry.contains("feed_mm_per_s"))
     conditions.feed_m_per_s = in.number_of(entry, path, "feed_mm_per_s", kMm);
+  if (entry.contains("measured_utc"))
+    conditions.measured = read_measured(in, entry.at("measured_utc"));
   return conditions;
 }
 
@@ -195,21 +213,23 @@ std::optional<RunFigures> read_run_figures(ModelReader& in) {
   const std::string path = "run";
   if (!in.root().is_object() || !in.root().contains(path)) return std::nullopt;
   const ModelJson& run = in.root().at(path);
+  const auto optional_text = [&](const char* key) {
+    return run.is_object() && run.contains(key) ? in.text_of(run, path, key) : std::string{};
+  };
   return RunFigures{.held_out = in.text_of(run, path, "held_out"),
                     .held_out_before_m = in.number_of(run, path, "held_out_before_um", kMicroUnit),
                     .held_out_after_m = in.number_of(run, path, "held_out_after_um", kMicroUnit),
                     .notes = read_notes(in, in.find(run, path, "notes")),
                     .residuals = read_intervals(in, in.find(run, path, kResiduals)),
                     .places_m = read_places(in, run),
-                    .part_kind = run.is_object() && run.contains("part_kind")
-                                     ? in.text_of(run, path, "part_kind")
-                                     : std::string{},
+                    .part_kind = optional_text("part_kind"),
                     .parts = read_parts(in, run),
                     .series = read_series(in, run),
                     .sigma_counts = read_sigma_counts(in, run),
                     .held_out_cells = read_cells(in, run),
                     .tables = read_tables(in, run),
-                    .conditions = read_conditions(in, run)};
+                    .conditions = read_conditions(in, run),
+                    .of_model = optional_text("of_model")};
 }
 
 }  // namespace abbe::daemon

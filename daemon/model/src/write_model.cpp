@@ -189,10 +189,13 @@ void write_statistics(JsonText& out, const ModelStatistics& s,
       "{{\"samples\": {}, \"lost_samples\": {}, \"observations\": {}, \"unknowns\": {}, \"rank\": "
       "{},\n"
       "    \"condition\": {}, \"sigma0\": {}, \"chi2_per_dof\": {}, \"covariance_factor\": {},\n"
-      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}}}",
+      "    \"before\": {},\n    \"after\": {},\n    \"iterations\": {}, \"stop_reason\": {}{}{}}}",
       s.samples, s.lost_samples, s.observations, s.unknowns, s.rank, to_decimal(s.condition, 0),
       to_decimal(s.sigma0, 0), to_decimal(s.chi2_per_dof, 0), to_decimal(s.variance_factor, 0),
       residuals(s.before), residuals(s.after), s.iterations, JsonText::quoted(s.stop_reason),
+      s.degrees_of_freedom
+          ? fmt::format(", \"degrees_of_freedom\": {}", to_decimal(*s.degrees_of_freedom, 0))
+          : "",
       bar ? bar_figures(*bar) : ""));
 }
 
@@ -249,8 +252,11 @@ std::string conditions_of(const RunFigures::Conditions& c) {
     all += fmt::format("{}\"{}\": {}", all.empty() ? "" : ", ", key, value);
   };
   if (c.temperature_K) add("temperature_K", numbers(*c.temperature_K, 0));
+  if (c.bar_temperature_K) add("bar_temperature_K", numbers(*c.bar_temperature_K, 0));
   if (c.duration_s) add("duration_s", to_decimal(*c.duration_s, 0));
   if (c.feed_m_per_s) add("feed_mm_per_s", to_decimal(*c.feed_m_per_s, kMm));
+  if (c.measured)
+    add("measured_utc", texts_of({to_text((*c.measured)[0]), to_text((*c.measured)[1])}));
   return fmt::format(",\n    \"conditions\": {{{}}}", all);
 }
 
@@ -266,6 +272,8 @@ std::string further_figures(const RunFigures& run) {
     all += fmt::format(",\n    \"held_out_cells\": {}", cells_of(run));
   if (!run.tables.empty()) all += fmt::format(",\n    \"tables\": {}", tables_of(run));
   if (run.conditions) all += conditions_of(*run.conditions);
+  if (!run.of_model.empty())
+    all += fmt::format(",\n    \"of_model\": {}", JsonText::quoted(run.of_model));
   return all;
 }
 

@@ -87,13 +87,16 @@ class Calibrations {
     return status;
   }
   void hand_over(CalibrationRun run) {
-    done_.push_back({.ended = session_.status(), .points_sha256 = inputs_of(run).back().sha256});
+    done_.push_back({.ended = session_.status(),
+                     .points_sha256 = inputs_of(run).back().sha256,
+                     .observed = observed(run)});
     identified_ = true;
     options_.runs(std::move(run));
   }
   void identify_again(const CalibrationRun& run) {
     ReplayedCalibration c{.ended = session_.status(),
-                          .points_sha256 = inputs_of(run).back().sha256};
+                          .points_sha256 = inputs_of(run).back().sha256,
+                          .observed = observed(run)};
     c.outcome = identify(run, config_, options_.active);
     if (*c.outcome) {
       std::visit([this](auto& candidate) { judge_recording(recording_, candidate.verdict); },

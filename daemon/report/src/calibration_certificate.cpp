@@ -6,57 +6,17 @@
 #include <array>
 #include <string_view>
 
-#include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
+#include "certificate_dates.hpp"
 #include "certificate_parts.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-/// The date of an instant, "2024-05-17".
-std::string date_of(protocol::UtcTime time) {
-  constexpr std::size_t kDate = 10;
-  return to_text(time).substr(0, kDate);
-}
-
-/// Days of the measurement: those of the details, else that of the model.
-struct MeasurementDays {
-  std::string begin, end;
-  explicit MeasurementDays(const ReportSubject& subject)
-      : begin(subject.details.begin_date), end(subject.details.end_date) {
-    const std::string day = date_of(subject.document.created);
-    if (begin.empty()) begin = end.empty() ? day : std::min(day, end);
-    if (end.empty()) end = std::max(day, begin);
-  }
-};
-
-/// Dates that contradict each other. Dates as in ISO 8601 are ordered as texts.
-void add_wrong_dates(const ReportSubject& subject, std::vector<std::string>& wrong) {
-  const CertificateDetails& d = subject.details;
-  for (const std::string& date : {d.begin_date, d.end_date, d.issue_date})
-    if (!date.empty() && !is_date(date)) {
-      wrong.emplace_back("certificate: dates such as \"2026-11-26\"");
-      return;
-    }
-  const MeasurementDays days(subject);
-  if (days.end < days.begin)
-    wrong.push_back(
-        fmt::format("certificate.end_date: {} is before begin_date, {}", days.end, days.begin));
-  if (!d.issue_date.empty() && d.issue_date < days.end)
-    wrong.push_back(
-        fmt::format("certificate.issue_date: {} is before the end of the measurement, {}",
-                    d.issue_date, days.end));
-  for (const EquipmentDetails& e : d.equipment)
-    if (!e.valid_until.empty() && e.valid_until < days.end)
-      wrong.push_back(
-          fmt::format("equipment \"{}\": its calibration was valid until {}, the "
-                      "measurement ended {}",
-                      e.name, e.valid_until, days.end));
-}
-
 /// Entries without which a certificate is not valid.
-std::vector<std::string> missing_entries(const ReportSubject& subject) {
+std::vector<std::string> missing_entries(const ReportSubject& subject,
+                                         const ReportSubject* as_left) {
   const CertificateDetails& d = subject.details;
   std::vector<std::string> missing;
   const auto require = [&missing](bool present, const char* what) {
@@ -76,13 +36,13 @@ std::vector<std::string> missing_entries(const ReportSubject& subject) {
   constexpr std::array<std::string_view, 5> kLocations{"laboratory", "customer", "laboratoryBranch",
                                                        "customerBranch", "other"};
   require(std::ranges::find(kLocations, d.location) != kLocations.end(), "certificate.location");
-  add_wrong_dates(subject, missing);
+  const auto dates = wrong_dates(subject, as_left);
+  missing.insert(missing.end(), dates.begin(), dates.end());
   return missing;
 }
 
-void write_core_data(XmlText& out, const ReportSubject& subject) {
+void write_core_data(XmlText& out, const ReportSubject& subject, const MeasurementDays& days) {
   const CertificateDetails& d = subject.details;
-  const MeasurementDays days(subject);
   out.open("dcc:coreData");
   out.element("dcc:countryCodeISO3166_1", d.laboratory.country);
   out.element("dcc:usedLangCodeISO639_1", "en");
@@ -146,15 +106,16 @@ void write_statements(XmlText& out, const ReportSubject& subject, bool has_as_le
   out.close();
 }
 
-void write_administrative_data(XmlText& out, const ReportSubject& subject, bool has_as_left) {
+void write_administrative_data(XmlText& out, const ReportSubject& subject,
+                               const ReportSubject* as_left) {
   out.open("dcc:administrativeData");
   out.open("dcc:dccSoftware");
-  write_software(out);
+  write_software(out, ABBE_VERSION);
   out.close();
-  write_core_data(out, subject);
+  write_core_data(out, subject, measurement_days(subject, as_left));
   write_item(out, subject);
   write_people(out, subject.details);
-  write_statements(out, subject, has_as_left);
+  write_statements(out, subject, as_left != nullptr);
   out.close();
 }
 
@@ -170,7 +131,8 @@ Result<void> write_result(XmlText& out, const ReportSubject& subject, State stat
 
 Result<std::string> calibration_certificate(const ReportSubject& as_found,
                                             const std::optional<ReportSubject>& as_left) {
-  if (auto missing = missing_entries(as_found); !missing.empty())
+  const ReportSubject* const left = as_left ? &*as_left : nullptr;
+  if (auto missing = missing_entries(as_found, left); !missing.empty())
     return tl::make_unexpected(
         Error{ErrorCode::BadInput,
               "certificate: entries are missing or invalid; give them with --details FILE",
@@ -183,7 +145,7 @@ Result<std::string> calibration_certificate(const ReportSubject& as_found,
             {"xmlns:xsi", "http://www.w3.org/2001/XMLSchema-instance"},
             {"xsi:schemaLocation", "https://ptb.de/dcc https://ptb.de/dcc/v3.2.1/dcc.xsd"},
             {"schemaVersion", "3.2.1"}});
-  write_administrative_data(out, as_found, as_left.has_value());
+  write_administrative_data(out, as_found, left);
   out.open("dcc:measurementResults");
   if (auto done = write_result(out, as_found, State::AsFound, as_found.details); !done)
     return tl::make_unexpected(done.error());

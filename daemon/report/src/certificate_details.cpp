@@ -32,4 +32,8 @@ bool is_country_code(std::string_view text) {
   return text.size() == 2 && std::ranges::all_of(text, [](char c) { return c >= 'A' && c <= 'Z'; });
 }
 
+bool is_used(const EquipmentDetails& equipment, EquipmentUse use) {
+  return equipment.use == use || equipment.use == EquipmentUse::Both;
+}
+
 }  // namespace abbe::daemon

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "abbe/base/utc_text.hpp"
+#include <algorithm>
+
 #include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
+#include "stated_conditions.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -60,48 +62,45 @@ void write_values(XmlText& out, const CertifiedValues& values) {
   out.close();
 }
 
-void write_condition(XmlText& out, std::string_view name, State state, double value,
-                     std::string_view unit, std::string_view U) {
+/// `name`, `description` and the status of a condition; to be closed after its data.
+void open_condition(XmlText& out, std::string_view name, std::string_view description,
+                    State state) {
   out.open("dcc:influenceCondition");
   write_name(out, name);
+  if (!description.empty()) write_contents(out, "dcc:description", {std::string(description)});
   out.element("dcc:status", state == State::AsFound ? "beforeAdjustment" : "afterAdjustment");
   out.open("dcc:data");
-  out.open("dcc:quantity");
-  write_real(out, name, fmt::format("{:.3f}", value), unit, U);
-  out.close();
+}
+
+void write_condition(XmlText& out, const StatedCondition& condition, State state) {
+  if (condition.numbers.empty()) return;
+  open_condition(out, condition.name, condition.origin, state);
+  for (const StatedCondition::Number& number : condition.numbers) {
+    out.open("dcc:quantity");
+    write_real(out, number.label, number.value, condition.dsi_unit, number.U);
+    out.close();
+  }
   out.close();
   out.close();
 }
 
 void write_state(XmlText& out, const ReportSubject& subject, State state) {
-  out.open("dcc:influenceCondition");
-  write_name(out, "State of the machine");
-  out.element("dcc:status", state == State::AsFound ? "beforeAdjustment" : "afterAdjustment");
-  out.open("dcc:data");
-  write_contents(
-      out, "dcc:text",
-      {fmt::format("measured {} (UTC), tool offsets {}", to_text(subject.document.created),
-                   tools_in_words(subject.document.model))});
+  open_condition(out, "State of the machine", "", state);
+  write_contents(out, "dcc:text",
+                 {fmt::format("{} (UTC), tool offsets {}", when_in_words(subject.document),
+                              tools_in_words(subject.document.model))});
   out.close();
   out.close();
 }
 
+/// The details state the conditions of the measurement as found.
 void write_conditions(XmlText& out, const ReportSubject& subject, State state,
-                      const CertificateDetails& d) {
+                      const CertificateDetails& details) {
   out.open("dcc:influenceConditions");
   write_state(out, subject, state);
-  if (state == State::AsLeft) {  // the details state the conditions of the other measurement
-    out.close();
-    return;
-  }
-  if (d.temperature_C)
-    write_condition(out, "temperature", state, *d.temperature_C, "\\degreecelsius",
-                    d.u_temperature_K ? fmt::format("{:.3f}", 2.0 * *d.u_temperature_K) : "");
-  if (d.humidity_percent)
-    write_condition(out, "humidity", state, *d.humidity_percent, "\\percent", "");
-  if (d.feed_mm_per_min)
-    write_condition(out, "feed", state, *d.feed_mm_per_min, "\\milli\\metre\\minute\\tothe{-1}",
-                    "");
+  for (const StatedCondition& condition : stated_conditions(
+           subject.document, state == State::AsFound ? details : CertificateDetails{}))
+    write_condition(out, condition, state);
   out.close();
 }
 
@@ -113,10 +112,13 @@ std::string calibration_of(const EquipmentDetails& e) {
   return text;
 }
 
-void write_equipment(XmlText& out, const std::vector<EquipmentDetails>& equipment) {
-  if (equipment.empty()) return;
+void write_equipment(XmlText& out, const std::vector<EquipmentDetails>& all, State state) {
+  const auto use = state == State::AsFound ? EquipmentUse::AsFound : EquipmentUse::AsLeft;
+  const auto of_state = [use](const EquipmentDetails& e) { return is_used(e, use); };
+  if (std::ranges::none_of(all, of_state)) return;
   out.open("dcc:measuringEquipments");
-  for (const EquipmentDetails& e : equipment) {
+  for (const EquipmentDetails& e : all) {
+    if (!of_state(e)) continue;
     out.open("dcc:measuringEquipment");
     write_name(out, e.name);
     if (const std::string calibration = calibration_of(e); !xml_text(calibration).empty())
@@ -141,8 +143,12 @@ void write_method(XmlText& out, const ModelDocument& document) {
   out.open("dcc:usedMethods");
   out.open("dcc:usedMethod");
   write_name(out, method_in_words(document));
-  for (const char* const norm : {"ISO 230-1", "ISO 230-2", "ISO 230-6"})
-    out.element("dcc:norm", norm);
+  write_contents(
+      out, "dcc:description",
+      {"Positioning (M, E, B) and diagonals are quantities as defined in ISO 230-2 and ISO "
+       "230-6, computed from the identified model. The tests of these standards were not "
+       "made: no target was approached repeatedly, no diagonal was driven for them."});
+  out.element("dcc:norm", "ISO 230-1");
   out.close();
   out.close();
 }
@@ -199,10 +205,10 @@ void write_contact(XmlText& out, std::string_view element, const Contact& contac
   out.close();
 }
 
-void write_software(XmlText& out) {
+void write_software(XmlText& out, std::string_view release) {
   out.open("dcc:software");
   write_name(out, "abbe");
-  out.element("dcc:release", ABBE_VERSION);
+  out.element("dcc:release", xml_text(release).empty() ? std::string_view(ABBE_VERSION) : release);
   out.element("dcc:type", "application");
   out.close();
 }
@@ -221,9 +227,9 @@ void write_measurement_result(XmlText& out, const ReportSubject& subject,
   write_name(out, state == State::AsFound ? "As found" : "As left");
   write_method(out, subject.document);
   out.open("dcc:usedSoftware");
-  write_software(out);
+  write_software(out, subject.document.software);
   out.close();
-  write_equipment(out, details.equipment);
+  write_equipment(out, details.equipment, state);
   write_conditions(out, subject, state, details);
   write_values(out, values);
   write_meta_data(out, subject);

@@ -13,7 +13,8 @@ void write_name(XmlText& out, std::string_view text);
 void write_identification(XmlText& out, std::string_view issuer, std::string_view value,
                           std::string_view name);
 void write_contact(XmlText& out, std::string_view element, const Contact& contact);
-void write_software(XmlText& out);
+/// abbe with this release; an empty one is that of this program.
+void write_software(XmlText& out, std::string_view release);
 /// dcc:statement with one paragraph for each text.
 void write_statement(XmlText& out, std::string_view name, const std::vector<std::string>& texts);
 /// dcc:measurementResult: methods, software, equipment, conditions, all values.

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "abbe/base/units.hpp"
-#include "abbe/base/utc_text.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "abbe/report/model_words.hpp"
 #include "abbe/report/sections.hpp"
@@ -62,7 +61,7 @@ void add_states(HtmlReport& page, const Sides& sides) {
   row("model", [](const ReportSubject& s) { return model_id(s.document); });
   row("machine", [](const ReportSubject& s) { return s.document.machine; });
   row("verdict", [](const ReportSubject& s) { return verdict_in_words(s).text; });
-  row("measured (UTC)", [](const ReportSubject& s) { return to_text(s.document.created); });
+  row("date (UTC)", [](const ReportSubject& s) { return when_in_words(s.document); });
   row("method", [](const ReportSubject& s) { return method_in_words(s.document); });
   row("gauge",
       [](const ReportSubject& s) { return std::string{calib::name(s.document.model.gauge())}; });

@@ -12,8 +12,14 @@
 namespace abbe::daemon {
 namespace {
 
-void add_fit(HtmlReport& page, const ModelStatistics& s) {
+void add_fit(HtmlReport& page, const ModelDocument& document) {
   page.heading("Residuals of the fit");
+  if (is_joint(document)) {
+    page.paragraph(kResidualsOfParts);
+    return;
+  }
+  if (const std::string whose = whose_residuals(document); !whose.empty()) page.paragraph(whose);
+  const ModelStatistics& s = document.statistics;
   const auto row = [](const char* what, const ResidualFigures& f) {
     return std::vector<std::string>{what, um_text(f.mean_abs_m, 3), um_text(f.rms_m, 3),
                                     um_text(f.max_abs_m, 3)};
@@ -97,7 +103,7 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_verdict_of(page, subject);
   add_values(page, *values, 0, 1);
   page.paragraph(box_in_words(values->standard));
-  add_fit(page, document.statistics);
+  add_fit(page, document);
   if (document.run) add_held_out(page, *document.run);
 
   page.page_break();

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
 #include "report_sections.hpp"
+#include "stated_conditions.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -34,60 +34,10 @@ std::string operator_of(const ReportSubject& subject) {
   return {};
 }
 
-std::string temperature_text(const CertificateDetails& details) {
-  if (!details.temperature_C) return {};
-  return details.u_temperature_K
-             ? fmt::format("{:.2f} \u00b1 {:.2f} C (k = 2)", *details.temperature_C,
-                           2.0 * *details.u_temperature_K)
-             : fmt::format("{:.2f} C", *details.temperature_C);
-}
-
-constexpr std::string_view kAbsent = "not recorded";
-
-/// Of the run; all absent in models of earlier versions.
-RunFigures::Conditions conditions_of(const ModelDocument& document) {
-  return document.run && document.run->conditions ? *document.run->conditions
-                                                  : RunFigures::Conditions{};
-}
-
-/// As stated in the details, else as measured in the run.
-std::string temperature_of(const ReportSubject& subject) {
-  if (subject.details.temperature_C) return temperature_text(subject.details);
-  const auto range_K = conditions_of(subject.document).temperature_K;
-  return range_K ? fmt::format("{:.2f} to {:.2f} C, lowest and highest value of all sensors",
-                               (*range_K)[0] - kZeroCelsius_K, (*range_K)[1] - kZeroCelsius_K)
-                 : std::string(kAbsent);
-}
-
-std::string feed_of(const ReportSubject& subject) {
-  if (subject.details.feed_mm_per_min)
-    return fmt::format("{} mm/min", *subject.details.feed_mm_per_min);
-  constexpr double kSecondsPerMinute = 60.0;
-  const auto feed = conditions_of(subject.document).feed_m_per_s;
-  return feed ? fmt::format("{:.0f} mm/min, median over the legs",
-                            kMmPerM * kSecondsPerMinute * *feed)
-              : std::string(kAbsent);
-}
-
-std::string duration_of(const ModelDocument& document) {
-  const auto duration_s = conditions_of(document).duration_s;
-  return duration_s ? fmt::format("{:.1f} s from the first to the last observation", *duration_s)
-                    : std::string(kAbsent);
-}
-
 void add_conditions(Facts& facts, const ReportSubject& subject) {
-  const CertificateDetails& d = subject.details;
-  const ModelDocument& document = subject.document;
-  facts.emplace_back("temperature", temperature_of(subject));
-  if (document.artefact)
-    facts.emplace_back("temperature of the ball array",
-                       fmt::format("{:.2f} C, corrected with {:.2f} um/(m K)",
-                                   document.artefact->temperature_K - kZeroCelsius_K,
-                                   kUmPerM * document.artefact->alpha_per_K));
-  if (d.humidity_percent) facts.emplace_back("humidity", fmt::format("{} %", *d.humidity_percent));
-  facts.emplace_back("feed", feed_of(subject));
-  facts.emplace_back("duration", duration_of(document));
-  facts.emplace_back("tool offsets", tools_in_words(document.model));
+  for (const StatedCondition& condition : stated_conditions(subject.document, subject.details))
+    facts.emplace_back(condition.name, in_words(condition));
+  facts.emplace_back("tool offsets", tools_in_words(subject.document.model));
 }
 
 Facts facts_of(const ReportSubject& subject) {
@@ -102,15 +52,19 @@ Facts facts_of(const ReportSubject& subject) {
   facts.emplace_back("model", fmt::format("{}, hash {}", model_id(document), model_hash(document)));
   facts.emplace_back("hash of the machine configuration", document.machine_hash);
   facts.emplace_back("method", method_in_words(document));
-  facts.emplace_back("measured (UTC)", to_text(document.created));
+  if (const auto measured = measured_of(document))
+    facts.emplace_back("measured (UTC)", fmt::format("{} to {}", to_seconds((*measured)[0]),
+                                                     to_seconds((*measured)[1])));
+  facts.emplace_back("identified (UTC)", to_text(document.created));
   add_if(facts, "measurement from, to", joined({d.begin_date, d.end_date}));
   add_if(facts, "operator", operator_of(subject));
   add_if(facts, "laboratory", joined({contact_text(d.laboratory), d.laboratory_code}));
   add_if(facts, "customer", contact_text(d.customer));
   for (const EquipmentDetails& e : d.equipment)
-    facts.emplace_back("equipment",
-                       joined({e.name, e.manufacturer, e.model, e.serial, e.certificate,
-                               e.valid_until.empty() ? "" : "valid until " + e.valid_until}));
+    if (is_used(e, EquipmentUse::AsFound))
+      facts.emplace_back("equipment",
+                         joined({e.name, e.manufacturer, e.model, e.serial, e.certificate,
+                                 e.valid_until.empty() ? "" : "valid until " + e.valid_until}));
   add_conditions(facts, subject);
   add_if(facts, "remark", d.remark);
   facts.emplace_back(
@@ -122,13 +76,18 @@ Facts facts_of(const ReportSubject& subject) {
 
 Facts statistics_of(const ModelDocument& document) {
   const ModelStatistics& s = document.statistics;
-  return {
-      {"samples", fmt::format("{}, {} lost", s.samples, s.lost_samples)},
-      {"observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}", s.observations,
-                                   s.unknowns, s.rank, s.condition)},
-      {"sigma0, chi-square per degree of freedom",
-       fmt::format("{:.3f}, {:.3f}", s.sigma0, s.chi2_per_dof)},
-      {"variance factor (multiplies the covariance)", fmt::format("{:.3f}", s.variance_factor)}};
+  Facts facts;
+  if (!is_joint(document))
+    facts.emplace_back("samples", fmt::format("{}, {} lost", s.samples, s.lost_samples));
+  facts.emplace_back("observations", fmt::format("{} for {} unknowns, rank {}, condition {:.3g}",
+                                                 s.observations, s.unknowns, s.rank, s.condition));
+  facts.emplace_back(is_joint(document) ? "held-out legs: rms and mean square of residuals divided "
+                                          "by their uncertainty"
+                                        : "sigma0, chi-square per degree of freedom",
+                     fmt::format("{:.3f}, {:.3f}", s.sigma0, s.chi2_per_dof));
+  facts.emplace_back("variance factor (multiplies the covariance)",
+                     fmt::format("{:.3f}", s.variance_factor));
+  return facts;
 }
 
 }  // namespace
@@ -136,6 +95,8 @@ Facts statistics_of(const ModelDocument& document) {
 void add_origin_of(HtmlReport& page, const ReportSubject& subject) {
   page.heading("Origin and conditions");
   page.facts(facts_of(subject));
+  if (const std::string whose = whose_residuals(subject.document); !whose.empty())
+    page.paragraph(whose);
   page.facts(statistics_of(subject.document));
   std::vector<std::vector<std::string>> rows;
   for (const InputFile& input : subject.document.inputs) rows.push_back({input.name, input.sha256});

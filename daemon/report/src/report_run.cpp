@@ -53,18 +53,26 @@ void add_series(HtmlReport& page, const RunFigures::Series& series) {
   page.paragraph(text + ".");
 }
 
-/// Counts beside those that the stated uncertainties predict: a fit with n observations and f
-/// degrees of freedom leaves residuals with the standard deviation sqrt(f / n).
-void add_sigma_counts(HtmlReport& page, const RunFigures& run, const ModelStatistics& s) {
+/// Standard deviation that the stated uncertainties predict for residuals in units of them: a fit
+/// with n observations and f degrees of freedom leaves sqrt(f / n). 0: no prediction.
+double predicted_sd(const ModelDocument& document) {
+  const ModelStatistics& s = document.statistics;
+  if (document.method == "evemu" || s.observations == 0) return 0.0;
+  double freedom = s.degrees_of_freedom.value_or(0.0);
+  // In models of earlier versions the rank of a bar's model counts all unknowns with a prior.
+  if (!s.degrees_of_freedom && document.method == "otf" && s.observations > s.rank)
+    freedom = static_cast<double>(s.observations - s.rank);
+  return freedom > 0.0 ? std::sqrt(freedom / static_cast<double>(s.observations)) : 0.0;
+}
+
+/// Counts beside those that the stated uncertainties predict.
+void add_sigma_counts(HtmlReport& page, const RunFigures& run, const ModelDocument& document) {
   if (run.sigma_counts.empty()) return;
   constexpr double kMost = RunFigures::kMostSigmas;
   const double width = 2.0 * kMost / static_cast<double>(run.sigma_counts.size());
   double all = 0.0;
   for (const std::size_t count : run.sigma_counts) all += static_cast<double>(count);
-  const double sd = s.observations > s.rank
-                        ? std::sqrt(static_cast<double>(s.observations - s.rank) /
-                                    static_cast<double>(s.observations))
-                        : 0.0;
+  const double sd = predicted_sd(document);
   const auto below = [sd](double x) { return 0.5 * std::erfc(-x / (sd * std::numbers::sqrt2)); };
 
   Curve bars{.name = "residuals", .x = {}, .y = {}, .dot_every = 0};
@@ -85,6 +93,11 @@ void add_sigma_counts(HtmlReport& page, const RunFigures& run, const ModelStatis
                   .curves = {bars}};
   if (sd > 0.0) chart.curves.push_back(normal);
   page.plot(chart);
+  if (document.method == "evemu")
+    page.paragraph(
+        "Residuals in standard uncertainties have no predicted distribution here: the noise of a "
+        "ball centre is estimated from these residuals, and the noise of ball 1 is common to all "
+        "balls of a position.");
 }
 
 void add_rms_of_parts(HtmlReport& page, const RunFigures& run) {
@@ -201,19 +214,32 @@ LineChart backlash_chart(const std::vector<calib::otf::Backlash>& backlash, cali
 
 }  // namespace
 
+std::string whose_residuals(const ModelDocument& document) {
+  if (!document.run || document.run->of_model.empty()) return {};
+  return fmt::format(
+      "This model is an update of the model before it with a run. Residuals, statistics and the "
+      "test with what was excluded from the fit are those of the model of the run alone, {}.",
+      document.run->of_model);
+}
+
 void add_residuals_of(HtmlReport& page, const ModelDocument& document) {
   page.heading("Residuals over time and by part of the run");
+  if (is_joint(document)) {
+    page.paragraph(kResidualsOfParts);
+    return;
+  }
   const bool has_parts = document.run && document.run->series && !document.run->parts.empty();
   if (!document.run || (!has_parts && document.run->residuals.empty())) {
     page.paragraph(kNotRecorded);
     return;
   }
   const RunFigures& run = *document.run;
+  if (const std::string whose = whose_residuals(document); !whose.empty()) page.paragraph(whose);
   page.paragraph("What the model does not explain of the observations to which it was fitted.");
   if (has_parts) add_series(page, *run.series);
   add_along_path(page, run);
   if (!has_parts) return;
-  add_sigma_counts(page, run, document.statistics);
+  add_sigma_counts(page, run, document);
   add_rms_of_parts(page, run);
   add_table_of_parts(page, run);
 }

@@ -1,6 +1,9 @@
 #pragma once
 /// Sections of the reports that are made from stored models.
 
+#include <array>
+#include <optional>
+#include <string>
 #include <string_view>
 
 #include "abbe/report/html_report.hpp"
@@ -10,6 +13,29 @@ namespace abbe::daemon {
 
 /// In place of a figure that a model of an earlier version does not have.
 inline constexpr std::string_view kNotRecorded = "Not recorded.";
+
+/// First and last observation of the run; nullopt: the model does not have them, as one that was
+/// identified from files.
+[[nodiscard]] std::optional<std::array<protocol::UtcTime, 2>> measured_of(const ModelDocument&);
+/// "measured 2024-05-17T08:00:00Z to 2024-05-17T08:30:00Z", else "identified ...; when it was
+/// measured is not recorded". UTC.
+[[nodiscard]] std::string when_in_words(const ModelDocument& document);
+/// The end of the measurement, else the time of the identification.
+[[nodiscard]] protocol::UtcTime time_of(const ModelDocument& document);
+/// "2024-05-17T08:30:00Z"
+[[nodiscard]] std::string to_seconds(protocol::UtcTime time);
+
+/// A joint model is combined from its parts: it has no residuals of its own, and its statistics are
+/// those of the held-out test.
+[[nodiscard]] inline bool is_joint(const ModelDocument& document) {
+  return document.method == "joint";
+}
+inline constexpr std::string_view kResidualsOfParts =
+    "A joint model has no residuals of its own; the models of its parts have them.";
+
+/// Of an update (`[drift] continuous`): whose residuals and statistics are reported. Empty: those of
+/// the model itself.
+[[nodiscard]] std::string whose_residuals(const ModelDocument& document);
 
 /// The state of a model as a lamp and in words.
 struct VerdictInWords {

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "abbe/base/utc_text.hpp"
 #include "abbe/report/model_words.hpp"
+#include "certificate_dates.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -10,6 +13,19 @@ namespace {
 std::string who_and_when(const StoreEvent& event) {
   return fmt::format("{}, {} (UTC){}{}", event.actor.who, to_text(event.actor.when),
                      event.actor.why.empty() ? "" : ": ", event.actor.why);
+}
+
+/// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
+/// that does not have this day, on the day of its identification.
+void add_expired_equipment(const ReportSubject& subject, std::vector<std::string>& notes) {
+  const std::string end = measurement_days(subject, nullptr).end;
+  const std::string day = end.empty() ? day_of(subject.document.created) : end;
+  for (const EquipmentDetails& e : subject.details.equipment)
+    if (is_used(e, EquipmentUse::AsFound) && !e.valid_until.empty() && e.valid_until < day)
+      notes.push_back(
+          fmt::format("equipment \"{}\": its calibration was valid until {}, the model "
+                      "was {} {}",
+                      e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
 /// What happened to the model in the store, apart from its verdict.
@@ -34,8 +50,11 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
         break;
     }
   }
-  if (!subject.document.recording_gap.empty())
-    notes.push_back(cannot_be_checked(subject.document.recording_gap));
+  if (const auto& gap = subject.document.recording_gap; !gap.empty()) {
+    const std::string note = cannot_be_checked(gap);  // of a run of abbed it is among its notes
+    if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
+  }
+  add_expired_equipment(subject, notes);
   return notes;
 }
 

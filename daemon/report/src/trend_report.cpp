@@ -68,14 +68,20 @@ std::string text_of_key(const CertifiedValues& values, std::string_view key) {
   return {};
 }
 
+/// To minutes: "2024-05-17T08:30", the end of the measurement; "identified 2024-05-17T08:30" if that
+/// is not recorded.
+std::string date_in_table(const ModelDocument& document) {
+  constexpr std::size_t kMinutes = 16;
+  const std::string text = to_text(time_of(document)).substr(0, kMinutes);
+  return measured_of(document) ? text : "identified " + text;
+}
+
 void add_trend_table(HtmlReport& page, const std::vector<TrendPoint>& points) {
   std::vector<std::vector<std::string>> rows;
   for (const TrendPoint& point : points) {
-    constexpr std::size_t kMinutes = 16;  // "2024-05-17T08:30"
     const VerdictInWords verdict = verdict_in_words(*point.subject);
     constexpr std::array kLamps{"red", "yellow", "green", "no verdict"};
-    rows.push_back({model_id(point.subject->document),
-                    to_text(point.subject->document.created).substr(0, kMinutes),
+    rows.push_back({model_id(point.subject->document), date_in_table(point.subject->document),
                     kLamps.at(static_cast<std::size_t>(verdict.signal)),
                     text_of_key(point.values, "V.max"), text_of_key(point.values, "M_d"),
                     text_of_key(point.values, "EC0Y")});
@@ -95,12 +101,12 @@ Result<std::string> trend_report(const std::vector<ReportSubject>& models) {
     points.push_back({&subject, *std::move(values), 0.0});
   }
   if (points.empty()) return fail(ErrorCode::DataInsufficient, "trend: there are no models");
-  std::ranges::stable_sort(points, {},
-                           [](const TrendPoint& point) { return point.subject->document.created; });
-  const auto first = points.front().subject->document.created;
+  std::ranges::stable_sort(
+      points, {}, [](const TrendPoint& point) { return time_of(point.subject->document); });
+  const auto first = time_of(points.front().subject->document);
   for (TrendPoint& point : points)
     point.days =
-        std::chrono::duration<double, std::ratio<86400>>(point.subject->document.created - first)
+        std::chrono::duration<double, std::ratio<86400>>(time_of(point.subject->document) - first)
             .count();
 
   HtmlReport page(fmt::format("{}: trend", points.front().subject->document.machine));

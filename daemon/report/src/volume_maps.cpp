@@ -237,13 +237,13 @@ void add_volume_maps(HtmlReport& page, const calib::VolumetricModel& model,
   page.maps(maps.V);
   page.maps(maps.U);
   page.facts({{"before, |V|", summary(maps.V)},
-              {"after, U(V): at least this is to be expected", summary(maps.U)}});
+              {"after, U(V): |V| left is below it with 95 to 99 %", summary(maps.U)}});
   page.paragraph(
       "U(V): twice the root of the sum of the variances of the three components (coverage factor k "
-      "= 2), in the gauge of the model. After compensation, an error of at least this size is to "
-      "be expected. U(V) does not contain errors between the nodes or of a higher degree than the "
-      "model has, lack of fit that the residuals do not show, and changes of the machine after the "
-      "measurement, for example with temperature.");
+      "= 2), in the gauge of the model. |V| that is left after compensation is below U(V) with 95 to "
+      "99 %, apart from what U(V) does not contain: errors between the nodes or of a higher degree "
+      "than the model has, lack of fit that the residuals do not show, and changes of the machine "
+      "after the measurement, for example with temperature.");
   if (observations_of(held_out) > 0) add_held_out_cells(page, model.validity(), held_out);
 }
 

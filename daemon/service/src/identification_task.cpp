@@ -6,7 +6,9 @@
 #include <chrono>
 #include <ratio>
 #include <utility>
+#include <vector>
 
+#include "abbe/calib/otf/backlash.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/drift.hpp"
 #include "abbe/service/calibration_service.hpp"
@@ -43,8 +45,22 @@ void cite(const RecordingDigest& recording, std::vector<InputFile>& inputs) {
   inputs.insert(recording.gap.empty() ? inputs.begin() : inputs.end(), {name, recording.sha256});
 }
 
+std::vector<calib::otf::Backlash> determined_backlash(const calib::VolumetricModel& model) {
+  std::vector<calib::otf::Backlash> all;
+  for (const auto& backlash : calib::otf::backlash_of(model))
+    if (backlash.determined) all.push_back(backlash);
+  return all;
+}
+
+/// The notes of the verdict on a stored model are in the model, for its report.
+void keep_notes(ModelDocument& document, const calib::Verdict& verdict) {
+  if (document.run) document.run->notes = verdict.notes;
+}
+
 /// The document of an update: that of the run with the updated model. Its parents, the run and the
-/// previous model, are the last inputs, with the hashes of their content.
+/// previous model, are the last inputs, with the hashes of their content. Statistics and residuals
+/// stay those of the run, and RunFigures::of_model names its model; the backlash is that of the
+/// update.
 ModelDocument updated_document(calib::VolumetricModel model, const ModelDocument& run,
                                const PublishedModel& previous) {
   ModelDocument document = run;
@@ -55,6 +71,11 @@ ModelDocument updated_document(calib::VolumetricModel model, const ModelDocument
   parent.method = previous.method;
   document.inputs.push_back({fmt::format("run, model {}", model_id(run)), model_hash(run)});
   document.inputs.push_back({fmt::format("previous model {}", previous.id), model_hash(parent)});
+  document.backlash = determined_backlash(document.model);
+  if (document.run) {
+    document.run->of_model = model_id(run);
+    document.run->held_out_cells.clear();  // predictions of the model of the run
+  }
   return document;
 }
 
@@ -74,6 +95,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   const auto created = utc.to_utc(state->now);
   auto document = document_of(*candidate, *config, std::move(inputs), created);
   document.recording_gap = std::move(recording.gap);
+  add_measured(document, observed(run), utc);
   auto id = model_id(document);
   auto why = fmt::format("calibrate {}", method_of(*candidate));
 
@@ -84,6 +106,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
                       .actor = {.who = who, .why = std::move(why), .when = created}}};
   add_notes(*model);
   if (active) compare_with_active(*model, run);
+  keep_notes(model->document, model->verdict);
   return model;
 }
 
@@ -117,6 +140,7 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
     return;
   }
 
+  keep_notes(model.document, model.verdict);
   model.beside.run = model.document;
   model.beside.run_accepted = model.verdict.accepted;
   model.beside.run_reasons = model.verdict.reasons;

@@ -83,7 +83,7 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
                                         options_.artefact_sensor));
   }
 
-  intake_.usable();
+  intake_.usable(snapshot);
   for (const std::string& text : guide_.take(reading_m).notes) intake_.note(snapshot, text);
   if (guide_.taken() > 0 && phase_ == Phase::WaitingAtStart) phase_ = Phase::Running;
 
@@ -122,7 +122,7 @@ void EvemuAcquisition::tick(HostTime now) {
 }
 
 EvemuRun EvemuAcquisition::release() {
-  return {std::move(request_), guide_.touches(), thermometer_.over_the_run()};
+  return {std::move(request_), guide_.touches(), thermometer_.over_the_run(), intake_.observed()};
 }
 
 }  // namespace abbe::daemon

@@ -25,7 +25,8 @@ ModelStatistics model_statistics(const calib::evemu::Statistics& s) {
           .before = document_figures(s.before),
           .after = document_figures(s.after),
           .iterations = s.iterations,
-          .stop_reason = "converged"};
+          .stop_reason = "converged",
+          .degrees_of_freedom = s.degrees_of_freedom};
 }
 
 }  // namespace

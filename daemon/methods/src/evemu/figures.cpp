@@ -174,11 +174,7 @@ RunFigures evemu_figures(const EvemuCandidate& candidate) {
   figures.tables.push_back(fit_table(solution));
   if (!solution.pose_rotations_rad.empty()) figures.tables.push_back(poses_table(solution));
   if (solution.sparse) figures.tables.push_back(choice_table(*solution.sparse));
-  figures.conditions.emplace();
-  if (solution.artefact && solution.artefact->expansion) {
-    const double temperature_K = solution.artefact->expansion->temperature_K;
-    figures.conditions->temperature_K = {temperature_K, temperature_K};
-  }
+  figures.conditions.emplace();  // the temperature of the array is in ModelDocument::artefact
   return figures;
 }
 

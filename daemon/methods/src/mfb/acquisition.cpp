@@ -54,7 +54,8 @@ MfbAcquisition::MfbAcquisition(mfb::Bar bar, std::vector<InputFile> sources, mfb
     : bar_(std::move(bar)),
       sources_(std::move(sources)),
       guide_(std::move(guide)),
-      intake_(std::move(rules)) {
+      intake_(std::move(rules)),
+      has_earlier_(guide_.taken() > 0) {
   follow_guide();
 }
 
@@ -80,7 +81,7 @@ void MfbAcquisition::take(const protocol::Snapshot& snapshot) {
     return end(std::move(lost));
   if (const auto fault = touch_fault(snapshot); !fault.empty()) return refuse(snapshot, fault);
 
-  intake_.usable();
+  intake_.usable(snapshot);
   const calib::Vector3 reading_m{snapshot.position[0], snapshot.position[1], snapshot.position[2]};
   const mfb::GuidedTouch taken = guide_.take(reading_m);
   for (const std::string& text : taken.notes) intake_.note(snapshot, text);
@@ -132,7 +133,8 @@ std::vector<calib::Vector3> MfbAcquisition::readings_m() const {
 }
 
 MfbRun MfbAcquisition::release() {
-  return {std::move(bar_), guide_.plan(), guide_.passes(), std::move(sources_)};
+  return {std::move(bar_), guide_.plan(), guide_.passes(), std::move(sources_),
+          has_earlier_ ? std::nullopt : intake_.observed()};
 }
 
 }  // namespace abbe::daemon

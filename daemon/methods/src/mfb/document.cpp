@@ -66,7 +66,8 @@ ModelStatistics bar_statistics(const MfbCandidate& candidate) {
           .before = figures_of(candidate.found.solution, &mfb::PassResiduals::before_m),
           .after = figures_of(candidate.found.solution, &mfb::PassResiduals::O_m),
           .iterations = 1,
-          .stop_reason = "direct"};
+          .stop_reason = "direct",
+          .degrees_of_freedom = s.degrees_of_freedom};
 }
 
 BarFigures bar_figures(const mfb::Identification& found) {

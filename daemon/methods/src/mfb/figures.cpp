@@ -100,13 +100,16 @@ Table monte_carlo_table(const mfb::MonteCarlo& trials) {
                {"expected scatter of one ratio", fmt::format("{:.3f}", trials.scatter_of_ratio)}}};
 }
 
+/// Lowest and highest temperature of the bar.
+std::array<double, 2> temperatures_K(const mfb::Observations& o) {
+  const auto [low, high] =
+      std::ranges::minmax_element(o.passes, {}, &mfb::PassObservation::temperature_K);
+  return {low->temperature_K, high->temperature_K};
+}
+
 Table bar_table(const MfbCandidate& candidate) {
   const mfb::Observations& o = candidate.found.observations;
-  double low_K = o.passes.front().temperature_K, high_K = low_K;
-  for (const mfb::PassObservation& pass : o.passes) {
-    low_K = std::min(low_K, pass.temperature_K);
-    high_K = std::max(high_K, pass.temperature_K);
-  }
+  const auto [low_K, high_K] = temperatures_K(o);
   return {.title = "The Multi-Feature Bar",
           .explanation = {},
           .columns = {},
@@ -200,7 +203,7 @@ RunFigures mfb_figures(const MfbCandidate& candidate) {
   if (Table corrections = corrections_table(candidate); !corrections.rows.empty())
     figures.tables.push_back(std::move(corrections));
   figures.tables.push_back(positions_table(candidate));
-  figures.conditions.emplace();
+  figures.conditions.emplace().bar_temperature_K = temperatures_K(candidate.found.observations);
   return figures;
 }
 

@@ -39,7 +39,8 @@ ModelStatistics model_statistics(const calib::otf::Solution& solution) {
           .before = document_figures(s.before),
           .after = document_figures(s.after),
           .iterations = s.iterations,
-          .stop_reason = std::string{calib::otf::stop_reason(solution.estimator)}};
+          .stop_reason = std::string{calib::otf::stop_reason(solution.estimator)},
+          .degrees_of_freedom = static_cast<double>(s.degrees_of_freedom)};
 }
 
 /// rms before and after in equal intervals of the paths of all runs, one after the other.

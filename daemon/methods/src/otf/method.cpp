@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "abbe/config/capabilities.hpp"
 #include "abbe/methods/otf/document.hpp"
@@ -63,14 +66,18 @@ OtfMethod::Run OtfMethod::run_of(Acquisition&& acquisition) {
   const EnvironmentUseOptions& use = acquisition.options().environment;
   std::vector<AxisPosition> path_m = acquisition.release_path();
   for (AxisPosition& q_m : path_m) q_m = at_temperature(q_m, effect, use);
+  std::vector<RunPoint> points = acquisition.release();
+  std::optional<std::array<protocol::HostTime, 2>> observed;
+  if (!points.empty()) observed = {points.front().time, points.back().time};
 
   return {.path_m = std::move(path_m),
-          .points = acquisition.release(),
+          .points = std::move(points),
           .u_scale = effect.u_scale,
           .u_axis_scale = effect.u_expansion_factor,
           .unmeasured_air = use.unmeasured_air,
           .mode = acquisition.mode(),
-          .temperature_K = acquisition.temperature_K()};
+          .temperature_K = acquisition.temperature_K(),
+          .observed = observed};
 }
 
 Result<OtfMethod::Candidate> OtfMethod::identify(const Run& run, const Config& config,

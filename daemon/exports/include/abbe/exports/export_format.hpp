@@ -37,6 +37,7 @@ struct FormatFacts {
   bool equidistant = false;
   std::size_t most_nodes = 0;  ///< of an axis; 0: no limit is known
   bool folder = false;         ///< several files
+  bool comments = true;        ///< ExportOrigin is in the file
   std::array<std::string_view, 3> axis_names{"X", "Y", "Z"};
   bool axes_named = false;  ///< the file contains names of axes that the control defines
   /// +1 or -1: direction in which a positive value moves the axis; 0: not found in public

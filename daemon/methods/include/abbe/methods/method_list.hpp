@@ -7,7 +7,8 @@
 ///     Options           of the acquisition, from the configuration: options(Config)
 ///     Acquisition       takes snapshots: begin, take, tick, phase, reason, progress, points;
 ///                       next and take_notes where the operator is guided
-///     Run               the acquired data: run_of(Acquisition)
+///     Run               the acquired data: run_of(Acquisition); its member `observed` has the times
+///                       of the first and the last observation
 ///     Candidate         a judged model: model(), verdict
 ///     needs(Config)     which devices it reads
 ///     to_json(Request), request_from(json, Config*)

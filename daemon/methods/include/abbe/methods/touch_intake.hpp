@@ -3,8 +3,10 @@
 /// run, notes on them, and the ends of a run that do not depend on the method. Decisions depend on
 /// snapshots only; only pause() is given the time. Not for the RT path; not thread-safe.
 
+#include <array>
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,7 +42,11 @@ class TouchIntake {
   /// Notes an unusable touch. Returns why a run without a usable touch ends; empty: it does not.
   [[nodiscard]] std::string refuse(const protocol::Snapshot& touch, std::string_view fault,
                                    std::string_view expected);
-  void usable() noexcept { refused_in_a_row_ = 0; }
+  void usable(const protocol::Snapshot& touch) noexcept;
+  /// Times of the first and the last usable touch; nullopt without one.
+  [[nodiscard]] const std::optional<std::array<protocol::HostTime, 2>>& observed() const noexcept {
+    return observed_;
+  }
   /// Why the run ends at `now`: no touch for too long; empty: it does not.
   [[nodiscard]] std::string pause(protocol::HostTime now) const;
 
@@ -51,6 +57,7 @@ class TouchIntake {
  private:
   TouchRules rules_;
   protocol::HostTime from_{}, last_touch_{};
+  std::optional<std::array<protocol::HostTime, 2>> observed_;
   std::size_t refused_in_a_row_ = 0;
   std::vector<std::string> notes_;
 };

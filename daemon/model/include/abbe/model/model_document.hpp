@@ -39,6 +39,9 @@ struct ModelStatistics {
   ResidualFigures before, after;
   int iterations = 0;
   std::string stop_reason;
+  /// Observations less the unknowns that they determine; one with a prior counts in part. nullopt:
+  /// not known, as in models of earlier versions.
+  std::optional<double> degrees_of_freedom{};
   friend bool operator==(const ModelStatistics&, const ModelStatistics&) = default;
 };
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "abbe/calib/geometry.hpp"
+#include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
 
@@ -30,8 +31,12 @@ struct ResidualSeries {
 
 struct RunConditions {
   std::optional<std::array<double, 2>> temperature_K{};  ///< lowest and highest of the run
+  /// Lowest and highest temperature of a bar, as used in its measurements.
+  std::optional<std::array<double, 2>> bar_temperature_K{};
   std::optional<double> duration_s{};
   std::optional<double> feed_m_per_s{};  ///< median over the legs
+  /// First and last observation; nullopt: the observations have no date, as in files.
+  std::optional<std::array<protocol::UtcTime, 2>> measured{};
   friend bool operator==(const RunConditions&, const RunConditions&) = default;
 };
 
@@ -86,6 +91,9 @@ struct RunFigures {
   std::vector<HeldOutCell> held_out_cells{};
   std::vector<Table> tables{};
   std::optional<Conditions> conditions{};
+  /// Id of the model that was fitted to the run, if it is not this one but was only used to update
+  /// it: residuals, held-out test and statistics are those of that model.
+  std::string of_model{};
   friend bool operator==(const RunFigures&, const RunFigures&) = default;
 };
 

@@ -50,6 +50,7 @@ struct ReplayedCalibration {
   std::string model_hash;  ///< empty without a model
   std::string model_id;
   std::string points_sha256;  ///< of the points or touches that entered the identification
+  ObservedTimes observed{};   ///< host times of the recording
 };
 
 /// The datum of one axis: the one found live, and the one that the replay found from the reference

@@ -14,10 +14,16 @@ struct Contact {
   std::string country{};  ///< ISO 3166-1, two capital letters
 };
 
+/// With which measurement an instrument was used: that of MODEL, as found, or that of `--as-left`.
+enum class EquipmentUse { AsFound, AsLeft, Both };
+
 struct EquipmentDetails {
   std::string name, manufacturer, model, serial, certificate;
   std::string valid_until{};  ///< last day of its calibration, "2027-03-31"
+  EquipmentUse use = EquipmentUse::AsFound;
 };
+/// True if the instrument was used as found, or as left.
+[[nodiscard]] bool is_used(const EquipmentDetails& equipment, EquipmentUse use);
 
 struct CertificateDetails {
   /// Dates as in ISO 8601, "2026-11-26". location: one of laboratory, customer, laboratoryBranch,
@@ -27,7 +33,8 @@ struct CertificateDetails {
   std::string laboratory_code;  ///< accreditation
   std::string person, role;     ///< who is responsible and signs
   std::string machine_manufacturer, machine_model, machine_serial;
-  /// Conditions of the measurement; with two models those of the first one (as found).
+  /// Conditions of the measurement; with two models those of the first one (as found). Where they
+  /// are absent, those that the run recorded are stated.
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
 };

@@ -31,7 +31,8 @@ struct ReportSubject {
 /// Two models side by side. DataInsufficient if they are not valid for a common tool and volume.
 [[nodiscard]] Result<std::string> comparison_report(const ReportSubject& a, const ReportSubject& b);
 
-/// Trend over models of one machine, in the order of their dates.
+/// Trend over models of one machine, in the order of the dates of their measurement; where that is
+/// not recorded, of the identification.
 [[nodiscard]] Result<std::string> trend_report(const std::vector<ReportSubject>& models);
 
 }  // namespace abbe::daemon

@@ -5,6 +5,7 @@
 /// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,8 @@ struct EvemuRun {
   std::vector<calib::evemu::Touch> touches;
   /// temperature of the array during the touches; nullopt: unknown
   std::optional<calib::evemu::ArtefactTemperature> artefact;
+  /// Host times of the first and the last observation; nullopt: not known.
+  std::optional<std::array<protocol::HostTime, 2>> observed{};
 };
 
 struct EvemuAcquisitionOptions {

@@ -5,6 +5,7 @@
 /// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -38,6 +39,9 @@ struct MfbRun {
   calib::mfb::Plan plan;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
   std::vector<InputFile> sources;
+  /// Host times of the first and the last touch; nullopt: not known, for the touches of earlier
+  /// sessions come without times.
+  std::optional<std::array<protocol::HostTime, 2>> observed{};
 };
 
 struct MfbAcquisitionOptions {
@@ -85,6 +89,7 @@ class MfbAcquisition {
   std::vector<InputFile> sources_;
   calib::mfb::TouchGuide guide_;
   TouchIntake intake_;
+  bool has_earlier_ = false;  // touches of earlier sessions
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
 };

@@ -35,6 +35,8 @@ struct OtfRun {
   calib::otf::Mode mode = calib::otf::Mode::OnTheFly;
   /// Lowest and highest temperature during the run; nullopt: not measured.
   std::optional<std::array<double, 2>> temperature_K{};
+  /// Host times of the first and the last observation; nullopt: not known.
+  std::optional<std::array<protocol::HostTime, 2>> observed{};
 };
 
 using RunResiduals = std::vector<calib::otf::PlacedResidual>;

@@ -1,0 +1,113 @@
+#include "certificate_dates.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <optional>
+
+#include "report_sections.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Local time is between UTC - 12 h and UTC + 14 h.
+constexpr auto kMostBehindUtc = 12h, kMostAheadOfUtc = 14h;
+
+std::optional<std::string> first_day(const ReportSubject& subject) {
+  const auto measured = measured_of(subject.document);
+  return measured ? std::optional(day_of((*measured)[0])) : std::nullopt;
+}
+
+std::optional<std::string> last_day(const ReportSubject& subject) {
+  const auto measured = measured_of(subject.document);
+  return measured ? std::optional(day_of((*measured)[1])) : std::nullopt;
+}
+
+/// Dates of the details that no time zone makes agree with the measurement of the model.
+void compare_with_model(const CertificateDetails& d, const ReportSubject& subject,
+                        std::string_view state, std::vector<std::string>& wrong) {
+  const auto measured = measured_of(subject.document);
+  if (!measured) return;
+  const auto [first, last] = *measured;
+  if (!d.begin_date.empty() && day_of(first + kMostAheadOfUtc) < d.begin_date)
+    wrong.push_back(fmt::format("certificate.begin_date: {} is after {} began, {} (UTC)",
+                                d.begin_date, state, day_of(first)));
+  if (!d.end_date.empty() && d.end_date < day_of(last - kMostBehindUtc))
+    wrong.push_back(fmt::format("certificate.end_date: {} is before {} ended, {} (UTC)", d.end_date,
+                                state, day_of(last)));
+}
+
+void compare_measurements(const ReportSubject& as_found, const ReportSubject& as_left,
+                          std::vector<std::string>& wrong) {
+  const auto found = measured_of(as_found.document), left = measured_of(as_left.document);
+  if (found && left && (*left)[0] < (*found)[1])
+    wrong.push_back(fmt::format("--as-left: {}, before the end of as found, {}",
+                                when_in_words(as_left.document), to_seconds((*found)[1])));
+}
+
+/// `state`: "the measurement", "as left"; `ended`: its last day, empty: not known.
+void compare_equipment(const std::vector<EquipmentDetails>& equipment, EquipmentUse use,
+                       std::string_view state, const std::string& ended,
+                       std::vector<std::string>& wrong) {
+  for (const EquipmentDetails& e : equipment)
+    if (is_used(e, use) && !e.valid_until.empty() && e.valid_until < ended)
+      wrong.push_back(
+          fmt::format("equipment \"{}\": its calibration was valid until {}, {} ended "
+                      "{}",
+                      e.name, e.valid_until, state, ended));
+}
+
+}  // namespace
+
+std::string day_of(protocol::UtcTime time) {
+  constexpr std::size_t kDate = 10;
+  return to_seconds(time).substr(0, kDate);
+}
+
+MeasurementDays measurement_days(const ReportSubject& as_found, const ReportSubject* as_left) {
+  const CertificateDetails& d = as_found.details;
+  MeasurementDays days{d.begin_date, d.end_date};
+  const auto first = first_day(as_found), last = last_day(as_left != nullptr ? *as_left : as_found);
+  if (days.begin.empty() && first)
+    days.begin = days.end.empty() ? *first : std::min(*first, days.end);
+  if (days.end.empty() && last) days.end = std::max(*last, days.begin);
+  return days;
+}
+
+std::vector<std::string> wrong_dates(const ReportSubject& as_found, const ReportSubject* as_left) {
+  const CertificateDetails& d = as_found.details;
+  for (const std::string& date : {d.begin_date, d.end_date, d.issue_date})
+    if (!date.empty() && !is_date(date)) return {"certificate: dates such as \"2026-11-26\""};
+
+  std::vector<std::string> wrong;
+  const MeasurementDays days = measurement_days(as_found, as_left);
+  constexpr const char* kNotKnown =
+      "certificate.{}: the model does not have the time of its measurement";
+  if (days.begin.empty()) wrong.push_back(fmt::format(kNotKnown, "begin_date"));
+  if (days.end.empty()) wrong.push_back(fmt::format(kNotKnown, "end_date"));
+  if (!days.end.empty() && days.end < days.begin)
+    wrong.push_back(
+        fmt::format("certificate.end_date: {} is before begin_date, {}", days.end, days.begin));
+  if (!d.issue_date.empty() && d.issue_date < days.end)
+    wrong.push_back(
+        fmt::format("certificate.issue_date: {} is before the end of the measurement, {}",
+                    d.issue_date, days.end));
+
+  compare_with_model(d, as_found, as_left != nullptr ? "as found" : "the measurement", wrong);
+  if (as_left == nullptr) {
+    compare_equipment(d.equipment, EquipmentUse::AsFound, "the measurement", days.end, wrong);
+    return wrong;
+  }
+  compare_with_model(d, *as_left, "as left", wrong);
+  compare_measurements(as_found, *as_left, wrong);
+  compare_equipment(d.equipment, EquipmentUse::AsFound, "as found",
+                    last_day(as_found).value_or(days.begin), wrong);
+  compare_equipment(d.equipment, EquipmentUse::AsLeft, "as left", days.end, wrong);
+  return wrong;
+}
+
+}  // namespace abbe::daemon

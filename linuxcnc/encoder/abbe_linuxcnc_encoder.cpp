@@ -15,6 +15,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -32,6 +33,7 @@ constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
 constexpr int kSamplerKey = 0x48534130;  // of sampler.0 in LinuxCNC 2.9; the others follow
 constexpr char kColumns[] = "ffffffb";   // cfg= of the sampler: motor (3), offset (3), homed
 constexpr std::chrono::microseconds kPollPeriod{200};
+constexpr std::chrono::milliseconds kReportPeriod{100};  // between two reported changes
 
 volatile sig_atomic_t stop_requested = 0;
 
@@ -103,6 +105,21 @@ int open_socket(std::uint16_t local_port, const std::string& peer_name, std::uin
   return -1;
 }
 
+/// Prints why the control has no positions, or that it has, when this changes.
+class Reporter {
+ public:
+  void report(const Causes& causes, std::chrono::steady_clock::time_point now) {
+    if (causes == reported_ || (reported_ && now - reported_at_ < kReportPeriod)) return;
+    reported_ = causes;
+    reported_at_ = now;
+    std::fprintf(stderr, "abbe-linuxcnc-encoder: %s\n", describe(causes).c_str());
+  }
+
+ private:
+  std::optional<Causes> reported_;
+  std::chrono::steady_clock::time_point reported_at_{};
+};
+
 int run(const Options& options) {
   SamplerStream stream(options.channel);
   if (!stream.attached()) {
@@ -132,6 +149,8 @@ int run(const Options& options) {
   }
 
   Decimation decimation(options.every);
+  EmergencySchedule schedule;
+  Reporter reporter;
   std::vector<ServoSample> samples;
   std::uint8_t sequence = 0;
   std::uint64_t sent = 0;
@@ -143,7 +162,10 @@ int run(const Options& options) {
       (void)::send(simulator, record.data(), record.size(), MSG_DONTWAIT);
     }
     if (const auto due = decimation.choose(samples)) {
-      const auto datagram = encoder_datagram(*due, sequence++, options.bus);
+      const auto causes = causes_of(*due, options.bus);
+      reporter.report(causes, std::chrono::steady_clock::now());
+      const auto datagram =
+          encoder_datagram(*due, sequence++, options.bus, schedule.choose(due->number, causes));
       // Without a receiver the datagram is lost, as on a bus without a listener.
       sent += ::send(fd, datagram.data(), datagram.size(), MSG_DONTWAIT) > 0 ? 1 : 0;
     }

@@ -14,32 +14,79 @@ namespace {
 
 namespace can = protocol::can;
 
+using can::ControlCause;
+
 constexpr std::size_t kDatagramBytes = 128;
+
+can::NodeId node_of(const EncoderBusOptions& options, std::size_t joint) {
+  return static_cast<can::NodeId>(static_cast<std::size_t>(options.first_node) + joint);
+}
+
+double count_of(const ServoSample& sample, std::size_t joint, const EncoderBusOptions& options) {
+  return std::round(sample.reading_mm(joint) / options.step_mm);
+}
 
 }  // namespace
 
+Causes causes_of(const ServoSample& sample, const EncoderBusOptions& options) {
+  Causes causes;
+  for (std::size_t joint = 0; joint < kEncoderJoints; ++joint) {
+    // NaN is not within the range either.
+    const bool fits = std::abs(count_of(sample, joint, options)) <=
+                      double{std::numeric_limits<std::int32_t>::max()};
+    if (!sample.homed) {
+      causes[joint] = ControlCause::NotHomed;
+    } else if (!fits) {
+      causes[joint] = ControlCause::NoPosition;
+    }
+  }
+  return causes;
+}
+
+std::string describe(const Causes& causes) {
+  std::string text;
+  for (std::size_t joint = 0; joint < causes.size(); ++joint) {
+    if (!causes[joint]) continue;
+    // Homing is a state of the whole control.
+    if (causes[joint] == ControlCause::NotHomed)
+      return std::string(can::to_text(ControlCause::NotHomed)) + ": abbed receives no positions";
+    text += (text.empty() ? "joint " : "; joint ") + std::to_string(joint) + ": " +
+            can::to_text(*causes[joint]);
+  }
+  return text.empty() ? "LinuxCNC is homed: abbed receives its positions" : text;
+}
+
 std::vector<std::byte> encoder_datagram(const ServoSample& sample, std::uint8_t sequence,
-                                        const EncoderBusOptions& options) {
+                                        const EncoderBusOptions& options, Emergencies emergencies) {
   std::array<std::byte, kDatagramBytes> buffer{};
   can::DatagramWriter writer(buffer, sequence);
   can::CanFrame sync;
   sync.id = can::cob::kSync;
   bool fits = writer.add(sync);
 
-  for (std::size_t joint = 0; joint < kEncoderJoints && sample.homed; ++joint) {
-    const double count = std::round(sample.reading_mm(joint) / options.step_mm);
-    // NaN is not within the range either.
-    if (!(std::abs(count) <= std::numeric_limits<std::int32_t>::max())) continue;
-    const auto node =
-        static_cast<std::uint32_t>(options.first_node) + static_cast<std::uint32_t>(joint);
-    fits = writer.add(can::encode_position(can::cob::kTpdo1 + node, can::PositionType::Signed32,
-                                           static_cast<std::int64_t>(count))) &&
+  const Causes causes = causes_of(sample, options);
+  for (std::size_t joint = 0; joint < kEncoderJoints; ++joint) {
+    const can::NodeId node = node_of(options, joint);
+    if (emergencies == Emergencies::Included)
+      fits = writer.add(can::encode_emergency(can::control_emergency(node, causes[joint]))) && fits;
+    if (causes[joint]) continue;
+    const auto count = static_cast<std::int64_t>(count_of(sample, joint, options));
+    fits = writer.add(
+               can::encode_position(can::cob::tpdo(1, node), can::PositionType::Signed32, count)) &&
            fits;
   }
   if (!fits) return {};
 
   const auto bytes = writer.finish();
   return {bytes.begin(), bytes.end()};
+}
+
+Emergencies EmergencySchedule::choose(std::uint32_t number, const Causes& causes) {
+  // Unsigned: the number of a servo cycle may wrap.
+  if (causes_ == causes && number - sent_ < kRepeatCycles) return Emergencies::Omitted;
+  causes_ = causes;
+  sent_ = number;
+  return Emergencies::Included;
 }
 
 protocol::PositionRecord position_record(const ServoSample& sample, std::uint32_t period_ns) {

@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "abbe/protocol/can/control_emergency.hpp"
 #include "abbe/protocol/position_record.hpp"
 
 namespace abbe::linuxcnc {
@@ -34,12 +36,37 @@ struct EncoderBusOptions {
   double step_mm = 10e-6;  ///< of one count: step_nm = 10 in abbed.toml
 };
 
+/// Why each joint has no position to send; nullopt: it has one.
+using Causes = std::array<std::optional<protocol::can::ControlCause>, kEncoderJoints>;
+[[nodiscard]] Causes causes_of(const ServoSample& sample, const EncoderBusOptions& options);
+
+/// In words: "LinuxCNC is not homed: abbed receives no positions", "joint 1: ...", or that abbed
+/// receives the positions.
+[[nodiscard]] std::string describe(const Causes& causes);
+
+enum class Emergencies { Omitted, Included };
+
 /// One datagram: SYNC, and the answer of every node (TPDO 1: the position, 32 bits). There is no
 /// answer, and the axis is missing in abbe, before homing and for a reading that is not finite or
-/// beyond 32 bits.
+/// beyond 32 bits. With `emergencies` it contains one of each node: the cause, or error reset.
 [[nodiscard]] std::vector<std::byte> encoder_datagram(const ServoSample& sample,
                                                       std::uint8_t sequence,
-                                                      const EncoderBusOptions& options);
+                                                      const EncoderBusOptions& options,
+                                                      Emergencies emergencies);
+
+/// Chooses the datagrams that contain emergencies: at every change of a cause, and again every
+/// kRepeatCycles, because abbed may start later, and UDP may lose a datagram.
+class EmergencySchedule {
+ public:
+  static constexpr std::uint32_t kRepeatCycles = 1000;  ///< servo cycles: 1 s at 1 kHz
+
+  /// `number`: of the servo cycle that is sent.
+  [[nodiscard]] Emergencies choose(std::uint32_t number, const Causes& causes);
+
+ private:
+  std::optional<Causes> causes_;
+  std::uint32_t sent_ = 0;  ///< servo cycle of the latest emergencies
+};
 
 /// What abbe-sim receives of every servo cycle. A reading that is not finite counts as not homed.
 [[nodiscard]] protocol::PositionRecord position_record(const ServoSample& sample,

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "abbe/protocol/can/control_emergency.hpp"
 #include "encoder_line.hpp"
 
 namespace abbe::drivers {
@@ -48,6 +49,23 @@ TEST(EmergencyReports, ReportAnotherCodeWithinTheSecondAfterIt) {
   EXPECT_THAT(r.reports.take_fault(kStart + 1s).value_or(""),
               AllOf(HasSubstr("8120h"), HasSubstr("1 others")));
   EXPECT_FALSE(r.reports.take_fault(kStart + 1h));
+}
+
+TEST(EmergencyReports, GiveOneFaultForTheCauseThatAControlRepeats) {
+  Reports r;
+  std::vector<std::string> faults;
+  const auto control = [&](std::optional<can::ControlCause> cause, HostTime at) {
+    r.reports.on_frame(can::encode_emergency(can::control_emergency(1, cause)), at);
+    while (const auto text = r.reports.take_fault(at)) faults.push_back(*text);
+  };
+  for (int i = 0; i < 5; ++i) control(can::ControlCause::NotHomed, kStart + 1s * i);
+  EXPECT_THAT(faults, testing::ElementsAre("encoder X (node 1): LinuxCNC is not homed"));
+  EXPECT_EQ(r.reports.condition(0b001, kStart + 5s), "X missing (node 1): LinuxCNC is not homed");
+
+  control(std::nullopt, kStart + 6s);
+  EXPECT_EQ(r.reports.condition(0, kStart + 6s), "");
+  control(can::ControlCause::NotHomed, kStart + 7s);
+  EXPECT_EQ(faults.size(), 2u) << "once more";
 }
 
 TEST(EmergencyReports, ClearTheEmergencyOfARecoveredAxis) {

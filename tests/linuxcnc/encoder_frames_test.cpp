@@ -7,14 +7,21 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <string>
+#include <vector>
 
+#include "abbe/drivers/can/emergency_reports.hpp"
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/can/pdo.hpp"
 #include "abbe/protocol/can/udp_framing.hpp"
 
 namespace {
 
+using abbe::linuxcnc::causes_of;
 using abbe::linuxcnc::Decimation;
+using abbe::linuxcnc::describe;
+using abbe::linuxcnc::Emergencies;
+using abbe::linuxcnc::EmergencySchedule;
 using abbe::linuxcnc::encoder_datagram;
 using abbe::linuxcnc::EncoderBusOptions;
 using abbe::linuxcnc::ServoSample;
@@ -31,7 +38,7 @@ ServoSample sample_at(double x_mm, double y_mm, double z_mm) {
 /// Positions in mm by node, as abbed decodes them; the first frame must be the SYNC.
 std::map<std::uint32_t, double> decoded_mm(const ServoSample& sample) {
   const EncoderBusOptions options;
-  const auto bytes = encoder_datagram(sample, 7, options);
+  const auto bytes = encoder_datagram(sample, 7, options, Emergencies::Omitted);
   auto view = can::DatagramView::parse(bytes);
   EXPECT_TRUE(view);
   EXPECT_EQ(view->sequence(), 7);
@@ -72,6 +79,62 @@ TEST(EncoderFrames, AReadingThatCannotBeEncodedIsMissing) {
     EXPECT_EQ(mm.size(), 2u) << bad_mm;
     EXPECT_FALSE(mm.contains(2)) << bad_mm;
   }
+}
+
+/// What `abbe status` shows of the axes after `emergencies` has received `sample` at `at`.
+std::string condition_after(const ServoSample& sample, abbe::drivers::EmergencyReports& emergencies,
+                            abbe::protocol::HostTime at) {
+  const auto bytes = encoder_datagram(sample, 0, {}, Emergencies::Included);
+  auto view = can::DatagramView::parse(bytes);
+  EXPECT_TRUE(view);
+  unsigned absent = 0b111;
+  can::CanFrame frame;
+  while (view->next(frame)) {
+    emergencies.on_frame(frame, at);
+    if (can::cob::is_tpdo(frame)) absent &= ~(1u << (frame.id - can::cob::kTpdo1 - 1));
+  }
+  return emergencies.condition(static_cast<std::uint8_t>(absent), at);
+}
+
+TEST(EncoderFrames, ReportThatTheControlIsNotHomed) {
+  const std::vector<abbe::drivers::EncoderAxis> axes{
+      {.name = "X", .node = 1}, {.name = "Y", .node = 2}, {.name = "Z", .node = 3}};
+  abbe::drivers::EmergencyReports emergencies(axes);
+  abbe::protocol::HostTime at{std::chrono::seconds{1}};
+  ServoSample sample = sample_at(1, 2, 3);
+  sample.homed = false;
+  EXPECT_EQ(condition_after(sample, emergencies, at),
+            "X missing (node 1): LinuxCNC is not homed; Y missing (node 2): LinuxCNC is not "
+            "homed; Z missing (node 3): LinuxCNC is not homed");
+  EXPECT_EQ(emergencies.take_fault(at), "encoder X (node 1): LinuxCNC is not homed");
+
+  EXPECT_EQ(condition_after(sample_at(1, 2, 3), emergencies, at), "");
+  sample = sample_at(1, 1e9, 3);
+  EXPECT_EQ(condition_after(sample, emergencies, at),
+            "Y missing (node 2): LinuxCNC reports no position that can be sent");
+}
+
+TEST(EmergencySchedule, ReportsAChangeAtOnceAndRepeatsItEverySecond) {
+  ServoSample homed = sample_at(1, 2, 3), not_homed = homed;
+  not_homed.homed = false;
+  EmergencySchedule schedule;
+  std::vector<std::uint32_t> included;
+  for (std::uint32_t n = 0; n < 5000; n += 5) {
+    const auto causes = causes_of(n < 2500 ? not_homed : homed, {});
+    // The number of a cycle wraps at 2^32: here at n = 1000.
+    if (schedule.choose(n - 1000, causes) == Emergencies::Included) included.push_back(n);
+  }
+  EXPECT_EQ(included, (std::vector<std::uint32_t>{0, 1000, 2000, 2500, 3500, 4500}));
+}
+
+TEST(DescriptionOfCauses, NamesTheControlOrTheJoints) {
+  ServoSample sample = sample_at(1, 2, 3);
+  EXPECT_EQ(describe(causes_of(sample, {})), "LinuxCNC is homed: abbed receives its positions");
+  sample.motor_mm[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(describe(causes_of(sample, {})),
+            "joint 2: LinuxCNC reports no position that can be sent");
+  sample.homed = false;
+  EXPECT_EQ(describe(causes_of(sample, {})), "LinuxCNC is not homed: abbed receives no positions");
 }
 
 TEST(PositionRecordOfASample, HasTheReadingOfEachJoint) {

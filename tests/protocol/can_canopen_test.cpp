@@ -1,4 +1,5 @@
 #include "abbe/protocol/can/canopen.hpp"
+#include "abbe/protocol/can/control_emergency.hpp"
 
 #include <gtest/gtest.h>
 
@@ -81,6 +82,30 @@ TEST(Emergency, IsCodeRegisterAndFiveManufacturerBytes) {
 TEST(Emergency, IsNotASyncAndNotShort) {
   EXPECT_FALSE(decode_emergency(encode_sync()));
   EXPECT_FALSE(decode_emergency(standard_frame(0x083, {0, 0, 0, 0, 0, 0, 0})));
+}
+
+TEST(ControlEmergency, CarriesTheCauseOrItsReset) {
+  for (const auto cause : {ControlCause::NotHomed, ControlCause::NoPosition}) {
+    const auto frame = encode_emergency(control_emergency(3, cause));
+    const auto emergency = decode_emergency(frame);
+    ASSERT_TRUE(emergency);
+    EXPECT_EQ(emergency->node, 3);
+    EXPECT_EQ(control_cause(*emergency), cause);
+  }
+  EXPECT_EQ(control_emergency(3, std::nullopt).code, 0);
+  EXPECT_FALSE(control_cause(control_emergency(3, std::nullopt)));
+}
+
+TEST(ControlEmergency, IsNotTheSameCodeOfAnotherDevice) {
+  Emergency emergency = control_emergency(1, ControlCause::NotHomed);
+  emergency.manufacturer[0] = std::byte{'M'};
+  EXPECT_FALSE(control_cause(emergency));
+  emergency = control_emergency(1, ControlCause::NotHomed);
+  emergency.manufacturer[4] = std::byte{0};
+  EXPECT_FALSE(control_cause(emergency));
+  emergency = control_emergency(1, ControlCause::NotHomed);
+  emergency.code = 0xFF02;
+  EXPECT_FALSE(control_cause(emergency));
 }
 
 TEST(Canopen, IgnoresExtendedRemoteAndErrorFrames) {

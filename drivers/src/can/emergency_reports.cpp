@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "abbe/protocol/can/control_emergency.hpp"
+
 namespace abbe::drivers {
 
 using protocol::HostTime;
@@ -13,6 +15,7 @@ namespace {
 constexpr std::chrono::seconds kReportAgainAfter{1};
 
 std::string text_of(const can::Emergency& emergency) {
+  if (const auto cause = can::control_cause(emergency)) return can::to_text(*cause);
   return fmt::format("EMCY {:04X}h ({}), error register {:02X}h", emergency.code,
                      can::emergency_text(emergency.code), emergency.error_register);
 }
@@ -36,6 +39,14 @@ void EmergencyReports::on_frame(const can::CanFrame& frame, HostTime now) {
 }
 
 void EmergencyReports::on_emergency(Node& node, const can::Emergency& emergency, HostTime now) {
+  // A control repeats its emergency while the cause lasts; that is no other fault.
+  const bool repeated = node.code != 0 && node.latest && can::control_cause(emergency) &&
+                        can::control_cause(emergency) == can::control_cause(*node.latest);
+  if (repeated) {
+    node.disturbed_at = now;
+    return;
+  }
+
   const bool other = !node.latest || node.latest->code != emergency.code;
   node.code = emergency.code;
   if (emergency.code == 0) return;

@@ -5,6 +5,7 @@
 /// depend on snapshots only, so that a replay takes exactly the same touches; only tick() is given
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -93,6 +94,7 @@ class EvemuAcquisition {
   TouchIntake intake_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
+  std::shared_ptr<const std::vector<FeatureToTouch>> features_;  ///< made again after each touch
 };
 
 }  // namespace abbe::daemon

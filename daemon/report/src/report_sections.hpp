@@ -5,19 +5,12 @@
 
 #include "abbe/report/html_report.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/report/verdict_in_words.hpp"
 
 namespace abbe::daemon {
 
 /// In place of a figure that a model of an earlier version does not have.
 inline constexpr std::string_view kNotRecorded = "Not recorded.";
-
-/// The state of a model as a lamp and in words.
-struct VerdictInWords {
-  Signal signal = Signal::Unlit;
-  std::string text;
-  std::vector<std::string> reasons, notes;
-};
-[[nodiscard]] VerdictInWords verdict_in_words(const ReportSubject& subject);
 
 /// "1.23 +- 0.45 um", "1.2 um", "not estimable".
 [[nodiscard]] std::string with_U(const CertifiedValue& value);

@@ -46,6 +46,35 @@ TEST_F(ModelViewsTest, AModelThatIsAddedIsInHistoryAndTrend) {
   EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 2u);
 }
 
+TEST_F(ModelViewsTest, AModelIsShownWithItsVerdictAndTheEventsThatCameLater) {
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  const daemon::StoreActor anna{.who = "anna", .why = "step gauge passed", .when = {}};
+  const auto id =
+      store->add(daemon::test::synthetic_document(1), false, {"held-out rms 9 um"}, anna);
+  ASSERT_TRUE(id);
+  const auto before = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  EXPECT_EQ(before["lamp"], "red");
+  EXPECT_EQ(before["reasons"][0], "held-out rms 9 um");
+  ASSERT_TRUE(store->activate(*id, anna, true));
+  const auto after = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  EXPECT_THAT(after["text"], HasSubstr("It is the active model"));
+  EXPECT_THAT(after["notes"].dump(), HasSubstr("activated against the verdict by anna"));
+  EXPECT_EQ(after["reasons"], before["reasons"]);
+}
+
+TEST_F(ModelViewsTest, TheTrendHasEachTableOfTheNewestModels) {
+  for (unsigned seed = 1; seed <= 8; ++seed) add(seed);
+  const auto trend = nlohmann::json::parse(views_.trend().value());
+  EXPECT_EQ(trend["models"].size(), 8u);
+  ASSERT_FALSE(trend["tables"].empty());
+  for (const auto& table : trend["tables"]) {
+    ASSERT_EQ(table["curves"].size(), 6u) << table["name"];
+    EXPECT_EQ(table["curves"].back()["model"], 7);
+    EXPECT_EQ(table["curves"][0]["u"].size(), table["curves"][0]["x"].size());
+  }
+  for (const auto& value : trend["values"]) EXPECT_NE(value["group"], "");
+}
+
 TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {
   const std::string id = add(1);
   const std::string before = views_.report(id).value();

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "abbe/sim/mfb/reversal.hpp"
@@ -25,7 +26,16 @@ struct ReversalCommandOptions : BarOptions {
   double shape_scatter_um = 0.3;
   std::vector<double> gauge_beside_mm{0.0, 0.0};
   double u_rotation_urad = 2.0, gauge_step_mm = 25.0, u_gauge_um = 0.15, u_gauge_um_per_m = 0.75;
+  double inclined_mrad = 0.0;  ///< of bar and gauge; the plan states X
+  std::vector<double> gauge_turned_mrad{0.0, 0.0};
+  double gauge_alignment_mrad = 0.25;
+  std::string gauge_travel = "bar";
 };
+
+mfb::GaugeTravel travel_of(std::string_view word) {
+  if (word == "gauge") return mfb::GaugeTravel::AlongGauge;
+  return word == "x" ? mfb::GaugeTravel::AlongX : mfb::GaugeTravel::AlongBar;
+}
 
 mfb::StepGauge gauge_of(const ReversalCommandOptions& o) {
   return {.step_m = o.gauge_step_mm * kMilli,
@@ -33,11 +43,15 @@ mfb::StepGauge gauge_of(const ReversalCommandOptions& o) {
           .u_per_m = o.u_gauge_um_per_m * kMicro,
           .temperature_C = o.temperature_C,
           .beside_bar_m = {0.0, o.gauge_beside_mm[0] * kMilli, o.gauge_beside_mm[1] * kMilli},
+          .turned_rad = {o.gauge_turned_mrad[0] * kMilli, o.gauge_turned_mrad[1] * kMilli},
+          .alignment_rad = o.gauge_alignment_mrad * kMilli,
+          .travel = travel_of(o.gauge_travel),
           .u_rotation_rad = o.u_rotation_urad * kMicro};
 }
 
 void without_errors(mfb::StepGauge& gauge) {
   gauge.u_m = gauge.u_per_m = gauge.u_alpha_per_K = gauge.u_temperature_K = 0.0;
+  gauge.alignment_rad = 0.0;
 }
 
 /// The bar and the machine that calibrates it.
@@ -58,7 +72,10 @@ Result<Reversal> reversal_of(const ReversalCommandOptions& options) {
       bar_of(options),
       mfb::measuring_machine(options.mean_error_um * kMicro, options.length_m(), options.seed),
       gauge_of(options),
-      {.repeats = options.repeats, .probing = simulated(*stated, options)}};
+      {.repeats = options.repeats,
+       .inclination_rad = options.inclined_mrad * kMilli,
+       .planned_inclination_rad = 0.0,
+       .probing = simulated(*stated, options)}};
   out.applied.gauge = out.gauge;
   if (options.exact) without_errors(out.applied.gauge);
   return out;
@@ -94,15 +111,15 @@ int run_offline(const ReversalCommandOptions& options, const Reversal& reversal)
   return kDone;
 }
 
-/// Faces of the gauge that are touched in the direction of X.
+/// Faces across the gauge.
 std::vector<Face> faces_of_gauge(const Reversal& reversal) {
   constexpr double kHalfSize_m = 4e-3;
+  const Eigen::Vector3d outward = -mfb::gauge_direction(reversal.applied);
   std::vector<Face> faces;
   for (const Eigen::Vector3d& tip_m :
        mfb::gauge_faces_m(reversal.machine, reversal.bar.pattern.length_m(), reversal.applied)) {
     const double radius_m = reversal.applied.probing.probe.tip_radius_m;
-    faces.push_back(
-        {tip_m + radius_m * Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitX(), kHalfSize_m});
+    faces.push_back({tip_m - radius_m * outward, outward, kHalfSize_m});
   }
   return faces;
 }
@@ -137,6 +154,7 @@ int run_live(const ReversalCommandOptions& options, Reversal reversal) {
   things.push_back({"step gauge", machine});
   run.distances_m = mfb::gauge_distances_m(reversal.bar.pattern.length_m(), reversal.applied.gauge);
   run.gauge_origin_m = mfb::gauge_origin_m(reversal.machine, reversal.applied);
+  run.plan = mfb::as_planned(std::move(run.plan), reversal.applied);
 
   if (const auto written = write_files(options, reversal, run, {}); !written)
     return report(written.error());
@@ -183,6 +201,19 @@ void add_reversal(CLI::App& sub, ReversalCommandOptions& o) {
       ->delimiter(',')
       ->expected(2)
       ->check(CLI::Range(-1000.0, 1000.0));
+  sub.add_option("--inclined-mrad", o.inclined_mrad,
+                 "angle of bar and gauge to X, which plan.toml states, in the plane of X and Y")
+      ->check(CLI::Range(-50.0, 50.0));
+  sub.add_option("--gauge-turned-mrad", o.gauge_turned_mrad,
+                 "the gauge is turned from the bar by these angles, about z and about y")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(-50.0, 50.0));
+  sub.add_option("--gauge-alignment-mrad", o.gauge_alignment_mrad,
+                 "and by random angles of this standard deviation")
+      ->check(CLI::Range(0.0, 20.0));
+  sub.add_option("--gauge-travel", o.gauge_travel, "the tip moves from face to face along this")
+      ->check(CLI::IsMember({"bar", "gauge", "x"}));
   sub.add_option("--gauge-step-mm", o.gauge_step_mm, "distance of its faces")
       ->check(CLI::Range(5.0, 200.0));
   sub.add_option("--u-gauge-um", o.u_gauge_um, "standard uncertainty of a distance of the gauge")

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "abbe/calib/mfb/points_of_interest.hpp"
 #include "simulated_bar.hpp"
 
@@ -20,6 +22,7 @@ sim::mfb::ReversalOptions usual(std::uint64_t seed) {
   options.probing.machine_noise_m = 0.1e-6;
   options.probing.shape_scatter_m = 0.3e-6;
   options.probing.sag = sim::mfb::reference_sag(sim::mfb::reference_pattern());
+  options.probing.temperature = {.u_K = 0.02, .alpha_per_K = 1e-6, .u_alpha_per_K = 0.05e-6};
   return options;
 }
 
@@ -28,7 +31,8 @@ sim::mfb::ReversalOptions without_noise() {
   options.probing.probe.noise_m = options.probing.probe.feed_scatter = 0.0;
   options.probing.machine_noise_m = options.probing.shape_scatter_m = 0.0;
   options.gauge.u_m = options.gauge.u_per_m = 0.0;
-  options.gauge.u_temperature_K = options.gauge.u_alpha_per_K = 0.0;
+  options.gauge.u_temperature_K = options.gauge.u_alpha_per_K = options.gauge.alignment_rad = 0.0;
+  options.probing.temperature.u_K = options.probing.temperature.u_alpha_per_K = 0.0;
   return options;
 }
 
@@ -86,31 +90,98 @@ TEST(BarCalibration, FindsAnotherBar) {
   EXPECT_LT(largest_error_m(s, calibrated(s)), 0.03e-6);
 }
 
-TEST(BarCalibration, AnInclinedBarIsAsLong) {
+/// The bar is inclined to X and to its plan.
+sim::mfb::ReversalOptions inclined(double inclination_rad) {
+  sim::mfb::ReversalOptions options = without_noise();
+  options.inclination_rad = inclination_rad;
+  options.planned_inclination_rad = 0.0;
+  return options;
+}
+
+TEST(BarCalibration, AnInclinedBarIsAsLongWhateverThePlanStates) {
   // The readings of X are shorter than the bar by 2.5 um at 3 mrad and 27 um at 10 mrad.
   for (const double inclination_rad : {3e-3, -10e-3}) {
-    sim::mfb::ReversalOptions inclined = without_noise();
-    inclined.inclination_rad = inclination_rad;
-    const Simulated s = simulated(inclined);
+    const Simulated s = simulated(inclined(inclination_rad));
+    const BarCalibration found = calibrated(s);
     // Of the straightness of the machine, 2 um, a part of `inclination_rad` is along the bar.
-    EXPECT_LT(largest_error_m(s, calibrated(s)), 0.06e-6) << inclination_rad;
+    EXPECT_LT(largest_error_m(s, found), 0.06e-6) << inclination_rad;
+    EXPECT_NEAR(found.direction.y(), inclination_rad, 0.4e-3);  // scatter of the clamping
+    EXPECT_THAT(found.notes, testing::Contains(HasSubstr("bar_x of the plan is ")));
   }
 }
 
-TEST(BarCalibration, DirectionOfTheGaugeIsInTheUncertainty) {
-  Simulated s = simulated(without_noise());
-  s.gauge.u_alignment_rad = 0.0;
-  const double aligned_m = calibrated(s).positioning.back().gauge_m;
-  s.gauge.u_alignment_rad = 1e-3;
-  const double length_m = s.truth_m.back().x();
-  // e^2 / 2 of two angles of 1 mrad: expectation and standard deviation 1e-6
-  EXPECT_NEAR(calibrated(s).positioning.back().gauge_m,
-              std::hypot(aligned_m, std::sqrt(2.0) * 1e-6 * length_m), 1e-10);
-  s.gauge.u_alignment_rad.reset();  // +-0.3 mm over its length
-  const double gauge_m = s.gauge.faces.back().distance_m;
-  EXPECT_NEAR(calibrated(s).positioning.back().gauge_m,
-              std::hypot(aligned_m, std::sqrt(2.0) * length_m * 0.03e-6 / (gauge_m * gauge_m)),
-              1e-10);
+TEST(BarCalibration, AGaugeThatIsTouchedAlongItselfHasItsOwnDirection) {
+  // 0.5 mrad from a bar that is inclined by 10 mrad: readings of X alone would be wrong by 2.8 um.
+  sim::mfb::ReversalOptions options = inclined(10e-3);
+  options.gauge.turned_rad = {0.5e-3, 0.2e-3};
+  options.gauge.travel = sim::mfb::GaugeTravel::AlongGauge;
+  const Simulated s = simulated(options);
+  EXPECT_LT(largest_error_m(s, calibrated(s)), 0.06e-6);
+}
+
+TEST(BarCalibration, TouchesParallelToTheAxisOfAnInclinedGaugeAreRefused) {
+  sim::mfb::ReversalOptions options = inclined(10e-3);  // 27 um
+  options.gauge.travel = sim::mfb::GaugeTravel::AlongX;
+  const auto refused = simulated(options).calibrated();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, calib::ErrorCode::BadInput);
+  EXPECT_THAT(refused.error().text, HasSubstr("the line of its touches is"));
+}
+
+TEST(BarCalibration, AGaugeThatIsNotAlongTheBarIsRefusedOrInTheUncertainty) {
+  sim::mfb::ReversalOptions options = without_noise();
+  options.gauge.turned_rad = {2e-3, 2e-3};  // 2.2 um, if it is touched along the bar
+  options.gauge.travel = sim::mfb::GaugeTravel::AlongGauge;
+  const auto refused = simulated(options).calibrated();
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, testing::ContainsRegex("touches is 2\\.[6-9] mrad"));
+
+  options.gauge.travel = sim::mfb::GaugeTravel::AlongBar;
+  options.gauge.u_alignment_rad = 2e-3;
+  const Simulated s = simulated(options);
+  const BarCalibration found = calibrated(s);
+  const double off_m = found.bar.O_m.back().x() - s.truth_m.back().x();
+  EXPECT_LT(off_m, -2e-6);
+  EXPECT_GT(off_m, -2.0 * found.u_m.back().x());
+}
+
+/// The true x of every hole, over gauges whose direction is random, as are plan, bar and way of the
+/// tip.
+TEST(BarCalibration, UncertaintyOfTheGaugeIsTrue) {
+  constexpr std::uint64_t kGauges = 500;
+  constexpr std::size_t kHoles = 6;
+  using sim::mfb::GaugeTravel;
+  std::size_t inside = 0, all = 0, refused = 0;
+  for (std::uint64_t seed = 1; seed <= kGauges; ++seed) {
+    sim::mfb::ReversalOptions options = usual(seed);
+    options.repeats = 2;
+    // Without noise: two repeats, with their Student's t, would be most of the uncertainty.
+    options.probing.probe.noise_m = options.probing.machine_noise_m = 0.0;
+    options.probing.shape_scatter_m = 0.0;
+    options.planned_inclination_rad = 0.0;
+    const bool small = seed % 2 == 0;
+    options.inclination_rad = small ? 0.4e-3 : 12e-3;
+    options.gauge.travel = seed % 3 == 0 ? GaugeTravel::AlongGauge
+                           : small       ? GaugeTravel::AlongX
+                                         : GaugeTravel::AlongBar;
+    options.gauge.alignment_rad = seed % 5 == 0 ? 2e-3 : 0.5e-3;
+    options.gauge.u_alignment_rad = options.gauge.alignment_rad;
+    const Simulated s = simulated(options, kHoles);
+    const auto found = s.calibrated();
+    if (!found) {
+      EXPECT_THAT(found.error().text, HasSubstr("the line of its touches is"));
+      ++refused;
+      continue;
+    }
+    for (std::size_t i = 1; i < kHoles; ++i, ++all) {
+      const double off_m = found->bar.O_m[i].x() - s.truth_m[i].x();
+      inside += std::abs(off_m) <= 2.0 * found->u_m[i].x() ? 1 : 0;
+    }
+  }
+  EXPECT_LT(refused, kGauges / 50);  // 1 % of those that are touched along the gauge
+  const double part = static_cast<double>(inside) / static_cast<double>(all);
+  EXPECT_GT(part, 0.90);
+  EXPECT_LT(part, 0.99);
 }
 
 TEST(BarCalibration, GrowthIsTakenOut) {
@@ -245,14 +316,94 @@ TEST(BarCalibration, WrongPlansAreRefused) {
   s.gauge.faces.resize(10);
   EXPECT_THAT(s.calibrated().error().text, HasSubstr("reaches from"));
   s = good;
-  s.gauge.faces[4].readings_m[0] += 25e-3;
+  for (Vector3& reading_m : s.gauge.faces[4].readings_m) {
+    reading_m.x() += 25e-3;
+  }
   EXPECT_THAT(s.calibrated().error().text, HasSubstr("face 5"));
   s = good;
-  s.gauge.origin_m.x() += 0.15;  // without the tool
+  s.gauge.origin_m.z() += 0.15;  // without the tool
   EXPECT_THAT(s.calibrated().error().text, HasSubstr("origin"));
   s = good;
   s.gauge.u_m = -1e-7;
   EXPECT_FALSE(s.calibrated());
+}
+
+/// Whether the calibration is refused, or has a note, with this text.
+void expect_named(const Simulated& s, const char* text) {
+  const auto found = s.calibrated();
+  if (found) {
+    EXPECT_THAT(found->notes, testing::Contains(HasSubstr(text)));
+  } else {
+    EXPECT_THAT(found.error().text, HasSubstr(text));
+  }
+}
+
+TEST(BarCalibration, MistakesOnTheShopFloorAreNamed) {
+  const Simulated good = simulated(usual(7));
+  EXPECT_THAT(calibrated(good).notes, testing::IsEmpty());
+
+  Simulated s = good;
+  s.gauge.faces[4].readings_m[1].x() += 5e-6;  // moves the mean of the face by 1 um
+  expect_named(s, "face 5, run 2: ");
+  s = good;
+  for (Vector3& reading_m : s.gauge.faces[4].readings_m) {
+    reading_m.x() += 3e-6;  // dirt
+  }
+  expect_named(s, "face 5: its E_XX is about");
+  s = good;  // another gauge of the same kind
+  for (std::size_t k = 1; k < s.gauge.faces.size(); ++k) {
+    s.gauge.faces[k].distance_m += (k * k * k % 7 - 3.0) * 1e-6;
+  }
+  expect_named(s, "the distances of another gauge");
+  s = good;  // from the other end
+  std::reverse(s.gauge.faces.begin(), s.gauge.faces.end());
+  for (calib::mfb::GaugeFace& face : s.gauge.faces) {
+    face.distance_m = good.gauge.faces.back().distance_m - face.distance_m;
+  }
+  expect_named(s, "begin at the face near hole 1");
+  s = good;
+  s.passes[2] = s.passes[0];
+  expect_named(s, "N2: its touches are those of N1");
+  s = good;  // other blocks
+  for (calib::mfb::Touch& touch : s.passes[3]) {
+    touch.reading_m.z() += 2e-3;
+  }
+  expect_named(s, "R2: the bar lay 1.9");
+}
+
+TEST(BarCalibration, WrongUnitsAreNamed) {
+  const Simulated good = simulated(usual(7));
+  Simulated s = good;
+  for (calib::mfb::GaugeFace& face : s.gauge.faces) {
+    for (Vector3& reading_m : face.readings_m) {
+      reading_m *= 1e3;
+    }
+  }
+  expect_named(s, "another face, unit or temperature");
+  s = good;
+  for (calib::mfb::Touch& touch : s.passes[1]) {
+    touch.reading_m *= 1e3;
+  }
+  expect_named(s, "R1: ");
+}
+
+TEST(BarCalibration, TemperaturesThatAreNotStatedAreNoted) {
+  const Simulated good = simulated(usual(7));
+  Simulated s = good;
+  s.gauge.expansion.reset();
+  expect_named(s, "the step gauge has no thermal expansion");
+  s = good;
+  s.nominal.expansion.reset();
+  expect_named(s, "the bar has no thermal expansion");
+  s = good;
+  s.gauge.u_temperature_K = 0.0;
+  expect_named(s, "step gauge has no u_temperature");
+  s = good;
+  s.gauge.temperature_K += 48.0;  // 68 F, as C
+  expect_named(s, "another face, unit or temperature");
+  s = good;
+  s.gauge.temperature_K += 8.0;
+  expect_named(s, "um per m: check the temperature");
 }
 
 /// The touches of one pass of the simulator, grouped by feature.

@@ -105,6 +105,19 @@ TEST_F(BarCli, PrintsWhatTheOffsetOfTheGaugeCosts) {
   EXPECT_THAT(refused.err, HasSubstr("u_rotation"));
 }
 
+TEST_F(BarCli, AnInclinedBarNeedsAGaugeThatIsInclinedAndTouchedAsItLies) {
+  simulate("bar --exact --inclined-mrad 10 -o cal");  // plan.toml states X
+  const Ran ran = abbe(kIdentifyBar);
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_LT(largest_error_um(), 0.06);
+  EXPECT_THAT(ran.out, HasSubstr("bar_x of the plan is 10 mrad"));
+
+  simulate("bar --inclined-mrad 10 --gauge-travel x -o cal");
+  const Ran refused = abbe(kIdentifyBar);
+  EXPECT_EQ(refused.exit, 3) << refused.out;
+  EXPECT_THAT(refused.err, HasSubstr("the line of its touches is"));
+}
+
 TEST_F(BarCli, ShopFloorMistakesAreNamed) {
   simulate("bar --repeats 2 --turned R2=z -o cal");
   Ran ran = abbe(kIdentifyBar);
@@ -136,12 +149,15 @@ distance_mm = 1
 readings_mm = []
 [[step]]
 distance_mm = 0.5
+readings_mm = [[1, 0, 0], [2, 0, 0]]
+[[step]]
+distance_mm = 50
 readings_mm = [1, 2]
 )");
   const auto text = test::faults_text(read_gauge_toml(folder_.path() / "gauge.toml"));
   for (const char* fault :
        {"gauge.toml:3:", "tool_offset_mm", "u_um", "u_alpha_um_per_m_K", "colour",
-        "gauge.toml:9:", "gauge.toml:10:", "must ascend", "one per run"})
+        "gauge.toml:9:", "gauge.toml:10:", "must ascend", "one per run", "all three axes"})
     EXPECT_THAT(text, HasSubstr(fault)) << text;
 }
 

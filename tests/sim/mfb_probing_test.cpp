@@ -336,7 +336,7 @@ TEST(MfbReversal, SignatureChangesItsSideAndTheGaugeShowsTheMachine) {
   options.repeats = 2;
   options.probing = plain();
   options.gauge.u_m = options.gauge.u_per_m = 0.0;
-  options.gauge.u_temperature_K = 0.0;
+  options.gauge.u_temperature_K = options.gauge.alignment_rad = 0.0;
   const TruthMachine machine = measuring_machine(2e-6, 0.55, 1);
   const auto run = run_reversal(machine, kBar, options);
   ASSERT_TRUE(run) << run.error().text;
@@ -352,7 +352,8 @@ TEST(MfbReversal, SignatureChangesItsSideAndTheGaugeShowsTheMachine) {
   for (std::size_t i = 0; i < run->distances_m.size(); ++i) {
     const Vector3d face_m = run->gauge_origin_m + run->distances_m[i] * Vector3d::UnitX();
     const double E_m = error_m(with_tool, reading_at_m(with_tool, face_m)).x();
-    const double measured_m = run->distances_m[i] - (run->readings_m[i][0] - run->readings_m[0][0]);
+    const double measured_m =
+        run->distances_m[i] - (run->readings_m[i][0] - run->readings_m[0][0]).x();
     EXPECT_NEAR(measured_m, E_m - E_first_m, 1e-12);
   }
 }

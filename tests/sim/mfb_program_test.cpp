@@ -99,6 +99,8 @@ TEST_F(MfbProgram, WrongOptionsAreUsageErrors) {
       {"mfb -o out --turned X9=z", "X9"},
       {"mfb -o out --turned X1=w", "x, y or z"},
       {"bar -o out --gauge-beside-mm 3", "--gauge-beside-mm"},
+      {"bar -o out --gauge-turned-mrad 3", "--gauge-turned-mrad"},
+      {"bar -o out --gauge-travel y", "--gauge-travel"},
       {"bar -o out --repeats 0", "--repeats"}};
   for (const auto& [arguments, what] : cases) {
     const Outcome ran = run(arguments);

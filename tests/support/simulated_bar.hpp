@@ -99,7 +99,8 @@ inline calib::mfb::StepGauge gauge_of(const sim::mfb::ReversalRun& run,
       .u_temperature_K = stated.u_temperature_K,
       .origin_m = run.gauge_origin_m,
       .tool_offset_m = run.plan.front().tool_offset_m,
-      .u_rotation_rad = stated.u_rotation_rad};
+      .u_rotation_rad = stated.u_rotation_rad,
+      .u_alignment_rad = stated.u_alignment_rad};
   for (std::size_t i = 0; i < run.distances_m.size(); ++i) {
     gauge.faces.push_back({run.distances_m[i], run.readings_m[i]});
   }

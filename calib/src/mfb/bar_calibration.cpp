@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <string_view>
+#include <utility>
 
 #include "abbe/calib/mfb/reversal.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
@@ -32,27 +34,6 @@ Result<MfbMachine> machine_without_limits() {
   return machine;
 }
 
-Result<AlongBar> along_bar(const Plan& plan) {
-  constexpr double kMostFromAxis_rad = 20e-3;
-  const Vector3 first = plan.measurements.front().bar_x.normalized();
-  AlongBar along;
-  first.cwiseAbs().maxCoeff(&along.axis);
-  along.component = first(along.axis);
-  const double sign = std::copysign(1.0, along.component);
-
-  for (const Measurement& m : plan.measurements) {
-    const Vector3 x = m.bar_x.normalized();
-    const double off = (x - sign * Vector3::Unit(along.axis)).norm();
-    if (off > kMostFromAxis_rad) {
-      return failure(ErrorCode::BadInput,
-                     message(m.name, ": bar_x is ", 1e3 * off, " mrad from ", sign < 0.0 ? "-" : "",
-                             "XYZ"[along.axis],
-                             ": for a calibration the bar lies along one axis in all passes"));
-    }
-  }
-  return along;
-}
-
 /// True for each reversed pass.
 Result<std::vector<bool>> reversed_passes(const Plan& plan) {
   const Vector3 normal = plan.measurements.front().bar_z.normalized();
@@ -75,30 +56,6 @@ Result<std::vector<bool>> reversed_passes(const Plan& plan) {
     reversed.push_back(cosine < 0.0);
   }
   return reversed;
-}
-
-/// Distances along the bar of its holes, and the place of its line: means over all passes.
-struct LineOfBar {
-  std::vector<double> along_m;
-  Vector3 middle_m = Vector3::Zero();  ///< centre of the tip, machine axes
-};
-
-LineOfBar line_of_bar(const Observations& o, const AlongBar& along) {
-  const std::size_t holes = o.bar.O_m.size();
-  const auto passes = static_cast<double>(o.passes.size());
-  LineOfBar line{std::vector<double>(holes, 0.0)};
-  for (const PassObservation& pass : o.passes) {
-    const BarPose& pose = o.positions[pass.position].pose;
-    const Measurement& m = o.plan.measurements[pass.measurement];
-    const std::vector<Vector3> O_m = O_at(o.bar, pass.temperature_K);
-    for (std::size_t i = 0; i < holes; ++i) {
-      const Vector3 off_m = pass.delta_m.segment<3>(3 * static_cast<Eigen::Index>(i));
-      const Vector3 place_m = pose.origin_m + pose.axes * (O_m[i] + off_m);
-      line.along_m[i] += along.of(Vector3(place_m - m.tool_offset_m)) / passes;
-    }
-    line.middle_m += (pose.origin_m + 0.5 * pose.axes * O_m.back()) / passes;
-  }
-  return line;
 }
 
 /// Deviations in the axes of a normal pass, at 20 degC.
@@ -142,18 +99,31 @@ Result<double> u_rotation_rad(const StepGauge& gauge, const Vector3& beside_m) {
               "uncertainty of the rotations of the machine"));
 }
 
-Result<void> check_origin(const StepGauge& gauge, const AlongBar& along) {
-  const double read_m = gauge.faces.front().readings_m.front() + gauge.tool_offset_m(along.axis);
-  const double off_m = read_m - gauge.origin_m(along.axis);
-  if (std::abs(off_m) <= kBeside_m) {
+Result<void> check_origin(const StepGauge& gauge) {
+  const Vector3 read_m = gauge.faces.front().readings_m.front() + gauge.tool_offset_m;
+  if ((read_m - gauge.origin_m).norm() <= kBeside_m) {
     return {};
   }
-  return failure(
-      ErrorCode::BadInput,
-      message("step gauge: reading and tool offset place the first face at ", kMmPerM * read_m,
-              " mm along the bar, its origin says ", kMmPerM * gauge.origin_m(along.axis),
-              " mm: the origin is the centre of "
-              "the tip, reading plus tool offset"));
+  return failure(ErrorCode::BadInput,
+                 message("step gauge: readings and tool offset place the first face at ",
+                         mm_text(read_m), ", its origin says ", mm_text(gauge.origin_m),
+                         ": the origin is the centre of the tip, reading plus tool offset"));
+}
+
+/// A pass that was copied has no scatter.
+Result<void> check_distinct(const Plan& plan, std::span<const PassTouches> touches) {
+  const auto same = [](const Touch& a, const Touch& b) { return a.reading_m == b.reading_m; };
+  for (std::size_t m = 1; m < touches.size(); ++m) {
+    for (std::size_t before = 0; before < m; ++before) {
+      const PassTouches &a = touches[before], &b = touches[m];
+      if (!a.empty() && std::equal(a.begin(), a.end(), b.begin(), b.end(), same)) {
+        return failure(ErrorCode::BadInput,
+                       message(plan.measurements[m].name, ": its touches are those of ",
+                               plan.measurements[before].name, ": measure every pass"));
+      }
+    }
+  }
+  return {};
 }
 
 /// The covariances of x of the points, apart from that of the repeats.
@@ -235,23 +205,65 @@ void set_points(BarCalibration& found, const Bar& nominal, const CalibratedBar& 
   found.student_t95 = student_quantile(0.05, reversal.degrees_of_freedom);
 }
 
-void add_notes(BarCalibration& found, const StepGauge& gauge, const Bar& nominal) {
+void note_abbe_error(BarCalibration& found, const StepGauge& gauge) {
   const double beside_m = found.gauge_beside_m.norm();
-  if (beside_m > kBeside_m) {
-    double largest_m = 0.0;
-    for (const PositioningBudget& x : found.positioning) {
-      largest_m = std::max(largest_m, x.abbe_m);
-    }
-    found.notes.push_back(message("the step gauge lies ", kMmPerM * beside_m,
-                                  " mm beside the line of the bar: rotations of the machine of ",
-                                  kUmPerM * gauge.u_rotation_rad.value_or(0.0), " urad add up to ",
-                                  kUmPerM * largest_m, " um to u(x)"));
+  if (beside_m <= kBeside_m) {
+    return;
   }
+  double largest_m = 0.0;
+  for (const PositioningBudget& x : found.positioning) {
+    largest_m = std::max(largest_m, x.abbe_m);
+  }
+  found.notes.push_back(message("the step gauge lies ", kMmPerM * beside_m,
+                                " mm beside the line of the bar: rotations of the machine of ",
+                                kUmPerM * gauge.u_rotation_rad.value_or(0.0), " urad add up to ",
+                                kUmPerM * largest_m, " um to u(x)"));
+}
+
+/// What the files do not state about the temperatures, and what that costs.
+void note_temperatures(BarCalibration& found, const StepGauge& gauge, const TouchNoise& noise) {
+  const auto without_expansion = [&](std::string_view what) {
+    found.notes.push_back(message(what,
+                                  " has no thermal expansion: its lengths are not corrected "
+                                  "to 20 C, and the uncertainty does not contain this"));
+  };
+  const auto exact = [&](std::string_view what) {
+    found.notes.push_back(
+        message("the temperature of the ", what, " has no u_temperature: it counts as exact"));
+  };
+  if (!found.bar.expansion) {
+    without_expansion("the bar");
+  } else if (!(noise.u_temperature_K > 0.0)) {
+    exact("bar");
+  }
+  if (!gauge.expansion) {
+    without_expansion("the step gauge");
+  } else if (!(gauge.u_temperature_K > 0.0)) {
+    exact("step gauge");
+  }
+}
+
+/// An E_XX that no measuring machine has: a wrong temperature, scale or unit.
+void note_scale(BarCalibration& found) {
+  constexpr double kMost = 50e-6;
+  const double length_m = found.bar.O_m.back().x();
+  const double scale = found.machine_m.back().x() / length_m;
+  if (std::abs(scale) > kMost) {
+    found.notes.push_back(message("E_XX of the machine is ", kUmPerM * scale,
+                                  " um per m: check the temperature of the step gauge and the "
+                                  "expansion of the scales"));
+  }
+}
+
+void add_notes(BarCalibration& found, const StepGauge& gauge, const Plan& plan) {
+  note_abbe_error(found, gauge);
   if (gauge.faces.front().readings_m.size() < 2) {
     found.notes.emplace_back(
         "the step gauge was measured once: its repeatability is not in the uncertainty");
   }
-  if (!nominal.pattern.has_signature()) {
+  note_temperatures(found, gauge, plan.noise);
+  note_scale(found);
+  if (!found.bar.pattern.has_signature()) {
     found.notes.emplace_back(
         "the bar has no shifted holes: a bar that lies turned is not recognised");
   }
@@ -260,9 +272,8 @@ void add_notes(BarCalibration& found, const StepGauge& gauge, const Bar& nominal
 /// The passes along the bar, and where they are on the machine.
 struct MeasuredPasses {
   Observations observed;
-  AlongBar along;
   std::vector<bool> reversed;  ///< by measurement
-  LineOfBar line;
+  BarLine line;
 };
 
 Result<MeasuredPasses> measured_passes(const Bar& nominal, const Plan& plan,
@@ -276,16 +287,18 @@ Result<MeasuredPasses> measured_passes(const Bar& nominal, const Plan& plan,
   if (!o) {
     return tl::unexpected(o.error());
   }
-  const Result<AlongBar> along = along_bar(plan);
-  if (!along) {
-    return tl::unexpected(along.error());
+  if (Result<void> distinct = check_distinct(plan, touches); !distinct) {
+    return tl::unexpected(distinct.error());
+  }
+  Result<BarLine> line = line_of_bar(*o);
+  if (!line) {
+    return tl::unexpected(line.error());
   }
   Result<std::vector<bool>> reversed = reversed_passes(plan);
   if (!reversed) {
     return tl::unexpected(reversed.error());
   }
-  LineOfBar line = line_of_bar(*o, *along);
-  return MeasuredPasses{*std::move(o), *along, *std::move(reversed), std::move(line)};
+  return MeasuredPasses{*std::move(o), *std::move(reversed), *std::move(line)};
 }
 
 Result<CalibratedBar> reversal_of(const MeasuredPasses& passes, const Positioning& x) {
@@ -301,7 +314,7 @@ Result<CalibratedBar> reversal_of(const MeasuredPasses& passes, const Positionin
 
 PositioningCovariances covariances_of(const MeasuredPasses& passes, const Positioning& x,
                                       double beside_m, double u_rotation) {
-  const std::vector<double>& along_m = passes.line.along_m;
+  const std::vector<double>& along_m = passes.line.coordinate_m;
   Eigen::VectorXd distance_m(std::ssize(along_m));
   for (Eigen::Index i = 0; i < distance_m.size(); ++i) {
     distance_m(i) = along_m[static_cast<std::size_t>(i)] - along_m.front();
@@ -311,11 +324,40 @@ PositioningCovariances covariances_of(const MeasuredPasses& passes, const Positi
           u_length * u_length * distance_m * distance_m.transpose()};
 }
 
-Vector3 beside_bar_m(const StepGauge& gauge, const MeasuredPasses& passes) {
-  const Matrix3 axes = passes.observed.plan.measurements.front().axes();
-  Vector3 beside_m = axes.transpose() * (gauge.origin_m - passes.line.middle_m);
-  beside_m.x() = 0.0;
-  return beside_m;
+/// Distance of the line of the gauge from that of the bar, bar axes: the larger one of both ends.
+Vector3 beside_bar_m(const GaugeLine& gauge, const BarLine& bar) {
+  const Vector3 direction = bar.axes.transpose() * gauge.direction;
+  Vector3 largest_m = Vector3::Zero();
+  for (const double from_middle : {-0.5, 0.5}) {
+    const Vector3 place_m(from_middle * bar.length_m, 0.0, 0.0);
+    const Vector3 off_m = bar.axes.transpose() * (gauge.middle_m - bar.middle_m) - place_m;
+    Vector3 beside_m = off_m - direction * (off_m.x() / direction.x());
+    beside_m.x() = 0.0;
+    if (beside_m.norm() > largest_m.norm()) {
+      largest_m = beside_m;
+    }
+  }
+  return largest_m;
+}
+
+/// The gauge as it was measured along the bar.
+struct MeasuredGauge {
+  Positioning x;
+  Vector3 beside_bar_m = Vector3::Zero();
+};
+
+Result<MeasuredGauge> measured_gauge(const StepGauge& gauge, const BarLine& bar) {
+  const Result<GaugeLine> line = line_of_gauge(gauge);
+  if (!line) {
+    return tl::unexpected(line.error());
+  }
+  return check_alignment(gauge, *line, bar)
+      .and_then([&] { return positioning_by_gauge(gauge, *line, bar); })
+      .and_then([&](Positioning x) {
+        return check_origin(gauge).map([&] {
+          return MeasuredGauge{std::move(x), beside_bar_m(*line, bar)};
+        });
+      });
 }
 
 }  // namespace
@@ -327,30 +369,42 @@ Result<BarCalibration> calibrate_bar(const Bar& nominal, const Plan& plan,
   if (!passes) {
     return tl::unexpected(passes.error());
   }
-  const Result<Positioning> x = positioning_by_gauge(gauge, passes->along, passes->line.along_m);
-  if (!x) {
-    return tl::unexpected(x.error());
-  }
-  if (Result<void> valid = check_origin(gauge, passes->along); !valid) {
-    return tl::unexpected(valid.error());
+  const Result<MeasuredGauge> measured = measured_gauge(gauge, passes->line);
+  if (!measured) {
+    return tl::unexpected(measured.error());
   }
 
   BarCalibration found{.bar = nominal};
-  found.gauge_beside_m = beside_bar_m(gauge, *passes);
+  found.direction = passes->line.axes.col(0);
+  found.gauge_beside_m = measured->beside_bar_m;
   const Result<double> u_rotation = u_rotation_rad(gauge, found.gauge_beside_m);
   if (!u_rotation) {
     return tl::unexpected(u_rotation.error());
   }
-  const Result<CalibratedBar> reversal = reversal_of(*passes, *x);
+  const Result<CalibratedBar> reversal = reversal_of(*passes, measured->x);
   if (!reversal) {
     return tl::unexpected(reversal.error());
   }
 
   set_points(found, nominal, *reversal);
-  set_uncertainty(found, covariances_of(*passes, *x, found.gauge_beside_m.norm(), *u_rotation));
+  set_uncertainty(found,
+                  covariances_of(*passes, measured->x, found.gauge_beside_m.norm(), *u_rotation));
   found.notes = outlying_features(nominal, plan, touches);
-  add_notes(found, gauge, nominal);
+  const auto append = [&](const std::vector<std::string>& notes) {
+    found.notes.insert(found.notes.end(), notes.begin(), notes.end());
+  };
+  append(notes_of_line(passes->observed, passes->line, most_angle_rad(gauge, passes->line)));
+  append(measured->x.notes);
+  add_notes(found, gauge, plan);
   return found;
+}
+
+Result<Vector3> direction_of_bar(const Bar& nominal, const Plan& plan,
+                                 std::span<const PassTouches> touches,
+                                 const ObserveLimits& limits) {
+  return measured_passes(nominal, plan, touches, limits).map([](const MeasuredPasses& passes) {
+    return Vector3(passes.line.axes.col(0));
+  });
 }
 
 Result<void> check_pass(const Bar& nominal, const Plan& plan, std::size_t measurement,

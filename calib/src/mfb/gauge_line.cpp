@@ -1,43 +1,18 @@
 #include "mfb/gauge_line.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "abbe/calib/root_sum_of_squares.hpp"
 #include "elementary.hpp"
+#include "median.hpp"
 #include "message.hpp"
 #include "units.hpp"
 
 namespace abbe::calib::mfb {
 namespace {
-
-/// Mean reading of each face along the bar, and the standard deviation of one reading.
-struct FaceReadings {
-  std::vector<double> mean_m;
-  double s_m = 0.0;  ///< over all faces; 0 without repeats
-};
-
-FaceReadings face_readings(const StepGauge& gauge, const AlongBar& direction) {
-  FaceReadings faces;
-  double squares = 0.0;
-  std::size_t degrees_of_freedom = 0;
-  for (const GaugeFace& face : gauge.faces) {
-    const auto& readings = face.readings_m;
-    const double mean = std::accumulate(readings.begin(), readings.end(), 0.0) /
-                        static_cast<double>(readings.size());
-    for (const double r : readings) {
-      squares += (r - mean) * (r - mean);
-    }
-    degrees_of_freedom += readings.size() - 1;
-    faces.mean_m.push_back(direction.of(mean));
-  }
-  if (degrees_of_freedom > 0) {
-    faces.s_m = std::sqrt(squares / static_cast<double>(degrees_of_freedom));
-  }
-  return faces;
-}
 
 bool valid_number(double value) {
   return std::isfinite(value) && value >= 0.0;
@@ -55,7 +30,7 @@ Result<void> check_faces(const StepGauge& gauge) {
     }
     const bool finite = std::isfinite(face.distance_m) &&
                         std::all_of(face.readings_m.begin(), face.readings_m.end(),
-                                    [](double r) { return std::isfinite(r); });
+                                    [](const Vector3& r) { return r.allFinite(); });
     if (!finite) {
       return failure(ErrorCode::NotFinite,
                      message("step gauge, face ", k + 1, ": a value is not a number"));
@@ -72,12 +47,13 @@ Result<void> check_faces(const StepGauge& gauge) {
 
 Result<void> check_gauge(const StepGauge& gauge) {
   const Expansivity expansion = gauge.expansion.value_or(Expansivity{});
-  const bool valid =
-      valid_number(gauge.u_m) && valid_number(gauge.u_per_m) &&
-      std::isfinite(gauge.temperature_K) && valid_number(gauge.u_temperature_K) &&
-      std::isfinite(expansion.alpha_per_K) && valid_number(expansion.u_alpha_per_K) &&
-      valid_number(gauge.u_rotation_rad.value_or(0.0)) &&
-      valid_number(gauge.u_alignment_rad.value_or(0.0)) && gauge.origin_m.allFinite();
+  const bool valid = valid_number(gauge.u_m) && valid_number(gauge.u_per_m) &&
+                     std::isfinite(gauge.temperature_K) && valid_number(gauge.u_temperature_K) &&
+                     std::isfinite(expansion.alpha_per_K) &&
+                     valid_number(expansion.u_alpha_per_K) &&
+                     valid_number(gauge.u_rotation_rad.value_or(0.0)) &&
+                     valid_number(gauge.u_alignment_rad.value_or(0.0)) &&
+                     gauge.origin_m.allFinite() && gauge.tool_offset_m.allFinite();
   if (!valid) {
     return failure(ErrorCode::BadInput,
                    message("step gauge \"", gauge.name,
@@ -86,20 +62,97 @@ Result<void> check_gauge(const StepGauge& gauge) {
   return check_faces(gauge);
 }
 
+double expansion_factor(const StepGauge& gauge) {
+  const double alpha_per_K = gauge.expansion ? gauge.expansion->alpha_per_K : 0.0;
+  return 1.0 + alpha_per_K * (gauge.temperature_K - kReferenceTemperature_K);
+}
+
 /// A face whose measured distance is that of another face.
-Result<void> check_distances(const StepGauge& gauge, const std::vector<double>& along_m) {
+Result<void> check_distances(const StepGauge& gauge, const GaugeLine& line) {
   constexpr double kMostError_m = 0.1e-3;
-  for (std::size_t k = 1; k < along_m.size(); ++k) {
-    const double measured_m = along_m[k] - along_m[0];
-    if (std::abs(measured_m - gauge.faces[k].distance_m) > kMostError_m) {
+  for (std::size_t k = 1; k < gauge.faces.size(); ++k) {
+    const double distance_m = gauge.faces[k].distance_m * expansion_factor(gauge);
+    if (!(std::abs(line.measured_m(k) - distance_m) <= kMostError_m)) {
       return failure(
           ErrorCode::BadInput,
-          message("step gauge, face ", k + 1, ": measured ", kMmPerM * measured_m,
-                  " mm from the first face along the bar, calibrated ",
-                  kMmPerM * gauge.faces[k].distance_m, " mm: another face, axis or direction"));
+          message("step gauge, face ", k + 1, ": measured ", kMmPerM * line.measured_m(k),
+                  " mm from the first face along the line of the touches, calibrated ",
+                  kMmPerM * distance_m,
+                  " mm at its temperature: another face, unit or temperature"));
     }
   }
   return {};
+}
+
+Vector3 mean_reading(const GaugeFace& face) {
+  Vector3 sum_m = Vector3::Zero();
+  for (const Vector3& reading_m : face.readings_m) {
+    sum_m += reading_m;
+  }
+  return sum_m / static_cast<double>(face.readings_m.size());
+}
+
+/// Slope of the touches over the calibrated distances, by least squares.
+Vector3 direction_of(const StepGauge& gauge, const std::vector<Vector3>& face_m) {
+  const auto faces = static_cast<double>(face_m.size());
+  double mean_m = 0.0;
+  for (const GaugeFace& face : gauge.faces) {
+    mean_m += face.distance_m / faces;
+  }
+  Vector3 slope = Vector3::Zero();
+  for (std::size_t k = 0; k < face_m.size(); ++k) {
+    slope += (gauge.faces[k].distance_m - mean_m) * (face_m[k] - face_m[0]);
+  }
+  return slope.normalized();
+}
+
+/// Residuals of the runs of all faces along the line, from the mean of their face.
+struct RunResiduals {
+  std::size_t face = 0, run = 0;  ///< of the largest one
+  double largest_m = 0.0;
+  double usual_m = 0.0;  ///< standard deviation from the median, which an outlier does not change
+  double s_m = 0.0;      ///< standard deviation from the squares; 0 without repeats
+};
+
+RunResiduals run_residuals(const StepGauge& gauge, const GaugeLine& line) {
+  RunResiduals out;
+  std::vector<double> all_m;
+  double squares = 0.0;
+  for (std::size_t k = 0; k < gauge.faces.size(); ++k) {
+    const auto& readings_m = gauge.faces[k].readings_m;
+    for (std::size_t r = 0; r < readings_m.size(); ++r) {
+      const double off_m = std::abs(line.direction.dot(readings_m[r] - line.face_m[k]));
+      squares += off_m * off_m;
+      all_m.push_back(off_m);
+      if (off_m > out.largest_m) {
+        out.face = k;
+        out.run = r;
+        out.largest_m = off_m;
+      }
+    }
+  }
+
+  const auto readings = static_cast<double>(all_m.size());
+  const double degrees_of_freedom = readings - static_cast<double>(gauge.faces.size());
+  if (degrees_of_freedom > 0.0) {
+    out.s_m = std::sqrt(squares / degrees_of_freedom);
+    out.usual_m = kMadToSigma * median(all_m) * std::sqrt(readings / degrees_of_freedom);
+  }
+  return out;
+}
+
+/// A false trigger or dirt in one run moves the mean of its face.
+Result<void> check_runs(const RunResiduals& runs) {
+  constexpr double kWorse = 8.0, kSmall_m = 1e-6;
+  if (runs.largest_m <= std::max(kWorse * runs.usual_m, kSmall_m)) {
+    return {};
+  }
+  return failure(ErrorCode::BadInput,
+                 message("step gauge, face ", runs.face + 1, ", run ", runs.run + 1, ": ",
+                         kUmPerM * runs.largest_m, " um from the mean of its face, usual are ",
+                         kUmPerM * runs.usual_m,
+                         " um: dirt or a false trigger; measure the gauge again, or leave out this "
+                         "run of all faces"));
 }
 
 /// Row: weights of the faces in the value at `at_m`, linear between the faces.
@@ -114,14 +167,72 @@ Eigen::RowVectorXd weights_at(double at_m, const std::vector<double>& faces_m) {
   return weights;
 }
 
-/// Relative standard uncertainty of all distances by the direction of the gauge. An angle e between
-/// gauge and bar makes the measured distances 1 / cos e = 1 + e^2 / 2 times as long. Both components
-/// of e have the standard uncertainty u: e^2 / 2 has the expectation u^2 and the variance u^4.
-double u_of_alignment(const StepGauge& gauge) {
-  const double length_m = gauge.faces.back().distance_m;
-  const double u_rad =
-      gauge.u_alignment_rad.value_or(kGaugeAlignment_m / (std::numbers::sqrt3 * length_m));
-  return std::numbers::sqrt2 * u_rad * u_rad;
+/// Weights of the faces in the polynomial through `four` of them, at face `at`.
+Eigen::Vector4d lagrange_weights(const StepGauge& gauge, const std::array<std::size_t, 4>& four,
+                                 std::size_t at) {
+  Eigen::Vector4d weights = Eigen::Vector4d::Ones();
+  for (std::size_t i = 0; i < four.size(); ++i) {
+    for (std::size_t k = 0; k < four.size(); ++k) {
+      if (k != i) {
+        weights(static_cast<Eigen::Index>(i)) *=
+            (gauge.faces[at].distance_m - gauge.faces[four[k]].distance_m) /
+            (gauge.faces[four[i]].distance_m - gauge.faces[four[k]].distance_m);
+      }
+    }
+  }
+  return weights;
+}
+
+/// E of each face from the cubic through four faces around it, divided by the standard deviation
+/// that this has for independent errors of standard deviation 1. An error of the machine that is
+/// smooth over five faces does not show. Empty below 5 faces.
+std::vector<double> roughness_m(const StepGauge& gauge, const Eigen::VectorXd& E_m) {
+  constexpr std::size_t kWindow = 5;
+  const std::size_t faces = gauge.faces.size();
+  std::vector<double> out;
+  for (std::size_t k = 0; faces >= kWindow && k < faces; ++k) {
+    const std::size_t first = std::min(k < 2 ? 0 : k - 2, faces - kWindow);
+    std::array<std::size_t, 4> four{};
+    for (std::size_t i = 0, face = first; i < four.size(); ++i, ++face) {
+      if (face == k) {
+        ++face;
+      }
+      four[i] = face;
+    }
+    const Eigen::Vector4d weights = lagrange_weights(gauge, four, k);
+    double off_m = E_m(static_cast<Eigen::Index>(k));
+    for (std::size_t i = 0; i < four.size(); ++i) {
+      off_m -= weights(static_cast<Eigen::Index>(i)) * E_m(static_cast<Eigen::Index>(four[i]));
+    }
+    out.push_back(std::abs(off_m) / std::sqrt(1.0 + weights.squaredNorm()));
+  }
+  return out;
+}
+
+std::vector<std::string> notes_of_faces(const StepGauge& gauge, const GaugeLine& line,
+                                        const Eigen::VectorXd& E_m) {
+  const std::vector<double> rough_m = roughness_m(gauge, E_m);
+  if (rough_m.empty()) {
+    return {};
+  }
+  constexpr double kRougher = 4.0, kWorse = 6.0, kRough_m = 0.3e-6, kSmall_m = 0.5e-6;
+  const auto runs = static_cast<double>(gauge.faces.front().readings_m.size());
+  const double expected_m = root_sum_of_squares(gauge.u_m, line.s_m / std::sqrt(runs));
+  std::vector<double> sorted_m = rough_m;
+  const double usual_m = kMadToSigma * median(sorted_m);
+  if (usual_m > std::max(kRougher * expected_m, kRough_m)) {
+    return {message("step gauge: from face to face E_XX scatters by ", kUmPerM * usual_m,
+                    " um, stated u and repeatability explain ", kUmPerM * expected_m,
+                    " um: the distances of another gauge, a gauge measured from its other end, or "
+                    "an error of the machine with a short period")};
+  }
+  const auto worst = std::max_element(rough_m.begin(), rough_m.end());
+  if (*worst > std::max(kWorse * std::max(usual_m, expected_m), kSmall_m)) {
+    return {message("step gauge, face ", worst - rough_m.begin() + 1, ": its E_XX is about ",
+                    kUmPerM * *worst,
+                    " um beside those of the faces around it: dirt, or a wrong distance")};
+  }
+  return {};
 }
 
 /// Relative standard uncertainty of all distances at the temperature of the gauge.
@@ -135,49 +246,99 @@ double u_of_scale(const StepGauge& gauge) {
 
 }  // namespace
 
-Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const AlongBar& direction,
-                                         std::span<const double> along_m) {
+Result<GaugeLine> line_of_gauge(const StepGauge& gauge) {
   if (Result<void> valid = check_gauge(gauge); !valid) {
     return tl::unexpected(valid.error());
   }
-  const auto [faces_m, s_m] = face_readings(gauge, direction);
-  if (Result<void> valid = check_distances(gauge, faces_m); !valid) {
-    return tl::unexpected(valid.error());
+  GaugeLine line;
+  for (const GaugeFace& face : gauge.faces) {
+    line.face_m.push_back(mean_reading(face));
+    line.middle_m +=
+        (line.face_m.back() + gauge.tool_offset_m) / static_cast<double>(gauge.faces.size());
   }
-  if (along_m.front() < faces_m.front() || along_m.back() > faces_m.back()) {
+  line.direction = direction_of(gauge, line.face_m);
+
+  const RunResiduals runs = run_residuals(gauge, line);
+  line.s_m = runs.s_m;
+  return check_runs(runs).and_then([&] { return check_distances(gauge, line); }).map([&] {
+    return line;
+  });
+}
+
+double u_of_alignment(const StepGauge& gauge) {
+  const double length_m = gauge.faces.back().distance_m;
+  return gauge.u_alignment_rad.value_or(kGaugeAlignment_m / (std::numbers::sqrt3 * length_m));
+}
+
+double most_angle_rad(const StepGauge& gauge, const BarLine& bar) {
+  constexpr double kMost = 3.0;  // 1 % of two normal components are beyond
+  return kMost * root_sum_of_squares(u_of_alignment(gauge), bar.u_direction_rad);
+}
+
+Result<void> check_alignment(const StepGauge& gauge, const GaugeLine& line, const BarLine& bar) {
+  constexpr double kMradPerRadian = 1e3;
+  const Vector3 along = bar.axes.transpose() * line.direction;
+  if (along.x() < 0.0) {
     return failure(
         ErrorCode::BadInput,
-        message("step gauge: reaches from ", kMmPerM * direction.reading_m(faces_m.front()), " to ",
-                kMmPerM * direction.reading_m(faces_m.back()),
-                " mm (readings), the holes of the bar from ",
-                kMmPerM * direction.reading_m(along_m.front()), " to ",
-                kMmPerM * direction.reading_m(along_m.back()), " mm"));
+        "step gauge: its faces ascend from the last hole to the first: begin at the face "
+        "near hole 1");
+  }
+  const double most_rad = most_angle_rad(gauge, bar);
+  if (along.tail<2>().norm() <= most_rad) {
+    return {};
+  }
+  return failure(
+      ErrorCode::BadInput,
+      message("step gauge: the line of its touches is ", angle_text(bar.axes, line.direction),
+              " from the bar, at most ", two_digits(kMradPerRadian * most_rad),
+              " mrad, three times the uncertainty of its alignment: put the gauge along the bar as "
+              "it lay, and move the tip along the gauge; or state u_alignment"));
+}
+
+Result<Positioning> positioning_by_gauge(const StepGauge& gauge, const GaugeLine& line,
+                                         const BarLine& bar) {
+  const Eigen::Index faces = std::ssize(gauge.faces), points = std::ssize(bar.coordinate_m);
+  std::vector<double> at_m;
+  for (const Vector3& reading_m : line.face_m) {
+    at_m.push_back(bar.along.of(reading_m));
+  }
+  if (bar.coordinate_m.front() < at_m.front() || bar.coordinate_m.back() > at_m.back()) {
+    const auto reading_mm = [&](double c_m) { return kMmPerM * bar.along.reading_m(c_m); };
+    return failure(ErrorCode::BadInput,
+                   message("step gauge: reaches from ", reading_mm(at_m.front()), " to ",
+                           reading_mm(at_m.back()), " mm (readings), the holes of the bar from ",
+                           reading_mm(bar.coordinate_m.front()), " to ",
+                           reading_mm(bar.coordinate_m.back()), " mm"));
   }
 
-  const Eigen::Index faces = std::ssize(faces_m), points = std::ssize(along_m);
-  const double alpha_per_K = gauge.expansion ? gauge.expansion->alpha_per_K : 0.0;
-  const double growth = 1.0 + alpha_per_K * (gauge.temperature_K - kReferenceTemperature_K);
-  Eigen::VectorXd E_faces_m(faces), variance_m2(faces), distance_m(points);
+  Eigen::VectorXd E_faces_m(faces), variance_m2(faces), distance_m(faces);
+  Eigen::MatrixXd beside_m(faces, 3);  // w_k
   for (Eigen::Index k = 0; k < faces; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    E_faces_m(k) = gauge.faces[i].distance_m * growth - (faces_m[i] - faces_m[0]);
+    distance_m(k) = gauge.faces[i].distance_m;
+    E_faces_m(k) = distance_m(k) * expansion_factor(gauge) - line.measured_m(i);
     const auto runs = static_cast<double>(gauge.faces[i].readings_m.size());
-    variance_m2(k) = s_m * s_m / runs + (k == 0 ? 0.0 : gauge.u_m * gauge.u_m);
+    variance_m2(k) = line.s_m * line.s_m / runs + (k == 0 ? 0.0 : gauge.u_m * gauge.u_m);
+    beside_m.row(k) = line.face_m[i] - line.face_m[0] - line.measured_m(i) * line.direction;
   }
 
   Eigen::MatrixXd weights(points, faces);
   for (Eigen::Index i = 0; i < points; ++i) {
-    const double at_m = along_m[static_cast<std::size_t>(i)];
-    weights.row(i) = weights_at(at_m, faces_m);
-    distance_m(i) = at_m - along_m.front();
+    weights.row(i) = weights_at(bar.coordinate_m[static_cast<std::size_t>(i)], at_m);
   }
   const Eigen::RowVectorXd at_first = weights.row(0);
   weights.rowwise() -= at_first;
 
-  const double u_scale = root_sum_of_squares(u_of_scale(gauge), u_of_alignment(gauge));
-  return Positioning{weights * E_faces_m,
-                     weights * variance_m2.asDiagonal() * weights.transpose() +
-                         u_scale * u_scale * distance_m * distance_m.transpose()};
+  const double u_rad = u_of_alignment(gauge);
+  const double phi2 = (bar.axes.transpose() * line.direction).tail<2>().squaredNorm();
+  const double u_cosine = root_sum_of_squares(std::numbers::sqrt2 * u_rad * u_rad, 0.5 * phi2);
+  const double u_length = root_sum_of_squares(u_of_scale(gauge), u_cosine);
+  const Eigen::MatrixXd of_faces_m2 = variance_m2.asDiagonal().toDenseMatrix() +
+                                      u_rad * u_rad * beside_m * beside_m.transpose() +
+                                      u_length * u_length * distance_m * distance_m.transpose();
+  return Positioning{weights * E_faces_m, weights * of_faces_m2 * weights.transpose(),
+                     notes_of_faces(gauge, line, E_faces_m)};
 }
 
 Eigen::MatrixXd abbe_covariance_m2(double beside_m, double u_rotation_rad,

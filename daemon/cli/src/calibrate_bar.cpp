@@ -213,13 +213,27 @@ class BarCalibration {
     return points_.add(rows_of(m, touches));
   }
 
+  /// The first measurement with the direction of the bar that the touches of all passes show.
+  [[nodiscard]] Result<mfb::Measurement> bar_as_it_lay() const {
+    const auto touches = read_bar_points_csv(points_.file(), what_.bar.bar, what_.plan,
+                                             nodes_of_measuring_machine());
+    if (!touches) return tl::unexpected(touches.error());
+    const auto direction = mfb::direction_of_bar(what_.bar.bar, what_.plan.plan, touches->passes);
+    if (!direction) return tl::unexpected(error_of(direction.error()));
+    mfb::Measurement m = what_.plan.plan.measurements.front();
+    m.bar_x = *direction;
+    m.bar_z = m.axes().col(2);
+    return m;
+  }
+
   [[nodiscard]] Result<void> touch_gauge() {
     mfb::StepGauge gauge = what_.gauge.gauge;
-    const mfb::Measurement& normal = what_.plan.plan.measurements.front();
+    const auto normal = bar_as_it_lay();
+    if (!normal) return tl::unexpected(normal.error());
     const auto ready = wait_for_operator(
         fmt::format("step gauge {}: put it where the bar was, along ({}) {}, the centre of the tip "
                     "on its first face at ({}) mm, within 1 mm.",
-                    gauge.name, text_of(normal.bar_x), alignment_of(gauge),
+                    gauge.name, text_of(normal->bar_x), alignment_of(gauge),
                     text_of(kMmPerM * gauge.origin_m)),
         arguments_.yes);
     if (!ready) return ready;
@@ -227,7 +241,7 @@ class BarCalibration {
     const auto tip_m = machine_position(socket_);
     if (!tip_m) return tl::unexpected(tip_m.error());
     const auto touches =
-        mfb::gauge_on_machine(gauge, normal, arguments_.gauge_runs, *tip_m, touch_options());
+        mfb::gauge_on_machine(gauge, *normal, arguments_.gauge_runs, *tip_m, touch_options());
     if (!touches) return tl::unexpected(error_of(touches.error()));
     const auto made = make_touches(socket_, *touches);
     if (!made) return tl::unexpected(made.error());
@@ -235,12 +249,10 @@ class BarCalibration {
       return fail(ErrorCode::DataInsufficient,
                   fmt::format("step gauge: {}; --continue touches it again", made->reason));
 
-    Eigen::Index axis = 0;
-    normal.bar_x.cwiseAbs().maxCoeff(&axis);
     for (std::size_t i = 0; i < made->places_m.size(); ++i) {
       const std::size_t run = i / gauge.faces.size(), n = i % gauge.faces.size();
       auto& face = gauge.faces[run % 2 == 0 ? n : gauge.faces.size() - 1 - n];
-      face.readings_m.push_back(made->places_m[i](axis) - gauge.tool_offset_m(axis));
+      face.readings_m.push_back(made->places_m[i] - gauge.tool_offset_m);
     }
     return replace_file(gauge_file(), gauge_toml(gauge, fmt::format("# measured with {} touches\n",
                                                                     made->places_m.size())));

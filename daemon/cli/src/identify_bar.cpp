@@ -28,21 +28,13 @@ struct BarOnMachine {
   std::vector<std::string> notes;
 };
 
-/// A measuring machine has no file: its readings may be anywhere.
-calib::MachineNodes nodes_without_limits() {
-  constexpr double kFar_m = 50.0;
-  calib::MachineNodes nodes;
-  for (auto& axis : nodes) axis.nodes_m = {-kFar_m, kFar_m};
-  return nodes;
-}
-
 Result<BarOnMachine> calibrated_bar(const IdentifyBarArguments& arguments) {
   const auto bar = read_bar_toml(arguments.bar);
   if (!bar) return tl::make_unexpected(bar.error());
   const auto plan = read_bar_plan_toml(arguments.plan, bar->bar);
   if (!plan) return tl::make_unexpected(plan.error());
   const auto points =
-      read_bar_points_csv(arguments.points, bar->bar, *plan, nodes_without_limits());
+      read_bar_points_csv(arguments.points, bar->bar, *plan, nodes_of_measuring_machine());
   if (!points) return tl::make_unexpected(points.error());
   const auto gauge = read_gauge_toml(arguments.gauge);
   if (!gauge) return tl::make_unexpected(gauge.error());
@@ -97,6 +89,7 @@ nlohmann::json bar_json(const BarOnMachine& found, const std::string& out) {
           {"repeats", found.repeats},
           {"degrees_of_freedom", c.degrees_of_freedom},
           {"student_t95", c.student_t95},
+          {"direction", {c.direction.x(), c.direction.y(), c.direction.z()}},
           {"gauge_beside_bar_mm", {kMmPerM * c.gauge_beside_m.y(), kMmPerM * c.gauge_beside_m.z()}},
           {"points", points},
           {"notes", found.notes},
@@ -129,6 +122,13 @@ void print_summary(const BarOnMachine& found, const std::string& out) {
 }
 
 }  // namespace
+
+calib::MachineNodes nodes_of_measuring_machine() {
+  constexpr double kFar_m = 50.0;
+  calib::MachineNodes nodes;
+  for (auto& axis : nodes) axis.nodes_m = {-kFar_m, kFar_m};
+  return nodes;
+}
 
 int identify_bar(const IdentifyBarArguments& arguments) {
   const auto found = calibrated_bar(arguments);

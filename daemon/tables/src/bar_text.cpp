@@ -91,9 +91,13 @@ std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comm
     fmt::format_to(out, "u_rotation_urad = {:.15g}\n", kUmPerM * *gauge.u_rotation_rad);
   if (gauge.u_alignment_rad)
     fmt::format_to(out, "u_alignment_mrad = {:.15g}\n", 1e3 * *gauge.u_alignment_rad);
-  for (const calib::mfb::GaugeFace& face : gauge.faces)
-    fmt::format_to(out, "\n[[step]]\ndistance_mm = {:.15g}\nreadings_mm = {}\n",
-                   kMmPerM * face.distance_m, toml_list(face.readings_m, kMmPerM));
+  for (const calib::mfb::GaugeFace& face : gauge.faces) {
+    std::vector<std::string> readings_mm;
+    for (const calib::Vector3& q_m : face.readings_m)
+      readings_mm.push_back(toml_list(q_m, kMmPerM));
+    fmt::format_to(out, "\n[[step]]\ndistance_mm = {:.15g}\nreadings_mm = [{}]\n",
+                   kMmPerM * face.distance_m, fmt::join(readings_mm, ", "));
+  }
   return text;
 }
 

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "abbe/base/units.hpp"
 #include "expansivity.hpp"
@@ -40,6 +42,32 @@ void read_gauge_head(Section head, StepGauge& out) {
   head.close();
 }
 
+/// [x, y, z] of each run. False after a fault, or without the key.
+bool get_readings(Section& step, Need need, std::vector<calib::Vector3>& out) {
+  constexpr std::string_view kKey = "readings_mm";
+  const toml::node* node = step.node(kKey);
+  if (node == nullptr) {
+    if (need == Need::Required) step.fault(kKey, "missing");
+    return false;
+  }
+  const toml::array* runs = node->as_array();
+  bool valid = runs != nullptr;
+  for (std::size_t r = 0; valid && r < runs->size(); ++r) {
+    const toml::array* reading = runs->get(r)->as_array();
+    valid = reading != nullptr && reading->size() == 3;
+    calib::Vector3 q_m;
+    for (std::size_t k = 0; valid && k < 3; ++k) {
+      const auto value = reading->get(k)->value<double>();
+      valid = value && std::isfinite(*value);
+      if (valid) q_m(static_cast<Eigen::Index>(k)) = *value / kMmPerM;
+    }
+    if (valid) out.push_back(q_m);
+  }
+  if (valid) return true;
+  step.fault(kKey, "must be [x, y, z] of each run: the readings of all three axes");
+  return false;
+}
+
 /// Distances ascend from 0; every face has the same number of readings.
 void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
   const bool required = readings == GaugeReadings::Required;
@@ -47,8 +75,8 @@ void read_faces(Section& root, GaugeReadings readings, StepGauge& out) {
     GaugeFace face;
     const bool placed =
         step.get("distance_mm", face.distance_m, kMilli, kNotNegative, Need::Required);
-    const bool measured = step.get("readings_mm", face.readings_m, kMilli,
-                                   required ? Need::Required : Need::Optional);
+    const bool measured =
+        get_readings(step, required ? Need::Required : Need::Optional, face.readings_m);
     const bool first = out.faces.empty();
     if (!required && !first && measured == out.faces.front().readings_m.empty())
       step.fault("readings_mm", measured ? "the first [[step]] has none: all have them or none"

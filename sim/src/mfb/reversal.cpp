@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <iterator>
 
@@ -20,6 +21,7 @@ using Eigen::Vector3d;
 constexpr double kBeside_m = 0.05;  // travel of the machine beyond the bar, at both ends
 // The bar and the gauge lie in the middle of the travel of Y and Z.
 constexpr double kMiddle = 0.5;
+constexpr double kMradPerRad = 1e3;
 
 Vector3d bar_origin_m(const TruthMachine& machine, const ReversalOptions& options) {
   const auto middle = [&](Axis axis) {
@@ -29,18 +31,35 @@ Vector3d bar_origin_m(const TruthMachine& machine, const ReversalOptions& option
   return Vector3d(kBeside_m, middle(Axis::Y), middle(Axis::Z)) + options.tool_offset_m;
 }
 
+Vector3d inclined_x(double inclination_rad) {
+  return {std::cos(inclination_rad), std::sin(inclination_rad), 0.0};
+}
 Vector3d bar_x(const ReversalOptions& options) {
-  return {std::cos(options.inclination_rad), std::sin(options.inclination_rad), 0.0};
+  return inclined_x(options.inclination_rad);
 }
 
-/// Random numbers of the gauge: of face i from i (runs + 1) on, of the whole gauge beyond.
+Vector3d travel_of_tip(const ReversalOptions& options) {
+  switch (options.gauge.travel) {
+    case GaugeTravel::AlongBar:
+      return bar_x(options);
+    case GaugeTravel::AlongGauge:
+      return gauge_direction(options);
+    case GaugeTravel::AlongX:
+      return Vector3d::UnitX();
+  }
+  return Vector3d::UnitX();
+}
+
+constexpr std::uint64_t kOfGauge = 1000000;  // random numbers of the whole gauge, from here on
+
+/// Random numbers of the gauge: of face i from i (4 runs + 1) on.
 struct GaugeDraw {
   const ReversalOptions& options;
   [[nodiscard]] double number(std::uint64_t n) const {
     return gaussian(options.probing.seed, NoiseStream::StepGauge, n);
   }
   [[nodiscard]] std::uint64_t first_of(std::size_t face) const {
-    return face * (options.gauge.runs + 1);
+    return face * (4 * options.gauge.runs + 1);
   }
 };
 
@@ -48,7 +67,7 @@ struct GaugeDraw {
 void measure_gauge(TruthMachine machine, double length_m, const ReversalOptions& options,
                    ReversalRun& run) {
   const GaugeDraw draw{options};
-  const double noise_m = std::hypot(options.probing.machine_noise_m, options.probing.probe.noise_m);
+  const Vector3d travel = travel_of_tip(options);
   const std::vector<Vector3d> faces_m = gauge_faces_m(machine, length_m, options);
   machine.target_offset_m = options.tool_offset_m;
   run.gauge_origin_m = gauge_origin_m(machine, options);
@@ -56,9 +75,13 @@ void measure_gauge(TruthMachine machine, double length_m, const ReversalOptions&
 
   for (std::size_t i = 0; i < faces_m.size(); ++i) {
     auto& readings_m = run.readings_m.emplace_back();
-    for (std::size_t r = 0; r < options.gauge.runs; ++r)
-      readings_m.push_back(reading_at_m(machine, faces_m[i]).x() +
-                           noise_m * draw.number(draw.first_of(i) + 1 + r));
+    for (std::size_t r = 0; r < options.gauge.runs; ++r) {
+      const std::uint64_t n = draw.first_of(i) + 1 + 4 * r;
+      const Vector3d of_machine(draw.number(n), draw.number(n + 1), draw.number(n + 2));
+      readings_m.emplace_back(reading_at_m(machine, faces_m[i]) +
+                              options.probing.machine_noise_m * of_machine +
+                              options.probing.probe.noise_m * draw.number(n + 3) * travel);
+    }
   }
 }
 
@@ -93,6 +116,12 @@ std::vector<Measurement> reversal_plan(const TruthMachine& machine,
   return plan;
 }
 
+std::vector<Measurement> as_planned(std::vector<Measurement> plan, const ReversalOptions& options) {
+  for (Measurement& m : plan)
+    m.bar_x = inclined_x(options.planned_inclination_rad.value_or(options.inclination_rad));
+  return plan;
+}
+
 Vector3d gauge_origin_m(const TruthMachine& machine, const ReversalOptions& options) {
   return bar_origin_m(machine, options) + options.gauge.beside_bar_m -
          options.gauge.step_m * bar_x(options);
@@ -106,11 +135,22 @@ std::vector<double> gauge_distances_m(double bar_length_m, const StepGauge& gaug
   return distances_m;
 }
 
-std::vector<Vector3d> gauge_faces_m(const TruthMachine& machine, double bar_length_m,
-                                    const ReversalOptions& options) {
-  constexpr std::uint64_t kOfGauge = 1000000;
+Vector3d gauge_direction(const ReversalOptions& options) {
   const StepGauge& gauge = options.gauge;
   const GaugeDraw draw{options};
+  const double about_z_rad = gauge.turned_rad(0) + gauge.alignment_rad * draw.number(kOfGauge + 3);
+  const double about_y_rad = gauge.turned_rad(1) + gauge.alignment_rad * draw.number(kOfGauge + 4);
+  const Vector3d x = bar_x(options), y = Vector3d::UnitZ().cross(x);
+  return Eigen::AngleAxisd(about_z_rad, Vector3d::UnitZ()) *
+         (Eigen::AngleAxisd(about_y_rad, y) * x);
+}
+
+std::vector<Vector3d> gauge_faces_m(const TruthMachine& machine, double bar_length_m,
+                                    const ReversalOptions& options) {
+  const StepGauge& gauge = options.gauge;
+  const GaugeDraw draw{options};
+  const Vector3d travel = travel_of_tip(options);
+  const double along_gauge = travel.dot(gauge_direction(options));  // distance per travel
   const double slope = gauge.u_per_m * draw.number(kOfGauge);
   const double alpha_per_K = gauge.alpha_per_K + gauge.u_alpha_per_K * draw.number(kOfGauge + 1);
   const double true_C = gauge.temperature_C + gauge.u_temperature_K * draw.number(kOfGauge + 2);
@@ -121,7 +161,7 @@ std::vector<Vector3d> gauge_faces_m(const TruthMachine& machine, double bar_leng
     const double off_m =
         i == 0 ? 0.0 : gauge.u_m * draw.number(draw.first_of(i)) + slope * stated_m;
     const double true_m = (stated_m + off_m) * (1.0 + alpha_per_K * (true_C - kReference_C));
-    faces_m.emplace_back(gauge_origin_m(machine, options) + true_m * bar_x(options));
+    faces_m.emplace_back(gauge_origin_m(machine, options) + true_m / along_gauge * travel);
   }
   return faces_m;
 }
@@ -133,6 +173,7 @@ Result<ReversalRun> run_reversal(const TruthMachine& machine, const TrueBar& bar
   auto probed = probe_bar(machine, bar, run.plan, options.probing);
   if (!probed) return tl::unexpected(probed.error());
   run.probed = *std::move(probed);
+  run.plan = as_planned(std::move(run.plan), options);
   measure_gauge(machine, bar.pattern.length_m(), options, run);
   return run;
 }
@@ -151,15 +192,16 @@ std::string format_gauge_toml(const ReversalRun& run, const StepGauge& gauge,
       gauge.name, kUmPerM * gauge.u_m, kUmPerM * gauge.u_per_m, kUmPerM * gauge.alpha_per_K,
       kUmPerM * gauge.u_alpha_per_K, gauge.temperature_C, gauge.u_temperature_K,
       vector_mm(run.gauge_origin_m), vector_mm(tool_offset_m), kUmPerM * gauge.u_rotation_rad);
+  if (gauge.u_alignment_rad)
+    text += fmt::format("u_alignment_mrad = {:.17g}\n", kMradPerRad * *gauge.u_alignment_rad);
 
   for (std::size_t i = 0; i < run.distances_m.size(); ++i) {
     fmt::format_to(std::back_inserter(text), "\n[[step]]\ndistance_mm = {:.17g}\n",
                    kMmPerM * run.distances_m[i]);
     if (run.readings_m.empty()) continue;
-    std::vector<double> readings_mm;
-    for (const double r_m : run.readings_m[i]) readings_mm.push_back(kMmPerM * r_m);
-    fmt::format_to(std::back_inserter(text), "readings_mm = [{:.17g}]\n",
-                   fmt::join(readings_mm, ", "));
+    std::vector<std::string> readings_mm;
+    for (const Vector3d& r_m : run.readings_m[i]) readings_mm.push_back(vector_mm(r_m));
+    fmt::format_to(std::back_inserter(text), "readings_mm = [{}]\n", fmt::join(readings_mm, ", "));
   }
   return text;
 }

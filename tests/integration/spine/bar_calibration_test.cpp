@@ -159,16 +159,17 @@ TEST_F(BarReversal, WithoutAnOperatorOrFilesItIsRefused) {
   EXPECT_THAT(bad.err, HasSubstr("empty.toml"));
 
   write("half.toml", replaced(text_of(file("bar") + "/gauge.toml"), "distance_mm = 0\n",
-                              "distance_mm = 0\nreadings_mm = [25.0]\n"));
+                              "distance_mm = 0\nreadings_mm = [[25.0, 325.0, 175.0]]\n"));
   const auto half = run({ABBE_PROGRAM, "calibrate", "bar", "-c", file("abbed.toml"), "--bar",
                          file("bar") + "/nominal.toml", "--plan", file("bar") + "/plan.toml",
                          "--gauge", file("half.toml"), "-o", file("bar.toml")});
   EXPECT_EQ(half.code, 3) << half.err;
   EXPECT_THAT(half.err, HasSubstr("all have them or none"));
 
-  write("bar.gauge.toml", replaced(replaced(text_of(file("bar") + "/gauge.toml"),
-                                            "(distance_mm = .*)", "$1\nreadings_mm = [25.0]"),
-                                   "u_um = [0-9.e-]+", "u_um = 0.5"));
+  write("bar.gauge.toml",
+        replaced(replaced(text_of(file("bar") + "/gauge.toml"), "(distance_mm = .*)",
+                          "$1\nreadings_mm = [[25.0, 325.0, 175.0]]"),
+                 "u_um = [0-9.e-]+", "u_um = 0.5"));
   const auto stale = calibrate({});
   EXPECT_EQ(stale.code, 2) << stale.err;
   EXPECT_THAT(stale.err, HasSubstr("bar.gauge.toml: exists: --continue uses its readings"));

@@ -36,8 +36,9 @@ struct PassOnMachine {
                                                     std::size_t measurement, const Vector3& from_m,
                                                     const MachineTouchOptions& = {});
 
-/// All faces of the gauge in the direction of `bar_x`, `runs` times, every second run backward: run
-/// after run. BadInput as above, or without runs or faces.
+/// All faces of the gauge, `runs` times, every second run backward: run after run. The tip moves in
+/// the direction of bar_x of `normal`, along which the gauge lies: that of the bar as it lay
+/// (direction_of_bar()). BadInput as above, or without runs or faces.
 [[nodiscard]] Result<MachineTouches> gauge_on_machine(const StepGauge&, const Measurement& normal,
                                                       std::size_t runs, const Vector3& from_m,
                                                       const MachineTouchOptions& = {});

@@ -18,7 +18,7 @@ namespace abbe::daemon {
 ///   [gauge]  name, origin_mm, tool_offset_mm, u_um, u_um_per_m, temperature_C, u_temperature_K,
 ///            alpha_um_per_m_K and u_alpha_um_per_m_K (both or neither), u_rotation_urad,
 ///            u_alignment_mrad
-///   [[step]] distance_mm, readings_mm
+///   [[step]] distance_mm, readings_mm ([x, y, z] of each run)
 struct GaugeFile {
   InputFile source;
   calib::mfb::StepGauge gauge;

@@ -51,8 +51,10 @@ Diagonal diagonal_of(const ErrorFunctions& functions, const LineBox& box, std::s
                           down = diagonal_rows(functions, d, backward);
     Eigen::MatrixXd both(up.rows() + down.rows(), up.cols());
     both << up, down;
-    d.E = range_of(functions, both);
-    d.B = largest_of(functions, up - down);
+    if (!functions.has_undetermined_travel(up - down)) {
+      d.E = range_of(functions, both);
+      d.B = largest_of(functions, up - down);
+    }
   }
   return d;
 }

@@ -1,7 +1,11 @@
 #include "iso/error_functions.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "abbe/calib/otf/backlash.hpp"
+#include "elementary.hpp"
 
 namespace abbe::calib::iso {
 namespace {
@@ -27,6 +31,28 @@ const estimation::TableBasis& basis_of(const VolumetricModel& model) {
   return model.travel() != nullptr ? *model.travel_tables() : *model.tables();
 }
 
+/// Columns e = P^T L D^(1/2) z with cov = P^T L D L^T P and standard normal z. The same for a
+/// covariance in every run.
+Eigen::MatrixXd drawn_from(const Eigen::MatrixXd& covariance) {
+  constexpr Eigen::Index kDraws = 128;  // with their opposites: a mean to 6 % of the scatter
+  const Eigen::LDLT<Eigen::MatrixXd> factors(covariance);
+  NormalDeviates normal(1);
+  Eigen::MatrixXd z(covariance.rows(), kDraws);
+  for (double& one : z.reshaped()) {
+    one = normal.next();
+  }
+  z = factors.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal() * z;
+  z = factors.matrixL() * z;
+  return factors.transpositionsP().transpose() * z;
+}
+
+/// Coefficients are 1 for translations and metres for rotations: smaller ones are rounding.
+template <class Derived>
+bool is_none(const Eigen::MatrixBase<Derived>& coefficients) {
+  constexpr double kRounding = 1e-9;
+  return coefficients.cwiseAbs().maxCoeff() < kRounding;
+}
+
 }  // namespace
 
 ErrorFunctions::ErrorFunctions(const VolumetricModel& model)
@@ -34,6 +60,12 @@ ErrorFunctions::ErrorFunctions(const VolumetricModel& model)
   if (model.travel() != nullptr) {
     U_.conservativeResize(covariance_.rows());
     U_.tail(model.travel()->D.size()) = model.travel()->D;
+  }
+  drawn_errors_ = drawn_from(covariance_);
+
+  undetermined_.assign(static_cast<std::size_t>(model.U().size()), false);
+  for (const otf::Backlash& difference : otf::backlash_of(model)) {
+    undetermined_.push_back(!difference.determined);
   }
 }
 
@@ -67,34 +99,46 @@ Eigen::RowVectorXd ErrorFunctions::table_row(const Table& table, double position
 
 Value ErrorFunctions::with_u(const Eigen::RowVectorXd& row) const {
   const double variance = row * covariance_ * row.transpose();
-  return {value(row), std::sqrt(std::max(0.0, variance))};
+  return {value(row), std::sqrt(std::max(0.0, variance)), !is_none(row)};
+}
+
+bool ErrorFunctions::has_undetermined_travel(const Eigen::MatrixXd& rows) const {
+  for (Eigen::Index i = 0; i < rows.cols(); ++i) {
+    if (undetermined_[static_cast<std::size_t>(i)] && !is_none(rows.col(i))) {
+      return true;
+    }
+  }
+  return false;
 }
 
 Value range_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
-  Eigen::Index high = 0, low = 0;
-  double largest = functions.value(rows.row(0)), smallest = largest;
-  for (Eigen::Index i = 1; i < rows.rows(); ++i) {
-    const double value = functions.value(rows.row(i));
-    if (value > largest) {
-      largest = value;
-      high = i;
-    }
-    if (value < smallest) {
-      smallest = value;
-      low = i;
-    }
+  const Eigen::MatrixXd centred = rows.rowwise() - rows.colwise().mean();
+  Eigen::VectorXd y(rows.rows());
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    y(i) = functions.value(centred.row(i));
   }
-  return functions.with_u(rows.row(high) - rows.row(low));
+
+  const auto range = [](const Eigen::VectorXd& v) { return v.maxCoeff() - v.minCoeff(); };
+  Eigen::Index high = 0, low = 0;
+  y.maxCoeff(&high);
+  y.minCoeff(&low);
+  const Value difference = functions.with_u(rows.row(high) - rows.row(low));
+  const double excess = excess_of(y, centred * functions.drawn_errors(), range);
+  return {difference.value, std::hypot(difference.u, excess), !is_none(centred)};
 }
 
 Value largest_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
-  Eigen::Index at = 0;
-  for (Eigen::Index i = 1; i < rows.rows(); ++i) {
-    if (std::abs(functions.value(rows.row(i))) > std::abs(functions.value(rows.row(at)))) {
-      at = i;
-    }
+  Eigen::VectorXd y(rows.rows());
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    y(i) = functions.value(rows.row(i));
   }
-  return functions.with_u(rows.row(at));
+
+  const auto largest = [](const Eigen::VectorXd& v) { return v.cwiseAbs().maxCoeff(); };
+  Eigen::Index at = 0;
+  y.cwiseAbs().maxCoeff(&at);
+  const Value value = functions.with_u(rows.row(at));
+  const double excess = excess_of(y, rows * functions.drawn_errors(), largest);
+  return {value.value, std::hypot(value.u, excess), !is_none(rows)};
 }
 
 }  // namespace abbe::calib::iso

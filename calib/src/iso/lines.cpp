@@ -8,6 +8,9 @@ namespace {
 
 // [ISO 230-2] for axes up to 2 m; for longer ones fewer per metre are allowed.
 constexpr double kFewestTargets = 5.0, kFewestPerMetre = 5.0;
+// Models that are curved between their nodes: a chord differs from a polynomial of order 5 by less
+// than 1 % of its range.
+constexpr double kTargetsOfCurve = 41.0;
 
 /// The largest factor with which all corners of the box about `centre_m` are in the volume.
 double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
@@ -36,9 +39,9 @@ double largest_factor(const ValidityVolume& volume, const Vector3& centre_m,
 }
 
 /// Halves the longest interval until there are enough targets.
-void complete(std::vector<double>& targets_m) {
+void complete(std::vector<double>& targets_m, double least) {
   const double length_m = targets_m.back() - targets_m.front();
-  const double fewest = std::max(kFewestTargets, std::ceil(kFewestPerMetre * length_m - 1e-9));
+  const double fewest = std::max(least, std::ceil(kFewestPerMetre * length_m - 1e-9));
   while (static_cast<double>(targets_m.size()) < fewest) {
     std::size_t longest = 1;
     for (std::size_t i = 1; i < targets_m.size(); ++i) {
@@ -85,7 +88,7 @@ AxisLine line_of(const VolumetricModel& model, const LineBox& box, Axis axis) {
     }
   }
   line.targets_m.push_back(box.high_m(a));
-  complete(line.targets_m);
+  complete(line.targets_m, model.linear_between_nodes() ? kFewestTargets : kTargetsOfCurve);
   return line;
 }
 

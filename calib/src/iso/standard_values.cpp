@@ -24,9 +24,11 @@ Positioning positioning_of(const ErrorFunctions& functions, const AxisLine& line
                           down = line.rows(functions, component, Travel::Backward);
     Eigen::MatrixXd both(up.rows() + down.rows(), up.cols());
     both << up, down;
-    p.E = range_of(functions, both);
-    p.B = largest_of(functions, up - down);
-    p.mean_B = functions.with_u((up - down).colwise().mean());
+    if (!functions.has_undetermined_travel(up - down)) {
+      p.E = range_of(functions, both);
+      p.B = largest_of(functions, up - down);
+      p.mean_B = functions.with_u((up - down).colwise().mean());
+    }
   }
   return p;
 }

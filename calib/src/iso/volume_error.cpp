@@ -1,25 +1,45 @@
 #include <algorithm>
 #include <cmath>
 
-#include "abbe/calib/iso/standard_values.hpp"
 #include "abbe/calib/model_comparison.hpp"
+#include "iso/error_functions.hpp"
 
 namespace abbe::calib::iso {
 namespace {
 
-constexpr int kPerSide = 11;
-
-std::vector<Vector3> lattice_of(const LineBox& box) {
+std::vector<Vector3> lattice_of(const LineBox& box, int per_side) {
   std::vector<Vector3> points_m;
-  const Vector3 step_m = (box.high_m - box.low_m) / (kPerSide - 1.0);
-  for (int x = 0; x < kPerSide; ++x) {
-    for (int y = 0; y < kPerSide; ++y) {
-      for (int z = 0; z < kPerSide; ++z) {
+  const Vector3 step_m = (box.high_m - box.low_m) / (per_side - 1.0);
+  for (int x = 0; x < per_side; ++x) {
+    for (int y = 0; y < per_side; ++y) {
+      for (int z = 0; z < per_side; ++z) {
         points_m.push_back(box.low_m + step_m.cwiseProduct(Vector3(x, y, z)));
       }
     }
   }
   return points_m;
+}
+
+/// By how much noise raises the largest |V| on average. Neighbouring points of a fine lattice have
+/// the same errors: a coarse one is enough.
+double excess_of_largest(const ErrorFunctions& functions, const LineBox& box) {
+  constexpr int kPerSide = 5;
+  const std::vector<Vector3> points_m = lattice_of(box, kPerSide);
+  Eigen::VectorXd V_m(3 * std::ssize(points_m));
+  Eigen::MatrixXd errors_m(V_m.size(), functions.drawn_errors().cols());
+  Eigen::Index i = 0;
+  for (const Vector3& q_m : points_m) {
+    for (const Axis axis : kAllAxes) {
+      const auto component = static_cast<Eigen::Index>(index(axis));
+      const Eigen::RowVectorXd row = functions.row(q_m, Vector3::Unit(component));
+      V_m(i) = functions.value(row);
+      errors_m.row(i++) = row * functions.drawn_errors();
+    }
+  }
+
+  return excess_of(V_m, errors_m, [](const Eigen::VectorXd& all_m) {
+    return std::sqrt(all_m.reshaped(3, all_m.size() / 3).colwise().squaredNorm().maxCoeff());
+  });
 }
 
 }  // namespace
@@ -30,12 +50,13 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
     return tl::unexpected(box.error());
   }
 
+  constexpr int kPerSide = 11;
   const Vector3 tool_m = model.tool_offsets_m().front();
-  const std::vector<Vector3> lattice_m = lattice_of(*box);
+  const std::vector<Vector3> lattice_m = lattice_of(*box, kPerSide);
   VolumeError e{.points = lattice_m.size()};
   std::vector<Vector3> points_m, V_m;
   for (const Vector3& q_m : lattice_m) {
-    const VolumetricError at = model.error_at(q_m, tool_m);
+    const VolumetricError at = model.error_at(q_m, tool_m, estimation::AxisTravel{});
     points_m.push_back(q_m + tool_m);
     V_m.push_back(at.V_m);
     const double U_m = 2.0 * std::sqrt(std::max(0.0, at.cov_V_m2.trace()));
@@ -48,6 +69,7 @@ Result<VolumeError> volume_error(const VolumetricModel& model) {
     }
   }
 
+  e.largest.u = std::hypot(e.largest.u, excess_of_largest(ErrorFunctions(model), *box));
   const Result<ModelDifference> statistics = rigid_free(points_m, V_m);
   if (!statistics) {
     return tl::unexpected(statistics.error());

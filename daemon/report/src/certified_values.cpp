@@ -18,6 +18,14 @@ using calib::iso::Value;
 
 constexpr std::string_view kNoTravel =
     "the model has no differences between the directions of travel";
+constexpr std::string_view kUndetermined =
+    "the path does not determine the backlash: an axis moved in one direction only, or on too few "
+    "legs";
+constexpr std::string_view kNotInModel = "the model has no table for it, or too few nodes";
+/// Explains U of ranges and of largest values.
+constexpr std::string_view kOfRanges =
+    "Noise of the measurement makes a range larger; U contains this. A range that is not several "
+    "times as large as its U is an upper limit.";
 
 /// Decimals with which a number has two significant digits, 0 to 4; 3 for 0.
 int decimals_of(double number) {
@@ -31,7 +39,12 @@ std::string decimal_text(double number, int decimals) {
   return is_zero && text.front() == '-' ? text.substr(1) : text;
 }
 
+CertifiedValue not_estimable(std::string key, std::string name, std::string_view why) {
+  return {.key = std::move(key), .name = std::move(name), .why = std::string(why)};
+}
+
 CertifiedValue certified(std::string key, std::string name, const Value& value, bool is_angle) {
+  if (!value.in_model) return not_estimable(std::move(key), std::move(name), kNotInModel);
   const double scale = is_angle ? kUradPerRad : kUmPerM;
   const double U = 2.0 * scale * value.u;
   const int decimals = decimals_of(U);
@@ -52,11 +65,11 @@ CertifiedValue without_u(std::string key, std::string name, double length_m, dou
           .value_si = length_m};
 }
 
-/// Values that need both directions of travel.
+/// Values that need both directions of travel. `why`: why there are none.
 CertifiedValue of_both_directions(std::string key, std::string name,
-                                  const std::optional<Value>& value) {
+                                  const std::optional<Value>& value, std::string_view why) {
   if (value) return certified(std::move(key), std::move(name), *value, false);
-  return {.key = std::move(key), .name = std::move(name), .why = std::string(kNoTravel)};
+  return not_estimable(std::move(key), std::move(name), why);
 }
 
 ValueGroup volume_group(const calib::iso::VolumeError& e) {
@@ -66,7 +79,8 @@ ValueGroup volume_group(const calib::iso::VolumeError& e) {
                   "model, and without the rigid motion that fits best. U(V) = 2 "
                   "sqrt(u_x^2 + u_y^2 + u_z^2) of the model: |V| that is left after "
                   "compensation is below it with 95 to 99 %, apart from what the uncertainty does "
-                  "not contain.",
+                  "not contain. Noise of the measurement makes mean and largest |V| larger; U of "
+                  "the largest contains this, and the means have no U.",
                   e.points),
       {without_u("V.mean", "before: |V|, mean", e.mean_m, e.max_U_m),
        certified("V.max", "before: |V|, largest", e.largest, false),
@@ -78,25 +92,25 @@ ValueGroup volume_group(const calib::iso::VolumeError& e) {
        without_u("U.max", "after: U(V), largest", e.max_U_m, e.max_U_m)}};
 }
 
-ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
+ValueGroup positioning_group(const calib::iso::StandardValues& standard, std::string_view why) {
   ValueGroup group{
       "Positioning (ISO 230-1, ISO 230-2)",
       "V along the axis on the line through the centre of the box. M: range of the mean of both "
       "directions, which is the range of EXX, EYY, EZZ. E: range over both directions. B: largest "
       "reversal error, forward minus backward. E and B are stated only if the model has "
       "differences between the directions. A, R and s of ISO 230-2 need repeated approaches, "
-      "which a model does not contain. A range that is not several times as large as its U is an "
-      "upper limit: noise makes ranges larger.",
+      "which a model does not contain. " +
+          std::string(kOfRanges),
       {}};
   for (const calib::iso::Positioning& p : standard.positioning) {
     const char axis = letter(p.axis);
     group.values.push_back(certified(fmt::format("{}.M", axis),
                                      fmt::format("{0}: M, range of E{0}{0}", axis), p.M, false));
-    group.values.push_back(
-        of_both_directions(fmt::format("{}.E", axis),
-                           fmt::format("{}: E, bidirectional systematic deviation", axis), p.E));
-    group.values.push_back(of_both_directions(fmt::format("{}.B", axis),
-                                              fmt::format("{}: B, reversal error", axis), p.B));
+    group.values.push_back(of_both_directions(
+        fmt::format("{}.E", axis), fmt::format("{}: E, bidirectional systematic deviation", axis),
+        p.E, why));
+    group.values.push_back(of_both_directions(
+        fmt::format("{}.B", axis), fmt::format("{}: B, reversal error", axis), p.B, why));
   }
   return group;
 }
@@ -104,7 +118,8 @@ ValueGroup positioning_group(const calib::iso::StandardValues& standard) {
 ValueGroup straightness_group(const calib::iso::StandardValues& standard) {
   ValueGroup group{"Straightness (ISO 230-1)",
                    "Range of V across the axis, on the same lines, relative to the least-squares "
-                   "straight line over the travel.",
+                   "straight line over the travel. " +
+                       std::string(kOfRanges),
                    {}};
   for (const calib::iso::Straightness& s : standard.straightness) {
     const std::string name = calib::name(s.motion);
@@ -132,7 +147,8 @@ ValueGroup squareness_group(const calib::iso::StandardValues& standard) {
 ValueGroup angular_group(const calib::iso::StandardValues& standard) {
   ValueGroup group{"Angular errors (ISO 230-1)",
                    "Range over the box. Missing ones cannot be distinguished from other errors "
-                   "with the tools of this measurement.",
+                   "with the tools of this measurement. " +
+                       std::string(kOfRanges),
                    {}};
   for (const calib::iso::Angular& a : standard.angular) {
     const std::string name = calib::name(a.motion);
@@ -156,12 +172,13 @@ ValueGroup backlash_group(const calib::VolumetricModel& model) {
   return group;
 }
 
-ValueGroup diagonal_group(const calib::iso::StandardValues& standard) {
+ValueGroup diagonal_group(const calib::iso::StandardValues& standard, std::string_view why) {
   ValueGroup group{"Diagonals (ISO 230-6)",
                    "V along the body diagonals of the box. P: travel in positive direction of X, "
                    "Y, Z, N: in negative direction. M: range of the mean of both directions. E: "
                    "range over both directions, E_d the largest E; stated only if the model has "
-                   "differences between the directions.",
+                   "differences between the directions. " +
+                       std::string(kOfRanges),
                    {}};
   const calib::iso::Diagonal& longest = standard.diagonal_of_largest_M();
   group.values.push_back(
@@ -171,14 +188,14 @@ ValueGroup diagonal_group(const calib::iso::StandardValues& standard) {
       "E_d",
       worst != nullptr ? fmt::format("E_d, diagonal systematic deviation, of {}", worst->name)
                        : "E_d, diagonal systematic deviation",
-      worst != nullptr ? worst->E : std::nullopt));
+      worst != nullptr ? worst->E : std::nullopt, why));
   for (const calib::iso::Diagonal& d : standard.diagonals) {
     group.values.push_back(
         certified(d.name + ".M", fmt::format("{}: M, range", d.name), d.M, false));
     group.values.push_back(of_both_directions(
-        d.name + ".E", fmt::format("{}: E, bidirectional systematic deviation", d.name), d.E));
+        d.name + ".E", fmt::format("{}: E, bidirectional systematic deviation", d.name), d.E, why));
     group.values.push_back(
-        of_both_directions(d.name + ".B", fmt::format("{}: B, reversal error", d.name), d.B));
+        of_both_directions(d.name + ".B", fmt::format("{}: B, reversal error", d.name), d.B, why));
   }
   return group;
 }
@@ -194,10 +211,11 @@ Result<CertifiedValues> certified_values(const ModelDocument& document) {
                             standard ? volume.error().text : standard.error().text));
 
   CertifiedValues all{.standard = *standard, .volume = *volume, .groups = {}};
-  all.groups = {volume_group(*volume), positioning_group(*standard), straightness_group(*standard),
-                squareness_group(*standard)};
+  const std::string_view why = document.model.travel() == nullptr ? kNoTravel : kUndetermined;
+  all.groups = {volume_group(*volume), positioning_group(*standard, why),
+                straightness_group(*standard), squareness_group(*standard)};
   if (!standard->angular.empty()) all.groups.push_back(angular_group(*standard));
-  all.groups.push_back(diagonal_group(*standard));
+  all.groups.push_back(diagonal_group(*standard, why));
   if (document.model.travel() != nullptr) all.groups.push_back(backlash_group(document.model));
   return all;
 }

@@ -21,51 +21,64 @@ bool is_refused(const TrendPoint& point) {
   return point.subject->entry && !point.subject->entry->accepted;
 }
 
-/// One curve over the models that the gate did not refuse.
-template <class Member>
-Curve trend_curve(const std::vector<TrendPoint>& points, std::string name, Member member) {
-  Curve curve{.name = std::move(name), .x = {}, .y = {}};
+const CertifiedValue* value_of_key(const CertifiedValues& values, std::string_view key) {
+  for (const ValueGroup& group : values.groups)
+    for (const CertifiedValue& value : group.values)
+      if (value.key == key) return &value;
+  return nullptr;
+}
+
+/// One curve over the models that have the value and that the gate did not refuse.
+Curve trend_curve(const std::vector<TrendPoint>& points, const std::string& key) {
+  Curve curve{.name = key, .x = {}, .y = {}};
   for (const TrendPoint& point : points) {
-    if (is_refused(point)) continue;
-    const calib::iso::Value value = member(point.values);
+    const CertifiedValue* const found = value_of_key(point.values, key);
+    if (is_refused(point) || found == nullptr || found->value.empty()) continue;
     curve.x.push_back(point.days);
-    curve.y.push_back(kUmPerM * value.value);
-    curve.u.push_back(kUmPerM * value.u);
+    curve.y.push_back(kUmPerM * found->value_si);
+    curve.u.push_back(kUmPerM * found->u_si);
   }
   return curve;
 }
 
-LineChart empty_trend(std::string title, std::string y_label) {
-  return {.title = std::move(title),
-          .x_label = "days since the first model",
-          .y_label = std::move(y_label),
-          .wide = true};
+/// A chart with one curve for each of `keys` that at least one model has; none without such a key.
+void add_trend_chart(HtmlReport& page, const std::vector<TrendPoint>& points, std::string title,
+                     std::string y_label, const std::vector<std::string>& keys) {
+  LineChart chart{.title = std::move(title),
+                  .x_label = "days since the first model",
+                  .y_label = std::move(y_label),
+                  .wide = true};
+  for (const std::string& key : keys)
+    if (Curve curve = trend_curve(points, key); !curve.x.empty())
+      chart.curves.push_back(std::move(curve));
+  if (!chart.curves.empty()) page.plot(chart);
 }
 
 void add_trend_charts(HtmlReport& page, const std::vector<TrendPoint>& points) {
-  LineChart positioning = empty_trend("Positioning: M of each axis", "um");
-  LineChart squareness = empty_trend("Squareness", "urad");
-  LineChart diagonals = empty_trend("Diagonals: M of each", "um");
-  for (const calib::Axis axis : calib::kAllAxes)
-    positioning.curves.push_back(trend_curve(
-        points, std::string(1, letter(axis)),
-        [axis](const CertifiedValues& v) { return v.standard.positioning[index(axis)].M; }));
-  for (std::size_t k = 0; k < 3; ++k)
-    squareness.curves.push_back(
-        trend_curve(points, points.front().values.standard.squareness[k].name,
-                    [k](const CertifiedValues& v) { return v.standard.squareness[k].angle; }));
-  for (std::size_t k = 0; k < 4; ++k)
-    diagonals.curves.push_back(
-        trend_curve(points, points.front().values.standard.diagonals[k].name,
-                    [k](const CertifiedValues& v) { return v.standard.diagonals[k].M; }));
-  for (const LineChart* chart : {&positioning, &squareness, &diagonals}) page.plot(*chart);
+  const auto add = [&](std::string title, std::string unit, const std::vector<std::string>& keys) {
+    add_trend_chart(page, points, std::move(title), std::move(unit), keys);
+  };
+  add("Positioning: M of each axis", "um", {"X.M", "Y.M", "Z.M"});
+  add("Reversal error B of each axis", "um", {"X.B", "Y.B", "Z.B"});
+  for (const calib::Axis axis : calib::kAllAxes) {
+    const char a = letter(axis);
+    std::vector<std::string> straight;
+    for (const char in : {'X', 'Y', 'Z'})
+      if (in != a) straight.push_back(fmt::format("E{}{}", in, a));
+    add(fmt::format("Straightness of {}", a), "um", straight);
+  }
+  add("Squareness", "urad", {"EC0Y", "EB0Z", "EA0Z"});
+  for (const calib::Axis axis : calib::kAllAxes) {
+    const char a = letter(axis);
+    add(fmt::format("Angular errors of {}: range", a), "urad",
+        {fmt::format("EA{}", a), fmt::format("EB{}", a), fmt::format("EC{}", a)});
+  }
+  add("Diagonals: M of each", "um", {"PPP.M", "NPP.M", "PNP.M", "NNP.M"});
 }
 
 std::string text_of_key(const CertifiedValues& values, std::string_view key) {
-  for (const ValueGroup& group : values.groups)
-    for (const CertifiedValue& value : group.values)
-      if (value.key == key) return with_U(value);
-  return {};
+  const CertifiedValue* const value = value_of_key(values, key);
+  return value != nullptr ? with_U(*value) : std::string();
 }
 
 /// To minutes: "2024-05-17T08:30", the end of the measurement; "identified 2024-05-17T08:30" if that

@@ -5,9 +5,11 @@
 /// rigid motion of the whole volume; they are therefore the same in every gauge.
 ///
 /// Uncertainty: each value f is a linear function of the parameters, f = a U, u^2 = a cov(U) a^T
-/// ([GUM] 5.2.2 eq. (13)). A range max - min is evaluated as the difference at the two positions at
-/// which it occurs. The noise of the estimate makes a range larger than the true one on average: a
-/// range that is not several times as large as its U is an upper limit, not an estimate.
+/// ([GUM] 5.2.2 eq. (13)). A range max - min is the difference at the two positions at which it
+/// occurs. The noise of the estimate makes a range, and a largest |value|, larger than the true one
+/// by b on average; the value is not corrected for it, so that u^2 = a cov(U) a^T + b^2
+/// ([GUM] F.2.4.5). A range that is not several times as large as its U is an upper limit, not an
+/// estimate. The mean and the rms of |V| are raised likewise; they have no u.
 /// Not contained: the scatter of repeated approaches (a model has no repetitions, so the A, R and
 /// s of ISO 230-2 cannot be computed), errors between the nodes, and changes after the measurement.
 ///
@@ -26,6 +28,9 @@ namespace abbe::calib::iso {
 struct Value {
   double value = 0.0;
   double u = 0.0;
+  /// false: the value is 0 for all parameters of the model, for example the straightness of an axis
+  /// with two nodes. It is not known then.
+  bool in_model = true;
 };
 
 /// The box inside the validity volume in which the lines are: the bounding box of the volume, or,
@@ -42,13 +47,14 @@ struct LineBox {
 /// Positioning along one axis on the line through the centre of the box ([ISO 230-2]; terms there
 /// refer to mean deviations x_i of repeated approaches; here x_i is the component of V along the
 /// axis). Targets p_i: the nodes of the model inside the box and its ends, at least 5, and at least 5
-/// per metre.
+/// per metre; at least 41 if the model is curved between its nodes.
 ///     x_i up, x_i down: V for approaches forward and backward;  x_i: their mean;
 ///     B_i = x_i up - x_i down
 ///     M = max x_i - min x_i                        mean bidirectional positional deviation
 ///     B = the B_i with the largest |B_i|           reversal error, with its sign
 ///     E = max(x_i up, x_i down) - min(x_i up, x_i down)   bidirectional systematic deviation
-/// Without differences between the directions in the model, B and E are absent.
+/// B and E are absent without differences between the directions in the model, and if the path does
+/// not determine one that has an effect here (otf/backlash.hpp), because the axis moved one way only.
 struct Positioning {
   Axis axis = Axis::X;
   std::vector<double> targets_m;
@@ -60,8 +66,8 @@ struct Positioning {
 };
 
 /// Straightness of the functional point on the line of Positioning: range of the component of V
-/// after subtraction of the least-squares straight line over the travel ([ISO 230-1]), V being linear
-/// between the targets, so that the line does not depend on where the targets are dense.
+/// after subtraction of the least-squares straight line over the travel ([ISO 230-1]), V being taken
+/// as linear between the targets, so that the line does not depend on where the targets are dense.
 struct Straightness {
   ErrorMotion motion;
   std::vector<Value> deviation;  ///< from the reference line, at the targets of the axis
@@ -96,7 +102,8 @@ struct Diagonal {
   std::vector<double> along_m;  ///< distance from the beginning
   std::vector<Value> mean;      ///< mean of both directions of travel, relative to the beginning
   Value M;                      ///< range of the mean
-  /// Bidirectional systematic deviation: range over both directions; absent without backlash.
+  /// Bidirectional systematic deviation: range over both directions. Absent, as B, without backlash
+  /// and if the path does not determine that of each axis.
   std::optional<Value> E;
   std::optional<Value> B;  ///< reversal error of the largest size, with its sign
 };
@@ -121,11 +128,12 @@ struct StandardValues {
 struct VolumeError {
   std::size_t points = 0;
   double mean_m = 0.0, rms_m = 0.0;  ///< |V| before compensation
-  Value largest;                     ///< the largest |V|, u of V in its direction
+  Value largest;  ///< the largest |V|; u of V in its direction, and what noise adds on average
   /// The same without the rigid motion that fits best to the lattice.
   double rigid_free_mean_m = 0.0, rigid_free_rms_m = 0.0, rigid_free_max_m = 0.0;
-  /// U(V) = 2 sqrt(trace cov V). |V| that is left after compensation is below it with a probability
-  /// of 95 % (one uncertain direction) to 99 % (three alike).
+  /// U(V) = 2 sqrt(trace cov V), directions of travel unknown (volumetric_model.hpp). |V| that is left
+  /// after compensation is below it with a probability of 95 % (one uncertain direction) to 99 %
+  /// (three alike).
   double mean_U_m = 0.0, max_U_m = 0.0;
 };
 [[nodiscard]] Result<VolumeError> volume_error(const VolumetricModel&);

@@ -59,8 +59,9 @@ TEST(EmergencyReports, GiveOneFaultForTheCauseThatAControlRepeats) {
     while (const auto text = r.reports.take_fault(at)) faults.push_back(*text);
   };
   for (int i = 0; i < 5; ++i) control(can::ControlCause::NotHomed, kStart + 1s * i);
-  EXPECT_THAT(faults, testing::ElementsAre("encoder X (node 1): LinuxCNC is not homed"));
-  EXPECT_EQ(r.reports.condition(0b001, kStart + 5s), "X missing (node 1): LinuxCNC is not homed");
+  EXPECT_THAT(faults, testing::ElementsAre("encoder XYZ1 (node 1): LinuxCNC is not homed"));
+  EXPECT_EQ(r.reports.condition(0b001, kStart + 5s),
+            "XYZ1 missing (node 1): LinuxCNC is not homed");
 
   control(std::nullopt, kStart + 6s);
   EXPECT_EQ(r.reports.condition(0, kStart + 6s), "");

@@ -172,8 +172,8 @@ TEST_P(EveryFormat, StatesItsOriginAndValidityWhereItHasComments) {
                          .tool = "20, -15, -120 mm",
                          .direction = ""};
   std::string text;
-  for (const auto& file : write_export(made.facts->format, made.held, made.options).value())
-    text += file.text;
+  const auto files = write_export(made.facts->format, made.held, made.options).value();
+  for (const auto& file : files) text += file.text;
   for (const char* const stated :
        {"abbe export of model 00c0ffee", "machine: mill",
         "valid for X -300 to 300 mm, tool offset 20, -15, -120 mm", "sign: "}) {

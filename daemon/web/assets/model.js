@@ -235,7 +235,7 @@ async function chooser(id, beside) {
 
 function origin(model) {
   return facts("model", [
-    ["model", model.id], ["measured (UTC)", when(model.created)], ["method", model.method],
+    ["model", model.id], ["identified (UTC)", when(model.created)], ["method", model.method],
     ["machine", `${model.machine}, chain ${model.chain}`], ["tools", model.tools],
     ["solution", `${model.observations} observations, ${model.unknowns} unknowns, rank ` +
       `${model.rank}, condition ${model.condition.toPrecision(3)}, sigma0 ${fixed(model.sigma0, 3)}`],

@@ -478,7 +478,7 @@ TEST(VolumeErrorOfAModel, IsTheStatisticsOfV) {
   EXPECT_GE(volume.max_U_m, volume.mean_U_m);
 }
 
-/// Nobody knows from where an axis came: U(V) is that of DDS, with u of the difference.
+/// Without the direction of travel U(V) contains half the difference and its u, as over DDS.
 TEST(VolumeErrorOfAModel, ContainsTheUncertaintyOfTheBacklash) {
   const VolumetricModel model = with_backlash(0.0, 1e-6);
   const auto volume = iso::volume_error(model).value();

@@ -38,7 +38,8 @@ TEST(SameBits, PrintsAHashOfEveryResult) {
     EXPECT_NE(native().find(std::string(name) + ' '), std::string::npos) << name;
 }
 
-TEST(SameBits, WithAnotherCompilersOptimisation) {
+/// In the preset dev also by another compiler.
+TEST(SameBits, WithAnotherOptimisation) {
   expect_the_same(ABBE_IDENTIFY_X86_64);
 }
 

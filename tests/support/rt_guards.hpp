@@ -43,7 +43,15 @@ inline void allow_only_exit() {
   }
 }
 
-#if defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_THREAD__)  // GCC
+#define ABBE_THREAD_SANITIZER
+#elif defined(__has_feature)  // Clang
+#if __has_feature(thread_sanitizer)
+#define ABBE_THREAD_SANITIZER
+#endif
+#endif
+
+#ifdef ABBE_THREAD_SANITIZER
 // ThreadSanitizer maps its shadow memory on demand and uses futexes
 inline constexpr bool kSystemCallsAreOurs = false;
 #else

@@ -58,10 +58,12 @@ export async function viewFault({ page }) {
   return page.evaluate(() => document.querySelector("#view > div > p.bad")?.innerText ?? null);
 }
 
-/** Waits until the page shows the text, in the element of `selector`. */
+/** Waits until the page shows the text, in the element of `selector`. Looks at every change of the
+ * page: a state such as "acquiring" lasts 2 s here, and a loaded computer may draw no frame in that time. */
 export async function waitForText({ page }, text, selector = "body") {
   await page.waitForFunction(
-    (s, t) => document.querySelector(s)?.innerText.includes(t), { timeout: kPatience_ms }, selector, text)
+    (s, t) => document.querySelector(s)?.innerText.includes(t), { polling: "mutation", timeout: kPatience_ms },
+    selector, text)
     .catch(async (error) => {
       const shown = await page.evaluate((s) => document.querySelector(s)?.innerText ?? "(no such element)", selector);
       throw new Error(`"${text}" did not appear in ${selector}: ${error.message}\nshown:\n${shown}`);

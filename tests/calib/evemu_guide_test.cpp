@@ -104,6 +104,35 @@ TEST(TouchGuide, SaysBallOneThenTheBlocksThenTheOtherBalls) {
   EXPECT_THAT(order, testing::ElementsAre("ball 1", "block 1", "block 2", "ball 2"));
 }
 
+TEST(TouchGuide, CountsThePointsOfEachFeatureOfThePosition) {
+  Toucher t = toucher();
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1, 3);
+  const auto features = t.guide_.features();
+  ASSERT_THAT(features, SizeIs(11));
+  EXPECT_EQ(features[0].touched, 25u);
+  EXPECT_EQ(name(features[1].on), "block 1");
+  EXPECT_EQ(features[1].touched, 3u);
+  EXPECT_EQ(features[10].touched, 0u);
+}
+
+TEST(TouchGuide, KnowsWhereTheArrayStandsFromTheFirstTwoBallsAndTheFaces) {
+  Toucher t = toucher();
+  EXPECT_FALSE(t.guide_.features()[0].at_m);
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1);
+  t.touch_all(4, Feature::Block, 2);
+  EXPECT_TRUE(t.guide_.features()[0].at_m);
+  EXPECT_TRUE(t.guide_.features()[2].normal);
+  EXPECT_FALSE(t.guide_.features()[10].at_m) << "on which side of the faces the balls lie is open";
+
+  t.touch_all(4, Feature::Ball, 2);
+  const auto ball9 = t.guide_.features()[10].at_m;
+  ASSERT_TRUE(ball9);
+  const Vector3 measured = fit::fit_sphere(t.points(4, Feature::Ball, 9))->centre;
+  EXPECT_LT((*ball9 - measured).norm(), GuideOptions{}.max_off_expected_m);
+}
+
 TEST(TouchGuide, ATouchInTheSamePlaceCountsOnce) {
   Toucher t = toucher();
   const Vector3 p = t.points(4, Feature::Ball, 1)[0];

@@ -61,6 +61,10 @@ TEST_F(EvemuAcquisitionTest, ReportsWhatToTouchAndRunsFromTheFirstTouch) {
   touch(0);
   EXPECT_EQ(acquisition.phase(), AcquisitionPhase::Running);
   EXPECT_EQ(acquisition.next()->touched, 1u);
+  const auto features = acquisition.next()->features;
+  ASSERT_EQ(features->size(), 11u);
+  EXPECT_EQ(features->front().on, "ball 1");
+  EXPECT_EQ(features->front().touched, 1u);
 }
 
 TEST_F(EvemuAcquisitionTest, ATouchTheProbeIsNotQualifiedForIsNamedAndNotUsed) {

@@ -109,6 +109,22 @@ NextTouch TouchGuide::next() const {
           points_of(feature_)};
 }
 
+std::vector<FeatureProgress> TouchGuide::features() const {
+  std::vector<FeatureProgress> all;
+  for (std::size_t f = 0; f < passed_.size(); ++f) {
+    auto& seen = all.emplace_back(FeatureProgress{
+        .on = feature_at(f), .touched = site_->points(f).size(), .points = points_of(f)});
+    if (seen.on.feature == Feature::Ball) {
+      seen.at_m = site_->centre_m(static_cast<std::size_t>(seen.on.number) - 1);
+    } else if (const auto face = site_->face(f)) {
+      seen.at_m = face->point;
+      seen.normal = face->normal;
+    }
+  }
+
+  return all;
+}
+
 std::size_t TouchGuide::planned() const {
   const std::size_t balls = setup_->calibrator.balls.size();
   return plan().positions.size() * (balls * plan().points_per_ball + 2 * plan().points_per_block);

@@ -245,6 +245,13 @@ bool Site::is_sided(const fit::Plane& face) const {
   return (face.point - *ball1_m_).dot(face.normal) > 2.0 * options_.max_off_expected_m;
 }
 
+/// While several assumptions about the sides of the faces are left, only Ball1 has one place.
+std::optional<Vector3> Site::centre_m(std::size_t ball) const {
+  if (ball == 0) return ball1_m_;
+  if (candidates_.size() != 1) return std::nullopt;
+  return candidates_.front().centres_m[ball];
+}
+
 std::vector<double> Site::possible_sides(std::size_t block, const fit::Plane& face) const {
   const auto& known = sides_[block - 1];
   return known && is_sided(face) ? std::vector{*known} : std::vector{1.0, -1.0};

@@ -39,6 +39,10 @@ class Site {
   /// infinity if no place is known.
   [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
 
+  /// Index of a ball, from 0. nullopt: the touches leave its place open.
+  [[nodiscard]] std::optional<Vector3> centre_m(std::size_t ball) const;
+  /// The plane of a touched face, with the normal away from Ball1; nullopt: too few points.
+  [[nodiscard]] std::optional<fit::Plane> face(std::size_t block) const;
   [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const {
     return points_[feature];
   }
@@ -67,7 +71,6 @@ class Site {
   [[nodiscard]] std::optional<std::size_t> ball_of(const Vector3& p_m, std::size_t expected) const;
   [[nodiscard]] FeatureCheck check_ball(std::size_t feature) const;
   [[nodiscard]] FeatureCheck check_face(std::size_t feature) const;
-  [[nodiscard]] std::optional<fit::Plane> face(std::size_t block) const;
   [[nodiscard]] bool is_sided(const fit::Plane& face) const;
   [[nodiscard]] std::vector<double> possible_sides(std::size_t block, const fit::Plane& face) const;
   void place_balls();

@@ -58,6 +58,17 @@ json device_json(const StreamHealth& h) {
           {"latency_counts", latency_json(h.latency)}};
 }
 
+json features_json(const std::vector<FeatureToTouch>& features) {
+  json out = json::array();
+  for (const FeatureToTouch& f : features) {
+    json& feature =
+        out.emplace_back(json{{"on", f.on}, {"touched", f.touched}, {"points", f.points}});
+    if (f.at_m) feature["at_m"] = *f.at_m;
+    if (f.normal) feature["normal"] = *f.normal;
+  }
+  return out;
+}
+
 json next_json(const RequestedTouch& next) {
   json out{{"place", next.place + 1},
            {"on", next.on},
@@ -67,6 +78,7 @@ json next_json(const RequestedTouch& next) {
     out["position"] = next.position;
   else
     out["measurement"] = next.measurement;
+  if (next.features) out["features"] = features_json(*next.features);
   return out;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <memory>
 #include <span>
 #include <utility>
 
@@ -30,6 +32,22 @@ std::string outside(const calib::Vector3& reading_m,
       "the axis",
       "XYZ"[axis], kMmPerM * reading_m[static_cast<Eigen::Index>(axis)], kMmPerM * nodes_m.front(),
       kMmPerM * nodes_m.back());
+}
+
+std::optional<std::array<double, 3>> xyz(const std::optional<calib::Vector3>& v) {
+  if (!v) return std::nullopt;
+  return std::array{v->x(), v->y(), v->z()};
+}
+
+std::shared_ptr<const std::vector<FeatureToTouch>> features_of(const evemu::TouchGuide& guide) {
+  std::vector<FeatureToTouch> features;
+  for (const evemu::FeatureProgress& f : guide.features())
+    features.push_back({.on = evemu::name(f.on),
+                        .touched = f.touched,
+                        .points = f.points,
+                        .at_m = xyz(f.at_m),
+                        .normal = xyz(f.normal)});
+  return std::make_shared<const std::vector<FeatureToTouch>>(std::move(features));
 }
 
 }  // namespace
@@ -65,7 +83,8 @@ std::optional<RequestedTouch> EvemuAcquisition::next() const {
                         .place = next.place,
                         .on = evemu::name(next.on),
                         .touched = next.touched,
-                        .points = next.points};
+                        .points = next.points,
+                        .features = features_};
 }
 
 void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
@@ -109,6 +128,7 @@ void EvemuAcquisition::end(std::string reason) {
 }
 
 void EvemuAcquisition::report_next_step() {
+  features_ = features_of(guide_);
   const auto next = guide_.next();
   reason_ =
       fmt::format("position {} ({} of {}): touch {}, {} points", next.position, next.place + 1,

@@ -55,6 +55,17 @@ struct NextTouch {
   std::size_t points = 0;   ///< points planned on this feature
 };
 
+/// A feature at the position that is being touched.
+struct FeatureProgress {
+  TouchedFeature on;
+  std::size_t touched = 0;  ///< points taken
+  std::size_t points = 0;   ///< points planned
+  /// In machine coordinates: the centre of a ball, the centroid of the points on a face. nullopt:
+  /// the touches of this position do not determine it yet.
+  std::optional<Vector3> at_m{};
+  std::optional<Vector3> normal{};  ///< of a face, towards either side; nullopt as for at_m
+};
+
 /// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched
 /// before; Doubled: the feature already has all its points; NotOnFeature: the touch is on no known
 /// feature, or was ignored because the guide is complete or has failed, or because the feature
@@ -84,6 +95,8 @@ class TouchGuide {
   [[nodiscard]] const std::optional<Error>& failure() const { return failure_; }
   /// Must not be called once complete().
   [[nodiscard]] NextTouch next() const;
+  /// The features at the current position in measuring order. Must not be called once complete().
+  [[nodiscard]] std::vector<FeatureProgress> features() const;
   [[nodiscard]] std::size_t taken() const;
   [[nodiscard]] std::size_t planned() const;
   /// Taken touches of the finished positions and of the current one.

@@ -1,6 +1,7 @@
 #pragma once
 /// State of a calibration session, as recorded, published and shown. Pure data.
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -48,6 +49,16 @@ struct LiveTables {
   double variance_factor = 1.0;
 };
 
+/// A feature of a ball array at the position that is being touched.
+struct FeatureToTouch {
+  std::string on;           ///< "ball 3", "block 1"
+  std::size_t touched = 0;  ///< points taken
+  std::size_t points = 0;   ///< points planned
+  /// Centre of a ball, or of the touched points of a block; nullopt: not known yet.
+  std::optional<std::array<double, 3>> at_m{};
+  std::optional<std::array<double, 3>> normal{};  ///< of the face of a block
+};
+
 /// The touch that a guided acquisition asks for.
 struct RequestedTouch {
   int position = 0;         ///< of a ball array, from 1; 0: `measurement` names it
@@ -56,6 +67,9 @@ struct RequestedTouch {
   std::string on;           ///< the feature: "ball 3", "hole 4"
   std::size_t touched = 0;  ///< points taken on this feature
   std::size_t points = 0;   ///< points planned on this feature
+  /// In measuring order; null: not a ball array. Shared with replies that other threads write; never
+  /// changed.
+  std::shared_ptr<const std::vector<FeatureToTouch>> features{};
 };
 
 struct SessionStatus {

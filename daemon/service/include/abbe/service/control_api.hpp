@@ -30,6 +30,10 @@
 /// "status" contains it in the "orders" of "tracker", with "outcome" "running", "done", "refused"
 /// or "failed" and its "text".
 ///
+/// While a ball array is touched, "next" of "session" contains the "features" of the position: "on",
+/// the points "touched" of "points" and, as soon as the touches determine them, "at_m" (centre of a
+/// ball, or of the points on a block) and the "normal" of a block.
+///
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of
 /// "status" alone; "calibration" the "request" of the present or last session. "activate" and

@@ -6,6 +6,7 @@
 /// the time. Not for the RT path; not thread-safe. Positions are scale readings in m.
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -96,6 +97,7 @@ class EvemuAcquisition {
   TouchIntake intake_;
   Phase phase_ = Phase::WaitingAtStart;
   std::string reason_;
+  std::shared_ptr<const std::vector<FeatureToTouch>> features_;  ///< made again after each touch
 };
 
 }  // namespace abbe::daemon

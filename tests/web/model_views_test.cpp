@@ -46,6 +46,22 @@ TEST_F(ModelViewsTest, AModelThatIsAddedIsInHistoryAndTrend) {
   EXPECT_EQ(nlohmann::json::parse(views_.history().value())["models"].size(), 2u);
 }
 
+TEST_F(ModelViewsTest, AModelIsShownWithItsVerdictAndTheEventsThatCameLater) {
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  const daemon::StoreActor anna{.who = "anna", .why = "step gauge passed", .when = {}};
+  const auto id =
+      store->add(daemon::test::synthetic_document(1), false, {"held-out rms 9 um"}, anna);
+  ASSERT_TRUE(id);
+  const auto before = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  EXPECT_EQ(before["lamp"], "red");
+  EXPECT_EQ(before["reasons"][0], "held-out rms 9 um");
+  ASSERT_TRUE(store->activate(*id, anna, true));
+  const auto after = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  EXPECT_THAT(after["text"], HasSubstr("It is the active model"));
+  EXPECT_THAT(after["notes"].dump(), HasSubstr("activated against the verdict by anna"));
+  EXPECT_EQ(after["reasons"], before["reasons"]);
+}
+
 TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {
   const std::string id = add(1);
   const std::string before = views_.report(id).value();

@@ -8,6 +8,7 @@
 
 #include "abbe/report/html_report.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/report/verdict_in_words.hpp"
 
 namespace abbe::daemon {
 
@@ -36,14 +37,6 @@ inline constexpr std::string_view kResidualsOfParts =
 /// Of an update (`[drift] continuous`): whose residuals and statistics are reported. Empty: those of
 /// the model itself.
 [[nodiscard]] std::string whose_residuals(const ModelDocument& document);
-
-/// The state of a model as a lamp and in words.
-struct VerdictInWords {
-  Signal signal = Signal::Unlit;
-  std::string text;
-  std::vector<std::string> reasons, notes;
-};
-[[nodiscard]] VerdictInWords verdict_in_words(const ReportSubject& subject);
 
 /// "1.23 +- 0.45 um", "1.2 um", "not estimable".
 [[nodiscard]] std::string with_U(const CertifiedValue& value);

@@ -1,5 +1,5 @@
-// One model, or one beside another: error motions with bands, the field in space, residuals, what it
-// does not know. Address: #model/ID or #model/ID/OTHER.
+// One model, or one beside another: verdict, error motions with bands, the field in space, residuals,
+// signs, what it does not know. Address: #model/ID or #model/ID/OTHER.
 
 import { draw } from "./charts.js";
 import { facts, fixed, h, list, table, when } from "./dom.js";
@@ -29,6 +29,21 @@ function alongPath(model) {
   return [{ title: "Residuals along the path, rms", x_label: "length of the path, m", y_label: "um",
     curves: [{ name: "before", x: run.at_m, y: run.before_um },
              { name: "after", x: run.at_m, y: run.after_um }] }];
+}
+
+/** The lamp of the report; its text also says the colour. */
+function verdict({ lamp, text, reasons, notes }) {
+  const lamps = h("span", { class: "lamps", "aria-hidden": "true" },
+    ["red", "yellow", "green"].map((colour) => h("span", { class: colour === lamp ? `lamp ${colour}` : "lamp" })));
+  const under = (title, items) => (items.length ? h("div", {}, h("h3", {}, title), list(items)) : null);
+  return h("section", { id: "verdict", "data-lamp": lamp }, h("h2", {}, "Verdict"),
+    h("div", { class: "signal" }, lamps, h("strong", {}, text)),
+    h("div", { class: "columns" }, under("Reasons against it", reasons),
+      under("Notes, no reasons against the model", notes)));
+}
+
+function signs(model) {
+  return h("section", { id: "signs" }, h("h2", {}, "Signs"), list(model.signs));
 }
 
 function unknowns(model) {
@@ -224,7 +239,7 @@ function origin(model) {
     ["machine", `${model.machine}, chain ${model.chain}`], ["tools", model.tools],
     ["solution", `${model.observations} observations, ${model.unknowns} unknowns, rank ` +
       `${model.rank}, condition ${model.condition.toPrecision(3)}, sigma0 ${fixed(model.sigma0, 3)}`],
-    ["gauge", model.gauge], ["recording", model.recording_gap],
+    ["gauge", model.gauge],
     ["inputs", model.inputs.map((i) => i.name).join(", ")]]);
 }
 
@@ -244,10 +259,10 @@ export async function show(place) {
       h("label", { for: "compare-choice" }, "Compare with"), choice.compare,
       h("a", { href: `reports/${choice.shown}`, target: "_blank" }, "Report to print"),
       h("a", { href: `models/${choice.shown}`, download: "model.json" }, "model.json")),
-    origin(model), ...residuals(model), h("h2", {}, "The error in space"));
+    verdict(model.verdict), origin(model), ...residuals(model), h("h2", {}, "The error in space"));
   const space = h("div");
   const motions = h("div");
-  place.append(space, h("h2", {}, "Error motions"), motions, unknowns(model),
+  place.append(space, h("h2", {}, "Error motions"), motions, unknowns(model), signs(model),
     h("h2", {}, "Values of the standards"), ...values(model, other));
 
   const ends = [listen("store", async () => {

@@ -1,5 +1,6 @@
 #include "model_json.hpp"
 
+#include <array>
 #include <cmath>
 
 #include "abbe/base/units.hpp"
@@ -8,6 +9,7 @@
 #include "abbe/report/certified_values.hpp"
 #include "abbe/report/model_figures.hpp"
 #include "abbe/report/model_words.hpp"
+#include "abbe/report/verdict_in_words.hpp"
 
 namespace abbe::web {
 namespace {
@@ -91,8 +93,16 @@ json residuals_json(const daemon::ModelDocument& document) {
     after.push_back(kUmPerM * interval.after_m);
   }
   out["along_path"] = {{"at_m", at}, {"before_um", before}, {"after_um", after}};
-  out["notes"] = run.notes;
   return out;
+}
+
+json verdict_json(const daemon::ReportSubject& subject) {
+  constexpr std::array kLamps{"red", "yellow", "green", ""};
+  const daemon::VerdictInWords verdict = daemon::verdict_in_words(subject);
+  return {{"lamp", kLamps.at(static_cast<std::size_t>(verdict.signal))},
+          {"text", verdict.text},
+          {"reasons", verdict.reasons},
+          {"notes", verdict.notes}};
 }
 
 json values_json(const daemon::ModelDocument& document) {
@@ -115,7 +125,8 @@ json values_json(const daemon::ModelDocument& document) {
 
 }  // namespace
 
-json model_json(const daemon::ModelDocument& document) {
+json model_json(const daemon::ReportSubject& subject) {
+  const daemon::ModelDocument& document = subject.document;
   const auto& s = document.statistics;
   json inputs = json::array();
   for (const auto& input : document.inputs)
@@ -134,7 +145,7 @@ json model_json(const daemon::ModelDocument& document) {
           {"condition", s.condition},
           {"sigma0", s.sigma0},
           {"inputs", std::move(inputs)},
-          {"recording_gap", document.recording_gap},
+          {"verdict", verdict_json(subject)},
           {"charts", charts_json(document.model)},
           {"field", field_json(document.model)},
           {"residuals", residuals_json(document)},

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "abbe/model/model_document.hpp"
+#include "abbe/report/model_report.hpp"
 
 namespace abbe::web {
 
-[[nodiscard]] nlohmann::json model_json(const daemon::ModelDocument& document);
+[[nodiscard]] nlohmann::json model_json(const daemon::ReportSubject& subject);
 
 }  // namespace abbe::web

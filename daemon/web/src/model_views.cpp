@@ -112,9 +112,14 @@ std::string stamp_of(const std::filesystem::path& file) {
                      seen.st_size);
 }
 
+/// Of the state file, which has verdicts and events.
+std::string events_stamp(const ModelStore& store) {
+  const auto state = store.stamp();
+  return fmt::format("{} {} {};", state.inode, state.modified_ns, state.bytes);
+}
+
 /// The stamps of the state file and of all models: much less work than to read the models.
 std::string stamp_of(const ModelStore& store) {
-  const auto state = store.stamp();
   const auto folder = store.model_path("any").parent_path();
   std::vector<std::string> models;
   std::error_code error;
@@ -122,8 +127,7 @@ std::string stamp_of(const ModelStore& store) {
        at.increment(error))
     models.push_back(at->path().filename().string() + " " + stamp_of(at->path()));
   std::ranges::sort(models);  // the order of a folder is arbitrary
-  return fmt::format("{} {} {};{}", state.inode, state.modified_ns, state.bytes,
-                     fmt::join(models, ""));
+  return events_stamp(store) + fmt::format("{}", fmt::join(models, ""));
 }
 
 Result<std::string> history_text(const ModelStore& store) {
@@ -218,11 +222,11 @@ Result<std::string> ModelViews::model(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
   if (!id) return tl::unexpected(id.error());
-  return kept("model " + *id, stamp_of(store.model_path(*id)), making_model_,
+  return kept("model " + *id, stamp_of(store.model_path(*id)) + events_stamp(store), making_model_,
               [&]() -> Result<std::string> {
-                const auto document = store.load(*id);
-                if (!document) return tl::unexpected(document.error());
-                return text_of(model_json(*document));
+                const auto subject = daemon::report_subject(store, *id);
+                if (!subject) return tl::unexpected(subject.error());
+                return text_of(model_json(*subject));
               });
 }
 

@@ -29,9 +29,9 @@ class ModelViews {
 
   /// {"models": [newest first], "events": [newest first]}.
   [[nodiscard]] daemon::Result<std::string> history();
-  /// A model: what it is based on, error motions with u, field of V with U, validity volume,
-  /// residuals before and after, and what it does not know. `id` may be "active". The text is kept
-  /// for the models that were asked for last.
+  /// A model: verdict with reasons and notes, what it is based on, error motions with u, field of V
+  /// with U, validity volume, residuals before and after, and what it does not know. `id` may be
+  /// "active". The text is kept for the models that were asked for last.
   [[nodiscard]] daemon::Result<std::string> model(const std::string& id);
   /// Certified values of all accepted models of the store, oldest first:
   /// {"models": [{"id", "created"}], "values": [{"key", "name", "unit", "value": [], "u": []}]}.

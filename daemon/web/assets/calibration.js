@@ -13,8 +13,11 @@ const may = () => ["calibrate", "administer"].includes(state.me.role);
 function nextTouch(next) {
   if (!next) return [];
   const of = next.measurement ? `measurement ${next.measurement}` : `position ${next.position}`;
+  const features = next.features ?? [];
+  const touched = features.filter((f) => f.touched >= f.points).length;
   return [h("p", {}, h("strong", {}, `Next: ${next.on}`), ` of ${of}; `,
-    `${next.touched} of ${next.points} points touched`)];
+    `${next.touched} of ${next.points} points touched`,
+    features.length ? `; ${touched} of ${features.length} balls and blocks of this position are complete` : "")];
 }
 
 function liveTables(live) {
@@ -47,6 +50,9 @@ function sessionParts(session) {
   ].filter((part) => part !== null);
 }
 
+// Colours of what is drawn: a place to go to, one that is done, the next one.
+const kOpen = 0x6e7f90, kTouched = 0x2fd3a0, kNext = 0xe69f00;
+
 /** The first three axes in mm; null while one of them is not known. */
 function place_mm(positions_m) {
   const known = (positions_m ?? []).slice(0, 3).filter((x) => typeof x === "number");
@@ -63,15 +69,16 @@ function corners(points) {
 /** The path to drive and the driven path; returns what ends it. */
 async function pathView(place, path_mm, driven_mm) {
   const space = await Space.create(place, ...corners(path_mm), "Path to drive and driven path");
-  space.path(path_mm, 0x6e7f90);
+  space.path(path_mm, kOpen);
   const driven = [...driven_mm];
   let line = null, ball = null;
   const redraw = () => {
     space.remove(line);
-    if (driven.length > 1) line = space.path(driven, 0xe69f00);
+    if (driven.length > 1) line = space.path(driven, kNext);
+    space.frame.dataset.driven = driven.length;
     const at = place_mm(state.live);
     if (at) {
-      ball ??= space.ball(at, 0.012 * space.size, 0x2fd3a0);
+      ball ??= space.ball(at, 0.012 * space.size, kTouched);
       ball.position.set(...at);
     }
     space.draw();
@@ -90,34 +97,117 @@ async function pathView(place, path_mm, driven_mm) {
   return () => { stop(); space.end(); };
 }
 
-/** The balls of an array, with the one that is to be touched next; returns what ends it. */
-async function artefactView(place, balls) {
-  const at = balls.map((b) => b.at_mm);
-  const space = await Space.create(place, ...corners(at), "Ball array with the next ball");
-  const radius = balls[0].radius_mm > 0 ? balls[0].radius_mm : 0.02 * space.size;
-  const drawn = balls.map((b) => {
-    space.text(String(b.number), new THREE.Vector3(b.at_mm[0], b.at_mm[1], b.at_mm[2] + 2.2 * radius));
-    return space.ball(b.at_mm, radius, 0x6e7f90);
+const mm = (metres) => metres.map((x) => 1e3 * x);
+const along = (v, n) => v.reduce((sum, x, i) => sum + x * n[i], 0);
+
+/** Balls and blocks with their places, mm. They stand in the machine (`posed`) as soon as the touches
+ * of the position show all of them; until then in the frame of the array. Its file states in which
+ * direction a block faces, not where it is: it is drawn beside the balls in this direction. */
+function featuresOf(calibrator, next) {
+  const seen = new Map((next?.features ?? []).map((f) => [f.on, f]));
+  const posed = seen.size > 0 && [...seen.values()].every((f) => f.at_m);
+  const touched = (on) => (seen.get(on)?.touched ?? 0) > 0;
+  const centres = calibrator.balls.map((b) => mm(b.centre_m));
+  const centre = [0, 1, 2].map((i) => centres.reduce((sum, c) => sum + c[i], 0) / centres.length);
+  const radius = 1e3 * Math.max(...calibrator.balls.map((b) => b.radius_m));
+  const balls = calibrator.balls.map((b) => ({ on: `ball ${b.number}`, name: String(b.number), radius: 1e3 * b.radius_m }))
+    .map((b, i) => ({ ...b, at: posed ? mm(seen.get(b.on).at_m) : centres[i], touched: touched(b.on) }));
+  const blocks = calibrator.blocks.map((b) => {
+    const on = `block ${b.number}`, length = Math.hypot(...b.normal);
+    const out = b.normal.map((x) => x / length);
+    const reach = Math.max(...centres.map((c) => along(c, out))) - along(centre, out) + 3 * radius;
+    return { on, name: `block ${b.number}`, side: 2 * radius, touched: touched(on),
+      at: posed ? mm(seen.get(on).at_m) : centre.map((x, i) => x + reach * out[i]),
+      normal: posed ? seen.get(on).normal : out };
   });
-  const mark = () => {
-    const on = state.status?.session.next?.on ?? "";
-    drawn.forEach((ball, i) => ball.material.color.set(on === `ball ${balls[i].number}` ? 0xe69f00 : 0x6e7f90));
+  return { posed, all: [...balls, ...blocks], radius };
+}
+
+/** What tells two drawings apart: the machine with its position of the array, or the array alone. */
+const frameOf = ({ posed }, next) => (posed ? `position ${next.position}` : "array");
+
+/** The array once, with what is touched and what is next; `arm`: see Space.create(). */
+async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
+  const margin = 2 * features.radius;
+  const [low, high] = corners(features.all.map((f) => f.at));
+  const space = await Space.create(place, low.map((x) => x - margin), high.map((x) => x + margin), "Ball array", arm);
+  for (const f of features.all)
+    space.text(f.name, new THREE.Vector3(f.at[0], f.at[1], f.at[2] + 2.2 * (f.radius ?? f.side / 2)));
+  space.frame.dataset.frame = frame;
+  let drawn = [], tip = null;
+  const mark = ({ all, posed }, next) => {
+    drawn.forEach((object) => space.remove(object));
+    drawn = all.map((f) => {
+      const isNext = f.on === next?.on;
+      const colour = isNext ? kNext : f.touched ? kTouched : kOpen;
+      const outline = !isNext && !f.touched, larger = isNext ? 1.3 : 1;
+      return f.normal ? space.plate(f.at, f.normal, larger * f.side, colour, outline)
+        : space.ball(f.at, larger * f.radius, colour, outline);
+    });
+    space.frame.dataset.next = next?.on ?? "";
+    space.frame.dataset.touched = all.filter((f) => f.touched).map((f) => f.on).join();
+    space.name(`Ball array ${posed ? "in the machine" : "in its own frame"}. Next: ${next?.on ?? "nothing"}. ` +
+      `Touched: ${space.frame.dataset.touched || "nothing"}`);
+  };
+  const showTip = () => {
+    const at = features.posed ? place_mm(state.live) : null;
+    if (!at) return;
+    tip ??= space.ball(at, 0.25 * features.radius, 0xcc79a7);
+    tip.position.set(...at);
     space.draw();
   };
-  mark();
-  const stop = listen("status", mark);
-  return () => { stop(); space.end(); };
+  return { space, frame, mark, showTip };
+}
+
+/** The balls and blocks of an array, with the one that is to be touched next; returns what ends it. */
+async function artefactView(place, calibrator) {
+  const words = h("p", { class: "weak" });
+  const view = h("div");
+  place.append(view, words);
+  let next = state.status?.session.next ?? null;
+  let drawing = null, shown = "", ended = false, busy = false;
+  const show = async () => {
+    const features = featuresOf(calibrator, next);
+    const frame = frameOf(features, next);
+    if (drawing?.frame !== frame) {
+      const arm = drawing?.space.arm;
+      drawing?.space.end();
+      drawing = null;
+      view.replaceChildren();
+      const made = await arrayDrawing(view, features, frame, arm);
+      if (ended) return made.space.end();
+      drawing = made;
+    }
+    drawing.mark(features, next);
+    drawing.showTip();
+    words.textContent = "Outline: not touched yet. Filled: touched. Orange and larger: touched next. " +
+      (features.posed ? "The array as it stands in the machine, with the tip." :
+        "The array in its own frame, with the blocks beside it: where it stands is known once both blocks and the first balls are touched.");
+  };
+  const follow = async (status) => {
+    const now = status?.session.next;
+    const key = JSON.stringify(now);
+    if (!now || key === shown || busy) return;  // at the end the last drawing stays
+    shown = key;
+    next = now;
+    busy = true;
+    await show().finally(() => { busy = false; });
+  };
+  await show();
+  const fault = (error) => { words.textContent = error.message; };
+  const ends = [listen("status", (status) => follow(status).catch(fault)), listen("live", () => drawing?.showTip())];
+  return () => {
+    ended = true;
+    ends.forEach((end) => end());
+    drawing?.space.end();
+  };
 }
 
 /** The planned places of a Multi-Feature Bar, with the one that is to be touched next. */
 async function barView(place, bars) {
   const space = await Space.create(place, ...corners(bars.flatMap((b) => b.holes_mm)),
-    "Places of the bar with the next hole");
-  for (const bar of bars) {
-    space.path(bar.holes_mm, 0x6e7f90);
-    space.dots(bar.holes_mm, 0x6e7f90, 0.008);
-  }
-  let shown = "", drawn = [];
+    "Places of the bar");
+  let shown = null, drawn = [];
   const mark = () => {
     const next = state.status?.session.next;
     const now = next ? `${next.measurement} ${next.on}` : "";
@@ -125,31 +215,28 @@ async function barView(place, bars) {
     shown = now;
     drawn.forEach((object) => space.remove(object));
     drawn = [];
-    const bar = bars.find((b) => b.measurement === next?.measurement);
-    if (!bar) return;
-    drawn.push(space.path(bar.holes_mm, 0xe69f00), space.dots(bar.holes_mm, 0xe69f00, 0.014));
-    const hole = bar.holes_mm[Number(/^hole (\d+)/.exec(next.on)?.[1]) - 1];
-    if (hole) drawn.push(space.ball(hole, 0.02 * space.size, 0xe69f00));
+    bars.forEach((bar, i) => {  // in the order of the plan
+      const isNext = bar.measurement === next?.measurement;
+      const isTouched = next && i < next.place - 1;
+      const colour = isNext ? kNext : isTouched ? kTouched : kOpen;
+      drawn.push(space.path(bar.holes_mm, colour), space.dots(bar.holes_mm, colour, isNext ? 0.014 : isTouched ? 0.012 : 0.006));
+      const hole = isNext && bar.holes_mm[Number(/^hole (\d+)/.exec(next.on)?.[1]) - 1];
+      if (hole) drawn.push(space.ball(hole, 0.02 * space.size, kNext));
+    });
+    space.frame.dataset.next = now;
+    space.name(`Places of the bar. Next: ${now || "nothing"}`);
   };
   mark();
   const stop = listen("status", mark);
   return () => { stop(); space.end(); };
 }
 
-/** The balls in the request of a calibration with a ball array; empty: it has none. */
-function ballsOf(request) {
-  return (request?.calibrator?.balls ?? []).map((b) => ({
-    number: b.number, at_mm: b.centre_m.map((x) => 1e3 * x), radius_mm: 1e3 * b.radius_m,
-  }));
-}
-
 async function drawing(place) {
   const { request, driven_mm, bars } = await get("api/calibration");
   place.replaceChildren();
-  const balls = ballsOf(request);
   if (request?.path_m?.length > 1)
     return pathView(place, request.path_m.map((p) => p.map((x) => 1e3 * x)), driven_mm);
-  if (balls.length > 1) return artefactView(place, balls);
+  if (request?.calibrator) return artefactView(place, request.calibrator);
   if (bars.length > 0) return barView(place, bars);
   return () => {};
 }

@@ -1,5 +1,6 @@
-// A scene in machine coordinates (mm) that turns under the hand: three.js with OrbitControls. Keys:
-// arrows turn, + and - zoom.
+// A scene in mm that turns under the hand: three.js with OrbitControls. Keys: arrows turn, + and -
+// zoom. One finger turns it left and right, and scrolls the page up and down (touch-action in
+// style.css); two fingers turn it in every direction and zoom.
 
 import { isDark, script } from "./charts.js";
 import { h } from "./dom.js";
@@ -10,27 +11,29 @@ async function load() {
 }
 
 export class Space {
-  /** `low`, `high`: opposite corners of the box that is shown, mm. `label`: what it shows. */
-  static async create(place, low, high, label) {
+  /** `low`, `high`: opposite corners of the box that is shown, mm. `label`: what it shows. `arm`: from
+   * its centre to the viewer, as a multiple of its diagonal. */
+  static async create(place, low, high, label, arm) {
     await load();
-    return new Space(place, low, high, label);
+    return new Space(place, low, high, label, arm);
   }
 
-  constructor(place, low, high, label) {
+  constructor(place, low, high, label, arm = [-0.6, -1.3, 0.75]) {
     this.low = new THREE.Vector3(...low);
     this.high = new THREE.Vector3(...high);
     this.size = this.high.distanceTo(this.low) || 1;
-    this.frame = h("div", { class: "space", tabindex: 0, role: "img",
-      "aria-label": `${label}. Arrow keys turn it, + and - zoom.` });
+    this.frame = h("div", { class: "space", tabindex: 0, role: "img" });
+    this.name(label);
     place.append(this.frame);
     this.scene = new THREE.Scene();
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.frame.append(this.renderer.domElement);
-    this.#look();
+    this.#look(arm);
     this.add(new THREE.Box3Helper(new THREE.Box3(this.low, this.high), this.lineColour()));
     for (const [i, name] of ["X", "Y", "Z"].entries()) this.#axisName(i, name);
     this.frame.addEventListener("keydown", (event) => this.#key(event));
+    this.#oneFinger();
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(this.frame);
     this.redraw = () => this.draw();
@@ -41,38 +44,76 @@ export class Space {
     return isDark() ? 0x9aa7b4 : 0x57606a;
   }
 
-  #look() {
+  /** What a screen reader reads. */
+  name(label) {
+    this.frame.setAttribute("aria-label", `${label}. Arrow keys turn it, + and - zoom.`);
+  }
+
+  /** From the centre to the viewer, for create(). */
+  get arm() {
+    return this.camera.position.clone().sub(this.controls.target).divideScalar(this.size).toArray();
+  }
+
+  #look(arm) {
     const centre = this.low.clone().add(this.high).multiplyScalar(0.5);
     this.camera = new THREE.PerspectiveCamera(40, 1, this.size / 100, this.size * 20);
     this.camera.up.set(0, 0, 1);
-    this.camera.position.copy(centre).add(
-      new THREE.Vector3(-0.6, -1.3, 0.75).multiplyScalar(this.size));
+    this.camera.position.copy(centre).add(new THREE.Vector3(...arm).multiplyScalar(this.size));
     this.controls = new THREE.OrbitControls(this.camera, this.renderer.domElement);
     this.controls.enableKeys = false;
+    this.controls.touches.TWO = THREE.TOUCH.DOLLY_ROTATE;
     this.controls.target.copy(centre);
     this.controls.update();
     this.controls.addEventListener("change", () => this.draw());
   }
 
-  #key(event) {
-    const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+  /** Turns the viewer about the vertical, and up; rad. */
+  #turn(around, up) {
     const arm = this.camera.position.clone().sub(this.controls.target);
-    if (turns[event.key]) {
-      const [around, up] = turns[event.key];
-      const at = new THREE.Spherical().setFromVector3(new THREE.Vector3(arm.x, arm.z, -arm.y));
-      at.theta += around;
-      at.phi = Math.min(Math.PI - 0.05, Math.max(0.05, at.phi + up));
-      const turned = new THREE.Vector3().setFromSpherical(at);
-      arm.set(turned.x, -turned.z, turned.y);
-    } else if (event.key === "+" || event.key === "-") {
-      arm.multiplyScalar(event.key === "+" ? 0.9 : 1.1);
-    } else {
-      return;
-    }
-    event.preventDefault();
+    const at = new THREE.Spherical().setFromVector3(new THREE.Vector3(arm.x, arm.z, -arm.y));
+    at.theta += around;
+    at.phi = Math.min(Math.PI - 0.05, Math.max(0.05, at.phi + up));
+    const turned = new THREE.Vector3().setFromSpherical(at);
+    this.#lookFrom(arm.set(turned.x, -turned.z, turned.y));
+  }
+
+  #lookFrom(arm) {
     this.camera.position.copy(this.controls.target).add(arm);
     this.controls.update();
     this.draw();
+  }
+
+  #key(event) {
+    const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+    const zooms = { "+": 0.9, "-": 1.1 };
+    if (turns[event.key]) this.#turn(...turns[event.key]);
+    else if (zooms[event.key])
+      this.#lookFrom(this.camera.position.clone().sub(this.controls.target).multiplyScalar(zooms[event.key]));
+    else return;
+    event.preventDefault();
+  }
+
+  /** One finger: OrbitControls would keep the browser from scrolling, so it sees two fingers only. */
+  #oneFinger() {
+    for (const name of ["touchstart", "touchmove"])
+      this.frame.addEventListener(name, (event) => {
+        if (event.touches.length === 1) event.stopPropagation();
+      }, { capture: true, passive: true });
+
+    const fingers = new Map();  // x in pixels, by pointer
+    this.frame.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch") fingers.set(event.pointerId, event.clientX);
+    });
+    this.frame.addEventListener("pointermove", (event) => {
+      if (!fingers.has(event.pointerId)) return;
+      const moved = event.clientX - fingers.get(event.pointerId);
+      fingers.set(event.pointerId, event.clientX);
+      // A turn for the height of the view, as OrbitControls does.
+      if (fingers.size === 1) this.#turn(-2 * Math.PI * moved / this.frame.clientHeight, 0);
+    });
+    // A finger that scrolls the page is cancelled.
+    for (const name of ["pointerup", "pointercancel"])
+      this.frame.addEventListener(name, (event) => fingers.delete(event.pointerId));
   }
 
   #axisName(i, name) {
@@ -130,11 +171,22 @@ export class Space {
       new THREE.PointsMaterial({ color: colour, size: share * this.size })));
   }
 
-  ball(at, radius, colour) {
-    const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 24, 16),
-      new THREE.MeshBasicMaterial({ color: colour }));
+  ball(at, radius, colour, wireframe = false) {
+    const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, wireframe ? 8 : 24, wireframe ? 6 : 16),
+      new THREE.MeshBasicMaterial({ color: colour, wireframe }));
     ball.position.set(...at);
     return this.add(ball);
+  }
+
+  /** A square plate whose face is at `at`, behind it in the direction opposite to `normal`. */
+  plate(at, normal, side, colour, wireframe = false) {
+    const thickness = 0.25 * side;
+    const plate = new THREE.Mesh(new THREE.BoxBufferGeometry(side, side, thickness),
+      new THREE.MeshBasicMaterial({ color: colour, wireframe }));
+    const n = new THREE.Vector3(...normal).normalize();
+    plate.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
+    plate.position.set(...at).addScaledVector(n, -0.5 * thickness);
+    return this.add(plate);
   }
 
   /** The edges of the convex hull of points. */

@@ -62,6 +62,19 @@ TEST_F(ModelViewsTest, AModelIsShownWithItsVerdictAndTheEventsThatCameLater) {
   EXPECT_EQ(after["reasons"], before["reasons"]);
 }
 
+TEST_F(ModelViewsTest, TheTrendHasEachTableOfTheNewestModels) {
+  for (unsigned seed = 1; seed <= 8; ++seed) add(seed);
+  const auto trend = nlohmann::json::parse(views_.trend().value());
+  EXPECT_EQ(trend["models"].size(), 8u);
+  ASSERT_FALSE(trend["tables"].empty());
+  for (const auto& table : trend["tables"]) {
+    ASSERT_EQ(table["curves"].size(), 6u) << table["name"];
+    EXPECT_EQ(table["curves"].back()["model"], 7);
+    EXPECT_EQ(table["curves"][0]["u"].size(), table["curves"][0]["x"].size());
+  }
+  for (const auto& value : trend["values"]) EXPECT_NE(value["group"], "");
+}
+
 TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {
   const std::string id = add(1);
   const std::string before = views_.report(id).value();

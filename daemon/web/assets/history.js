@@ -1,10 +1,10 @@
 // Models with verdicts, events, trends; activation and roll-back.
 
 import { ask } from "./ask.js";
-import { draw } from "./charts.js";
 import { h, list, table, when } from "./dom.js";
 import { message } from "./main.js";
 import { get, listen, post, state } from "./server.js";
+import { smallChart } from "./small_charts.js";
 
 const mayActivate = () => state.me.role === "administer";
 
@@ -60,31 +60,38 @@ function eventTable(events) {
     [when(e.when), e.action, h("span", { class: "mono" }, e.id), e.who, e.why]));
 }
 
-/** One value over all accepted models, with its band. */
+/** Each value over all accepted models, and each table of the newest ones, with their bands. */
 async function trend(place) {
-  const { models, values } = await get("api/trend");
-  if (models.length === 0 || values.length === 0) return () => {};
+  const { models, values, tables } = await get("api/trend");
+  if (models.length === 0) return;
   const first = Date.parse(models[0].created);
   const days = models.map((m) => (Date.parse(m.created) - first) / 86400e3);
-  const select = h("select", { id: "trend-choice" },
-    values.map((v) => h("option", { value: v.key }, `${v.name}, ${v.unit}`)));
-  const chart = h("div");
-  place.append(h("h2", {}, "Trend"), h("div", { class: "tools" },
-    h("label", { for: "trend-choice" }, "Value"), select), chart,
-    h("p", { class: "weak" }, "Accepted models only. Values of models with different volumes or methods are comparable only with care."));
-  let end = () => {};
-  const show = async () => {
-    end();
-    end = () => {};
-    chart.replaceChildren();
-    const v = values.find((value) => value.key === select.value);
-    const known = v.value.map((value, i) => [days[i], value, v.u[i]]).filter(([, value]) => value !== null);
-    end = await draw(chart, { title: v.name, x_label: "days since the first model", y_label: v.unit,
-      curves: [{ name: v.name, dots: true, x: known.map((k) => k[0]), y: known.map((k) => k[1]), u: known.map((k) => k[2]) }] });
-  };
-  select.addEventListener("change", show);
-  await show();
-  return () => end();
+  place.append(h("h2", {}, "Trend"), h("p", { class: "weak" },
+    `${models.length === 1 ? "One accepted model" : `${models.length} accepted models`}, over the days since the first one; bands: U (k = 2). ` +
+    "Values of models with different volumes or methods are comparable only with care. A click enlarges a chart."));
+  for (const group of new Set(values.map((v) => v.group)))
+    place.append(h("h3", {}, group), h("div", { class: "small-charts" },
+      values.filter((v) => v.group === group).map((v) => valueChart(v, days))));
+  if (tables.length)
+    place.append(h("h3", {}, "Tables along their axes, of the newest models"), h("div", { class: "small-charts" },
+      tables.map((table) => tableChart(table, models))));
+}
+
+function valueChart(v, days) {
+  const known = v.value.map((value, i) => ({ x: days[i], y: value, u: v.u[i] })).filter(({ y }) => y !== null)
+    .sort((a, b) => a.x - b.x);
+  const withU = known.every(({ u }) => u !== null);
+  const newest = known.at(-1);
+  const words = `${newest.y.toFixed(2)}${withU ? ` \u00b1 ${(2 * newest.u).toFixed(2)}` : ""} ${v.unit}`;
+  return smallChart({ title: v.name, x_label: "days since the first model", y_label: v.unit,
+    curves: [{ name: v.name, dots: true, x: known.map((k) => k.x), y: known.map((k) => k.y),
+      u: withU ? known.map((k) => k.u) : undefined }] }, words);
+}
+
+function tableChart(table, models) {
+  return smallChart({ title: table.name, x_label: table.x_label, y_label: table.y_label,
+    unit: table.y_label.split(", ").at(-1),
+    curves: table.curves.map((c) => ({ ...c, name: `${when(models[c.model].created)} ${models[c.model].id}` })) });
 }
 
 export async function show(place) {
@@ -99,14 +106,12 @@ export async function show(place) {
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
       h("h2", {}, "Events"), eventTable(events));
   };
-  let endTrend = () => {};
   const fillTrend = async () => {
-    endTrend();
-    trends.replaceChildren();
-    endTrend = await trend(trends);
+    const made = h("div");
+    await trend(made);
+    trends.replaceChildren(made);
   };
   await fill();
   await fillTrend();
-  const stop = listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));
-  return () => { stop(); endTrend(); };
+  return listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));
 }

@@ -5,6 +5,8 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/report/model_figures.hpp"
 #include "abbe/report/model_report.hpp"
 #include "lock_within.hpp"
 #include "model_json.hpp"
@@ -30,6 +33,7 @@ using nlohmann::json;
 
 constexpr std::size_t kMostViews = 12;         ///< history, trend, models of some 100 kB, reports
 constexpr std::size_t kMostTrendModels = 100;  ///< the newest
+constexpr std::size_t kMostTableModels = 6;    ///< the newest whose tables are in the trend
 constexpr std::size_t kMostEvents = 200;       ///< the newest
 
 /// Invalid UTF-8, which names of files may contain, is replaced.
@@ -81,7 +85,7 @@ Result<std::string> id_of(const ModelStore& store, const std::string& name) {
 }
 
 struct TrendValue {
-  std::string name;
+  std::string group, name;
   bool is_angle = false;
   std::vector<json> value, u;  ///< one for each model; null: the model does not have it
 };
@@ -94,12 +98,42 @@ void add_to_trend(std::vector<std::pair<std::string, TrendValue>>& trend, std::s
       if (v.value.empty()) continue;
       auto found = std::ranges::find(trend, v.key, &std::pair<std::string, TrendValue>::first);
       if (found == trend.end())
-        found = trend.insert(trend.end(), {v.key, {v.name, v.is_angle, {}, {}}});
+        found = trend.insert(trend.end(), {v.key, {group.name, v.name, v.is_angle, {}, {}}});
       TrendValue& row = found->second;
       row.value.resize(index);
       row.u.resize(index);
       row.value.push_back(daemon::kUmPerM * v.value_si);
-      row.u.push_back(daemon::kUmPerM * v.u_si);
+      row.u.push_back(v.U.empty() ? json{} : json(daemon::kUmPerM * v.u_si));
+    }
+  }
+}
+
+/// Rounded to 0.1 nm or 0.1 nrad, so that the answer stays short.
+json rounded(const std::vector<double>& values) {
+  constexpr double kPerUnit = 1e4;
+  json out = json::array();
+  for (const double value : values) out.push_back(std::round(value * kPerUnit) / kPerUnit);
+  return out;
+}
+
+/// A table of the models, with one curve for each.
+struct TrendTable {
+  std::string x_label, y_label;
+  json curves = json::array();
+};
+
+/// Adds the tables of one model, the `index`-th of the trend.
+void add_to_tables(std::map<std::string, TrendTable>& tables, std::size_t index,
+                   const calib::VolumetricModel& model) {
+  for (const daemon::LineChart& chart : daemon::table_line_charts(model)) {
+    for (const daemon::Curve& curve : chart.curves) {
+      TrendTable& table = tables[curve.name.substr(0, curve.name.find(','))];
+      table.x_label = chart.x_label;
+      table.y_label = chart.y_label;
+      table.curves.push_back({{"model", index},
+                              {"x", rounded(curve.x)},
+                              {"y", rounded(curve.y)},
+                              {"u", rounded(curve.u)}});
     }
   }
 }
@@ -153,12 +187,16 @@ Result<std::string> trend_text(const ModelStore& store) {
 
   json models = json::array();
   std::vector<std::pair<std::string, TrendValue>> trend;
-  for (const StoreEntry& entry : *entries) {
+  std::map<std::string, TrendTable> tables;
+  for (std::size_t i = 0; i < entries->size(); ++i) {
+    const StoreEntry& entry = (*entries)[i];
     const auto document = store.load(entry.id);
     if (!document) continue;
     const auto values = daemon::certified_values(*document);
     if (!values) continue;
     add_to_trend(trend, models.size(), *values);
+    if (i + kMostTableModels >= entries->size())
+      add_to_tables(tables, models.size(), document->model);
     models.push_back({{"id", entry.id}, {"created", daemon::to_text(document->created)}});
   }
 
@@ -167,12 +205,20 @@ Result<std::string> trend_text(const ModelStore& store) {
     row.value.resize(models.size());
     row.u.resize(models.size());
     rows.push_back({{"key", key},
+                    {"group", row.group},
                     {"name", row.name},
                     {"unit", row.is_angle ? "urad" : "um"},
                     {"value", row.value},
                     {"u", row.u}});
   }
-  return text_of({{"models", std::move(models)}, {"values", std::move(rows)}});
+  json curves = json::array();
+  for (auto& [name, table] : tables)
+    curves.push_back({{"name", name},
+                      {"x_label", table.x_label},
+                      {"y_label", table.y_label},
+                      {"curves", std::move(table.curves)}});
+  return text_of(
+      {{"models", std::move(models)}, {"values", std::move(rows)}, {"tables", std::move(curves)}});
 }
 
 Result<std::string> report_text(const ModelStore& store, const std::string& id) {

@@ -33,8 +33,10 @@ class ModelViews {
   /// with U, validity volume, residuals before and after, and what it does not know. `id` may be
   /// "active". The text is kept for the models that were asked for last.
   [[nodiscard]] daemon::Result<std::string> model(const std::string& id);
-  /// Certified values of all accepted models of the store, oldest first:
-  /// {"models": [{"id", "created"}], "values": [{"key", "name", "unit", "value": [], "u": []}]}.
+  /// Certified values of all accepted models of the store, oldest first, and the tables of the
+  /// newest ones: {"models": [{"id", "created"}], "values": [{"key", "group", "name", "unit",
+  /// "value": [], "u": []}], "tables": [{"name", "x_label", "y_label", "curves": [{"model": index,
+  /// "x", "y", "u"}]}]}. u null: no uncertainty is stated.
   [[nodiscard]] daemon::Result<std::string> trend();
   /// The report of the model as an HTML page without JavaScript.
   [[nodiscard]] daemon::Result<std::string> report(const std::string& id);

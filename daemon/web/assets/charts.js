@@ -2,6 +2,7 @@
 
 import { h } from "./dom.js";
 
+const contrast = matchMedia("(prefers-contrast: more)");
 let loading = null;
 
 /** Loads a classic script of the server once. */
@@ -37,8 +38,9 @@ function datasets(curves) {
 }
 
 function options(chart) {
-  const text = getComputedStyle(document.documentElement).getPropertyValue("--text").trim();
-  const grid = isDark() ? "#2d333b" : "#d0d7de";
+  const of = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const text = of("--text");
+  const grid = contrast.matches ? of("--line") : isDark() ? "#2d333b" : "#d0d7de";
   const axis = (label) => ({ type: "linear", ticks: { color: text }, grid: { color: grid },
     title: { display: true, text: label, color: text } });
   return {
@@ -72,5 +74,10 @@ export async function draw(place, chart) {
   let drawn = make();
   const again = () => { drawn.destroy(); drawn = make(); };
   addEventListener("theme", again);
-  return () => { removeEventListener("theme", again); drawn.destroy(); };
+  contrast.addEventListener("change", again);
+  return () => {
+    removeEventListener("theme", again);
+    contrast.removeEventListener("change", again);
+    drawn.destroy();
+  };
 }

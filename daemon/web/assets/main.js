@@ -111,15 +111,12 @@ find("log-in-form").addEventListener("submit", async (event) => {
   }
 });
 
-find("theme").addEventListener("click", () => setTheme(
-  document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
-function setTheme(theme) {
-  document.documentElement.dataset.theme = theme;
-  find("theme").textContent = theme === "dark" ? "Light" : "Dark";
-  localStorage.setItem("abbe-theme", theme);
-  dispatchEvent(new Event("theme"));
+function nameThemeButton() {
+  find("theme").textContent = document.documentElement.dataset.theme === "dark" ? "Light" : "Dark";
 }
-setTheme(localStorage.getItem("abbe-theme") ?? "dark");
+find("theme").addEventListener("click", changeTheme);
+addEventListener("theme", nameThemeButton);
+nameThemeButton();
 
 find("skip").addEventListener("click", (event) => {
   event.preventDefault();

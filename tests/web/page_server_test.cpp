@@ -334,6 +334,28 @@ TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {
   EXPECT_EQ(page_->fault(), "");
 }
 
+TEST(CertificateNotice, BeginsFourteenDaysBeforeTheEnd) {
+  const auto until = std::chrono::sys_days{std::chrono::year{2026} / 11 / 15};
+  EXPECT_EQ(certificate_notice("web.pem", until, until - 15 * 24h), "");
+  EXPECT_EQ(certificate_notice("web.pem", until, until - 14 * 24h),
+            "certificate web.pem expires on 2026-11-15: replace it and restart abbe-web");
+  EXPECT_THAT(certificate_notice("web.pem", until, until), HasSubstr("expired on 2026-11-15"));
+  const std::chrono::sys_days far = std::chrono::year{9999} / 12 / 31;
+  EXPECT_EQ(certificate_notice("web.pem", far, until), "");
+}
+
+TEST_F(PageServerTest, ACertificateThatExpiresSoonIsANotice) {
+  const auto soon = std::chrono::floor<std::chrono::days>(std::chrono::system_clock::now()) + 48h;
+  const std::chrono::year_month_day day{std::chrono::floor<std::chrono::days>(soon)};
+  write_certificate(
+      folder_, fmt::format("{:04}{:02}{:02}120000Z", static_cast<int>(day.year()),
+                           static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()))
+                   .c_str());
+  ASSERT_NO_FATAL_FAILURE(start(kTls));
+  EXPECT_THAT(page_->notice(), HasSubstr("web.pem expires on "));
+  EXPECT_EQ(page_->fault(), "");
+}
+
 TEST_F(PageServerTest, AKeyThatOthersMayReadIsNamed) {
   write_certificate(folder_, "20991231235959Z");
   ::chmod((folder_ / "key.pem").c_str(), 0640);

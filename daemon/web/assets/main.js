@@ -62,6 +62,12 @@ listen("lost", (reason) => {
   find("connection").textContent = reason ?? "";
 });
 
+// What is to be done soon, for example because the certificate of the page expires.
+listen("notice", ({ text }) => {
+  find("notice").hidden = text === "";
+  find("notice").textContent = text;
+});
+
 listen("status", (status) => {
   if (!status) return;
   find("machine").textContent = status.machine;

@@ -132,7 +132,7 @@ export function connect() {
     state.live = Array.isArray(positions) ? positions : null;
     if (state.live) lastValue = performance.now();
   });
-  for (const name of ["alive", "calibration", "store"]) on(name, () => {});
+  for (const name of ["alive", "calibration", "store", "notice"]) on(name, () => {});
   events.addEventListener("error", () => {
     connectionFault = "no connection to abbe-web: the values are not current";
     report(whyLost());

@@ -17,7 +17,6 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/service_manager.hpp"
-#include "abbe/web/certificate.hpp"
 #include "abbe/web/page_server.hpp"
 #include "abbe/web/web_users.hpp"
 
@@ -27,14 +26,10 @@ using abbe::daemon::Error;
 using abbe::daemon::ErrorCode;
 using abbe::daemon::ExitCode;
 
-using SystemClock = std::chrono::system_clock;
-using SystemTime = std::chrono::sys_seconds;
-
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kInternal = number(ExitCode::Internal);
 constexpr int kNice = 10;  ///< below abbed, which must not wait for a page
 constexpr std::chrono::hours kNoticePeriod{24};
-constexpr std::chrono::hours kCertificateNotice = std::chrono::days{14};
 
 std::string footer() {
   return "Examples: abbe-web -c /etc/abbe/abbed.toml\n"
@@ -94,14 +89,6 @@ std::filesystem::path abbe_program() {
   return !error && std::filesystem::exists(beside, error) ? beside : "abbe";
 }
 
-/// Empty, or when the certificate that the page uses expires or has expired: it was read at the start.
-std::string certificate_notice(const std::filesystem::path& file, SystemTime until) {
-  const auto left = until - std::chrono::floor<std::chrono::seconds>(SystemClock::now());
-  if (file.empty() || left > kCertificateNotice) return {};
-  return fmt::format("certificate {} {} on {}: replace it and restart abbe-web", file.string(),
-                     left.count() <= 0 ? "expired" : "expires", abbe::web::day_of(until));
-}
-
 /// Tells systemd how the page is, and the log when that changes or kNoticePeriod has passed.
 class Health {
  public:
@@ -130,8 +117,7 @@ class Health {
 
 /// Until SIGTERM or SIGINT, or until the page cannot serve. Feeds the watchdog of systemd as long as
 /// the page is served: then systemd starts a page anew that cannot be reached.
-int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page,
-                   const std::filesystem::path& certificate, SystemTime certificate_until) {
+int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page) {
   const bool watched = abbe::daemon::watchdog_period().has_value();
   const timespec period{.tv_sec = 1, .tv_nsec = 0};
   Health health;
@@ -142,7 +128,7 @@ int run_until_stop(const sigset_t& stop, const abbe::web::PageServer& page,
       log_line(fault);
       return number(ExitCode::Io);
     }
-    health.report(fault.empty() ? certificate_notice(certificate, certificate_until) : fault);
+    health.report(fault.empty() ? page.notice() : fault);
     if (watched && fault.empty()) abbe::daemon::notify_alive();
   }
 }
@@ -163,9 +149,6 @@ int serve(const std::string& file) {
   sigaddset(&stop, SIGTERM);
   sigaddset(&stop, SIGINT);
   pthread_sigmask(SIG_BLOCK, &stop, nullptr);
-  SystemTime certificate_until{};
-  if (const auto dates = abbe::web::read_certificate(web.certificate); web.tls() && dates)
-    certificate_until = dates->until;
   auto page = abbe::web::PageServer::start({.settings = std::move(*settings),
                                             .config_file = file,
                                             .abbe_program = abbe_program(),
@@ -176,7 +159,7 @@ int serve(const std::string& file) {
   log_line(fmt::format("serving http{}://{}{}{}:{}/", web.tls() ? "s" : "", v6 ? "[" : "",
                        web.address, v6 ? "]" : "", (*page)->port()));
   abbe::daemon::notify_ready("serving");
-  const int code = run_until_stop(stop, **page, web.certificate, certificate_until);
+  const int code = run_until_stop(stop, **page);
   abbe::daemon::notify_stopping();
   page->reset();
   log_line("stopped");

@@ -76,4 +76,12 @@ Result<void> check_certificate(const std::filesystem::path& file,
   return {};
 }
 
+std::string certificate_notice(const std::filesystem::path& file, sys_seconds until,
+                               std::chrono::system_clock::time_point now) {
+  const auto left = until - std::chrono::floor<std::chrono::seconds>(now);
+  if (left > kCertificateNotice) return {};
+  return fmt::format("certificate {} {} on {}: replace it and restart abbe-web", file.string(),
+                     left.count() <= 0 ? "expired" : "expires", day_of(until));
+}
+
 }  // namespace abbe::web

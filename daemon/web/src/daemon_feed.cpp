@@ -40,12 +40,13 @@ std::string folder_stamp(const std::filesystem::path& folder) {
 }  // namespace
 
 DaemonFeed::DaemonFeed(const daemon::WebSettings& settings, EventBoard& board,
-                       std::function<std::size_t()> pages)
+                       std::function<std::size_t()> pages, std::function<std::string()> notice)
     : models_(settings.config.daemon.models_dir()),
       recordings_(settings.config.recording.dir),
       live_period_(std::chrono::nanoseconds{std::llround(1e9 / settings.web.live_hz)}),
       board_(board),
       pages_(std::move(pages)),
+      notice_(std::move(notice)),
       connection_(settings.config.control.socket),
       least_step_m_(kFirstStep_m),
       thread_([this] { run(); }) {}
@@ -88,6 +89,7 @@ void DaemonFeed::cycle(Clock::time_point now) {
   if (now >= next_files_) {
     next_files_ = now + kFilesPeriod;
     follow_files();
+    follow_notice();
   }
 }
 
@@ -170,6 +172,13 @@ void DaemonFeed::follow_files() {
   if (seen == files_seen_) return;
   files_seen_ = std::move(seen);
   board_.post(Topic::Store, event_text({{"seen", files_seen_}}));
+}
+
+void DaemonFeed::follow_notice() {
+  std::string notice = notice_();
+  if (notice == notice_seen_) return;
+  notice_seen_ = std::move(notice);
+  board_.post(Topic::Notice, event_text({{"text", notice_seen_}}));
 }
 
 /// `reason`: why abbed does not answer; empty: it answers.

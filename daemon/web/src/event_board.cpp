@@ -7,8 +7,8 @@
 namespace abbe::web {
 namespace {
 
-constexpr std::array<std::string_view, kTopics> kTopicNames{"source", "status", "live",
-                                                            "calibration", "store"};
+constexpr std::array<std::string_view, kTopics> kTopicNames{"source",      "status", "live",
+                                                            "calibration", "store",  "notice"};
 
 }  // namespace
 

@@ -2,10 +2,12 @@
 /// What the routes of the server share.
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <optional>
 #include <string>
 
+#include "abbe/web/certificate.hpp"
 #include "abbe/web/daemon_feed.hpp"
 #include "abbe/web/event_board.hpp"
 #include "abbe/web/model_views.hpp"
@@ -29,7 +31,22 @@ struct PageContext {
                  [this](const std::string& line) { report.always(line); }),
         replays(options.abbe_program, options.settings.config.recording.dir),
         pages(options.settings.web.most_pages),
-        feed(options.settings, board, [this] { return pages.taken(); }) {}
+        certificate_until(until_of(options.settings.web)),
+        feed(
+            options.settings, board, [this] { return pages.taken(); },
+            [this] { return notice(); }) {}
+  /// Of the certificate with which the server started.
+  static std::optional<std::chrono::sys_seconds> until_of(const daemon::WebConfig& web) {
+    if (!web.tls()) return std::nullopt;
+    const auto dates = read_certificate(web.certificate);
+    return dates ? std::optional{dates->until} : std::nullopt;
+  }
+  /// PageServer::notice().
+  [[nodiscard]] std::string notice() const {
+    if (!certificate_until) return {};
+    return certificate_notice(options.settings.web.certificate, *certificate_until,
+                              std::chrono::system_clock::now());
+  }
   static std::chrono::seconds seconds_of(std::chrono::nanoseconds time) {
     return std::chrono::duration_cast<std::chrono::seconds>(time);
   }
@@ -46,6 +63,7 @@ struct PageContext {
   std::atomic<int> port{0};
   std::mutex changing;  // one change of a user at a time reaches abbed
   std::atomic<bool> stopping{false};
+  std::optional<std::chrono::sys_seconds> certificate_until;  ///< nullopt: no TLS
   DaemonFeed feed;  // last: its thread uses the members above
 };
 

@@ -167,6 +167,7 @@ class HttpPageServer final : public PageServer {
       return fmt::format("a connection has waited for {} s: all threads are busy", wait.count());
     return context_.feed.fault(now);
   }
+  [[nodiscard]] std::string notice() const override { return context_.notice(); }
   [[nodiscard]] bool ended() const override { return accepting_->ended(); }
   [[nodiscard]] std::uint16_t port() const override { return static_cast<std::uint16_t>(port_); }
 

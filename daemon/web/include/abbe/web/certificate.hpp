@@ -25,4 +25,11 @@ struct CertificateDates {
 [[nodiscard]] daemon::Result<void> check_certificate(const std::filesystem::path& file,
                                                      std::chrono::system_clock::time_point now);
 
+/// From 14 days before its end: "certificate web.crt expires on 2026-11-01: replace it and restart
+/// abbe-web", then "expired". Empty before that.
+inline constexpr std::chrono::days kCertificateNotice{14};
+[[nodiscard]] std::string certificate_notice(const std::filesystem::path& file,
+                                             std::chrono::sys_seconds until,
+                                             std::chrono::system_clock::time_point now);
+
 }  // namespace abbe::web

@@ -29,9 +29,10 @@ inline constexpr std::size_t kMostPathPoints = 8000;
 
 class DaemonFeed {
  public:
-  /// `pages`: number of open pages; called on the thread of the feed.
+  /// Called on the thread of the feed: `pages`, the number of open pages; `notice`, what the pages
+  /// show besides, empty: nothing.
   DaemonFeed(const daemon::WebSettings& settings, EventBoard& board,
-             std::function<std::size_t()> pages);
+             std::function<std::size_t()> pages, std::function<std::string()> notice);
   DaemonFeed(const DaemonFeed&) = delete;
   DaemonFeed& operator=(const DaemonFeed&) = delete;
   ~DaemonFeed();
@@ -53,6 +54,7 @@ class DaemonFeed {
   void ask_status();
   [[nodiscard]] bool ask_request(std::uint64_t session);
   void follow_files();
+  void follow_notice();
   void follow_path(const nlohmann::json& positions_m);
   void report_source(std::string reason);
 
@@ -60,10 +62,11 @@ class DaemonFeed {
   std::chrono::nanoseconds live_period_;
   EventBoard& board_;
   std::function<std::size_t()> pages_;
+  std::function<std::string()> notice_;
   daemon::ControlConnection connection_;
   Clock::time_point next_status_{}, next_files_{};
   std::string source_fault_ = "not asked yet";
-  std::string files_seen_;
+  std::string files_seen_, notice_seen_;
   bool acquiring_ = false;
   bool request_known_ = false;  ///< of the session path_.session
 

@@ -21,8 +21,9 @@ enum class Topic : std::uint8_t {
   Live,         ///< axis positions
   Calibration,  ///< a session began
   Store,        ///< models or recordings changed
+  Notice,       ///< what is to be done soon, see PageServer::notice()
 };
-inline constexpr std::size_t kTopics = 5;
+inline constexpr std::size_t kTopics = 6;
 
 class EventBoard {
  public:

@@ -51,6 +51,9 @@ class PageServer {
   /// Why browsers cannot reach the page, or why it is not kept up to date; empty: it is served. Any
   /// thread.
   [[nodiscard]] virtual std::string fault() const = 0;
+  /// What is to be done soon although the page is served: the certificate expires. Empty: nothing.
+  /// The page shows it. Any thread.
+  [[nodiscard]] virtual std::string notice() const = 0;
   /// True once the server cannot accept connections any more: only a new start helps.
   [[nodiscard]] virtual bool ended() const = 0;
 };

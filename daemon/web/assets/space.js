@@ -5,6 +5,9 @@
 import { isDark, script } from "./charts.js";
 import { h } from "./dom.js";
 
+const kFov = 40;  // degrees, vertical
+const kLeastAspect = 1.2;  // in which the box is seen from all sides
+
 async function load() {
   await script("three.min.js");
   for (const part of ["OrbitControls.js", "ConvexHull.js", "ConvexGeometry.js"]) await script(part);
@@ -56,7 +59,7 @@ export class Space {
 
   #look(arm) {
     const centre = this.low.clone().add(this.high).multiplyScalar(0.5);
-    this.camera = new THREE.PerspectiveCamera(40, 1, this.size / 100, this.size * 20);
+    this.camera = new THREE.PerspectiveCamera(kFov, 1, this.size / 100, this.size * 20);
     this.camera.up.set(0, 0, 1);
     this.camera.position.copy(centre).add(new THREE.Vector3(...arm).multiplyScalar(this.size));
     this.controls = new THREE.OrbitControls(this.camera, this.renderer.domElement);
@@ -212,6 +215,9 @@ export class Space {
     if (clientWidth === 0) return;
     this.renderer.setSize(clientWidth, clientHeight);
     this.camera.aspect = clientWidth / clientHeight;
+    // A view that is higher than wide, as on a telephone, shows the whole width all the same.
+    const narrow = Math.max(1, kLeastAspect / this.camera.aspect);
+    this.camera.fov = 2 * Math.atan(narrow * Math.tan(kFov / 2 * Math.PI / 180)) * 180 / Math.PI;
     this.camera.updateProjectionMatrix();
     this.draw();
   }

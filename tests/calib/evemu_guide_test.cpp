@@ -116,7 +116,7 @@ TEST(TouchGuide, CountsThePointsOfEachFeatureOfThePosition) {
   EXPECT_EQ(features[10].touched, 0u);
 }
 
-TEST(TouchGuide, KnowsWhereTheArrayStandsFromTheFirstTwoBallsAndTheFaces) {
+TEST(TouchGuide, KnowsWhereTheArrayStandsFromFacesAndSomeBalls) {
   Toucher t = toucher();
   EXPECT_FALSE(t.guide_.features()[0].at_m);
   t.touch_all(4, Feature::Ball, 1);
@@ -126,9 +126,10 @@ TEST(TouchGuide, KnowsWhereTheArrayStandsFromTheFirstTwoBallsAndTheFaces) {
   EXPECT_TRUE(t.guide_.features()[2].normal);
   EXPECT_FALSE(t.guide_.features()[10].at_m) << "on which side of the faces the balls lie is open";
 
-  t.touch_all(4, Feature::Ball, 2);
+  int ball = 2;
+  while (ball < 9 && !t.guide_.features()[10].at_m) t.touch_all(4, Feature::Ball, ball++);
   const auto ball9 = t.guide_.features()[10].at_m;
-  ASSERT_TRUE(ball9);
+  ASSERT_TRUE(ball9) << "before it was touched";
   const Vector3 measured = fit::fit_sphere(t.points(4, Feature::Ball, 9))->centre;
   EXPECT_LT((*ball9 - measured).norm(), GuideOptions{}.max_off_expected_m);
 }

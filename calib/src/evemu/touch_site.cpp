@@ -245,11 +245,16 @@ bool Site::is_sided(const fit::Plane& face) const {
   return (face.point - *ball1_m_).dot(face.normal) > 2.0 * options_.max_off_expected_m;
 }
 
-/// While several assumptions about the sides of the faces are left, only Ball1 has one place.
+/// While several assumptions about the sides of the faces are left, a ball has a place only if they
+/// agree on it, as they do on Ball1.
 std::optional<Vector3> Site::centre_m(std::size_t ball) const {
   if (ball == 0) return ball1_m_;
-  if (candidates_.size() != 1) return std::nullopt;
-  return candidates_.front().centres_m[ball];
+  if (candidates_.empty()) return std::nullopt;
+  const Vector3& first_m = candidates_.front().centres_m[ball];
+  const bool agree = std::ranges::all_of(candidates_, [&](const Candidate& candidate) {
+    return (candidate.centres_m[ball] - first_m).norm() <= options_.max_off_expected_m;
+  });
+  return agree ? std::optional(first_m) : std::nullopt;
 }
 
 std::vector<double> Site::possible_sides(std::size_t block, const fit::Plane& face) const {

@@ -1,7 +1,7 @@
-// A calibration with a Multi-Feature Bar is begun by clicking; the places of the bar are drawn, with
-// the first one marked.   bar.mjs URL FOLDER BAR.TOML PLAN.TOML PASSWORD
+// A calibration with a Multi-Feature Bar is begun on a telephone by tapping; the places of the bar are
+// drawn, with the first one marked.   bar.mjs URL FOLDER BAR.TOML PLAN.TOML PASSWORD
 
-import { answerQuestion, chooseFile, clickButton, goTo, logIn, screenshot, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, chooseFile, clickButton, goTo, logIn, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, bar, plan, password] = process.argv.slice(2);
 
@@ -14,10 +14,11 @@ await withPage(url, out, async (context) => {
   await chooseFile(context, "#plan-file", plan);
   await clickButton(context, "Begin");
   await waitForText(context, "Next: hole 1", "#view");
-  await page.waitForSelector(".space canvas");
+  await page.waitForFunction(() => /hole 1$/.test(document.querySelector(".space")?.dataset.next ?? ""));
+  const faults = await violations(context);
   await screenshot(context, "bar-begun");
   await clickButton(context, "Cancel the calibration");
   await answerQuestion(context, "Cancel the calibration");
   await waitForText(context, "cancelled", "#message");
-  return [];
-});
+  return faults;
+}, { size: "phone" });

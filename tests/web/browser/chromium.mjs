@@ -8,22 +8,25 @@ import puppeteer from "puppeteer-core";
 const axeSource = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 export const kPatience_ms = 180_000;
 
-/** Widths and heights of a telephone, a tablet beside the machine, and a desk. */
+/** A telephone and a tablet beside the machine, which are touched, and a desk with a mouse. */
 export const viewports = {
-  phone: { width: 390, height: 844 }, tablet: { width: 1024, height: 768 }, desk: { width: 1680, height: 1050 },
+  phone: { width: 390, height: 844, isMobile: true, hasTouch: true },
+  tablet: { width: 1024, height: 768, isMobile: true, hasTouch: true },
+  desk: { width: 1680, height: 1050 },
 };
 
 export function say(text) {
   process.stdout.write(`${text}\n`);
 }
 
-/** Opens the page at `url`; screenshots go to `out`. Errors on the console end the program. */
-export async function openPage(url, out, { expectLoss = false } = {}) {
+/** Opens the page at `url`; screenshots go to `out`. Errors on the console end the program. `size`: one
+ * of the viewports. */
+export async function openPage(url, out, { expectLoss = false, size = "desk" } = {}) {
   const browser = await puppeteer.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true,
     args: ["--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
       "--enable-unsafe-swiftshader", "--no-first-run", "--disable-extensions"],
-    defaultViewport: viewports.desk,
+    defaultViewport: viewports[size],
   });
   const page = await browser.newPage();
   page.setDefaultTimeout(kPatience_ms);
@@ -42,14 +45,64 @@ export async function openPage(url, out, { expectLoss = false } = {}) {
       errors.push(`the page asks another server: ${request.url()}`);
   });
   await page.goto(url, { waitUntil: "load" });
-  return { browser, page, errors, out };
+  return { browser, page, errors, out, touch: viewports[size].hasTouch ?? false };
+}
+
+/** Changes the size. Chromium loads the page again when touch comes or goes. */
+export async function resize(context, size) {
+  await context.page.setViewport(viewports[size]);
+  context.touch = viewports[size].hasTouch ?? false;
+  await context.page.waitForFunction(() => document.getElementById("view")?.dataset.ready);
+}
+
+/** The middle of an element, scrolled into the window. An error if something else lies above it. */
+export async function middleOf({ page }, element, name) {
+  await element.evaluate((e) => e.scrollIntoView({ block: "center" }));
+  const { x, y } = await element.clickablePoint();
+  const above = await element.evaluate((e, atX, atY) => {
+    const hit = document.elementFromPoint(atX, atY);
+    return hit && (e === hit || e.contains(hit)) ? null : hit?.outerHTML.slice(0, 120) ?? "nothing";
+  }, x, y);
+  if (above !== null) throw new Error(`${name} cannot be reached: there is ${above}`);
+  return { x, y };
+}
+
+/** Clicks with the mouse or taps with a finger, as the browser gets it from the system. `target`: a
+ * selector or an element. */
+export async function press(context, target, name = String(target)) {
+  const element = typeof target === "string" ? await context.page.waitForSelector(target) : target;
+  const { x, y } = await middleOf(context, element, name);
+  if (context.touch) await context.page.touchscreen.tap(x, y);
+  else await context.page.mouse.click(x, y);
+}
+
+/** Drags with the mouse or a finger from the middle of an element, dx and dy in pixels. */
+export async function drag(context, element, dx, dy) {
+  const { page, touch } = context;
+  const { x, y } = await middleOf(context, element, "what is dragged");
+  if (touch) await page.touchscreen.touchStart(x, y);
+  else { await page.mouse.move(x, y); await page.mouse.down(); }
+  const steps = 12;
+  for (let i = 1; i <= steps; ++i) {
+    const to = [x + dx * i / steps, y + dy * i / steps];
+    await (touch ? page.touchscreen.touchMove(...to) : page.mouse.move(...to));
+    await nextFrame(context);
+  }
+  await (touch ? page.touchscreen.touchEnd() : page.mouse.up());
+  await nextFrame(context);
+}
+
+/** Until what was changed before is drawn. */
+export async function nextFrame({ page }) {
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 }
 
 /** Shows a view by clicking its link. */
-export async function goTo({ page }, name) {
-  await page.click(`nav a[href="#${name}"]`);
+export async function goTo(context, name) {
+  const { page } = context;
+  await press(context, `nav a[href="#${name}"]`);
   await page.waitForFunction((n) => document.getElementById("view").dataset.ready === n, {}, name);
-  const fault = await viewFault({ page });
+  const fault = await viewFault(context);
   if (fault) throw new Error(`the view ${name} shows a fault: ${fault}`);
 }
 
@@ -70,32 +123,44 @@ export async function waitForText({ page }, text, selector = "body") {
     });
 }
 
-export async function clickButton({ page }, text) {
-  const clicked = await page.evaluate((t) => {
-    const button = [...document.querySelectorAll("button")].find((b) => b.innerText === t && b.offsetParent);
-    button?.click();
-    return button !== undefined;
-  }, text);
-  if (!clicked) throw new Error(`there is no button "${text}"`);
+/** A button with this text or label that is shown. */
+export async function button({ page }, text) {
+  const found = await page.evaluateHandle((t) => [...document.querySelectorAll("button")]
+    .find((b) => (b.innerText === t || b.getAttribute("aria-label") === t) && b.offsetParent), text);
+  const element = found.asElement();
+  if (!element) throw new Error(`there is no button "${text}"`);
+  return element;
+}
+
+export async function clickButton(context, text) {
+  await press(context, await button(context, text), `the button "${text}"`);
+}
+
+async function typeInto(context, selector, text) {
+  await press(context, selector);
+  await context.page.keyboard.type(text);
 }
 
 /** Answers the question of the page with the button `yes`, and a reason if it asks for one. */
-export async function answerQuestion({ page }, yes, reason = null) {
+export async function answerQuestion(context, yes, reason = null) {
+  const { page } = context;
   await page.waitForSelector("dialog.ask[open]");
-  if (reason !== null) await page.type("dialog.ask input[name=reason]", reason);
+  if (reason !== null) await typeInto(context, "dialog.ask input[name=reason]", reason);
   const said = await page.$eval("dialog.ask button[value=yes]", (b) => b.innerText);
   if (said !== yes) throw new Error(`the question offers "${said}", not "${yes}"`);
-  await page.click("dialog.ask button[value=yes]");
+  await press(context, "dialog.ask button[value=yes]");
 }
 
 export async function logIn(context, user, password) {
-  await context.page.click("#log-in");
-  await context.page.type("input[name=user]", user);
-  await context.page.type("input[name=password]", password);
-  await context.page.click("#log-in-form button[type=submit]");
+  await press(context, "#log-in");
+  await typeInto(context, "input[name=user]", user);
+  await typeInto(context, "input[name=password]", password);
+  await press(context, "#log-in-form button[type=submit]");
   await waitForText(context, `Log out ${user}`, "#log-in");
+  await context.page.waitForFunction(() => !document.querySelector("#log-in-dialog").open);
 }
 
+/** The dialog of the system for files is not part of the page. */
 export async function chooseFile({ page }, selector, file) {
   const input = await page.waitForSelector(selector);
   await input.uploadFile(file);

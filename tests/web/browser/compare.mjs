@@ -1,7 +1,7 @@
 // Two models beside each other, and the questions before a change: by keyboard and screen reader, too.
 //   compare.mjs URL FOLDER PASSWORD
 
-import { answerQuestion, clickButton, goTo, logIn, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, clickButton, goTo, logIn, press, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, password] = process.argv.slice(2);
 
@@ -9,7 +9,7 @@ const [url, out, password] = process.argv.slice(2);
 async function question(context) {
   const { page } = context;
   await goTo(context, "history");
-  await page.click('button[aria-label^="Activate "]');
+  await press(context, 'button[aria-label^="Activate "]');
   await waitForText(context, "Then: ", "dialog.ask");
   const faults = await violations(context);
   await screenshot(context, "activation-question");
@@ -17,7 +17,7 @@ async function question(context) {
   await page.waitForFunction(() => document.querySelector("dialog.ask") === null);
   if (await page.$eval("#message", (m) => m.innerText) !== "") faults.push("Escape has changed something");
 
-  await page.click('button[aria-label^="Activate "]');
+  await press(context, 'button[aria-label^="Activate "]');
   await answerQuestion(context, "Activate", "test of the page");
   await waitForText(context, "is activated", "#message");
   await waitForText(context, "test of the page", "#view");  // in the events

@@ -2,9 +2,18 @@
 // roll-back and replay.   otf.mjs URL FOLDER PATH.CSV PASSWORD
 // Prints "BEGUN" when the machine may move.
 
-import { answerQuestion, chooseFile, clickButton, goTo, logIn, say, screenshot, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, chooseFile, clickButton, goTo, logIn, say, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, path, password] = process.argv.slice(2);
+
+/** Waits until the drawing has at least `least` points of the driven path; returns how many. */
+async function drivenPoints({ page }, least) {
+  const handle = await page.waitForFunction((n) => {
+    const driven = Number(document.querySelector(".space")?.dataset.driven ?? 0);
+    return driven >= n ? driven : 0;
+  }, {}, least);
+  return handle.jsonValue();
+}
 
 await withPage(url, out, async (context) => {
   const { page } = context;
@@ -15,16 +24,24 @@ await withPage(url, out, async (context) => {
   await chooseFile(context, "#path-file", path);
   await clickButton(context, "Begin");
   await waitForText(context, "warming", "#session-state");
+  await page.waitForSelector(".space canvas");
+  const faults = await violations(context);
   say("BEGUN");
 
   await waitForText(context, "acquiring", "#session-state");
-  await page.waitForSelector(".space canvas");
+  const first = await drivenPoints(context, 2);
+  const later = await drivenPoints(context, first + 10);
+  say(`driven path ${first}, then ${later} points`);
   await screenshot(context, "otf-acquiring");
+  faults.push(...await violations(context));
   await waitForText(context, "ACTIVE", "#model-state");
   await screenshot(context, "otf-done");
 
   await goTo(context, "model");
   await waitForText(context, "What it does not know", "#view");
+  await waitForText(context, "Green: the gate accepted the model. It is the active model.", "#verdict");
+  if (await page.$eval("#verdict", (v) => v.dataset.lamp) !== "green") faults.push("the lamp is not green");
+  if (await page.$$eval("#signs li", (signs) => signs.length) < 3) faults.push("the signs are not stated in words");
   await page.waitForSelector(".chart canvas");
   await page.waitForSelector(".space canvas");
   await screenshot(context, "otf-model");
@@ -38,5 +55,6 @@ await withPage(url, out, async (context) => {
   await page.waitForFunction(() => document.getElementById("message").innerText !== "");
   const message = await page.$eval("#message", (m) => m.innerText);
   context.errors.splice(0, context.errors.length, ...context.errors.filter((e) => !e.includes("409")));
-  return message.includes("no model was active before") ? [] : [`roll back: ${message}`];
+  if (!message.includes("no model was active before")) faults.push(`roll back: ${message}`);
+  return faults;
 });

@@ -89,3 +89,10 @@ class Recording:
         environment: air_temperature_K, air_pressure_Pa, relative_humidity, temperature_K.
         touches: touch, position.
         """
+
+def otf_task(path: str) -> str:
+    """The request for a calibration on the fly along the path of path.csv, as JSON. For abbe.Control."""
+def evemu_task(calibrator: str, rotation_reference: str | None = None, u_reference_m: float = 1e-6) -> str:
+    """The request for a calibration with the ball array of calibrator.toml, as JSON. For abbe.Control."""
+def mfb_task(bar: str, plan: str) -> str:
+    """The request for a calibration with the bar of bar.toml by plan.toml, as JSON. For abbe.Control."""

@@ -1,14 +1,19 @@
 """The control socket of abbed: one JSON object a line."""
 
 import json
+import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from abbe import _abbe
 from abbe.errors import Error
 
 _LONGEST_ANSWER = 64 << 20
+_POLL_PERIOD_S = 0.2
+
+File = str | os.PathLike[str]
 
 
 class Control:
@@ -35,13 +40,35 @@ class Control:
         """Axes, streams, model, session and devices, as `abbe status --json`."""
         return self.ask({"do": "status"})
 
-    def calibrate_otf(self, path_m: list[list[float]], mode: str | None = None) -> dict[str, Any]:
-        """Begins a calibration on the fly along a path of scale readings, m."""
-        request: dict[str, Any] = {"do": "calibrate", "method": "otf", "who": self._who,
-                                   "path_m": [[float(x) for x in vertex] for vertex in path_m]}
-        if mode is not None:
-            request["mode"] = mode
-        return self.ask(request)
+    def calibrate_otf(self, path: File | Sequence[Sequence[float]], mode: str | None = None) -> dict[str, Any]:
+        """Begins a calibration on the fly. path: file path.csv, or scale readings of the vertices, m.
+
+        mode: "on-the-fly" or "standstill"; None: as in abbed.toml. Then the machine drives the path.
+        """
+        if isinstance(path, (str, os.PathLike)):
+            task = json.loads(_abbe.otf_task(os.fspath(path)))
+        else:
+            task = {"method": "otf", "path_m": [[float(x) for x in vertex] for vertex in path]}
+        return self._calibrate(task, mode=mode)
+
+    def calibrate_evemu(self, calibrator: File, *, rotation_reference: File | None = None,
+                        u_reference_m: float = 1e-6, points_per_ball: int | None = None,
+                        points_per_block: int | None = None) -> dict[str, Any]:
+        """Begins a calibration with the ball array of calibrator.toml.
+
+        rotation_reference: file errors.csv of points where V is known independently, with the standard
+        uncertainty u_reference_m. "next" of the session is the next touch.
+        """
+        reference = None if rotation_reference is None else os.fspath(rotation_reference)
+        return self._calibrate(json.loads(_abbe.evemu_task(os.fspath(calibrator), reference, u_reference_m)),
+                               points_per_ball=points_per_ball, points_per_block=points_per_block)
+
+    def calibrate_mfb(self, bar: File, plan: File) -> dict[str, Any]:
+        """Begins a calibration with the Multi-Feature Bar of bar.toml, by the measurements of plan.toml.
+
+        "next" of the session is the next touch.
+        """
+        return self._calibrate(json.loads(_abbe.mfb_task(os.fspath(bar), os.fspath(plan))))
 
     def cancel(self) -> dict[str, Any]:
         """Cancels the running calibration."""
@@ -58,17 +85,126 @@ class Control:
         """
         return self._change({"do": "rollback", "active": active, "why": why})
 
-    def follow(self, period_s: float = 0.2) -> Iterator[dict[str, Any]]:
+    def follow(self, period_s: float = _POLL_PERIOD_S) -> Iterator[dict[str, Any]]:
         """The status of the session whenever it changes, until the session has ended."""
+        return self._changes("session", lambda session: session["state"] in ("idle", "active", "refused"), period_s)
+
+    def reference(self, period_s: float = _POLL_PERIOD_S) -> Iterator[dict[str, Any]]:
+        """Searches for the reference marks while each axis is driven slowly over at least four of them.
+
+        The result yields "reference" of the status whenever it changes, until the search has ended.
+        Not to iterate does not end the search; cancel_reference() does.
+        """
+        self.ask({"do": "reference"})
+        return self._changes("reference", lambda found: not found["running"], period_s)
+
+    def reference_here(self, axes: Sequence[str] = (), u: float | None = None) -> None:
+        """States that axes without marks read their offset at their present position.
+
+        axes: none means all of them. u: standard uncertainty of the position, m (rotary axis: rad);
+        None: 100e-6, set by eye. Refused while they move or a calibration takes readings.
+        """
+        request: dict[str, Any] = {"do": "reference", "here": True, "axes": list(axes)}
+        if u is not None:
+            request["u"] = u
+        self.ask(request)
+
+    def cancel_reference(self) -> None:
+        """Ends the search for the reference marks."""
+        self.ask({"do": "reference", "cancel": True})
+
+    def tracker(self) -> dict[str, Any]:
+        """State of the tracker and its latest orders."""
+        tracker = self.status().get("tracker")
+        if tracker is None:
+            raise Error("refused", "tracker: abbed has none that takes orders")
+        return tracker
+
+    def tracker_initialize(self) -> str:
+        """Initializes the tracker, whose head moves; waits for the outcome and returns its text."""
+        return self._order({"do": "tracker", "order": "initialize"})["text"]
+
+    def tracker_home(self) -> str:
+        """Sends the beam to the home position; waits for the outcome and returns its text."""
+        return self._order({"do": "tracker", "order": "home"})["text"]
+
+    def tracker_find(self, distance_m: float) -> str:
+        """Searches for a reflector at about this distance; waits for the outcome and returns its text."""
+        return self._order({"do": "tracker", "order": "find", "distance_m": distance_m})["text"]
+
+    def tracker_use_reflector(self, reflector: str) -> str:
+        """Sets the reflector, by name or id; waits for the outcome and returns its text."""
+        return self._order({"do": "tracker", "order": "reflector set", "reflector": reflector})["text"]
+
+    def tracker_reflectors(self) -> list[dict[str, Any]]:
+        """The reflectors that the tracker knows: id, name, in_use."""
+        return self._order({"do": "tracker_reflectors"}).get("reflectors", [])
+
+    def machine(self) -> dict[str, Any]:
+        """Of a measuring machine: release_awaited, reason, tip_m and tip_age_s once it reported the tip."""
+        return self.ask({"do": "machine"})
+
+    def stop_machine(self) -> None:
+        """Stops every motion that abbed has commanded; the machine does not move before a release."""
+        self.ask({"do": "machine", "stop": True})
+
+    def release_machine(self) -> str:
+        """States that a person has checked the machine, which may move from then on; returns what was released."""
+        return self.ask({"do": "machine", "release": True})["released"]
+
+    def verification_points(self, count: int, period_s: float = _POLL_PERIOD_S) -> Iterator[dict[str, Any]]:
+        """Points for a verification: the machine stands still for some seconds at each, then moves on.
+
+        The result yields reading_m, tracker_m, tracker_points and scatter_m of each; `abbe verify`
+        evaluates such points. Error "refused" if another client begins a verification meanwhile, or if
+        abbed stops it.
+        """
+        number = self.ask({"do": "verification", "step": "begin"})["number"]
+        return self._points(number, count, period_s)
+
+    def _points(self, number: int, count: int, period_s: float) -> Iterator[dict[str, Any]]:
+        seen = 0
+        while seen < count:
+            answer = self.ask({"do": "verification", "step": "look", "number": number, "from": seen})
+            for point in answer["points"][:count - seen]:
+                seen += 1
+                yield point
+            if seen < count and answer.get("stopped"):
+                raise Error("refused", f"verification: after {seen} points: {answer['stopped']}")
+            if seen < count:
+                time.sleep(period_s)
+        self.ask({"do": "verification", "step": "end", "number": number, "from": seen})
+
+    def _changes(self, member: str, has_ended: Callable[[dict[str, Any]], bool],
+                 period_s: float) -> Iterator[dict[str, Any]]:
+        """A member of the status whenever it changes, until it has ended."""
         last = None
         while True:
-            session = self.status()["session"]
-            if session != last:
-                yield session
-                last = session
-            if session["state"] in ("idle", "active", "refused"):
+            now = self.status()[member]
+            if now != last:
+                yield now
+                last = now
+            if has_ended(now):
                 return
             time.sleep(period_s)
+
+    def _calibrate(self, task: dict[str, Any], **options: Any) -> dict[str, Any]:
+        given = {name: value for name, value in options.items() if value is not None}
+        return self.ask({**task, **given, "do": "calibrate", "who": self._who})
+
+    def _order(self, request: dict[str, Any]) -> dict[str, Any]:
+        """The order to the tracker once it has ended; Error if it was refused or failed."""
+        number = self.ask({**request, "who": self._who})["order"]
+        while True:
+            order = next((o for o in self.tracker()["orders"] if o["number"] == number), None)
+            if order is None:
+                raise Error("io", f"tracker: the outcome of order {number} is lost: abbed keeps the latest ones only")
+            if order["outcome"] == "done":
+                return order
+            if order["outcome"] != "running":
+                code = "refused" if order["outcome"] == "refused" else "io"
+                raise Error(code, f"tracker: {order['order']}: {order['text']}")
+            time.sleep(_POLL_PERIOD_S)
 
     def _change(self, request: dict[str, Any]) -> str:
         answer = self.ask({**request, "who": self._who})

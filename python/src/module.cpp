@@ -44,4 +44,5 @@ PYBIND11_MODULE(_abbe, module) {
   py::register_exception_translator(abbe::python::translate);
   abbe::python::bind_model(module);
   abbe::python::bind_recording(module);
+  abbe::python::bind_tasks(module);
 }

@@ -14,6 +14,7 @@
 #include "abbe/recording/recording_reader.hpp"
 #include "spine.hpp"
 #include "synthetic_model.hpp"
+#include "touching_run.hpp"
 
 namespace abbe::test {
 namespace {
@@ -23,17 +24,22 @@ using testing::AllOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
 
+/// The interpreter with a script, or with `-c` and a program, and the package in its path.
+std::vector<std::string> python_command(const std::vector<std::string>& arguments) {
+  std::vector<std::string> command{"/usr/bin/env", std::string{"PYTHONPATH="} + ABBE_PYTHON_PACKAGE,
+                                   std::string{"PATH="} + ABBE_WATCH_FOLDER + ":/usr/bin:/bin",
+                                   ABBE_PYTHON};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+std::string example(const std::string& name) {
+  return std::string{ABBE_PYTHON_EXAMPLES} + "/" + name;
+}
+
 struct Python : Spine {
-  /// A script, or `-c` and a program, with the package in its path.
-  [[nodiscard]] Outcome python(std::vector<std::string> arguments) const {
-    std::vector<std::string> command{
-        "/usr/bin/env", std::string{"PYTHONPATH="} + ABBE_PYTHON_PACKAGE,
-        std::string{"PATH="} + ABBE_WATCH_FOLDER + ":/usr/bin:/bin", ABBE_PYTHON};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    return run(std::move(command));
-  }
-  [[nodiscard]] static std::string example(const std::string& name) {
-    return std::string{ABBE_PYTHON_EXAMPLES} + "/" + name;
+  [[nodiscard]] Outcome python(const std::vector<std::string>& arguments) const {
+    return run(python_command(arguments));
   }
   /// The file of a recording in tests/golden, unpacked.
   [[nodiscard]] std::string golden(const std::string& name) const {
@@ -214,33 +220,120 @@ TEST_F(Python, TheExamplesOfARecordingAndAModelRun) {
   EXPECT_THAT(model.out, AllOf(HasSubstr("EXX: 3 nodes"), HasSubstr("2000 of 2000 places inside")));
 }
 
-TEST_F(Python, FollowsACalibrationOverTheSocketAndItsVectorsOverDds) {
+TEST_F(Python, CalibratesByAnExampleAndFollowsTheVectorsOverDds) {
   write_path("path.csv", path());
   ASSERT_NO_FATAL_FAILURE(start_simulator());
   hold_simulator();
   write_configuration("child");
   ASSERT_NO_FATAL_FAILURE(start_abbed());
-  constexpr const char* kBegin = R"(
+  const auto calibration = start(
+      python_command({example("calibrate.py"), file("run/control.sock"), "otf", file("path.csv")}),
+      "calibration");
+  ASSERT_TRUE(eventually([&] {
+    return !calibration->running() || status()["session"]["state"] == "warming";
+  })) << calibration->err();
+  constexpr const char* kBeginAgain = R"(
 import abbe, numpy, sys
 path_m = 1e-3 * numpy.loadtxt(sys.argv[2], delimiter=",", skiprows=1)
-print(abbe.Control(sys.argv[1]).calibrate_otf(path_m)["ok"])
 try:
-    abbe.Control(sys.argv[1]).calibrate_otf(path_m)
+    abbe.Control(sys.argv[1]).calibrate_otf(path_m, mode="on-the-fly")
 except abbe.Error as error:
     print(error.code)
 )";
-  const auto begun = python({"-c", kBegin, file("run/control.sock"), file("path.csv")});
-  ASSERT_EQ(begun.code, 0) << begun.err;
-  EXPECT_EQ(begun.out, "True\nrefused\n");
+  const auto refused = python({"-c", kBeginAgain, file("run/control.sock"), file("path.csv")});
+  EXPECT_EQ(refused.out, "refused\n") << refused.err;
   simulator_->signal(SIGCONT);
-  ASSERT_TRUE(
-      eventually([this] { return status()["model"]["state"] == "ACTIVE"; }, kPatienceForARun));
+  EXPECT_EQ(calibration->wait_for_end(kPatienceForARun), 0) << calibration->err();
+  EXPECT_THAT(calibration->out(), AllOf(HasSubstr("warming: "), HasSubstr("acquiring: "),
+                                        ContainsRegex("model [0-9a-f]+ is active")));
+  ASSERT_TRUE(eventually([this] { return status()["model"]["state"] == "ACTIVE"; }));
 
   const auto followed = python(
       {example("follow.py"), file("run/control.sock"), domain_.text(), ABBE_LOOPBACK_PROFILE, "6"});
   EXPECT_EQ(followed.code, 0) << followed.err;
   EXPECT_THAT(followed.out, AllOf(HasSubstr("model ACTIVE"), HasSubstr("session active"),
                                   ContainsRegex("vectors: [1-9][0-9]* may be applied")));
+}
+
+TEST_F(Python, VerifiesAtAStandstillAndOrdersTheTracker) {
+  write_path("path.csv", {{0, 0, -100}, {50, 0, -100}});
+  ASSERT_NO_FATAL_FAILURE(start_simulator());
+  hold_simulator();
+  write_configuration();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  constexpr const char* kRequests = R"(
+import abbe, sys
+control = abbe.Control(sys.argv[1])
+points = control.verification_points(1)
+print("begun", flush=True)
+for point in points:
+    print("standstill", [round(1e3 * q) for q in point["reading_m"]], point["tracker_points"] > 0)
+print("reflectors", len(control.tracker_reflectors()) > 0)
+print("home:", control.tracker_home())
+print("orders", [order["order"] for order in control.tracker()["orders"]])
+control.stop_machine()
+print("release awaited", control.machine()["release_awaited"])
+for name, request in (("find", lambda: control.tracker_find(-1)), ("release", control.release_machine),
+                      ("reference", lambda: list(control.reference())),
+                      ("here", lambda: control.reference_here(["X"], 1e-5))):
+    try:
+        print(name, "accepted", request())
+    except abbe.Error as error:
+        print(name, error.code, error.text)
+)";
+  const auto requests =
+      start(python_command({"-c", kRequests, file("run/control.sock")}), "requests");
+  ASSERT_TRUE(eventually([&] { return !requests->out().empty() || !requests->running(); }));
+  simulator_->signal(SIGCONT);
+  EXPECT_EQ(requests->wait_for_end(kPatienceForARun), 0) << requests->err();
+  EXPECT_THAT(requests->out(),
+              AllOf(HasSubstr("standstill [0, 0, -100] True"), HasSubstr("reflectors True"),
+                    HasSubstr("home: "), HasSubstr("'home'"), HasSubstr("release awaited False"),
+                    ContainsRegex("find (refused|bad_input|usage|io) ")));
+}
+
+TEST_F(Python, ReadsTheFilesOfACalibrationAsTheCommandLine) {
+  write("calibrator.toml", "[calibrator]\nname = 5\n");
+  write("bar.toml", "nothing = 1\n");
+  write("path.csv", "x_mm,y_mm,z_mm\n0,0,0\n100,0,0\n0,0,zero\n");
+  constexpr const char* kFaults = R"(
+import abbe
+control = abbe.Control("no.sock")
+for call in (lambda: control.calibrate_otf("path.csv"), lambda: control.calibrate_evemu("calibrator.toml"),
+             lambda: control.calibrate_mfb("bar.toml", "missing.toml"),
+             lambda: control.calibrate_evemu("missing.toml")):
+    try:
+        call()
+    except abbe.Error as error:
+        print(error.code, error)
+)";
+  const auto seen =
+      run({"/bin/sh", "-c", R"(cd "$1" && shift && exec "$@")", "sh", directory_.string(),
+           "/usr/bin/env", std::string{"PYTHONPATH="} + ABBE_PYTHON_PACKAGE, ABBE_PYTHON, "-c",
+           kFaults});
+  EXPECT_EQ(seen.code, 0) << seen.err;
+  EXPECT_THAT(seen.out, AllOf(HasSubstr("bad_input path.csv: 1 fault\npath.csv:4:5: z_mm: "),
+                              HasSubstr("calibrator.toml:1:1: calibrator.tip_radius_mm: missing"),
+                              HasSubstr("io read missing.toml")));
+}
+
+struct PythonWithBallArray : TouchingRun {};
+
+TEST_F(PythonWithBallArray, CalibratesByAnExample) {
+  ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
+  write_touching_configuration();
+  ASSERT_NO_FATAL_FAILURE(start_abbed());
+  const auto calibration = start(python_command({example("calibrate.py"), file("run/control.sock"),
+                                                 "evemu", file("calibrator.toml")}),
+                                 "calibration");
+  ASSERT_TRUE(eventually([&] {
+    const auto now = session();
+    return !calibration->running() || (now.is_object() && now["state"] == "warming");
+  })) << calibration->err();
+  let_machine_go();
+  EXPECT_EQ(calibration->wait_for_end(kPatienceForARun), 0) << calibration->err();
+  EXPECT_THAT(calibration->out(), AllOf(HasSubstr("(position 1, ball 1: "), HasSubstr("block 2: "),
+                                        ContainsRegex("model [0-9a-f]+ is active")));
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ STANDSTILL_S = 2.0       # before the calibration, at its first vertex
 DWELL_S = 0.2            # at each vertex
 PHASES = {"without": 10, "with": 20}  # line, arc and helix: + 1, 2, 3
 FAULTS = {"abbe-dds killed": 31, "NaN": 32, "machine off": 33, "model not ACTIVE": 34,
-          "model DRIFT": 36, "feeder killed": 35}
+          "not homed": 37, "model DRIFT": 36, "feeder killed": 35}
 
 command = status = None  # of a running LinuxCNC; evaluate.py reads the names of the phases only
 
@@ -82,11 +82,15 @@ def machine_on():
         command.wait_complete()
 
 
-def home():
+def joint_mode():
     command.mode(linuxcnc.MODE_MANUAL)
     command.wait_complete()
     command.teleop_enable(0)
     command.wait_complete()
+
+
+def home():
+    joint_mode()
     command.home(-1)
     wait_until("all joints are homed", lambda: hal.get_value("motion.is-all-homed"))
 
@@ -222,6 +226,20 @@ def model_not_active():
     write_request("continue-encoder")
 
 
+def not_homed():
+    """At standstill: LinuxCNC unhomes in joint mode only. It is homed again at the same place, so the
+    machine has the same coordinates."""
+    command.unhome(-1)
+    wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"))
+    time.sleep(1.0)  # abbed calls an axis missing after 150 ms
+    condition = next(s for s in abbe_status()["streams"] if s["name"] == "encoder")["condition"]
+    if "LinuxCNC is not homed" not in condition or not feeder_said("not all joints are homed"):
+        fail("the cause is not reported: the condition of the encoders is \"%s\"" % condition)
+    home()
+    wait_until("the correction is active again", active, 60)
+    time.sleep(0.5)
+
+
 def feeder_killed():
     write_request("kill-feeder")
     wait_until("the correction is stale", lambda: hal.get_value("abbe-correction.stale"))
@@ -232,11 +250,11 @@ def feeder_killed():
 
 ACTIONS = {"abbe-dds killed": lambda: (write_request("kill-dds"), time.sleep(2.5)),
            "NaN": not_a_number, "machine off": machine_off, "model not ACTIVE": model_not_active,
-           "model DRIFT": model_drifts, "feeder killed": feeder_killed}
+           "not homed": not_homed, "model DRIFT": model_drifts, "feeder killed": feeder_killed}
 
 
 def fault(name):
-    """Happens while the machine drives circles in the volume."""
+    """Happens while the machine drives circles in the volume, or stands at their beginning."""
     if name == "model DRIFT":
         write_request("change-machine")
         calibrate("changed")
@@ -246,8 +264,11 @@ def fault(name):
     command.wait_complete()
     move("G1 X75 Y0 Z-100")
     switch_on()
-    mdi("G3 X75 Y0 I-75 J0 P60")
-    time.sleep(1.0)
+    if name == "not homed":
+        joint_mode()
+    else:
+        mdi("G3 X75 Y0 I-75 J0 P60")
+        time.sleep(1.0)
     phase(FAULTS[name])
     ACTIONS[name]()
     time.sleep(0.5)

@@ -16,10 +16,10 @@ constexpr std::string_view kStyle =
     "body{font:14px/1.4 system-ui,'DejaVu Sans',sans-serif;width:190mm;margin:1.5rem "
     "auto;color:#1b1f24}"
     "h1{font-size:1.45rem}h2{font-size:1.1rem;margin:1.6rem 0 .5rem;border-bottom:1px solid "
-    "#ccd3da;break-after:avoid}p{margin:.45rem 0}"
+    "#ccd3da;break-after:avoid}p{margin:.45rem 0}h2+p{break-after:avoid}"
     "table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.1rem .9rem .1rem "
     "0;text-align:left;vertical-align:top}"
-    "td{font-variant-numeric:tabular-nums;overflow-wrap:anywhere}th{font-weight:600;color:#57606a}"
+    "td{font-variant-numeric:tabular-nums}td.long{overflow-wrap:anywhere}th{font-weight:600;color:#57606a}"
     ".maps{width:190mm;display:block;margin:.6rem 0;break-inside:avoid;font-size:11px;fill:#444}"
     ".maps rect{shape-rendering:crispEdges}"
     ".maps .title{font-weight:bold;font-size:12px}.maps .frame{fill:none;stroke:#57606a}"
@@ -36,6 +36,18 @@ constexpr std::string_view kStyle =
     ".signal svg{width:9mm;height:24mm;flex:none}ul{margin:.3rem 0;padding-left:1.2rem}"
     "@media print{body{margin:0;print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
 
+/// A cell of a table. A long word, as a hash, may be broken; a number never is.
+std::string cell(std::string_view text) {
+  constexpr std::size_t kLongestWord = 40;
+  std::size_t length = 0;
+  bool is_long = false;
+  for (const char letter : text) {
+    length = letter == ' ' ? 0 : length + 1;
+    is_long = is_long || length > kLongestWord;
+  }
+  return fmt::format("<td{}>{}</td>", is_long ? " class=\"long\"" : "", escaped(text));
+}
+
 }  // namespace
 
 HtmlReport::HtmlReport(std::string_view title) : title_(escaped(title)) {}
@@ -51,7 +63,7 @@ void HtmlReport::paragraph(std::string_view text) {
 void HtmlReport::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
   body_ += "<table>\n";
   for (const auto& [what, value] : facts)
-    body_ += fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", escaped(what), escaped(value));
+    body_ += fmt::format("<tr><th>{}</th>{}</tr>\n", escaped(what), cell(value));
   body_ += "</table>\n";
 }
 
@@ -62,7 +74,7 @@ void HtmlReport::table(const std::vector<std::string>& columns,
   body_ += "</tr>\n";
   for (const auto& row : rows) {
     body_ += "<tr>";
-    for (const auto& cell : row) body_ += fmt::format("<td>{}</td>", escaped(cell));
+    for (const auto& text : row) body_ += cell(text);
     body_ += "</tr>\n";
   }
   body_ += "</table>\n";

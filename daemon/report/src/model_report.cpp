@@ -118,7 +118,6 @@ Result<std::string> model_report(const ReportSubject& subject) {
   add_volume_maps(
       page, document.model,
       document.run ? document.run->held_out_cells : std::vector<RunFigures::HeldOutCell>{});
-  page.page_break();
   add_places(page, document, values->standard.box);
   add_residuals_of(page, document);
   add_tables_of_method(page, document);

@@ -66,12 +66,17 @@ struct Page : Run {
                                                                   : log.substr(begin, end - begin);
   }
 
-  /// Starts a program of tests/web/browser.
+  /// Starts a program of tests/web/browser with the page of abbe-web.
   void browse(const std::string& program, const std::vector<std::string>& more = {}) {
+    browse_at(url(), program, more);
+  }
+  void browse_at(const std::string& address, const std::string& program,
+                 const std::vector<std::string>& more) {
     const char* node = ::getenv("ABBE_NODE");
     const char* screenshots = ::getenv("ABBE_SCREENSHOTS");
     std::vector<std::string> command{node == nullptr ? "/usr/bin/node" : node,
-                                     std::string{ABBE_BROWSER_TESTS} + "/" + program, url(),
+                                     std::string{ABBE_BROWSER_TESTS} + "/" + program,
+                                     address,
                                      screenshots == nullptr ? this->file("") : screenshots};
     command.insert(command.end(), more.begin(), more.end());
     browser_ = this->start(std::move(command), program);
@@ -88,6 +93,16 @@ struct Page : Run {
         << browser_->out() << browser_->err() << web_->err();
     if (this->HasFailure()) return;
     fmt::print("{}", browser_->out());
+  }
+
+  /// The report of the active model on A4, as abbe and the browser print it.
+  void expect_report_prints(const std::string& name) {
+    const std::string html = this->file(name + ".html"), pdf = this->file(name + ".pdf");
+    const auto made = this->run({ABBE_PROGRAM, "report", "active", "-c", this->file("abbed.toml"), "-o",
+                           html, "--pdf", pdf});
+    ASSERT_EQ(made.code, 0) << made.err;
+    browse_at("file://" + html, "report.mjs", {pdf});
+    expect_browser_ends_well();
   }
 
   /// A connection that asks for the events and never reads them.
@@ -129,6 +144,7 @@ TEST_F(PageOnTheFly, IsCalibratedByClickingAndEveryViewIsRight) {
   simulator_->signal(SIGCONT);
   ASSERT_NO_FATAL_FAILURE(expect_browser_ends_well());
   EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+  ASSERT_NO_FATAL_FAILURE(expect_report_prints("report-otf"));
 
   std::vector<std::string> options{kPassword};
   if (kIsRelease) options.emplace_back(kLongestFirstView_ms);
@@ -193,6 +209,7 @@ TEST_F(PageBallArray, IsCalibratedByClicking) {
   let_machine_go();
   expect_browser_ends_well();
   EXPECT_EQ(status()["model"]["state"], "ACTIVE");
+  expect_report_prints("report-array");
 }
 
 struct PageBar : Page<BarRun> {};

@@ -75,8 +75,7 @@ struct Page : Run {
     const char* node = ::getenv("ABBE_NODE");
     const char* screenshots = ::getenv("ABBE_SCREENSHOTS");
     std::vector<std::string> command{node == nullptr ? "/usr/bin/node" : node,
-                                     std::string{ABBE_BROWSER_TESTS} + "/" + program,
-                                     address,
+                                     std::string{ABBE_BROWSER_TESTS} + "/" + program, address,
                                      screenshots == nullptr ? this->file("") : screenshots};
     command.insert(command.end(), more.begin(), more.end());
     browser_ = this->start(std::move(command), program);
@@ -98,8 +97,8 @@ struct Page : Run {
   /// The report of the active model on A4, as abbe and the browser print it.
   void expect_report_prints(const std::string& name) {
     const std::string html = this->file(name + ".html"), pdf = this->file(name + ".pdf");
-    const auto made = this->run({ABBE_PROGRAM, "report", "active", "-c", this->file("abbed.toml"), "-o",
-                           html, "--pdf", pdf});
+    const auto made = this->run({ABBE_PROGRAM, "report", "active", "-c", this->file("abbed.toml"),
+                                 "-o", html, "--pdf", pdf});
     ASSERT_EQ(made.code, 0) << made.err;
     browse_at("file://" + html, "report.mjs", {pdf});
     expect_browser_ends_well();
@@ -126,11 +125,19 @@ struct Page : Run {
 };
 
 struct PageOnTheFly : Page<Spine> {
+  /// Half as fast as other tests: Chromium without a graphics card draws few pictures in a second.
+  static constexpr int kSpeed = ABBE_SPINE_SPEED / 2;
+  void slow_down(const std::string& name) {
+    write(name,
+          replaced(text_of(file(name)), "\nspeed = [0-9]+", fmt::format("\nspeed = {}", kSpeed)));
+  }
   void start_everything() {
     write_path("path.csv", path());
+    slow_down("sim.toml");
     ASSERT_NO_FATAL_FAILURE(start_simulator());
     hold_simulator();
     write_configuration();
+    slow_down("abbed.toml");
     add_page();
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_NO_FATAL_FAILURE(open_server());

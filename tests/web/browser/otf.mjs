@@ -30,7 +30,7 @@ await withPage(url, out, async (context) => {
 
   await waitForText(context, "acquiring", "#session-state");
   const first = await drivenPoints(context, 2);
-  const later = await drivenPoints(context, first + 10);
+  const later = await drivenPoints(context, first + 1);
   say(`driven path ${first}, then ${later} points`);
   await screenshot(context, "otf-acquiring");
   faults.push(...await violations(context));

@@ -155,7 +155,7 @@ def vertices_mm():
     return [[float(v) for v in line] for line in lines]
 
 
-def calibrate(name):
+def drive_calibration(name):
     """abbed calibrates while LinuxCNC drives the path, a program with an exact stop at each vertex."""
     path = vertices_mm()
     with open("path.ngc", "w") as out:
@@ -176,10 +176,12 @@ def calibrate(name):
     time.sleep(1.0)
     wait_until("the path is driven", lambda: status.poll() or status.interp_state == linuxcnc.INTERP_IDLE,
                600)
+    print("drive: %d vertices of the calibration driven" % len(path), flush=True)
+
+
+def wait_for_end_of_path():
     wait_until("abbed has seen the end of the path",
                lambda: abbe_status()["session"]["state"] != "acquiring", 30)
-    move("G1 X0 Y0 Z-100")  # the path ends at the edge of the volume
-    print("drive: %d vertices of the calibration driven" % len(path), flush=True)
 
 
 def wait_for_calibration(name):
@@ -193,7 +195,7 @@ def feeder_said(text):
 
 
 def model_drifts():
-    """The calibration that drove before this circle shows that the machine has changed."""
+    """The calibration shows that the machine has changed."""
     wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"), 100)
     time.sleep(0.5)
     if not feeder_said("ModelState is DRIFT"):
@@ -256,14 +258,18 @@ ACTIONS = {"abbe-dds killed": lambda: (write_request("kill-dds"), time.sleep(2.5
 def fault(name):
     """Happens while the machine drives circles in the volume, or stands at their beginning."""
     if name == "model DRIFT":
+        # The path ends at the beginning of the circles. The correction is on before abbed has seen the
+        # end, which takes a standstill of 1 s, so before the calibration shows that the machine changed.
         write_request("change-machine")
-        calibrate("changed")
-    if not hal.get_value("motion.motion-enabled"):
-        machine_on()
-    command.mode(linuxcnc.MODE_MDI)
-    command.wait_complete()
-    move("G1 X75 Y0 Z-100")
-    switch_on()
+        drive_calibration("changed")
+        switch_on()
+        phase(FAULTS[name])
+        wait_for_end_of_path()
+    else:
+        if not hal.get_value("motion.motion-enabled"):
+            machine_on()
+        move("G1 X75 Y0 Z-100")
+        switch_on()
     if name == "not homed":
         joint_mode()
     else:
@@ -289,7 +295,8 @@ def main():
     with open("offsets.txt", "w") as out:
         out.write(" ".join("%.9f" % o for o in offsets) + "\n")
 
-    calibrate("first")
+    drive_calibration("first")
+    wait_for_end_of_path()
     if wait_for_calibration("first") != 0:
         fail("the calibration was refused")
     wait_until("the feeder has a valid correction", lambda: hal.get_value("abbe-feeder.valid"), 60)

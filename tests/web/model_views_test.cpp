@@ -62,6 +62,19 @@ TEST_F(ModelViewsTest, AModelIsShownWithItsVerdictAndTheEventsThatCameLater) {
   EXPECT_EQ(after["reasons"], before["reasons"]);
 }
 
+TEST_F(ModelViewsTest, TheLampIsYellowAfterALaterRunFoundDrift) {
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  const daemon::StoreActor anna{.who = "anna", .why = "", .when = {}};
+  const auto id = store->add(daemon::test::synthetic_document(1), true, {}, anna);
+  ASSERT_TRUE(id && store->activate(*id, anna));
+  const auto before = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  ASSERT_TRUE(store->add_drift(*id, {.who = "abbed", .why = "EXX by 4 um", .when = {}}));
+  const auto after = nlohmann::json::parse(views_.model(*id).value())["verdict"];
+  EXPECT_EQ(before["lamp"], "green");
+  EXPECT_EQ(after["lamp"], "yellow");
+  EXPECT_THAT(after["notes"].dump(), HasSubstr("a later run found drift: abbed"));
+}
+
 TEST_F(ModelViewsTest, TheTrendHasEachTableOfTheNewestModels) {
   for (unsigned seed = 1; seed <= 8; ++seed) add(seed);
   const auto trend = nlohmann::json::parse(views_.trend().value());

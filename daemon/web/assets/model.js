@@ -42,6 +42,12 @@ function verdict({ lamp, text, reasons, notes }) {
       under("Notes, no reasons against the model", notes)));
 }
 
+/** Shows the present verdict of the model: a later run may have found drift, or it was activated. */
+async function followVerdict(place, id) {
+  const { verdict: now } = await get(`api/models/${id}`);
+  place.querySelector("#verdict").replaceWith(verdict(now));
+}
+
 function signs(model) {
   return h("section", { id: "signs" }, h("h2", {}, "Signs"), list(model.signs));
 }
@@ -268,6 +274,7 @@ export async function show(place) {
   const ends = [listen("store", async () => {
     if (await choice.changed().catch(() => false))
       notice.textContent = "The models have changed since this view was opened: open it again.";
+    await followVerdict(place, choice.shown).catch((error) => { notice.textContent = error.message; });
   }), await motionView(motions, model, other)];
   try {
     ends.push(await spaceView(space, model, other));

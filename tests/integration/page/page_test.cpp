@@ -131,6 +131,27 @@ struct PageOnTheFly : Page<Spine> {
     write(name,
           replaced(text_of(file(name)), "\nspeed = [0-9]+", fmt::format("\nspeed = {}", kSpeed)));
   }
+  /// Accepted models of these seeds; the first one is active. Before abbed starts.
+  void add_models(const std::vector<unsigned>& seeds) const {
+    auto store = daemon::ModelStore::open(file("data/models"));
+    ASSERT_TRUE(store) << store.error().text;
+    const daemon::StoreActor actor{.who = "test", .why = "", .when = {}};
+    for (const unsigned seed : seeds) {
+      const auto added = store->add(daemon::test::synthetic_document(seed), true, {}, actor);
+      ASSERT_TRUE(added) << added.error().text;
+      if (seed == seeds.front()) {
+        ASSERT_TRUE(store->activate(*added, actor));
+      }
+    }
+  }
+  /// As after a run that shows a change of the machine.
+  void find_drift() const {
+    auto store = daemon::ModelStore::open(file("data/models"));
+    ASSERT_TRUE(store) << store.error().text;
+    const auto active = store->active_id();
+    ASSERT_TRUE(active && *active);
+    ASSERT_TRUE(store->add_drift(**active, {.who = "test", .why = "EXX by 4 um", .when = {}}));
+  }
   void start_everything() {
     write_path("path.csv", path());
     slow_down("sim.toml");
@@ -184,22 +205,20 @@ TEST_F(PageOnTheFly, APageThatReadsNoEventsIsClosedByName) {
 }
 
 TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
-  {
-    auto store = daemon::ModelStore::open(file("data/models"));
-    ASSERT_TRUE(store) << store.error().text;
-    const daemon::StoreActor actor{.who = "test", .why = "", .when = {}};
-    for (const unsigned seed : {3U, 4U}) {
-      const auto added = store->add(daemon::test::synthetic_document(seed), true, {}, actor);
-      ASSERT_TRUE(added) << added.error().text;
-      if (seed == 3U) {
-        ASSERT_TRUE(store->activate(*added, actor));
-      }
-    }
-  }
+  ASSERT_NO_FATAL_FAILURE(add_models({3, 4}));
   ASSERT_NO_FATAL_FAILURE(start_everything());
   browse("compare.mjs", {kPassword});
   expect_browser_ends_well();
   browse("keyboard.mjs", {kPassword});
+  expect_browser_ends_well();
+}
+
+TEST_F(PageOnTheFly, AnOpenModelViewShowsDrift) {
+  ASSERT_NO_FATAL_FAILURE(add_models({3}));
+  ASSERT_NO_FATAL_FAILURE(start_everything());
+  browse("drift.mjs");
+  ASSERT_TRUE(browser_prints("GREEN")) << browser_->out() << browser_->err();
+  find_drift();
   expect_browser_ends_well();
 }
 

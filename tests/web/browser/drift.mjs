@@ -1,0 +1,17 @@
+// The Model view is open while drift is found: its lamp follows. Prints "GREEN" when drift may be found.
+//   drift.mjs URL FOLDER
+
+import { goTo, say, screenshot, waitForText, withPage } from "./chromium.mjs";
+
+const [url, out] = process.argv.slice(2);
+
+await withPage(url, out, async (context) => {
+  const { page } = context;
+  await goTo(context, "model");
+  await waitForText(context, "Green: the gate accepted the model. It is the active model.", "#verdict");
+  say("GREEN");
+  await waitForText(context, "Yellow: accepted, but the machine has changed since.", "#verdict");
+  await waitForText(context, "EXX by 4 um", "#verdict");  // among the notes
+  await screenshot(context, "model-drift");
+  return await page.$eval("#verdict", (v) => v.dataset.lamp) === "yellow" ? [] : ["the lamp is not yellow after drift"];
+});

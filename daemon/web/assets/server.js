@@ -106,6 +106,7 @@ export function disconnect() {
   events = null;
   state.status = state.live = null;
   report(null);
+  notify("notice", { text: "" });
 }
 
 /** The reason why the server gives no stream. */

@@ -81,16 +81,17 @@ void DaemonFeed::run() {
 }
 
 void DaemonFeed::cycle(Clock::time_point now) {
+  // Before abbed is asked: an answer that is not understood ends the cycle.
+  if (now >= next_files_) {
+    next_files_ = now + kFilesPeriod;
+    follow_notice();
+    follow_files();
+  }
   if (now >= next_status_) {
     next_status_ = now + kStatusPeriod;
     ask_status();
   }
   if (source_fault_.empty()) ask_positions();
-  if (now >= next_files_) {
-    next_files_ = now + kFilesPeriod;
-    follow_files();
-    follow_notice();
-  }
 }
 
 void DaemonFeed::ask_status() {
@@ -177,8 +178,8 @@ void DaemonFeed::follow_files() {
 void DaemonFeed::follow_notice() {
   std::string notice = notice_();
   if (notice == notice_seen_) return;
+  board_.post(Topic::Notice, event_text({{"text", notice}}));
   notice_seen_ = std::move(notice);
-  board_.post(Topic::Notice, event_text({{"text", notice_seen_}}));
 }
 
 /// `reason`: why abbed does not answer; empty: it answers.

@@ -10,6 +10,7 @@
 #include <functional>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -66,7 +67,10 @@ class DaemonFeed {
   daemon::ControlConnection connection_;
   Clock::time_point next_status_{}, next_files_{};
   std::string source_fault_ = "not asked yet";
-  std::string files_seen_, notice_seen_;
+  std::string files_seen_;
+  /// nullopt: not posted yet. An empty notice is posted as well: a page that was open before a restart
+  /// of abbe-web may show an earlier one.
+  std::optional<std::string> notice_seen_;
   bool acquiring_ = false;
   bool request_known_ = false;  ///< of the session path_.session
 

@@ -50,6 +50,33 @@ function sessionParts(session) {
   ].filter((part) => part !== null);
 }
 
+/** The touches of a session: `next`, the one that is asked for, null: none; `last`, the one that was
+ * asked for last while this view was open; `end`, how the session has ended: "complete", "cancelled",
+ * "refused"; empty: it has not, or that is not known. */
+function touchesOf(session, last) {
+  const next = session?.next ?? null;
+  if (!session || next) return { next, last: next ?? last, end: "" };
+  const isComplete = ["identifying", "judged", "active"].includes(session.state) || session.model_id !== "";
+  return { next, last, end: isComplete ? "complete" : session.reason.startsWith("cancelled") ? "cancelled" : "refused" };
+}
+
+const kEnds = {
+  complete: "Complete: all touches were made.",
+  cancelled: "The calibration was cancelled.",
+  refused: "The calibration has ended without a model.",
+};
+const kNotKnown = "What was touched is not known: this view was opened later.";
+
+/** `id`: of the session that is drawn. Calls `show` with its touches, now and whenever they change. */
+function followTouches(id, show) {
+  let touches = touchesOf(null, null);
+  const follow = (status) => {
+    if (status?.session.id === id) touches = touchesOf(status.session, touches.last);
+    return show(touches);
+  };
+  return { end: listen("status", follow), first: follow(state.status) };
+}
+
 // Colours of what is drawn: a place to go to, one that is done, the next one.
 const kOpen = 0x6e7f90, kTouched = 0x2fd3a0, kNext = 0xe69f00;
 
@@ -100,23 +127,28 @@ async function pathView(place, path_mm, driven_mm) {
 const mm = (metres) => metres.map((x) => 1e3 * x);
 const along = (v, n) => v.reduce((sum, x, i) => sum + x * n[i], 0);
 
-/** Balls and blocks with their places, mm. They stand in the machine (`posed`) as soon as the touches
- * of the position show all of them; until then in the frame of the array. Its file states in which
- * direction a block faces, not where it is: it is drawn beside the balls in this direction. */
-function featuresOf(calibrator, next) {
-  const seen = new Map((next?.features ?? []).map((f) => [f.on, f]));
-  const posed = seen.size > 0 && [...seen.values()].every((f) => f.at_m);
-  const touched = (on) => (seen.get(on)?.touched ?? 0) > 0;
+/** Balls and blocks with their places, mm, and their state: "open", "begun", "touched". They stand in
+ * the machine (`posed`) as soon as the touches of the position show all of them; until then in the frame
+ * of the array. Its file states in which direction a block faces, not where it is: it is drawn beside the
+ * balls in this direction. */
+function featuresOf(calibrator, { last, end }) {
+  const seen = new Map((last?.features ?? []).map((f) => [f.on, f]));
+  const posed = seen.size > 0 && [...seen.values()].every((f) => f.at_m && (f.normal || f.on.startsWith("ball")));
+  const stateOf = (on) => {
+    const f = seen.get(on);
+    if (end === "complete" || (f && f.touched >= f.points)) return "touched";
+    return f?.touched > 0 ? "begun" : "open";
+  };
   const centres = calibrator.balls.map((b) => mm(b.centre_m));
   const centre = [0, 1, 2].map((i) => centres.reduce((sum, c) => sum + c[i], 0) / centres.length);
   const radius = 1e3 * Math.max(...calibrator.balls.map((b) => b.radius_m));
   const balls = calibrator.balls.map((b) => ({ on: `ball ${b.number}`, name: String(b.number), radius: 1e3 * b.radius_m }))
-    .map((b, i) => ({ ...b, at: posed ? mm(seen.get(b.on).at_m) : centres[i], touched: touched(b.on) }));
+    .map((b, i) => ({ ...b, at: posed ? mm(seen.get(b.on).at_m) : centres[i], state: stateOf(b.on) }));
   const blocks = calibrator.blocks.map((b) => {
     const on = `block ${b.number}`, length = Math.hypot(...b.normal);
     const out = b.normal.map((x) => x / length);
     const reach = Math.max(...centres.map((c) => along(c, out))) - along(centre, out) + 3 * radius;
-    return { on, name: `block ${b.number}`, side: 2 * radius, touched: touched(on),
+    return { on, name: `block ${b.number}`, side: 2 * radius, state: stateOf(on),
       at: posed ? mm(seen.get(on).at_m) : centre.map((x, i) => x + reach * out[i]),
       normal: posed ? seen.get(on).normal : out };
   });
@@ -124,7 +156,29 @@ function featuresOf(calibrator, next) {
 }
 
 /** What tells two drawings apart: the machine with its position of the array, or the array alone. */
-const frameOf = ({ posed }, next) => (posed ? `position ${next.position}` : "array");
+const frameOf = ({ posed }, { last }) => (posed ? `position ${last.position}` : "array");
+
+/** "Next: ball 3. Touched: ball 1, block 1", for a screen reader; `verb`: "Touched". */
+function touchesInWords({ next, last, end }, verb, done) {
+  if (end === "complete") return kEnds.complete;
+  return [next ? `Next: ${next.on}.` : kEnds[end] ?? "", last ? `${verb}: ${done.join(", ") || "nothing"}` : ""]
+    .filter((part) => part !== "").join(" ");
+}
+
+/** What the drawing of the array shows; colours by state, as arrayDrawing() uses them. */
+function drawingInWords({ posed }, { next, last, end }) {
+  const parts = [];
+  if (end) parts.push(kEnds[end]);
+  if (end !== "complete") {
+    if (last) parts.push("Outline: not touched yet. Green outline: begun. Filled: touched.");
+    else if (end) parts.push(kNotKnown);
+  }
+  if (next) parts.push("Orange and larger: touched next.");
+  if (posed) parts.push(`The array as it stands in the machine at position ${last.position}${next ? ", with the tip" : ""}.`);
+  else parts.push("The array in its own frame, with the blocks beside it" + (next ?
+    ": where it stands is known once both blocks and the first balls are touched." : "."));
+  return parts.join(" ");
+}
 
 /** The array once, with what is touched and what is next; `arm`: see Space.create(). */
 async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
@@ -135,22 +189,23 @@ async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
     space.text(f.name, new THREE.Vector3(f.at[0], f.at[1], f.at[2] + 2.2 * (f.radius ?? f.side / 2)));
   space.frame.dataset.frame = frame;
   let drawn = [], tip = null;
-  const mark = ({ all, posed }, next) => {
+  const mark = ({ all, posed }, touches) => {
     drawn.forEach((object) => space.remove(object));
     drawn = all.map((f) => {
-      const isNext = f.on === next?.on;
-      const colour = isNext ? kNext : f.touched ? kTouched : kOpen;
-      const outline = !isNext && !f.touched, larger = isNext ? 1.3 : 1;
+      const isNext = f.on === touches.next?.on;
+      const colour = isNext ? kNext : f.state === "open" ? kOpen : kTouched;
+      const outline = !isNext && f.state !== "touched", larger = isNext ? 1.3 : 1;
       return f.normal ? space.plate(f.at, f.normal, larger * f.side, colour, outline)
         : space.ball(f.at, larger * f.radius, colour, outline);
     });
-    space.frame.dataset.next = next?.on ?? "";
-    space.frame.dataset.touched = all.filter((f) => f.touched).map((f) => f.on).join();
-    space.name(`Ball array ${posed ? "in the machine" : "in its own frame"}. Next: ${next?.on ?? "nothing"}. ` +
-      `Touched: ${space.frame.dataset.touched || "nothing"}`);
+    const inState = (state) => all.filter((f) => f.state === state).map((f) => f.on);
+    Object.assign(space.frame.dataset, { next: touches.next?.on ?? "", end: touches.end,
+      begun: inState("begun").join(), touched: inState("touched").join() });
+    space.name(`Ball array ${posed ? "in the machine" : "in its own frame"}. ` +
+      touchesInWords(touches, "Touched", inState("touched")));
   };
-  const showTip = () => {
-    const at = features.posed ? place_mm(state.live) : null;
+  const showTip = ({ next }) => {
+    const at = features.posed && next ? place_mm(state.live) : null;
     if (!at) return;
     tip ??= space.ball(at, 0.25 * features.radius, 0xcc79a7);
     tip.position.set(...at);
@@ -160,15 +215,14 @@ async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
 }
 
 /** The balls and blocks of an array, with the one that is to be touched next; returns what ends it. */
-async function artefactView(place, calibrator) {
+async function artefactView(place, calibrator, id) {
   const words = h("p", { class: "weak" });
   const view = h("div");
   place.append(view, words);
-  let next = state.status?.session.next ?? null;
   let drawing = null, shown = "", ended = false, busy = false;
-  const show = async () => {
-    const features = featuresOf(calibrator, next);
-    const frame = frameOf(features, next);
+  const draw = async (touches) => {
+    const features = featuresOf(calibrator, touches);
+    const frame = frameOf(features, touches);
     if (drawing?.frame !== frame) {
       const arm = drawing?.space.arm;
       drawing?.space.end();
@@ -178,66 +232,66 @@ async function artefactView(place, calibrator) {
       if (ended) return made.space.end();
       drawing = made;
     }
-    drawing.mark(features, next);
-    drawing.showTip();
-    words.textContent = "Outline: not touched yet. Filled: touched. Orange and larger: touched next. " +
-      (features.posed ? "The array as it stands in the machine, with the tip." :
-        "The array in its own frame, with the blocks beside it: where it stands is known once both blocks and the first balls are touched.");
+    drawing.mark(features, touches);
+    drawing.showTip(touches);
+    words.textContent = drawingInWords(features, touches);
   };
-  const follow = async (status) => {
-    const now = status?.session.next;
-    const key = JSON.stringify(now);
-    if (!now || key === shown || busy) return;  // at the end the last drawing stays
-    shown = key;
-    next = now;
+  let touches = null;
+  const show = async (now) => {
+    touches = now;
+    if (busy) return;
     busy = true;
-    await show().finally(() => { busy = false; });
+    for (let key = ""; !ended && (key = JSON.stringify(touches)) !== shown;) {
+      shown = key;
+      await draw(touches).catch((error) => { words.textContent = error.message; });
+    }
+    busy = false;
   };
-  await show();
-  const fault = (error) => { words.textContent = error.message; };
-  const ends = [listen("status", (status) => follow(status).catch(fault)), listen("live", () => drawing?.showTip())];
+  const { end, first } = followTouches(id, show);
+  await first;
+  const ends = [end, listen("live", () => drawing?.showTip(touches))];
   return () => {
     ended = true;
-    ends.forEach((end) => end());
+    ends.forEach((each) => each());
     drawing?.space.end();
   };
 }
 
 /** The planned places of a Multi-Feature Bar, with the one that is to be touched next. */
-async function barView(place, bars) {
+async function barView(place, bars, id) {
   const space = await Space.create(place, ...corners(bars.flatMap((b) => b.holes_mm)),
     "Places of the bar");
   let shown = null, drawn = [];
-  const mark = () => {
-    const next = state.status?.session.next;
-    const now = next ? `${next.measurement} ${next.on}` : "";
-    if (now === shown) return;
-    shown = now;
+  const mark = (touches) => {
+    const key = JSON.stringify(touches);
+    if (key === shown) return;
+    shown = key;
+    const { next, last, end } = touches;
+    const done = end === "complete" ? bars.length : last ? last.place - 1 : 0;  // in the order of the plan
     drawn.forEach((object) => space.remove(object));
     drawn = [];
-    bars.forEach((bar, i) => {  // in the order of the plan
+    bars.forEach((bar, i) => {
       const isNext = bar.measurement === next?.measurement;
-      const isTouched = next && i < next.place - 1;
-      const colour = isNext ? kNext : isTouched ? kTouched : kOpen;
-      drawn.push(space.path(bar.holes_mm, colour), space.dots(bar.holes_mm, colour, isNext ? 0.014 : isTouched ? 0.012 : 0.006));
+      const colour = isNext ? kNext : i < done ? kTouched : kOpen;
+      drawn.push(space.path(bar.holes_mm, colour), space.dots(bar.holes_mm, colour, isNext ? 0.014 : i < done ? 0.012 : 0.006));
       const hole = isNext && bar.holes_mm[Number(/^hole (\d+)/.exec(next.on)?.[1]) - 1];
       if (hole) drawn.push(space.ball(hole, 0.02 * space.size, kNext));
     });
-    space.frame.dataset.next = now;
-    space.name(`Places of the bar. Next: ${now || "nothing"}`);
+    const asked = next ? { on: `${next.measurement} ${next.on}` } : null;
+    Object.assign(space.frame.dataset, { next: asked?.on ?? "", end, done });
+    space.name(`Places of the bar. ${touchesInWords({ next: asked, last, end }, "Done", bars.slice(0, done).map((b) => b.measurement))}`);
   };
-  mark();
-  const stop = listen("status", mark);
-  return () => { stop(); space.end(); };
+  const { end } = followTouches(id, mark);
+  return () => { end(); space.end(); };
 }
 
 async function drawing(place) {
-  const { request, driven_mm, bars } = await get("api/calibration");
+  const { session, request, driven_mm, bars } = await get("api/calibration");
   place.replaceChildren();
   if (request?.path_m?.length > 1)
     return pathView(place, request.path_m.map((p) => p.map((x) => 1e3 * x)), driven_mm);
-  if (request?.calibrator) return artefactView(place, request.calibrator);
-  if (bars.length > 0) return barView(place, bars);
+  if (request?.calibrator) return artefactView(place, request.calibrator, session);
+  if (bars.length > 0) return barView(place, bars, session);
   return () => {};
 }
 

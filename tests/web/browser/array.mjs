@@ -15,9 +15,9 @@ async function watchMarks({ page }) {
     globalThis.marks = [];
     const look = () => requestAnimationFrame(() => {
       const space = document.querySelector(".space");
-      const text = /Next: ((ball|block) \d+)/.exec(document.getElementById("view").innerText)?.[1];
+      const [, text, , position] = /Next: ((ball|block) \d+) of position (\d+)/.exec(document.getElementById("view").innerText) ?? [];
       if (!space || !text) return;
-      const now = { ...space.dataset, text };
+      const now = { ...space.dataset, text, position };
       const last = globalThis.marks.at(-1);
       if (JSON.stringify(now) !== JSON.stringify(last)) globalThis.marks.push(now);
     });
@@ -26,25 +26,48 @@ async function watchMarks({ page }) {
   });
 }
 
-function faultsOf(marks) {
+/** The drawing follows the text within one change of the page, and every feature is marked once. */
+function lagging(marks) {
   const faults = [];
-  const order = ["ball 1", "block 1", "block 2", "ball 2", "ball 3"];
-  const marked = new Set(marks.map((m) => m.next));
-  if (marked.size < order.length) faults.push(`the drawing has marked only ${[...marked].join(", ")}`);
-  if (![...marked].some((on) => on.startsWith("block"))) faults.push("the drawing has never marked a block");
-  if (!marks.some((m) => m.touched.includes("block 2"))) faults.push("no block was drawn as touched");
-  // The drawing follows the text at the next event of the status, when the place of the array is new.
-  const agreeing = marks.filter((m) => m.text === m.next).length;
-  if (agreeing < 0.5 * marks.length) faults.push(`the drawing marks something else than the text: ${JSON.stringify(marks)}`);
+  const changes = 1 + marks.filter((m, i) => i > 0 && m.text !== marks[i - 1].text).length;
+  const late = marks.filter((m) => m.text !== m.next);
+  if (late.length > changes)
+    faults.push(`${late.length} of ${marks.length} marks differ from the text, which has changed ${changes} times: ${JSON.stringify(late)}`);
+  for (const on of new Set(marks.map((m) => m.text)))
+    if (!marks.some((m) => m.text === on && m.next === on)) faults.push(`the drawing has never marked ${on} when the text asked for it`);
+  return faults;
+}
+
+function faultsOf(marks) {
+  const faults = lagging(marks);
+  const beforeBall4 = ["ball 1", "block 1", "block 2", "ball 2", "ball 3"];
+  for (const on of [...beforeBall4, "ball 4"])
+    if (!marks.some((m) => m.next === on)) faults.push(`the drawing has never marked ${on}`);
   for (const m of marks) {
-    const touched = m.touched.split(",").filter((on) => on !== "");
+    const [touched, begun] = [m.touched, m.begun].map((list) => list.split(",").filter((on) => on !== ""));
+    if (touched.includes(m.next)) faults.push(`${m.next} is next, but drawn as touched: ${JSON.stringify(m)}`);
+    if (begun.some((on) => touched.includes(on))) faults.push(`begun and touched: ${JSON.stringify(m)}`);
     // Before ball 4 is asked for, balls 1 to 3 and the blocks are touched.
-    if (m.next === "ball 4" && !["ball 1", "block 1", "block 2", "ball 2", "ball 3"].every((on) => touched.includes(on)))
+    if (m.next === "ball 4" && !beforeBall4.every((on) => touched.includes(on)))
       faults.push(`ball 4 is next, but only ${m.touched} are drawn as touched`);
-    if (m.next === "ball 4" && !/^position \d/.test(m.frame)) faults.push(`ball 4 is next, but the array is drawn in the frame "${m.frame}"`);
+    // The sides of the blocks are known from the first position on, so that three balls show where it stands.
+    if (m.next === "ball 4" && m.text === m.next && m.position !== marks[0].position && m.frame !== `position ${m.position}`)
+      faults.push(`ball 4 of position ${m.position} is next, but the array is drawn in the frame "${m.frame}"`);
   }
+  if (!marks.some((m) => m.begun.includes("block"))) faults.push("no block was drawn as begun");
   if (!marks.some((m) => m.frame === "array")) faults.push("the array was never drawn in its own frame");
   return faults;
+}
+
+/** The drawing of a calibration whose touches are complete. */
+async function completeFaults(context, when) {
+  const shown = await drawing(context);
+  const label = await context.page.$eval(".space", (s) => s.getAttribute("aria-label"));
+  const text = await context.page.$eval("#view", (v) => v.innerText);
+  const good = shown.end === "complete" && shown.next === "" && shown.begun === "" &&
+    shown.touched.split(",").length === 11 && label.includes("Complete: all touches were made.") &&
+    !label.includes("Next") && !text.includes("touched next") && !text.includes("where it stands is known once");
+  return good ? [] : [`${when}: ${JSON.stringify(shown)}, "${label}"`];
 }
 
 await withPage(url, out, async (context) => {
@@ -71,8 +94,13 @@ await withPage(url, out, async (context) => {
   await page.waitForFunction(() => globalThis.marks.some((m) => /^position/.test(m.frame) && m.touched.includes("ball 3")));
   await screenshot(context, "array-posed");
   await waitForText(context, "ACTIVE", "#model-state");
+  await page.waitForFunction(() => document.querySelector(".space")?.dataset.end === "complete");
   await screenshot(context, "array-done");
-  faults.push(...faultsOf(await page.evaluate(() => globalThis.marks)));
+  faults.push(...faultsOf(await page.evaluate(() => globalThis.marks)), ...await completeFaults(context, "at the end"));
+  await goTo(context, "live");
+  await goTo(context, "calibration");
+  await page.waitForFunction(() => document.querySelector(".space")?.dataset.end === "complete");
+  faults.push(...await completeFaults(context, "opened after the end"));
   await goTo(context, "model");
   await waitForText(context, "What it does not know", "#view");
   await screenshot(context, "array-model");

@@ -20,5 +20,14 @@ await withPage(url, out, async (context) => {
   await clickButton(context, "Cancel the calibration");
   await answerQuestion(context, "Cancel the calibration");
   await waitForText(context, "cancelled", "#message");
+  const label = () => page.$eval(".space", (s) => s.getAttribute("aria-label"));
+  for (const when of ["at the end", "opened after the end"]) {
+    await page.waitForFunction(() => document.querySelector(".space")?.dataset.end === "cancelled");
+    const { next } = await page.$eval(".space", (s) => ({ ...s.dataset }));
+    if (next !== "" || !(await label()).includes("cancelled")) faults.push(`${when}: next "${next}", "${await label()}"`);
+    await goTo(context, "live");
+    await goTo(context, "calibration");
+  }
+  if (/Done|Touched/.test(await label())) faults.push(`what was touched is not known, but claimed: ${await label()}`);
   return faults;
 }, { size: "phone" });

@@ -123,7 +123,8 @@ TEST(TouchGuide, KnowsWhereTheArrayStandsFromFacesAndSomeBalls) {
   t.touch_all(4, Feature::Block, 1);
   t.touch_all(4, Feature::Block, 2);
   EXPECT_TRUE(t.guide_.features()[0].at_m);
-  EXPECT_TRUE(t.guide_.features()[2].normal);
+  EXPECT_TRUE(t.guide_.features()[2].at_m);
+  EXPECT_FALSE(t.guide_.features()[2].normal) << "to which side the block faces is open";
   EXPECT_FALSE(t.guide_.features()[10].at_m) << "on which side of the faces the balls lie is open";
 
   int ball = 2;
@@ -132,6 +133,51 @@ TEST(TouchGuide, KnowsWhereTheArrayStandsFromFacesAndSomeBalls) {
   ASSERT_TRUE(ball9) << "before it was touched";
   const Vector3 measured = fit::fit_sphere(t.points(4, Feature::Ball, 9))->centre;
   EXPECT_LT((*ball9 - measured).norm(), GuideOptions{}.max_off_expected_m);
+}
+
+/// The rotation from the calibrator to the machine, by the reported places of the balls.
+Matrix3 rotation_of(const Calibrator& calibrator, const std::vector<FeatureProgress>& features) {
+  Eigen::Matrix3Xd stated(3, 0), reported(3, 0);
+  for (const FeatureProgress& f : features) {
+    if (f.on.feature != Feature::Ball || !f.at_m) continue;
+    const auto columns = stated.cols() + 1;
+    stated.conservativeResize(3, columns);
+    reported.conservativeResize(3, columns);
+    stated.rightCols<1>() = calibrator.balls[static_cast<std::size_t>(f.on.number) - 1].centre_m;
+    reported.rightCols<1>() = *f.at_m;
+  }
+  return Eigen::umeyama(stated, reported, false).topLeftCorner<3, 3>();
+}
+
+/// The calibrator, or one whose block 2 faces to the other side.
+class SidesOfABlock : public testing::TestWithParam<double> {};
+
+TEST_P(SidesOfABlock, ItsNormalPointsWhereTheCalibratorStates) {
+  Calibrator calibrator = tests::evemu::reference_calibrator();
+  calibrator.blocks[1].normal *= GetParam();
+  Toucher t = toucher(calibrator);
+  t.touch_all(4, Feature::Ball, 1);
+  t.touch_all(4, Feature::Block, 1);
+  t.touch_all(4, Feature::Block, 2);
+  for (int ball = 2; ball < 9; ++ball) t.touch_all(4, Feature::Ball, ball);
+  const auto features = t.guide_.features();
+  const Matrix3 R_machine_array = rotation_of(calibrator, features);
+  for (const std::size_t block : {std::size_t{1}, std::size_t{2}}) {
+    ASSERT_TRUE(features[block].normal);
+    const Vector3 stated = R_machine_array * calibrator.blocks[block - 1].normal.normalized();
+    EXPECT_GT(features[block].normal->dot(stated), 0.99);  // machine errors turn it by some mrad
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(TouchGuide, SidesOfABlock, testing::Values(1.0, -1.0));
+
+TEST(TouchGuide, BallOneOfThePreviousPositionIsNotReportedAtTheNext) {
+  Toucher t = toucher();
+  t.touch_position(4);
+  ASSERT_EQ(t.guide_.next().position, 8);
+  EXPECT_FALSE(t.guide_.features()[0].at_m);
+  t.touch_all(8, Feature::Ball, 1);
+  EXPECT_TRUE(t.guide_.features()[0].at_m);
 }
 
 TEST(TouchGuide, ATouchInTheSamePlaceCountsOnce) {

@@ -118,7 +118,7 @@ std::vector<FeatureProgress> TouchGuide::features() const {
       seen.at_m = site_->centre_m(static_cast<std::size_t>(seen.on.number) - 1);
     } else if (const auto face = site_->face(f)) {
       seen.at_m = face->point;
-      seen.normal = face->normal;
+      seen.normal = site_->normal(f);
     }
   }
 

@@ -215,8 +215,10 @@ void Site::add(std::size_t feature, const Vector3& p_m) {
   points_[feature].push_back(p_m);
   if (feature == kBall1) {
     const FeatureCheck seen = check(kBall1);
-    if (seen.valid && points_[kBall1].size() >= options_.observe.least_points_per_ball)
+    if (seen.valid && points_[kBall1].size() >= options_.observe.least_points_per_ball) {
       ball1_m_ = fit::fit_sphere(points_[kBall1])->centre;
+      ball1_measured_ = true;
+    }
   }
   if (feature <= kBlock2) place_balls();
 }
@@ -229,6 +231,7 @@ void Site::drop(std::size_t feature, std::size_t point) {
 void Site::clear(std::size_t feature) {
   points_[feature].clear();
   accepted_[feature] = false;
+  if (feature == kBall1) ball1_measured_ = false;
   if (feature <= kBlock2) place_balls();
 }
 
@@ -248,13 +251,24 @@ bool Site::is_sided(const fit::Plane& face) const {
 /// While several assumptions about the sides of the faces are left, a ball has a place only if they
 /// agree on it, as they do on Ball1.
 std::optional<Vector3> Site::centre_m(std::size_t ball) const {
-  if (ball == 0) return ball1_m_;
+  if (ball == 0) return ball1_measured_ ? ball1_m_ : std::nullopt;
   if (candidates_.empty()) return std::nullopt;
   const Vector3& first_m = candidates_.front().centres_m[ball];
   const bool agree = std::ranges::all_of(candidates_, [&](const Candidate& candidate) {
     return (candidate.centres_m[ball] - first_m).norm() <= options_.max_off_expected_m;
   });
   return agree ? std::optional(first_m) : std::nullopt;
+}
+
+/// While several assumptions about the sides of the faces are left, a normal is known only if they
+/// agree on its side.
+std::optional<Vector3> Site::normal(std::size_t block) const {
+  const auto plane = face(block);
+  if (!plane || candidates_.empty()) return std::nullopt;
+  const double side = candidates_.front().side[block - 1];
+  const bool agree = std::ranges::all_of(
+      candidates_, [&](const Candidate& candidate) { return candidate.side[block - 1] == side; });
+  return agree ? std::optional<Vector3>(side * plane->normal) : std::nullopt;
 }
 
 std::vector<double> Site::possible_sides(std::size_t block, const fit::Plane& face) const {

@@ -39,8 +39,11 @@ class Site {
   /// infinity if no place is known.
   [[nodiscard]] double nearest_ball_m(const Vector3& p_m, std::size_t& ball) const;
 
-  /// Index of a ball, from 0. nullopt: the touches leave its place open.
+  /// Index of a ball, from 0. nullopt: the touches of this position leave its place open.
   [[nodiscard]] std::optional<Vector3> centre_m(std::size_t ball) const;
+  /// The normal of the calibrator in machine coordinates; nullopt: the touches leave open to which side
+  /// the face points.
+  [[nodiscard]] std::optional<Vector3> normal(std::size_t block) const;
   /// The plane of a touched face, with the normal away from Ball1; nullopt: too few points.
   [[nodiscard]] std::optional<fit::Plane> face(std::size_t block) const;
   [[nodiscard]] const std::vector<Vector3>& points(std::size_t feature) const {
@@ -88,7 +91,8 @@ class Site {
 
   const Calibrator& calibrator_;
   const GuideOptions& options_;
-  std::optional<Vector3> ball1_m_;
+  std::optional<Vector3> ball1_m_;  ///< of the previous position until Ball1 is touched at this one
+  bool ball1_measured_ = false;     ///< at this position
   std::array<std::optional<double>, 2> sides_;  ///< known from previous positions
   std::vector<std::vector<Vector3>> points_;    ///< by feature
   std::vector<bool> accepted_;                  ///< by feature; only balls are accepted

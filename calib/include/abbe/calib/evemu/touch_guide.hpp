@@ -63,7 +63,9 @@ struct FeatureProgress {
   /// In machine coordinates: the centre of a ball, the centroid of the points on a face. nullopt:
   /// the touches of this position do not determine it yet.
   std::optional<Vector3> at_m{};
-  std::optional<Vector3> normal{};  ///< of a face, towards either side; nullopt as for at_m
+  /// Of the face of a block, in machine coordinates, to the side that the calibrator states. nullopt:
+  /// the touches do not determine this side yet.
+  std::optional<Vector3> normal{};
 };
 
 /// How a touch was used. Only Taken touches enter the result. SamePlace: the place was touched

@@ -56,7 +56,8 @@ struct FeatureToTouch {
   std::size_t points = 0;   ///< points planned
   /// Centre of a ball, or of the touched points of a block; nullopt: not known yet.
   std::optional<std::array<double, 3>> at_m{};
-  std::optional<std::array<double, 3>> normal{};  ///< of the face of a block
+  /// Of the face of a block, to the side that the calibrator states; nullopt: not known yet.
+  std::optional<std::array<double, 3>> normal{};
 };
 
 /// The touch that a guided acquisition asks for.

@@ -32,7 +32,8 @@
 ///
 /// While a ball array is touched, "next" of "session" contains the "features" of the position: "on",
 /// the points "touched" of "points" and, as soon as the touches determine them, "at_m" (centre of a
-/// ball, or of the points on a block) and the "normal" of a block.
+/// ball, or of the points on a block) and the "normal" of the face of a block, to the side that the
+/// calibrator states.
 ///
 /// The server sets "user", the user who sends the request. The first 64 bytes of "who", if it
 /// differs from "user", are kept beside it. Lengths in m. "live" returns the "position_m" of

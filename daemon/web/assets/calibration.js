@@ -77,9 +77,6 @@ function followTouches(id, show) {
   return { end: listen("status", follow), first: follow(state.status) };
 }
 
-// Colours of what is drawn: a place to go to, one that is done, the next one.
-const kOpen = 0x6e7f90, kTouched = 0x2fd3a0, kNext = 0xe69f00;
-
 /** The first three axes in mm; null while one of them is not known. */
 function place_mm(positions_m) {
   const known = (positions_m ?? []).slice(0, 3).filter((x) => typeof x === "number");
@@ -96,16 +93,16 @@ function corners(points) {
 /** The path to drive and the driven path; returns what ends it. */
 async function pathView(place, path_mm, driven_mm) {
   const space = await Space.create(place, ...corners(path_mm), "Path to drive and driven path");
-  space.path(path_mm, kOpen);
+  space.path(path_mm, "open");
   const driven = [...driven_mm];
   let line = null, ball = null;
   const redraw = () => {
     space.remove(line);
-    if (driven.length > 1) line = space.path(driven, kNext);
+    if (driven.length > 1) line = space.path(driven, "next");
     space.frame.dataset.driven = driven.length;
     const at = place_mm(state.live);
     if (at) {
-      ball ??= space.ball(at, 0.012 * space.size, kTouched);
+      ball ??= space.ball(at, 0.012 * space.size, "touched");
       ball.position.set(...at);
     }
     space.draw();
@@ -165,7 +162,7 @@ function touchesInWords({ next, last, end }, verb, done) {
     .filter((part) => part !== "").join(" ");
 }
 
-/** What the drawing of the array shows; colours by state, as arrayDrawing() uses them. */
+/** What the drawing of the array shows; see arrayDrawing(). */
 function drawingInWords({ posed }, { next, last, end }) {
   const parts = [];
   if (end) parts.push(kEnds[end]);
@@ -193,10 +190,10 @@ async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
     drawn.forEach((object) => space.remove(object));
     drawn = all.map((f) => {
       const isNext = f.on === touches.next?.on;
-      const colour = isNext ? kNext : f.state === "open" ? kOpen : kTouched;
+      const role = isNext ? "next" : f.state === "open" ? "open" : "touched";
       const outline = !isNext && f.state !== "touched", larger = isNext ? 1.3 : 1;
-      return f.normal ? space.plate(f.at, f.normal, larger * f.side, colour, outline)
-        : space.ball(f.at, larger * f.radius, colour, outline);
+      return f.normal ? space.plate(f.at, f.normal, larger * f.side, role, outline)
+        : space.ball(f.at, larger * f.radius, role, outline);
     });
     const inState = (state) => all.filter((f) => f.state === state).map((f) => f.on);
     Object.assign(space.frame.dataset, { next: touches.next?.on ?? "", end: touches.end,
@@ -207,7 +204,7 @@ async function arrayDrawing(place, features, frame, arm = [-0.5, -1, 0.6]) {
   const showTip = ({ next }) => {
     const at = features.posed && next ? place_mm(state.live) : null;
     if (!at) return;
-    tip ??= space.ball(at, 0.25 * features.radius, 0xcc79a7);
+    tip ??= space.ball(at, 0.25 * features.radius, "tip");
     tip.position.set(...at);
     space.draw();
   };
@@ -272,10 +269,10 @@ async function barView(place, bars, id) {
     drawn = [];
     bars.forEach((bar, i) => {
       const isNext = bar.measurement === next?.measurement;
-      const colour = isNext ? kNext : i < done ? kTouched : kOpen;
-      drawn.push(space.path(bar.holes_mm, colour), space.dots(bar.holes_mm, colour, isNext ? 0.014 : i < done ? 0.012 : 0.006));
+      const role = isNext ? "next" : i < done ? "touched" : "open";
+      drawn.push(space.path(bar.holes_mm, role), space.dots(bar.holes_mm, role, isNext ? 0.014 : i < done ? 0.012 : 0.006));
       const hole = isNext && bar.holes_mm[Number(/^hole (\d+)/.exec(next.on)?.[1]) - 1];
-      if (hole) drawn.push(space.ball(hole, 0.02 * space.size, kNext));
+      if (hole) drawn.push(space.ball(hole, 0.02 * space.size, "next"));
     });
     const asked = next ? { on: `${next.measurement} ${next.on}` } : null;
     Object.assign(space.frame.dataset, { next: asked?.on ?? "", end, done });

@@ -1,28 +1,24 @@
 // Line charts with bands of U = 2 u, drawn by Chart.js.
 
 import { h } from "./dom.js";
+import { isDark, onPalette, palette, prefersMore } from "./palette.js";
 
-const contrast = matchMedia("(prefers-contrast: more)");
-let loading = null;
-
-/** Loads a classic script of the server once. */
+/** Loads a classic script of the server once; after a fault the next call tries again. */
 const scripts = new Map();
 export function script(name) {
   if (!scripts.has(name)) {
     scripts.set(name, new Promise((resolve, reject) => {
       document.head.append(h("script", { src: name, onload: resolve,
-        onerror: () => reject(new Error(`${name} cannot be loaded`)) }));
+        onerror: () => {
+          scripts.delete(name);
+          reject(new Error(`${name} cannot be loaded`));
+        } }));
     }));
   }
   return scripts.get(name);
 }
 
-// Colours that people with colour vision deficiency can distinguish [Okabe, Ito 2008], lighter on
-// dark ground.
-const dark = ["#56b4e9", "#e69f00", "#2fd3a0", "#e29ac4", "#f0e442", "#ff8f5a"];
-const light = ["#0072b2", "#d55e00", "#00795a", "#a8457f", "#8a5a00", "#1b6fa8"];
-export const isDark = () => document.documentElement.dataset.theme === "dark";
-export const colour = (i) => (isDark() ? dark : light)[i % dark.length];
+const colour = (i) => palette().curves[i % palette().curves.length];
 
 function datasets(curves) {
   return curves.flatMap((curve, i) => {
@@ -40,7 +36,7 @@ function datasets(curves) {
 function options(chart) {
   const of = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const text = of("--text");
-  const grid = contrast.matches ? of("--line") : isDark() ? "#2d333b" : "#d0d7de";
+  const grid = prefersMore() ? of("--line") : isDark() ? "#2d333b" : "#d0d7de";
   const axis = (label) => ({ type: "linear", ticks: { color: text }, grid: { color: grid },
     title: { display: true, text: label, color: text } });
   return {
@@ -65,19 +61,16 @@ function inWords(chart) {
 
 /** Draws `chart` ({title, x_label, y_label, curves: [{name, x, y, u}]}); returns what removes it. */
 export async function draw(place, chart) {
-  loading ??= script("chart.min.js");
-  await loading;
+  await script("chart.min.js");
   const canvas = h("canvas", { role: "img", "aria-label": inWords(chart) });
   place.append(h("div", { class: "chart" }, canvas));
   const make = () => new Chart(canvas,
     { type: "line", data: { datasets: datasets(chart.curves) }, options: options(chart) });
   let drawn = make();
   const again = () => { drawn.destroy(); drawn = make(); };
-  addEventListener("theme", again);
-  contrast.addEventListener("change", again);
+  const end = onPalette(again);
   return () => {
-    removeEventListener("theme", again);
-    contrast.removeEventListener("change", again);
+    end();
     drawn.destroy();
   };
 }

@@ -200,14 +200,14 @@ async function fieldView(place, field, words = { before: "before: V, the error w
   const show = () => {
     drawn.forEach((object) => space.remove(object));
     drawn = [];
-    if (hull.checked) drawn.push(space.hull(field.hull_mm, 0x6e8fb5));
+    if (hull.checked) drawn.push(space.hull(field.hull_mm, "open"));
     if (choice.value !== "after") {
-      drawn.push(space.dots(field.vectors.map((v) => v.at_mm), 0x56b4e9));
-      drawn.push(space.segments(field.vectors.map((v) => [v.at_mm, at(v, 1)]), 0xe69f00));
+      drawn.push(space.dots(field.vectors.map((v) => v.at_mm), "point"));
+      drawn.push(space.segments(field.vectors.map((v) => [v.at_mm, at(v, 1)]), "error"));
     }
     if (choice.value !== "before")
       for (const v of field.vectors)
-        drawn.push(space.ball(v.at_mm, Math.max(factor * v.U_um, 0.0012 * space.size), 0x2fd3a0));
+        drawn.push(space.ball(v.at_mm, Math.max(factor * v.U_um, 0.0012 * space.size), "uncertainty"));
     space.draw();
   };
   choice.addEventListener("change", show);

@@ -2,8 +2,9 @@
 // zoom. One finger turns it left and right, and scrolls the page up and down (touch-action in
 // style.css); two fingers turn it in every direction and zoom.
 
-import { isDark, script } from "./charts.js";
+import { script } from "./charts.js";
 import { h } from "./dom.js";
+import { onPalette, palette } from "./palette.js";
 
 const kFov = 40;  // degrees, vertical
 const kLeastAspect = 1.2;  // in which the box is seen from all sides
@@ -13,6 +14,25 @@ async function load() {
   for (const part of ["OrbitControls.js", "ConvexHull.js", "ConvexGeometry.js"]) await script(part);
 }
 
+/** `role`: a name of palette(). */
+function paint(material, role) {
+  material.color.set(palette()[role]);
+  material.userData.role = role;
+  return material;
+}
+
+/** A picture of a text. */
+function picture(words) {
+  const canvas = h("canvas", { width: 256, height: 64 });
+  const pen = canvas.getContext("2d");
+  pen.font = "48px sans-serif";
+  pen.fillStyle = palette().text;
+  pen.textAlign = "center";
+  pen.fillText(words, 128, 48);
+  return new THREE.CanvasTexture(canvas);
+}
+
+/** Colours are names of palette(): they follow theme and contrast. */
 export class Space {
   /** `low`, `high`: opposite corners of the box that is shown, mm. `label`: what it shows. `arm`: from
    * its centre to the viewer, as a multiple of its diagonal. */
@@ -33,18 +53,25 @@ export class Space {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.frame.append(this.renderer.domElement);
     this.#look(arm);
-    this.add(new THREE.Box3Helper(new THREE.Box3(this.low, this.high), this.lineColour()));
+    const box = new THREE.Box3Helper(new THREE.Box3(this.low, this.high));
+    paint(box.material, "line");
+    this.add(box);
     for (const [i, name] of ["X", "Y", "Z"].entries()) this.#axisName(i, name);
     this.frame.addEventListener("keydown", (event) => this.#key(event));
     this.#oneFinger();
     this.observer = new ResizeObserver(() => this.#resize());
     this.observer.observe(this.frame);
-    this.redraw = () => this.draw();
-    addEventListener("theme", this.redraw);
+    this.endPalette = onPalette(() => this.#repaint());
   }
 
-  lineColour() {
-    return isDark() ? 0x9aa7b4 : 0x57606a;
+  #repaint() {
+    this.scene.traverse(({ material, userData }) => {
+      if (material?.userData.role) paint(material, material.userData.role);
+      if (!userData.words) return;
+      material.map.dispose();
+      material.map = picture(userData.words);
+    });
+    this.draw();
   }
 
   /** What a screen reader reads. */
@@ -126,15 +153,9 @@ export class Space {
   }
 
   /** A text that always faces the viewer. */
-  text(words, at, colour = isDark() ? "#8fa1b3" : "#4d5761") {
-    const canvas = h("canvas", { width: 256, height: 64 });
-    const pen = canvas.getContext("2d");
-    pen.font = "48px sans-serif";
-    pen.fillStyle = colour;
-    pen.textAlign = "center";
-    pen.fillText(words, 128, 48);
-    const material = new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false });
-    const sprite = new THREE.Sprite(material);
+  text(words, at) {
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: picture(words), depthTest: false }));
+    sprite.userData.words = words;
     sprite.scale.set(0.24 * this.size, 0.06 * this.size, 1);
     sprite.position.copy(at);
     return this.add(sprite);
@@ -154,38 +175,38 @@ export class Space {
   }
 
   /** A polyline through points [[x, y, z], ..]. */
-  path(points, colour) {
+  path(points, role) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flat(), 3));
-    return this.add(new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: colour })));
+    return this.add(new THREE.Line(geometry, paint(new THREE.LineBasicMaterial(), role)));
   }
 
   /** Lines [[from, to], ..]. */
-  segments(lines, colour) {
+  segments(lines, role) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(lines.flat(2), 3));
-    return this.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour })));
+    return this.add(new THREE.LineSegments(geometry, paint(new THREE.LineBasicMaterial(), role)));
   }
 
-  dots(points, colour, share = 0.012) {
+  dots(points, role, share = 0.012) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flat(), 3));
     return this.add(new THREE.Points(geometry,
-      new THREE.PointsMaterial({ color: colour, size: share * this.size })));
+      paint(new THREE.PointsMaterial({ size: share * this.size }), role)));
   }
 
-  ball(at, radius, colour, wireframe = false) {
+  ball(at, radius, role, wireframe = false) {
     const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, wireframe ? 8 : 24, wireframe ? 6 : 16),
-      new THREE.MeshBasicMaterial({ color: colour, wireframe }));
+      paint(new THREE.MeshBasicMaterial({ wireframe }), role));
     ball.position.set(...at);
     return this.add(ball);
   }
 
   /** A square plate whose face is at `at`, behind it in the direction opposite to `normal`. */
-  plate(at, normal, side, colour, wireframe = false) {
+  plate(at, normal, side, role, wireframe = false) {
     const thickness = 0.25 * side;
     const plate = new THREE.Mesh(new THREE.BoxBufferGeometry(side, side, thickness),
-      new THREE.MeshBasicMaterial({ color: colour, wireframe }));
+      paint(new THREE.MeshBasicMaterial({ wireframe }), role));
     const n = new THREE.Vector3(...normal).normalize();
     plate.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
     plate.position.set(...at).addScaledVector(n, -0.5 * thickness);
@@ -193,12 +214,12 @@ export class Space {
   }
 
   /** The edges of the convex hull of points. */
-  hull(points, colour) {
+  hull(points, role) {
     if (points.length < 4) return null;
     const hull = new THREE.ConvexGeometry(points.map((p) => new THREE.Vector3(...p)));
     const edges = new THREE.EdgesGeometry(hull, 1);
     hull.dispose();
-    return this.add(new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ color: colour })));
+    return this.add(new THREE.LineSegments(edges, paint(new THREE.LineBasicMaterial(), role)));
   }
 
   /** Draws in the next frame. */
@@ -223,7 +244,7 @@ export class Space {
   }
 
   end() {
-    removeEventListener("theme", this.redraw);
+    this.endPalette();
     this.observer.disconnect();
     cancelAnimationFrame(this.drawing);
     this.controls.dispose();

@@ -61,8 +61,7 @@ function eventTable(events) {
 }
 
 /** Each value over all accepted models, and each table of the newest ones, with their bands. */
-async function trend(place) {
-  const { models, values, tables } = await get("api/trend");
+function trend(place, { models, values, tables }) {
   if (models.length === 0) return;
   const first = Date.parse(models[0].created);
   const days = models.map((m) => (Date.parse(m.created) - first) / 86400e3);
@@ -94,23 +93,40 @@ function tableChart(table, models) {
     curves: table.curves.map((c) => ({ ...c, name: `${when(models[c.model].created)} ${models[c.model].id}` })) });
 }
 
+const nameOf = (element) => element.getAttribute("aria-label") ?? element.textContent;
+
 export async function show(place) {
   const tables = h("div"), trends = h("div");
   place.append(tables, trends);
+  let shownHistory = "", trendAnswer = null, shownTrend = "";
   const fill = async () => {
-    const { models, events } = await get("api/history");
+    const answer = await get("api/history");
+    if (JSON.stringify(answer) === shownHistory) return;
+    shownHistory = JSON.stringify(answer);
+    const { models, events } = answer;
+    const focused = tables.contains(document.activeElement) ? nameOf(document.activeElement) : null;
     tables.replaceChildren(h("h2", {}, "Models"),
       models.length ? modelTable(models, fill) : h("p", {}, "The store has no models yet."),
       mayActivate()
         ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active), fill) }, "Roll back"))
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),
       h("h2", {}, "Events"), eventTable(events));
+    if (focused) [...tables.querySelectorAll("button, a, [tabindex]")].find((e) => nameOf(e) === focused)?.focus();
   };
-  const fillTrend = async () => {
+  // A chart that has the focus, or is enlarged, stays; what has changed is shown when the focus leaves.
+  const showTrend = () => {
+    const text = JSON.stringify(trendAnswer);
+    if (text === shownTrend || trends.contains(document.activeElement) || document.querySelector("dialog.large")) return;
+    shownTrend = text;
     const made = h("div");
-    await trend(made);
+    trend(made, trendAnswer);
     trends.replaceChildren(made);
   };
+  const fillTrend = async () => {
+    trendAnswer = await get("api/trend");
+    showTrend();
+  };
+  trends.addEventListener("focusout", () => setTimeout(showTrend));  // until then nothing has the focus
   await fill();
   await fillTrend();
   return listen("store", () => Promise.all([fill(), fillTrend()]).catch((error) => message(error.message)));

@@ -22,6 +22,7 @@ async function show() {
   const number = ++shown;
   const place = h("div");
   message("");
+  for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();  // of the view that ends
   for (const link of document.querySelectorAll("nav a")) {
     if (link.getAttribute("href") === `#${name}`) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");

@@ -57,7 +57,13 @@ async function enlarge(chart) {
   let end = () => {};
   dialog.addEventListener("close", () => { end(); dialog.remove(); });
   dialog.showModal();
-  end = await draw(place, chart);
+  try {
+    const remove = await draw(place, chart);
+    if (dialog.open) end = remove;
+    else remove();
+  } catch (error) {
+    place.append(h("p", { class: "bad", role: "alert" }, error.message));
+  }
 }
 
 /** A button with a small picture of `chart` (see draw() of charts.js), and its newest value `words`. */

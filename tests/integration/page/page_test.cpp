@@ -144,13 +144,13 @@ struct PageOnTheFly : Page<Spine> {
       }
     }
   }
-  /// As after a run that shows a change of the machine.
-  void find_drift() const {
+  /// As after a run that shows that the machine has changed by `what`.
+  void find_drift(const std::string& what) const {
     auto store = daemon::ModelStore::open(file("data/models"));
     ASSERT_TRUE(store) << store.error().text;
     const auto active = store->active_id();
     ASSERT_TRUE(active && *active);
-    ASSERT_TRUE(store->add_drift(**active, {.who = "test", .why = "EXX by 4 um", .when = {}}));
+    ASSERT_TRUE(store->add_drift(**active, {.who = "test", .why = what, .when = {}}));
   }
   void start_everything() {
     write_path("path.csv", path());
@@ -213,12 +213,14 @@ TEST_F(PageOnTheFly, ComparesTwoModelsAndAsksBeforeAChange) {
   expect_browser_ends_well();
 }
 
-TEST_F(PageOnTheFly, AnOpenModelViewShowsDrift) {
+TEST_F(PageOnTheFly, OpenViewsShowDrift) {
   ASSERT_NO_FATAL_FAILURE(add_models({3}));
   ASSERT_NO_FATAL_FAILURE(start_everything());
   browse("drift.mjs");
   ASSERT_TRUE(browser_prints("GREEN")) << browser_->out() << browser_->err();
-  find_drift();
+  find_drift("EXX by 4 um");
+  ASSERT_TRUE(browser_prints("FOCUSED")) << browser_->out() << browser_->err();
+  find_drift("EYY by 3 um");
   expect_browser_ends_well();
 }
 

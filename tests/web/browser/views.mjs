@@ -110,6 +110,12 @@ async function trends(context) {
   await page.screenshot({ path: `${out}/trend-enlarged.png` });
   await clickButton(context, "Close");
   await page.waitForFunction(() => document.querySelector("dialog.large") === null);
+
+  // A view that ends takes its dialog with it.
+  await press(context, await page.$(".small-chart"), "the first trend");
+  await page.waitForSelector("dialog.large[open]");
+  await page.evaluate(() => { location.hash = "live"; });
+  await page.waitForFunction(() => document.querySelector("dialog.large") === null);
   return faults;
 }
 

@@ -6,28 +6,32 @@ import { screenshot, waitForText, withPage } from "./chromium.mjs";
 const [url, out, password] = process.argv.slice(2);
 const kMostTabs = 150;
 
-/** What has the focus: its label or text, and whether it is seen. */
+/** What has the focus: its label or text, and whether it is seen: it has an area in the window, and in its
+ * middle nothing else lies above it. The body, which has the focus between the last and the first stop, counts as seen. */
 async function focused({ page }) {
   return page.evaluate(() => {
     const e = document.activeElement;
-    const box = e.getBoundingClientRect();
-    const above = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    const box = e.getBoundingClientRect();  // of it, the part in the window
+    const [left, right] = [Math.max(box.left, 0), Math.min(box.right, innerWidth)];
+    const [top, bottom] = [Math.max(box.top, 0), Math.min(box.bottom, innerHeight)];
+    const above = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
     const name = e.getAttribute("aria-label") ?? e.getAttribute("name") ?? e.innerText.trim();
-    return { name, marked: e.matches(":focus-visible"), seen: above !== null && (e.contains(above) || above.contains(e)) };
+    const isStop = e !== document.body;
+    return { name, marked: !isStop || e.matches(":focus-visible"),
+      seen: !isStop || (right > left && bottom > top && above !== null && (e === above || e.contains(above))) };
   });
 }
 
-/** Presses Tab until something whose name begins with `name` has the focus. */
+/** Presses Tab until something whose name begins with `name` has the focus; every stop must be seen. */
 async function tabTo(context, name, faults) {
   const passed = [];
   for (let i = 0; i < kMostTabs; ++i) {
     await context.page.keyboard.press("Tab");
     const now = await focused(context);
     passed.push(now.name.slice(0, 20));
-    if (!now.name.startsWith(name)) continue;
-    if (!now.marked) faults.push(`"${name}" has the focus, but is not marked`);
-    if (!now.seen) faults.push(`"${name}" has the focus, but is not seen`);
-    return;
+    if (!now.marked) faults.push(`"${passed.at(-1)}" has the focus, but is not marked`);
+    if (!now.seen) faults.push(`"${passed.at(-1)}" has the focus, but is not seen`);
+    if (now.name.startsWith(name)) return;
   }
   throw new Error(`the key Tab does not reach "${name}": ${passed.join(", ")}`);
 }

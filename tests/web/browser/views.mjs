@@ -73,6 +73,17 @@ async function changes(context, element, act) {
   return before !== await element.screenshot({ encoding: "base64" });
 }
 
+/** The picture of the 3-D view on grey, so that only its own colours tell two pictures apart. */
+async function spacePicture(context) {
+  const element = await context.page.waitForSelector(".space canvas");
+  const ground = (colour) => context.page.evaluate((c) => document.body.style.setProperty("background", c, "important"), colour);
+  await ground("#808080");
+  await nextFrame(context);
+  const picture = await element.screenshot({ encoding: "base64" });
+  await ground("");
+  return picture;
+}
+
 /** The 3-D view turns with the arrow keys, the mouse and a finger. */
 async function turns(context, size) {
   const { page } = context;
@@ -119,8 +130,8 @@ async function trends(context) {
   return faults;
 }
 
-/** The page follows the system until another theme is chosen; more contrast and less motion are kept. */
-async function preferences(context) {
+/** The page follows the system until another theme is chosen. */
+async function themes(context) {
   const { page } = context;
   const faults = [];
   await prefer(context, { scheme: "light" });
@@ -134,9 +145,58 @@ async function preferences(context) {
   await prefer(context, { scheme: "light" });
   if (await theme(context) !== "light") faults.push("the page does not follow the system again");
 
+  await page.evaluate(() => {
+    localStorage.setItem("abbe-theme", "dark");  // an earlier page kept what was not chosen
+    localStorage.setItem("abbe-theme-chosen", "blue");
+  });
+  await page.reload();
+  if (await theme(context) !== "light") faults.push("the page takes a theme from the store that was not chosen");
+
+  const blocked = await page.evaluateOnNewDocument(() => Object.defineProperty(globalThis, "localStorage",
+    { get: () => { throw new DOMException("blocked", "SecurityError"); } }));
+  await page.reload();
+  await press(context, "#theme");
+  if (await theme(context) !== "dark") faults.push("without a store no theme can be chosen");
+  await page.removeScriptToEvaluateOnNewDocument(blocked.identifier);
+  await page.reload();
+  return faults;
+}
+
+/** What the browser computes from style.css: colours of the page, of a link of the navigation, and what
+ * an animation and a transition become. */
+async function computed({ page }) {
+  return page.evaluate(() => {
+    const probe = document.createElement("div");
+    probe.style.transition = "opacity 5s";
+    probe.style.animation = "probe 5s";
+    document.body.append(probe);
+    const { color, backgroundColor } = getComputedStyle(document.body);
+    const { transitionDuration, animationName } = getComputedStyle(probe);
+    const underlined = getComputedStyle(document.querySelector("nav a")).textDecorationLine === "underline";
+    const result = { color, backgroundColor, underlined, moves: transitionDuration === "5s" || animationName === "probe" };
+    probe.remove();
+    return result;
+  });
+}
+
+/** More contrast and less motion, if the system prefers them. */
+async function preferences(context) {
+  const faults = [];
+  const black = "rgb(0, 0, 0)", white = "rgb(255, 255, 255)";
   for (const scheme of ["dark", "light"]) {
-    await prefer(context, { scheme, contrast: "more", motion: "reduce" });
+    await prefer(context, { scheme });
     await goTo(context, "model");
+    const usual = await computed(context);
+    if (usual.underlined || !usual.moves || usual.color === (scheme === "dark" ? white : black))
+      faults.push(`${scheme}, without a preference: ${JSON.stringify(usual)}`);
+    const picture = await spacePicture(context);
+    await prefer(context, { scheme, contrast: "more", motion: "reduce" });
+    await nextFrame(context);
+    const now = await computed(context);
+    const [text, ground] = scheme === "dark" ? [white, black] : [black, white];
+    if (now.color !== text || now.backgroundColor !== ground || !now.underlined || now.moves)
+      faults.push(`more contrast and less motion, ${scheme}: ${JSON.stringify(now)}`);
+    if (await spacePicture(context) === picture) faults.push(`${scheme}: the 3-D view has the same colours with more contrast`);
     faults.push(...(await violations(context)).map((v) => `more contrast, ${scheme}: ${v}`));
     await screenshot(context, `model-contrast-${scheme}`);
   }
@@ -164,5 +224,6 @@ await withPage(url, out, async (context) => {
     faults.push(...await turns(context, size));
   }
   say(`views checked ${checked}`);
-  return [...faults, ...await trends(context), ...await keyboard(context), ...await preferences(context)];
+  return [...faults, ...await trends(context), ...await keyboard(context), ...await themes(context),
+    ...await preferences(context)];
 });

@@ -99,6 +99,11 @@ void HtmlReport::plot(const VectorChart& chart) {
   plot(line_chart(chart));
 }
 
+std::string_view lamp_name(Signal signal) noexcept {
+  constexpr std::array<std::string_view, 4> kNames{"red", "yellow", "green", "no verdict"};
+  return kNames[static_cast<std::size_t>(signal)];
+}
+
 void HtmlReport::signal(Signal signal, std::string_view text) {
   constexpr std::array<std::string_view, 3> kLit{"#c1121f", "#e6a700", "#1a7f37"};
   std::string lamps;

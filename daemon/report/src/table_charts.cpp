@@ -58,7 +58,8 @@ Curve curve_of(const VolumetricModel& model, const calib::Table& table) {
     }
   }
 
-  curve.name = fmt::format("{}, U \u2264 {:.2g}", calib::name(table.motion),
+  curve.key = calib::name(table.motion);
+  curve.name = fmt::format("{}, U \u2264 {:.2g}", curve.key,
                            2.0 * *std::ranges::max_element(curve.u));
   return curve;
 }

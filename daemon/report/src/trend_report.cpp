@@ -93,9 +93,8 @@ void add_trend_table(HtmlReport& page, const std::vector<TrendPoint>& points) {
   std::vector<std::vector<std::string>> rows;
   for (const TrendPoint& point : points) {
     const VerdictInWords verdict = verdict_in_words(*point.subject);
-    constexpr std::array kLamps{"red", "yellow", "green", "no verdict"};
     rows.push_back({model_id(point.subject->document), date_in_table(point.subject->document),
-                    kLamps.at(static_cast<std::size_t>(verdict.signal)),
+                    std::string{lamp_name(verdict.signal)},
                     text_of_key(point.values, "V.max"), text_of_key(point.values, "M_d"),
                     text_of_key(point.values, "EC0Y")});
   }

@@ -83,19 +83,16 @@ function valueAt(curve, y, x) {
   return y[i - 1] + part * (y[i] - y[i - 1]);
 }
 
-/** "EXX" of "EXX, U <= 0.19". */
-const motionOf = (curve) => curve.name.split(",")[0];
-
 /** The curve of the same error motion of another model. */
 const counterpart = (curve, other) =>
-  other.charts.flatMap((c) => c.curves).find((c) => motionOf(c) === motionOf(curve));
+  other.charts.flatMap((c) => c.curves).find((c) => c.key === curve.key);
 
 /** Each error motion of both models in one chart. */
 function together(model, other) {
   return model.charts.flatMap((chart) => chart.curves.map((curve) => {
     const beside = counterpart(curve, other);
-    const named = (c, id) => ({ ...c, name: `${motionOf(c)} of ${id}` });
-    return { ...chart, title: motionOf(curve),
+    const named = (c, id) => ({ ...c, name: `${c.key} of ${id}` });
+    return { ...chart, title: curve.key,
       curves: [named(curve, model.id), ...(beside ? [named(beside, other.id)] : [])] };
   }));
 }
@@ -108,7 +105,7 @@ function difference(model, other) {
       if (!beside) return [];
       const nodes = curve.x.map((x, i) => [x, curve.y[i] - valueAt(beside, beside.y, x),
         Math.hypot(curve.u[i], valueAt(beside, beside.u, x))]).filter(([, y]) => Number.isFinite(y));
-      return nodes.length === 0 ? [] : [{ name: motionOf(curve), x: nodes.map((n) => n[0]), y: nodes.map((n) => n[1]),
+      return nodes.length === 0 ? [] : [{ name: curve.key, x: nodes.map((n) => n[0]), y: nodes.map((n) => n[1]),
         u: nodes.map((n) => n[2]) }];
     }) })).filter((chart) => chart.curves.length > 0);
 }

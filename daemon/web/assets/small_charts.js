@@ -12,7 +12,7 @@ function svg(tag, attributes, ...children) {
   return element;
 }
 
-const two = (number) => String(Number(number.toPrecision(3)));
+const threeDigits = (number) => String(Number(number.toPrecision(3)));
 
 /** Smallest and largest of x, and of y with its band. */
 function rangeOf(curves) {
@@ -69,7 +69,7 @@ async function enlarge(chart) {
 /** A button with a small picture of `chart` (see draw() of charts.js), and its newest value `words`. */
 export function smallChart(chart, words = "") {
   const { y } = rangeOf(chart.curves);
-  const range = `${two(y.low)} to ${two(y.high)}`;
+  const range = `${threeDigits(y.low)} to ${threeDigits(y.high)}`;
   return h("button", { type: "button", class: "small-chart", title: `${chart.title}, ${chart.y_label}`,
     "aria-label": `${chart.title}: ${words || `${range} ${chart.y_label}`}. Enlarge`, onclick: () => enlarge(chart) },
     h("span", { class: "name" }, chart.title), picture(chart.curves), h("span", { class: "weak" }, words || `${range} ${chart.unit ?? ""}`));

@@ -1,6 +1,5 @@
 #include "model_json.hpp"
 
-#include <array>
 #include <cmath>
 
 #include "abbe/base/units.hpp"
@@ -30,7 +29,11 @@ json charts_json(const calib::VolumetricModel& model) {
   for (const daemon::LineChart& chart : daemon::table_line_charts(model)) {
     json curves = json::array();
     for (const daemon::Curve& curve : chart.curves)
-      curves.push_back({{"name", curve.name}, {"x", curve.x}, {"y", curve.y}, {"u", curve.u}});
+      curves.push_back({{"name", curve.name},
+                        {"key", curve.key},
+                        {"x", curve.x},
+                        {"y", curve.y},
+                        {"u", curve.u}});
     charts.push_back({{"title", chart.title},
                       {"x_label", chart.x_label},
                       {"y_label", chart.y_label},
@@ -97,9 +100,8 @@ json residuals_json(const daemon::ModelDocument& document) {
 }
 
 json verdict_json(const daemon::ReportSubject& subject) {
-  constexpr std::array kLamps{"red", "yellow", "green", ""};
   const daemon::VerdictInWords verdict = daemon::verdict_in_words(subject);
-  return {{"lamp", kLamps.at(static_cast<std::size_t>(verdict.signal))},
+  return {{"lamp", daemon::lamp_name(verdict.signal)},
           {"text", verdict.text},
           {"reasons", verdict.reasons},
           {"notes", verdict.notes}};

@@ -127,7 +127,7 @@ void add_to_tables(std::map<std::string, TrendTable>& tables, std::size_t index,
                    const calib::VolumetricModel& model) {
   for (const daemon::LineChart& chart : daemon::table_line_charts(model)) {
     for (const daemon::Curve& curve : chart.curves) {
-      TrendTable& table = tables[curve.name.substr(0, curve.name.find(','))];
+      TrendTable& table = tables[curve.key];
       table.x_label = chart.x_label;
       table.y_label = chart.y_label;
       table.curves.push_back({{"model", index},

@@ -66,7 +66,7 @@ EvemuAcquisition::EvemuAcquisition(EvemuRequest request, evemu::TouchGuide guide
       thermometer_(options.artefact),
       options_(std::move(options)),
       intake_(options_.touches) {
-  report_next_step();
+  follow_guide();
 }
 
 double EvemuAcquisition::progress() const noexcept {
@@ -113,7 +113,7 @@ void EvemuAcquisition::take(const protocol::Snapshot& snapshot) {
     reason_ =
         fmt::format("{} touches at {} positions", guide_.taken(), request_.plan.positions.size());
   } else {
-    report_next_step();
+    follow_guide();
   }
 }
 
@@ -127,7 +127,7 @@ void EvemuAcquisition::end(std::string reason) {
   reason_ = std::move(reason);
 }
 
-void EvemuAcquisition::report_next_step() {
+void EvemuAcquisition::follow_guide() {
   features_ = features_of(guide_);
   const auto next = guide_.next();
   reason_ =

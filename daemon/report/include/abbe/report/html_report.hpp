@@ -18,6 +18,7 @@ namespace abbe::daemon {
 /// from y - 2 u to y + 2 u is drawn; else, if `low` and `high` are not empty, a band between them.
 struct Curve {
   std::string name;
+  std::string key{};  ///< error motion of a table: "EXX"; else empty
   std::vector<double> x, y, u{};
   std::vector<double> low{}, high{};
   std::size_t dot_every = 1;  ///< dots at the points 0, n, 2 n ..; 0: no dots
@@ -59,6 +60,8 @@ struct VectorChart {
 
 /// The lit lamp of a traffic light. Unlit: there is no verdict.
 enum class Signal { Red = 0, Yellow = 1, Green = 2, Unlit = 3 };
+/// "red", "yellow", "green"; "no verdict"
+[[nodiscard]] std::string_view lamp_name(Signal signal) noexcept;
 
 /// Any text may be given: it is escaped. The page has the width of a printed A4 page.
 class HtmlReport {

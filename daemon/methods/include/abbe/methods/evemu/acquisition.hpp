@@ -88,7 +88,7 @@ class EvemuAcquisition {
                    EvemuAcquisitionOptions options);
   void refuse(const protocol::Snapshot& touch, std::string_view fault);
   void end(std::string reason);
-  void report_next_step();
+  void follow_guide();
 
   EvemuRequest request_;
   calib::evemu::TouchGuide guide_;

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "abbe/model/model_store.hpp"
@@ -17,9 +19,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 struct ModelViewsTest : test::WebFolder {
-  std::string add(unsigned seed) {
+  std::string add(unsigned seed) { return add(daemon::test::synthetic_document(seed)); }
+  std::string add(const daemon::ModelDocument& document) {
     auto store = daemon::ModelStore::open(folder_ / "models");
-    const auto id = store->add(daemon::test::synthetic_document(seed), true, {},
+    const auto id = store->add(document, true, {},
                                {.who = "test", .why = "", .when = {}});
     EXPECT_TRUE(id);
     return id.value_or("");
@@ -86,6 +89,34 @@ TEST_F(ModelViewsTest, TheTrendHasEachTableOfTheNewestModels) {
     EXPECT_EQ(table["curves"][0]["u"].size(), table["curves"][0]["x"].size());
   }
   for (const auto& value : trend["values"]) EXPECT_NE(value["group"], "");
+}
+
+/// Measured in the hour that ends at `hour`.
+daemon::ModelDocument measured_until(int hour, unsigned seed) {
+  const auto at = [](int h) { return protocol::UtcTime{std::chrono::hours{h}}; };
+  auto document = daemon::test::synthetic_document(seed);
+  document.run.emplace().conditions.emplace().measured = std::array{at(hour - 1), at(hour)};
+  return document;
+}
+
+TEST_F(ModelViewsTest, TheTrendIsInTheOrderOfTheMeasurements) {
+  constexpr int kFirst = 480000;  // since 1970
+  std::vector<std::string> ids;
+  for (unsigned i = 0; i < 8; ++i)
+    ids.push_back(add(measured_until(kFirst - 24 * static_cast<int>(i), i + 1)));
+  const auto trend = nlohmann::json::parse(views_.trend().value());
+  ASSERT_EQ(trend["models"].size(), 8u);
+  EXPECT_EQ(trend["models"][0]["id"], ids.back()) << "added last, measured first";
+  EXPECT_EQ(trend["models"][7]["id"], ids.front());
+  EXPECT_EQ(trend["models"][7]["measured"].get<std::string>().substr(0, 13), "2024-10-04T00");
+  const auto& curves = trend["tables"][0]["curves"];
+  ASSERT_EQ(curves.size(), 6u);
+  EXPECT_EQ(curves[0]["model"], 2) << "the oldest of the newest six";
+}
+
+TEST_F(ModelViewsTest, EachCurveNamesItsErrorMotion) {
+  const auto model = nlohmann::json::parse(views_.model(add(1)).value());
+  EXPECT_EQ(model["charts"][0]["curves"][0]["key"], "EXX");
 }
 
 TEST_F(ModelViewsTest, AReportHasTheEventsThatCameLater) {

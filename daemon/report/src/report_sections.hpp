@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "abbe/report/html_report.hpp"
+#include "abbe/report/measured_time.hpp"
 #include "abbe/report/model_report.hpp"
 #include "abbe/report/verdict_in_words.hpp"
 
@@ -21,8 +22,6 @@ inline constexpr std::string_view kNotRecorded = "Not recorded.";
 /// "measured 2024-05-17T08:00:00Z to 2024-05-17T08:30:00Z", else "identified ...; when it was
 /// measured is not recorded". UTC.
 [[nodiscard]] std::string when_in_words(const ModelDocument& document);
-/// The end of the measurement, else the time of the identification.
-[[nodiscard]] protocol::UtcTime time_of(const ModelDocument& document);
 /// "2024-05-17T08:30:00Z"
 [[nodiscard]] std::string to_seconds(protocol::UtcTime time);
 

@@ -63,10 +63,10 @@ function eventTable(events) {
 /** Each value over all accepted models, and each table of the newest ones, with their bands. */
 function trend(place, { models, values, tables }) {
   if (models.length === 0) return;
-  const first = Date.parse(models[0].created);
-  const days = models.map((m) => (Date.parse(m.created) - first) / 86400e3);
+  const measured = models.map((m) => Date.parse(m.measured));
+  const days = measured.map((time) => (time - Math.min(...measured)) / 86400e3);
   place.append(h("h2", {}, "Trend"), h("p", { class: "weak" },
-    `${models.length === 1 ? "One accepted model" : `${models.length} accepted models`}, over the days since the first one; bands: U (k = 2). ` +
+    `${models.length === 1 ? "One accepted model" : `${models.length} accepted models`}, over the days since the first measurement; bands: U (k = 2). ` +
     "Values of models with different volumes or methods are comparable only with care. A click enlarges a chart."));
   for (const group of new Set(values.map((v) => v.group)))
     place.append(h("h3", {}, group), h("div", { class: "small-charts" },
@@ -77,12 +77,11 @@ function trend(place, { models, values, tables }) {
 }
 
 function valueChart(v, days) {
-  const known = v.value.map((value, i) => ({ x: days[i], y: value, u: v.u[i] })).filter(({ y }) => y !== null)
-    .sort((a, b) => a.x - b.x);
+  const known = v.value.map((value, i) => ({ x: days[i], y: value, u: v.u[i] })).filter(({ y }) => y !== null);
   const withU = known.every(({ u }) => u !== null);
   const newest = known.at(-1);
   const words = `${newest.y.toFixed(2)}${withU ? ` \u00b1 ${(2 * newest.u).toFixed(2)}` : ""} ${v.unit}`;
-  return smallChart({ title: v.name, x_label: "days since the first model", y_label: v.unit,
+  return smallChart({ title: v.name, x_label: "days since the first measurement", y_label: v.unit,
     curves: [{ name: v.name, dots: true, x: known.map((k) => k.x), y: known.map((k) => k.y),
       u: withU ? known.map((k) => k.u) : undefined }] }, words);
 }
@@ -90,7 +89,7 @@ function valueChart(v, days) {
 function tableChart(table, models) {
   return smallChart({ title: table.name, x_label: table.x_label, y_label: table.y_label,
     unit: table.y_label.split(", ").at(-1),
-    curves: table.curves.map((c) => ({ ...c, name: `${when(models[c.model].created)} ${models[c.model].id}` })) });
+    curves: table.curves.map((c) => ({ ...c, name: `${when(models[c.model].measured)} ${models[c.model].id}` })) });
 }
 
 const nameOf = (element) => element.getAttribute("aria-label") ?? element.textContent;

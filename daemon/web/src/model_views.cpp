@@ -15,6 +15,7 @@
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
+#include "abbe/report/measured_time.hpp"
 #include "abbe/report/model_figures.hpp"
 #include "abbe/report/model_report.hpp"
 #include "lock_within.hpp"
@@ -32,8 +33,8 @@ using daemon::StoreEvent;
 using nlohmann::json;
 
 constexpr std::size_t kMostViews = 12;         ///< history, trend, models of some 100 kB, reports
-constexpr std::size_t kMostTrendModels = 100;  ///< the newest
-constexpr std::size_t kMostTableModels = 6;    ///< the newest whose tables are in the trend
+constexpr std::size_t kMostTrendModels = 100;  ///< those that were added last
+constexpr std::size_t kMostTableModels = 6;    ///< measured last; their tables are in the trend
 constexpr std::size_t kMostEvents = 200;       ///< the newest
 
 /// Invalid UTF-8, which names of files may contain, is replaced.
@@ -178,26 +179,44 @@ Result<std::string> history_text(const ModelStore& store) {
   return text_of(out);
 }
 
-Result<std::string> trend_text(const ModelStore& store) {
+struct TrendModel {
+  std::string id;
+  abbe::protocol::UtcTime measured{};
+  daemon::CertifiedValues values;
+};
+
+/// Accepted models, the one that was measured first at the beginning.
+Result<std::vector<TrendModel>> trend_models(const ModelStore& store) {
   auto entries = store.list();
   if (!entries) return tl::unexpected(entries.error());
   std::erase_if(*entries, [](const StoreEntry& e) { return !e.accepted || !e.fault.empty(); });
   if (entries->size() > kMostTrendModels) entries->resize(kMostTrendModels);
-  std::ranges::reverse(*entries);  // oldest first
+  std::ranges::reverse(*entries);  // in the order of adding, which decides at the same time
+
+  std::vector<TrendModel> models;
+  for (const StoreEntry& entry : *entries) {
+    const auto document = store.load(entry.id);
+    if (!document) continue;
+    auto values = daemon::certified_values(*document);
+    if (values) models.push_back({entry.id, daemon::time_of(*document), *std::move(values)});
+  }
+  std::ranges::stable_sort(models, {}, &TrendModel::measured);
+  return models;
+}
+
+Result<std::string> trend_text(const ModelStore& store) {
+  const auto found = trend_models(store);
+  if (!found) return tl::unexpected(found.error());
 
   json models = json::array();
   std::vector<std::pair<std::string, TrendValue>> trend;
   std::map<std::string, TrendTable> tables;
-  for (std::size_t i = 0; i < entries->size(); ++i) {
-    const StoreEntry& entry = (*entries)[i];
-    const auto document = store.load(entry.id);
-    if (!document) continue;
-    const auto values = daemon::certified_values(*document);
-    if (!values) continue;
-    add_to_trend(trend, models.size(), *values);
-    if (i + kMostTableModels >= entries->size())
-      add_to_tables(tables, models.size(), document->model);
-    models.push_back({{"id", entry.id}, {"created", daemon::to_text(document->created)}});
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    const TrendModel& model = (*found)[i];
+    add_to_trend(trend, i, model.values);
+    models.push_back({{"id", model.id}, {"measured", daemon::to_text(model.measured)}});
+    if (i + kMostTableModels < found->size()) continue;
+    if (const auto document = store.load(model.id)) add_to_tables(tables, i, document->model);
   }
 
   json rows = json::array();

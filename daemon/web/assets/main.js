@@ -63,7 +63,7 @@ listen("lost", (reason) => {
   find("connection").textContent = reason ?? "";
 });
 
-// What is to be done soon, for example because the certificate of the page expires.
+// A task for the administrator, for example an expiring certificate.
 listen("notice", ({ text }) => {
   find("notice").hidden = text === "";
   find("notice").textContent = text;

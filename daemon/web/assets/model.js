@@ -31,7 +31,7 @@ function alongPath(model) {
              { name: "after", x: run.at_m, y: run.after_um }] }];
 }
 
-/** The lamp of the report; its text also says the colour. */
+/** The lamp of the report; its text also states the colour. */
 function verdict({ lamp, text, reasons, notes }) {
   const lamps = h("span", { class: "lamps", "aria-hidden": "true" },
     ["red", "yellow", "green"].map((colour) => h("span", { class: colour === lamp ? `lamp ${colour}` : "lamp" })));

@@ -167,8 +167,9 @@ ValueGroup backlash_group(const calib::VolumetricModel& model) {
   ValueGroup group{
       "Backlash of the tables", "Forward minus backward, the largest of each table.", {}};
   for (const auto& b : calib::otf::largest_of_tables(calib::otf::backlash_of(model)))
-    group.values.push_back(certified(calib::name(b.motion) + ".backlash", calib::name(b.motion),
-                                     {b.value, b.u}, is_rotation(b.motion.motion)));
+    group.values.push_back(certified(calib::name(b.motion) + ".backlash",
+                                     calib::name(b.motion) + ": backlash", {b.value, b.u},
+                                     is_rotation(b.motion.motion)));
   return group;
 }
 

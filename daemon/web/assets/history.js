@@ -72,7 +72,7 @@ function trend(place, { models, values, tables }) {
     place.append(h("h3", {}, group), h("div", { class: "small-charts" },
       values.filter((v) => v.group === group).map((v) => valueChart(v, days))));
   if (tables.length)
-    place.append(h("h3", {}, "Tables along their axes, of the newest models"), h("div", { class: "small-charts" },
+    place.append(h("h3", {}, "Tables along their axes, of the newest models"), h("div", { class: "small-charts", id: "trend-tables" },
       tables.map((table) => tableChart(table, models))));
 }
 

@@ -11,6 +11,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/base/file_descriptor.hpp"
@@ -27,14 +28,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr const char* kPassword = "a long password";
-/// From the request to the first positions. Checked in the release build only: sanitized programs
-/// are slower.
-constexpr const char* kLongestFirstView_ms = "1000";
-#ifdef NDEBUG
-constexpr bool kIsRelease = true;
-#else
-constexpr bool kIsRelease = false;
-#endif
+/// From the request to the first positions; empty: not checked.
+constexpr std::string_view kLongestFirstView_ms{ABBE_LONGEST_FIRST_VIEW_MS};
 
 /// abbe-web and a browser beside the programs of `Run`.
 template <class Run>
@@ -175,7 +170,7 @@ TEST_F(PageOnTheFly, IsCalibratedByClickingAndEveryViewIsRight) {
   ASSERT_NO_FATAL_FAILURE(expect_report_prints("report-otf"));
 
   std::vector<std::string> options{kPassword};
-  if (kIsRelease) options.emplace_back(kLongestFirstView_ms);
+  if (!kLongestFirstView_ms.empty()) options.emplace_back(kLongestFirstView_ms);
   browse("views.mjs", options);
   expect_browser_ends_well();
 

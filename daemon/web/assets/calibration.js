@@ -94,30 +94,31 @@ function corners(points) {
 async function pathView(place, path_mm, driven_mm) {
   const space = await Space.create(place, ...corners(path_mm), "Path to drive and driven path");
   space.path(path_mm, "open");
-  const driven = [...driven_mm];
-  let line = null, ball = null;
-  const redraw = () => {
-    space.remove(line);
-    if (driven.length > 1) line = space.path(driven, "next");
-    space.frame.dataset.driven = driven.length;
-    const at = place_mm(state.live);
-    if (at) {
-      ball ??= space.ball(at, 0.012 * space.size, "touched");
-      ball.position.set(...at);
-    }
+  const draw = space.growingPath("next");
+  let driven = 0, last = null;
+  const drive = (at) => {
+    draw(at);
+    last = at;
+    space.frame.dataset.driven = ++driven;
+  };
+  driven_mm.forEach(drive);
+  let ball = null;
+  const show = (at) => {
+    ball ??= space.ball(at, 0.012 * space.size, "touched");
+    ball.position.set(...at);
     space.draw();
   };
-  redraw();
   const least = space.size / 500;
   let shown = null;
-  const stop = listen("live", (positions_m) => {
+  const follow = (positions_m) => {
     const at = place_mm(positions_m);
     if (!at || (shown && distance(at, shown) < least)) return;
     shown = at;
-    const last = driven.at(-1);
-    if (state.status?.session.state === "acquiring" && !(last && distance(at, last) < least)) driven.push(at);
-    redraw();
-  });
+    if (state.status?.session.state === "acquiring" && !(last && distance(at, last) < least)) drive(at);
+    show(at);
+  };
+  follow(state.live);
+  const stop = listen("live", follow);
   return () => { stop(); space.end(); };
 }
 

@@ -181,6 +181,28 @@ export class Space {
     return this.add(new THREE.Line(geometry, paint(new THREE.LineBasicMaterial(), role)));
   }
 
+  /** A polyline that grows by a point [x, y, z] with each call of what is returned. */
+  growingPath(role) {
+    const line = this.path([], role);
+    line.frustumCulled = false;  // where it will be is not known yet
+    let positions = new Float32Array(0), count = 0;
+    return (point) => {
+      if (3 * count === positions.length) {
+        const more = new Float32Array(Math.max(3 * 1024, 2 * positions.length));
+        more.set(positions);
+        positions = more;
+        line.geometry.dispose();
+        line.geometry = new THREE.BufferGeometry();
+        line.geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
+      }
+      positions.set(point, 3 * count);
+      ++count;
+      line.geometry.setDrawRange(0, count);
+      line.geometry.attributes.position.needsUpdate = true;
+      this.draw();
+    };
+  }
+
   /** Lines [[from, to], ..]. */
   segments(lines, role) {
     const geometry = new THREE.BufferGeometry();

@@ -20,8 +20,8 @@ export function say(text) {
 }
 
 /** Opens the page at `url`; screenshots go to `out`. Errors on the console end the program. `size`: one
- * of the viewports. */
-export async function openPage(url, out, { expectLoss = false, size = "desk" } = {}) {
+ * of the viewports. `everySize`: what is pressed must be reachable in all of them. */
+export async function openPage(url, out, { expectLoss = false, size = "desk", everySize = true } = {}) {
   const browser = await puppeteer.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true,
     args: ["--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
@@ -45,7 +45,7 @@ export async function openPage(url, out, { expectLoss = false, size = "desk" } =
       errors.push(`the page asks another server: ${request.url()}`);
   });
   await page.goto(url, { waitUntil: "load" });
-  return { browser, page, errors, out, touch: viewports[size].hasTouch ?? false };
+  return { browser, page, errors, out, everySize, touch: viewports[size].hasTouch ?? false };
 }
 
 /** Changes the size. Chromium loads the page again when touch comes or goes. */
@@ -67,10 +67,25 @@ export async function middleOf({ page }, element, name) {
   return { x, y };
 }
 
+/** An error if the element cannot be reached in a window as large as one of the viewports. Touch stays:
+ * Chromium loads the page again when it comes or goes. */
+async function reachInEverySize(context, element, name) {
+  const { page } = context;
+  const own = page.viewport();
+  for (const [size, { width, height }] of Object.entries(viewports)) {
+    await page.setViewport({ ...own, width, height });
+    await nextFrame(context);
+    await middleOf(context, element, `${name} (${size})`);
+  }
+  await page.setViewport(own);
+  await nextFrame(context);
+}
+
 /** Clicks with the mouse or taps with a finger, as the browser gets it from the system. `target`: a
  * selector or an element. */
 export async function press(context, target, name = String(target)) {
   const element = typeof target === "string" ? await context.page.waitForSelector(target) : target;
+  if (context.everySize) await reachInEverySize(context, element, name);
   const { x, y } = await middleOf(context, element, name);
   if (context.touch) await context.page.touchscreen.tap(x, y);
   else await context.page.mouse.click(x, y);

@@ -231,4 +231,4 @@ await withPage(url, out, async (context) => {
   say(`views checked ${checked}`);
   return [...faults, ...await trends(context), ...await keyboard(context), ...await themes(context),
     ...await preferences(context)];
-});
+}, { everySize: false });  // the views are shown in every size

@@ -9,13 +9,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define ABBE_SANITIZER_ALLOCATOR 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define ABBE_SANITIZER_ALLOCATOR 1
-#endif
-#endif
+#include "sanitizers.hpp"
 
 namespace abbe::tests {
 
@@ -33,7 +27,7 @@ class AllocationCount {
 
 }  // namespace abbe::tests
 
-#ifdef ABBE_SANITIZER_ALLOCATOR
+#if defined(ABBE_ADDRESS_SANITIZER) || defined(ABBE_THREAD_SANITIZER)
 
 // Declared here because <sanitizer/allocator_interface.h> does not come with every compiler
 // package.

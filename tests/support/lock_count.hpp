@@ -10,13 +10,11 @@
 
 #include <cstdint>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#include "sanitizers.hpp"
+
+#if defined(ABBE_ADDRESS_SANITIZER) || defined(ABBE_THREAD_SANITIZER) || \
+    defined(ABBE_MEMORY_SANITIZER)
 #define ABBE_SANITIZER_LOCKS 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define ABBE_SANITIZER_LOCKS 1
-#endif
 #endif
 
 namespace abbe::tests {

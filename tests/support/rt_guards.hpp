@@ -17,6 +17,7 @@
 #include <cstddef>
 
 #include "allocation_count.hpp"
+#include "sanitizers.hpp"
 
 namespace abbe::tests {
 
@@ -42,14 +43,6 @@ inline void allow_only_exit() {
     _exit(3);
   }
 }
-
-#if defined(__SANITIZE_THREAD__)  // GCC
-#define ABBE_THREAD_SANITIZER
-#elif defined(__has_feature)  // Clang
-#if __has_feature(thread_sanitizer)
-#define ABBE_THREAD_SANITIZER
-#endif
-#endif
 
 #ifdef ABBE_THREAD_SANITIZER
 // ThreadSanitizer maps its shadow memory on demand and uses futexes

@@ -8,8 +8,9 @@ import { say, screenshot, withPage } from "./chromium.mjs";
 
 const [url, out, pdf] = process.argv.slice(2);
 const name = basename(pdf, ".pdf");
-/** Width between the margins of the style sheet, 190 mm at 96 dpi. */
-const paper = { width: Math.round(190 / 25.4 * 96), height: 1032 };
+const pixels = (mm) => Math.round(mm / 25.4 * 96);
+/** A4 without the margins of the style sheet. */
+const paper = { width: pixels(210 - 2 * 10), height: pixels(297 - 2 * 12) };
 
 /** What does not fit on the paper. */
 function faultsOfTheLayout(width) {

@@ -326,6 +326,18 @@ TEST_F(PageLimitsTest, ManyConnectionsOfOneAddressLeaveAnotherItsAnswer) {
   EXPECT_THAT(log(), Contains(HasSubstr("127.0.0.1: more than 48 connections: closed")));
 }
 
+// Also of connections that arrive before the threads have taken the first ones.
+TEST_F(PageLimitsTest, OnlyAConnectionBeyondThoseServedAndWaitingIsClosed) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n", kWriteTimeOut, 1h));
+  constexpr int kServedAndWaiting = 65 + 64;
+  std::vector<daemon::FileDescriptor> silent;
+  for (const char* const address : {"127.0.0.1", "127.0.0.2", "127.0.0.3"})
+    for (int i = 0; i < kServedAndWaiting / 3; ++i)
+      silent.push_back(connection(page_->port(), "GET / HT", address));
+  EXPECT_EQ(all_of(connection(page_->port(), "GET / HT", "127.0.0.4")), "");
+  EXPECT_THAT(log(), ElementsAre(HasSubstr("127.0.0.4: closed: 64 connections wait already")));
+}
+
 // Of each address fewer than its limit, together more than there are threads.
 TEST_F(PageLimitsTest, SilentConnectionsOfSeveralAddressesEndWhileAnotherWaits) {
   ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n", kWriteTimeOut, 1h));

@@ -39,7 +39,8 @@ WorkerPool::~WorkerPool() {
 bool WorkerPool::enqueue(Serve serve) {
   {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMostWaiting) return false;
+    // A free thread may not have taken its connection yet.
+    if (served_ + waiting_.size() >= threads_.size() + kMostWaiting) return false;
     waiting_.push_back({std::move(serve), Clock::now()});
   }
   changed_.notify_one();
@@ -54,19 +55,22 @@ std::chrono::nanoseconds WorkerPool::longest_wait(Clock::time_point now) const {
 
 /// Serves until the pool ends and no connection waits.
 void WorkerPool::work() {
+  std::unique_lock lock(mutex_);
   for (;;) {
-    std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
     if (waiting_.empty()) return;
-    const Waiting next = std::move(waiting_.front());
+    Waiting next = std::move(waiting_.front());
     waiting_.pop_front();
+    ++served_;
     lock.unlock();
-    serve(next.serve);
+    serve(std::move(next.serve));
+    lock.lock();
+    --served_;
   }
 }
 
 /// A connection that throws, for example because memory is short, ends; its thread does not.
-void WorkerPool::serve(const Serve& task) {
+void WorkerPool::serve(Serve task) {  // NOLINT: ends with the call, before the lock is taken
   try {
     task(*this);
   } catch (const std::exception& error) {

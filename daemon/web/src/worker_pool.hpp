@@ -32,7 +32,7 @@ class WorkerPool {
   /// Serves the connections that wait, and ends the threads.
   ~WorkerPool();
 
-  /// False if kMostWaiting connections wait already; `serve` is then not called.
+  /// False if each thread has a connection and kMostWaiting others wait; `serve` is then not called.
   [[nodiscard]] bool enqueue(Serve serve);
   /// How long the connection that waits longest has waited; 0: none waits.
   [[nodiscard]] std::chrono::nanoseconds longest_wait(Clock::time_point now) const;
@@ -46,12 +46,13 @@ class WorkerPool {
   explicit WorkerPool(std::function<void(const std::string&)> report)
       : report_(std::move(report)) {}
   void work();
-  void serve(const Serve& task);
+  void serve(Serve task);
 
   std::function<void(const std::string&)> report_;
   mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
   std::deque<Waiting> waiting_;
+  std::size_t served_ = 0;  // connections that a thread serves
   bool stopping_ = false;
   std::vector<std::thread> threads_;
 };

@@ -297,6 +297,30 @@ TEST(EncoderReceiver, UnwrapsARotaryEncoderWithoutScalingAtItsPhysicalRevolution
   EXPECT_NEAR(line.samples[1].position[0], 2 * std::numbers::pi * 2.05, 1e-12);
 }
 
+TEST(EncoderReceiver, UnwrapsASingleTurnEncoderThatReportsNoRange) {
+  EncoderReceiverOptions options;
+  options.axes = {{.name = "C",
+                   .node = 1,
+                   .kind = AxisKind::Rotary,
+                   .position = can::PositionType::Unsigned32}};
+  Line line{options};
+  line.frame(can::standard_frame(0x581, {0x43, 0x00, 0x10, 0, 0x96, 0x01, 0x01, 0}),
+             kStart);  // device type: absolute single-turn encoder
+  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}),
+             kStart);  // 100 counts a revolution
+  std::int64_t ms = 0;
+
+  for (const std::int64_t count : {5, 90}) {
+    line.sync(kStart + 1ms * ms);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
+               kStart + 1ms * ms + 10us);
+    ++ms;
+  }
+
+  ASSERT_EQ(line.samples.size(), 2u);
+  EXPECT_EQ(line.samples[1].count[0], -10);
+}
+
 TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {
   Line line;
   line.cycle(kStart, 1000);

@@ -447,8 +447,11 @@ void EncoderReceiver::read_object(Axis& axis, can::ObjectId object, std::uint32_
     // reports.
     axis.heartbeat_timeout = std::max(
         heartbeat_timeout_, std::chrono::nanoseconds{std::chrono::milliseconds{value}} * 7 / 2);
+  } else if (object == obj::kDeviceType) {
+    axis.single_turn = static_cast<obj::EncoderKind>(value >> 16) == obj::EncoderKind::SingleTurn;
   } else if (step || turn) {
     axis.units = turn ? value : 0;
+    if (turn && axis.single_turn) wrap_at(axis, value);
     if (axis.scale_configured) return;
     if (value == 0) {
       ++counters_.scale_refusals;
@@ -456,16 +459,19 @@ void EncoderReceiver::read_object(Axis& axis, can::ObjectId object, std::uint32_
       return;
     }
     axis.scale = step ? kMetresPerNanometre * value : 2.0 * std::numbers::pi / value;
-  } else if (!linear && object == obj::kTotalRange && !axis.wrap_configured && value > 1) {
-    axis.modulus = value;
-    axis.raw %= value;
-  } else if (!linear && object == obj::kRevolutions && !axis.wrap_configured && value > 0 &&
-             axis.units > 1) {
+  } else if (!linear && object == obj::kTotalRange) {
+    wrap_at(axis, value);
+  } else if (!linear && object == obj::kRevolutions) {
     // Without scaling the position wraps after the number of distinguishable revolutions.
-    const auto counts = std::uint64_t{axis.units} * value;
-    axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);
-    axis.raw %= axis.modulus;
+    wrap_at(axis, std::uint64_t{axis.units} * value);
   }
+}
+
+/// The encoder reports the number of counts after which its position wraps; 0 and 1 are no range.
+void EncoderReceiver::wrap_at(Axis& axis, std::uint64_t counts) ABBE_RT {
+  if (axis.wrap_configured || counts <= 1) return;
+  axis.modulus = axis.type == can::PositionType::Signed64 ? counts : std::min(counts, kModulus32);
+  axis.raw %= axis.modulus;
 }
 
 }  // namespace abbe::drivers

@@ -109,6 +109,8 @@ void ObjectDictionary::add_profile_objects() noexcept {
     add_number({0x6030, 1}, Access::ReadOnly, 0, 2);
   } else {
     add_number(object::kUnitsPerRevolution, Access::ReadWrite, identity_.units_per_revolution, 4);
+    const auto revolutions = identity_.total_range / identity_.units_per_revolution;
+    add_number(object::kRevolutions, Access::ReadOnly, std::clamp(revolutions, 1u, 0xFFFFu), 2);
   }
 
   if (identity_.has_position64) {

@@ -75,7 +75,8 @@ struct EncoderAxis {
   std::optional<double> scale{};   ///< m or rad per count, negative reverses; none: read by SDO
   double offset = 0.0;             ///< m or rad: the reading at count 0
   /// Number of counts after which the position wraps to 0. 0: the range that the encoder reports;
-  /// if it reports none, 2^32 (2^64 for a position of 64 bits).
+  /// if it reports none, its revolution if it is a single-turn encoder, else 2^32 (2^64 for a
+  /// position of 64 bits).
   std::uint64_t wrap_counts = 0;
   std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };
@@ -184,6 +185,7 @@ class EncoderReceiver {
     std::uint8_t position_byte = 0;
     std::uint32_t bits_before = 0;  ///< offset of the mapping entry that is read next
     std::uint32_t units = 0;        ///< rotary: counts per revolution, as read
+    bool single_turn = false;       ///< as the device type says
     std::chrono::nanoseconds heartbeat_timeout{};
     bool scale_configured = false;
     bool wrap_configured = false;
@@ -224,6 +226,7 @@ class EncoderReceiver {
   void on_sdo_answer(Axis& axis, const can::CanFrame& frame) ABBE_RT;
   void read_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT;
   void read_object(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
+  static void wrap_at(Axis& axis, std::uint64_t counts) ABBE_RT;
   void check_heartbeats(protocol::HostTime time) ABBE_RT;
   void count_bad_block() ABBE_RT { ++counters_.bad_blocks; }
 

@@ -36,9 +36,9 @@ struct EncoderIdentity {
   std::uint32_t serial = 0;
   std::string_view name = "abbe encoder";        ///< 1008h, at most kMaxSdoBytes
   std::uint32_t step_nm = 10;                    ///< 6005h:01, linear; 10 nm: +-21.47 m in 32 bits
-  std::uint32_t units_per_revolution = 1 << 20;  ///< 6001h, rotary
-  std::uint32_t total_range = 0x7FFFFFFF;        ///< 6002h
-  bool has_position64 = true;                    ///< 6008h, 6009h exist (CiA 406 v3.1)
+  std::uint32_t units_per_revolution = 1 << 20;  ///< 6001h and 6501h, rotary; not 0
+  std::uint32_t total_range = 0x7FFFFFFF;  ///< 6002h; rotary: 6502h is the whole revolutions in it
+  bool has_position64 = true;              ///< 6008h, 6009h exist (CiA 406 v3.1)
 };
 
 /// Present configuration of a TPDO.

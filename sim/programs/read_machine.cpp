@@ -1,5 +1,7 @@
 #include "read_machine.hpp"
 
+#include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,35 +32,69 @@ void read_axes(TomlSection root, TruthMachine& truth) {
   }
 }
 
-std::optional<EncoderNodeOptions> read_encoder_node(TomlSection& section) {
+void read_linear_scale(TomlSection& section, EncoderNodeOptions& node) {
+  double step_nm = 1.0;  // as abbed reads the file
+  section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
+  section.number("offset_mm", node.offset, kMilli);
+  node.step_nm = static_cast<std::uint32_t>(step_nm);
+}
+
+void read_rotary_scale(TomlSection& section, EncoderNodeOptions& node) {
+  double step_nrad = 0.0;
+  if (section.number("step_nrad", step_nrad, 1.0, {2.0, 1e9}))
+    node.units_per_revolution =
+        static_cast<std::uint32_t>(std::lround(2e9 * std::numbers::pi / step_nrad));
+  section.number("offset_rad", node.offset, 1.0);
+}
+
+bool is_rotary(TomlSection root, const std::string& name) {
+  std::string kind;
+  TomlSection axis = root.child("axes").child(name);
+  return axis.present() && axis.text("kind", kind) && kind == "rotary";
+}
+
+std::optional<EncoderNodeOptions> read_encoder_node(TomlSection root, TomlSection& section) {
   EncoderNodeOptions node;
   std::string name;
   std::int64_t id = 0;
-  double step_nm = 10.0;
   section.text("axis", name);
-  const auto axis = axis_named(name);
 
-  if (!axis) {
-    section.fault("axis", "must be X, Y or Z");
+  if (const auto axis = axis_named(name)) {
+    node.axis = *axis;
+    read_linear_scale(section, node);
+  } else if (is_rotary(root, name)) {
+    node.axis = RotarySwing{};
+    read_rotary_scale(section, node);
+  } else {
+    section.fault("axis", "must be X, Y, Z or an axis with kind = \"rotary\" in [axes]");
     return std::nullopt;
   }
 
   if (!section.integer("node", id, 1, can::kMaxNodeId)) section.fault("node", "missing");
-  section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
-  section.number("offset_mm", node.offset_m, kMilli);
   section.flag("invert", node.invert);
-  node.axis = *axis;
   node.node = static_cast<can::NodeId>(id);
-  node.step_nm = static_cast<std::uint32_t>(step_nm);
 
   return node;
 }
 
-void read_encoder_nodes(TomlSection& encoder, std::vector<EncoderNodeOptions>& nodes) {
+/// Those of X, Y and Z, and one on each rotary axis: they exist without an entry in the file.
+void add_rotary_nodes(TomlSection root, std::vector<EncoderNodeOptions>& nodes) {
+  for (const std::string& name : root.child("axes").keys()) {
+    if (!is_rotary(root, name)) continue;
+    EncoderNodeOptions node;
+    node.node = static_cast<can::NodeId>(nodes.size() + 1);
+    node.axis = RotarySwing{};
+    nodes.push_back(node);
+  }
+}
+
+void read_encoder_nodes(TomlSection root, TomlSection& encoder,
+                        std::vector<EncoderNodeOptions>& nodes) {
   std::vector<EncoderNodeOptions> seen;
   for (TomlSection& section : encoder.children("nodes"))
-    if (const auto node = read_encoder_node(section)) seen.push_back(*node);
-  if (!seen.empty()) nodes = seen;
+    if (const auto node = read_encoder_node(root, section)) seen.push_back(*node);
+  if (seen.empty()) return add_rotary_nodes(root, nodes);
+  nodes = seen;
 }
 
 /// With sync = "external" the control of the machine sends the SYNC; the simulator does it.
@@ -100,7 +136,7 @@ void read_machine_tables(TomlSection root, SetupDraft& draft) {
   encoder.port("local_port", simulation.bus->peer_port);
   encoder.text("interface", simulation.bus->interface);
   read_sync(encoder, simulation);
-  read_encoder_nodes(encoder, simulation.nodes);
+  read_encoder_nodes(root, encoder, simulation.nodes);
   read_counter_card(root.child("counter_card"), simulation);
   read_reference(root.child("reference"), simulation);
   read_cmm(root.child("cmm"), simulation);

@@ -91,7 +91,7 @@ void read_sim(TomlSection sim, const std::string& file, SetupDraft& draft) {
   encoder.port("port", simulation.bus->port);
   encoder.port("peer_port", simulation.bus->peer_port);
   encoder.text("interface", simulation.bus->interface);
-  encoder.number("noise_nm", draft.encoder_noise_m, 1e-9, kNotNegativeNumber);
+  encoder.number("noise_nm", draft.encoder_noise, 1e-9, kNotNegativeNumber);
   double sync_period_us = 0.0;
   if (encoder.number("sync_period_us", sync_period_us, 1.0, {100.0, 1e6}))
     simulation.sync_period = seconds_to_ns(sync_period_us * 1e-6);

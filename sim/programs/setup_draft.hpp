@@ -20,7 +20,7 @@ struct SetupDraft {
   std::string machine_file;
   std::string artefact_file;
   std::int64_t seed = 1;
-  double encoder_noise_m = 5e-9;
+  double encoder_noise = 5e-9;
   Eigen::Vector3d drift_at_end_m = Eigen::Vector3d::Zero();  ///< of the tracker
   bool drift_is_random_walk = false;
   bool nest_visits = true;

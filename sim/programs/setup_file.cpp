@@ -125,7 +125,7 @@ void share_seed_and_speed(SetupDraft& draft) {
 
   for (EncoderNodeOptions& node : simulation.nodes) {
     node.seed = static_cast<std::uint64_t>(draft.seed);
-    node.noise_m = draft.encoder_noise_m;
+    node.noise = draft.encoder_noise;
   }
 
   if (simulation.measuring_machine)

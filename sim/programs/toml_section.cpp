@@ -46,6 +46,13 @@ TomlSection TomlSection::child(std::string_view key) {
   return {node != nullptr ? node->as_table() : nullptr, path_of(key), faults_};
 }
 
+std::vector<std::string> TomlSection::keys() const {
+  std::vector<std::string> keys;
+  if (table_ == nullptr) return keys;
+  for (const auto& [key, value] : *table_) keys.emplace_back(key.str());
+  return keys;
+}
+
 std::vector<TomlSection> TomlSection::children(std::string_view key) {
   std::vector<TomlSection> sections;
   const toml::node* node = find(key);

@@ -50,6 +50,7 @@ class TomlSection {
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] TomlSection child(std::string_view key);
   [[nodiscard]] std::vector<TomlSection> children(std::string_view key);  ///< of an array of tables
+  [[nodiscard]] std::vector<std::string> keys() const;                    ///< in alphabetical order
 
   /// Each function below sets `value` and returns true if the key is present and valid; else
   /// `value` is unchanged. `scale` converts the file's unit to SI.

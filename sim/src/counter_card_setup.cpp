@@ -1,26 +1,14 @@
 #include "abbe/sim/counter_card_setup.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 namespace abbe::sim {
 namespace {
 
-constexpr std::string_view kPathAxes = "XYZ";
-
 std::function<double(HostTime)> reading_of(const CardAxis& axis, const VirtualMachine& machine) {
-  const auto index = axis.name.size() == 1 ? kPathAxes.find(axis.name[0]) : std::string_view::npos;
-  if (index != std::string_view::npos) {
-    return [&machine, i = static_cast<Eigen::Index>(index)](HostTime at) {
-      return machine.motion(at).q_m[i];
-    };
-  }
-  const double rate = 2.0 * std::numbers::pi / axis.swing_period_s;
-  return [&machine, rate, amplitude = axis.swing_rad](HostTime at) {
-    const double since_s = machine.started() ? ns_to_seconds(at - *machine.started()) : 0.0;
-    return amplitude * std::sin(rate * std::max(0.0, since_s));
-  };
+  MeasuredAxis measured = axis.swing;
+  if (const auto linear = axis_named(axis.name)) measured = *linear;
+  return [&machine, measured](HostTime at) { return reading(measured, machine, at); };
 }
 
 PhaseSignal clock_of(const CounterCardSetup& setup) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "abbe/sim/noise.hpp"
@@ -20,9 +21,29 @@ can::EncoderIdentity identity_of(const EncoderNodeOptions& options) {
   identity.product = 406;
   identity.revision = 1;
   identity.serial = 1000u + options.node;
-  identity.name = "abbe-sim linear encoder";
-  identity.step_nm = options.step_nm;
+  if (std::holds_alternative<Axis>(options.axis)) {
+    identity.name = "abbe-sim linear encoder";
+    identity.step_nm = options.step_nm;
+  } else {
+    identity.name = "abbe-sim rotary encoder";
+    identity.kind = can::object::EncoderKind::SingleTurn;
+    identity.units_per_revolution = identity.total_range = options.units_per_revolution;
+  }
   return identity;
+}
+
+/// Size of a step, m or rad.
+double step_of(const EncoderNodeOptions& options) {
+  const double size = std::holds_alternative<Axis>(options.axis)
+                          ? 1e-9 * options.step_nm
+                          : 2.0 * std::numbers::pi / options.units_per_revolution;
+  return options.invert ? -size : size;
+}
+
+/// The count of a single-turn encoder: 0 to `units` - 1.
+std::int64_t within_revolution(std::int64_t count, std::int64_t units) {
+  const std::int64_t rest = count % units;
+  return rest < 0 ? rest + units : rest;
 }
 
 }  // namespace
@@ -127,12 +148,13 @@ void EncoderNode::on_sync(HostTime at) {
 }
 
 void EncoderNode::sample(HostTime at) {
-  const auto axis = static_cast<Eigen::Index>(options_.axis);
   const auto stream = static_cast<std::uint64_t>(NoiseStream::Encoder) + options_.node;
-  const double noise_m = options_.noise_m * gaussian(options_.seed, stream, readings_++);
-  const double step_m = (options_.invert ? -1e-9 : 1e-9) * options_.step_nm;
-  const double counts = (machine_.motion(at).q_m[axis] + noise_m - options_.offset_m) / step_m;
-  objects_.set_raw_position(std::llround(counts));
+  const double noise = options_.noise * gaussian(options_.seed, stream, readings_++);
+  const double measured = reading(options_.axis, machine_, at) + noise;
+  const std::int64_t count = std::llround((measured - options_.offset) / step_of(options_));
+  const bool linear = std::holds_alternative<Axis>(options_.axis);
+  objects_.set_raw_position(linear ? count
+                                   : within_revolution(count, options_.units_per_revolution));
 }
 
 void EncoderNode::advance(HostTime now) {

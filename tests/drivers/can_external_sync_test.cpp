@@ -60,10 +60,8 @@ class ExternalSync : public testing::Test {
   }
   sim::EncoderBus open_bus() {
     const std::array<sim::EncoderNodeOptions, 2> nodes{
-        sim::EncoderNodeOptions{
-            .node = 1, .axis = sim::Axis::X, .noise_m = 0.0, .configured = true},
-        sim::EncoderNodeOptions{
-            .node = 2, .axis = sim::Axis::Y, .noise_m = 0.0, .configured = true}};
+        sim::EncoderNodeOptions{.node = 1, .axis = sim::Axis::X, .noise = 0.0, .configured = true},
+        sim::EncoderNodeOptions{.node = 2, .axis = sim::Axis::Y, .noise = 0.0, .configured = true}};
     return sim::EncoderBus::open({.peer_port = port_}, nodes, machine_, time_.now()).value();
   }
   void cycle() {

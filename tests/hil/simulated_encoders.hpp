@@ -37,7 +37,7 @@ class SimulatedEncoders {
     for (std::size_t i = 0; i < axes; ++i) {
       nodes.push_back({.node = static_cast<can::NodeId>(i + 1),
                        .axis = sim::kAxes[i % sim::kAxes.size()],
-                       .noise_m = 0.0,
+                       .noise = 0.0,
                        .boot_time = std::chrono::milliseconds{20}});
     }
 

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "abbe/protocol/can/encoder_configurator.hpp"
 #include "abbe/protocol/can/error_frame.hpp"
@@ -48,7 +49,7 @@ HostTime configure(EncoderNode& node, HostTime now) {
 
 TEST(EncoderNode, BootsThenIsConfiguredThenAnswersSync) {
   const VirtualMachine machine = test::standing_machine();
-  EncoderNode node({.node = 5, .axis = Axis::Y, .noise_m = 0.0}, machine, kPowerOn);
+  EncoderNode node({.node = 5, .axis = Axis::Y, .noise = 0.0}, machine, kPowerOn);
   node.advance(kPowerOn);
   const auto boot = can::decode_heartbeat(frames_of(node).at(0));
 
@@ -72,7 +73,7 @@ TEST(EncoderNode, ReadsTheScaleAtTheSyncAndNotTheTruePosition) {
   // EXX of 1 mm everywhere
   truth.axis(Axis::X).error[0] = ErrorFunction({-1.0, 1.0}, {1e-3, 1e-3});
   VirtualMachine machine(truth, PathMotion::plan(plan).value());
-  EncoderNode node({.node = 1, .axis = Axis::X, .noise_m = 0.0}, machine, kPowerOn);
+  EncoderNode node({.node = 1, .axis = Axis::X, .noise = 0.0}, machine, kPowerOn);
   const HostTime now = configure(node, kPowerOn + 1s);
   machine.start(now);
   const HostTime sync = now + 2s;
@@ -82,10 +83,34 @@ TEST(EncoderNode, ReadsTheScaleAtTheSyncAndNotTheTruePosition) {
   EXPECT_EQ(count, std::llround(machine.motion(sync).q_m.x() / 10e-9));
 }
 
+TEST(EncoderNode, CountsTheRevolutionOfARotaryAxis) {
+  VirtualMachine machine = test::standing_machine();
+  constexpr std::uint32_t kUnits = 3'600'000;
+  EncoderNode node({.node = 4,
+                    .axis = RotarySwing{.amplitude_rad = 0.1, .period_s = 8.0},
+                    .units_per_revolution = kUnits,
+                    .noise = 0.0},
+                   machine, kPowerOn);
+  EXPECT_FALSE(can::object::is_linear(
+      static_cast<std::uint32_t>(*node.objects().number(can::object::kDeviceType))));
+  EXPECT_EQ(node.objects().number(can::object::kUnitsPerRevolution), kUnits);
+  EXPECT_EQ(node.objects().number(can::object::kTotalRange), kUnits);
+  const HostTime now = configure(node, kPowerOn + 1s);
+  const auto count_at = [&](HostTime at) {
+    node.on_frame(can::encode_sync(), at);
+    return can::decode_position(frames_of(node).back().payload(), can::PositionType::Unsigned32);
+  };
+  EXPECT_EQ(count_at(now), 0);  // the machine stands
+  machine.start(now);
+  const std::int64_t swing = std::llround(0.1 / (2.0 * std::numbers::pi) * kUnits);
+  EXPECT_EQ(count_at(now + 2s), swing);
+  EXPECT_EQ(count_at(now + 6s), kUnits - swing);
+}
+
 TEST(EncoderNode, HasItsOwnNoiseWhichIsTheSameInEveryRun) {
   const VirtualMachine machine = test::standing_machine();
   const auto counts = [&](std::uint64_t seed) {
-    EncoderNode node({.node = 1, .axis = Axis::X, .step_nm = 1, .noise_m = 50e-9, .seed = seed},
+    EncoderNode node({.node = 1, .axis = Axis::X, .step_nm = 1, .noise = 50e-9, .seed = seed},
                      machine, kPowerOn);
     HostTime now = configure(node, kPowerOn + 1s);
     std::vector<double> values;
@@ -232,7 +257,7 @@ TEST_F(EncoderBusTest, ProducesTheSyncOnRequest) {
 
 TEST(ConfiguredEncoderNode, AnswersASyncWithoutBeingConfigured) {
   const VirtualMachine machine = test::standing_machine();
-  EncoderNode node({.node = 5, .noise_m = 0.0, .configured = true}, machine, kPowerOn);
+  EncoderNode node({.node = 5, .noise = 0.0, .configured = true}, machine, kPowerOn);
   node.advance(kPowerOn);
   frames_of(node);
   node.on_frame(can::encode_sync(), kPowerOn + 1ms);

@@ -122,6 +122,19 @@ TEST_F(Program, ReportsAllFaultsOfAConfigurationTogether) {
   EXPECT_THAT(outcome.output, testing::Not(HasSubstr("sim.fault: unknown")));
 }
 
+TEST_F(Program, RefusesAnEncoderOfAnAxisThatIsNotSimulated) {
+  const std::string config =
+      write("abbed.toml",
+            "[axes.U]\nkind = \"linear\"\nmin_mm = 0\nmax_mm = 100\n[encoder]\nnodes = [\n"
+            "{axis = \"U\", node = 4},\n{axis = \"B\", node = 5}]\n");
+  const Outcome outcome = run("run --machine " + config);
+  EXPECT_EQ(outcome.code, 3);
+  constexpr const char* kReason =
+      ": encoder.nodes.axis: must be X, Y, Z or an axis with kind = \"rotary\" in [axes]";
+  EXPECT_THAT(outcome.output, HasSubstr(std::string{"abbed.toml:7"} + kReason));
+  EXPECT_THAT(outcome.output, HasSubstr(std::string{"abbed.toml:8"} + kReason));
+}
+
 TEST_F(Program, RefusesAWrongPathFile) {
   const std::string path = write("path.csv", "x_mm,y_mm,z_mm\n1,2\n1,2,up\n");
   const Outcome outcome = run("run --machine " + demo_ + "/machine.toml --path " + path);

@@ -7,19 +7,18 @@
 #include <vector>
 
 #include "abbe/sim/counter_card.hpp"
+#include "abbe/sim/measured_axis.hpp"
 #include "abbe/sim/virtual_machine.hpp"
 
 namespace abbe::sim {
 
 struct CardAxis {
-  /// name of the axis: X, Y, Z follow the path; any other is a rotary axis with sinusoidal motion
+  /// name of the axis: X, Y, Z follow the path; any other is a rotary axis
   std::string name = "X";
   std::uint8_t channel = 0;
-  double step = 10e-9;  ///< m or rad per count; negative: counts fall as the reading rises
-  double noise = 0.0;   ///< standard deviation of one reading, m or rad
-  /// rotary axis: amplitude of its motion, which begins when the machine starts
-  double swing_rad = 0.1;
-  double swing_period_s = 10.0;
+  double step = 10e-9;           ///< m or rad per count; negative: counts fall as the reading rises
+  double noise = 0.0;            ///< standard deviation of one reading, m or rad
+  RotarySwing swing;             ///< rotary axis: its motion
   double signal_period = 0.0;    ///< of the distance-coded marks, m or rad; 0: no marks
   int nominal_increment = 1000;  ///< signal periods between two fixed marks
   double marks_zero = 0.0;       ///< scale reading of the first fixed mark

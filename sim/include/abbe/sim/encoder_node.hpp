@@ -1,8 +1,8 @@
 #pragma once
 /// One CANopen encoder: the server side of CiA 301 and CiA 406 around an object dictionary,
-/// measuring one axis of the virtual machine. Sans-I/O: frames and a time in, frames with their
-/// send time out. The node sends the *scale reading* at the instant a SYNC arrives. Faults can be
-/// injected. Not thread-safe.
+/// measuring one axis of the virtual machine; a single-turn encoder on a rotary axis. Sans-I/O:
+/// frames and a time in, frames with their send time out. The node sends the *scale reading* at the
+/// instant a SYNC arrives. Faults can be injected. Not thread-safe.
 
 #include <cstdint>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "abbe/protocol/can/canopen.hpp"
 #include "abbe/protocol/can/object_dictionary.hpp"
 #include "abbe/protocol/can/sdo_server.hpp"
+#include "abbe/sim/measured_axis.hpp"
 #include "abbe/sim/virtual_machine.hpp"
 
 namespace abbe::sim {
@@ -19,11 +20,13 @@ namespace can = protocol::can;
 
 struct EncoderNodeOptions {
   can::NodeId node = 1;
-  Axis axis = Axis::X;
-  std::uint32_t step_nm = 10;
-  double offset_m = 0.0;  ///< the reading at count 0
-  bool invert = false;    ///< counts fall as the reading rises
-  double noise_m = 5e-9;  ///< standard deviation of one reading before it is rounded to counts
+  MeasuredAxis axis = Axis::X;
+  std::uint32_t step_nm = 10;                    ///< linear
+  std::uint32_t units_per_revolution = 1 << 20;  ///< rotary; the counts are 0 to one less than this
+  double offset = 0.0;                           ///< the reading at count 0, m or rad
+  bool invert = false;                           ///< counts fall as the reading rises
+  /// standard deviation of one reading before it is rounded to counts, m or rad
+  double noise = 5e-9;
   std::uint64_t seed = 1;
   /// from reset to boot-up message
   std::chrono::nanoseconds boot_time = std::chrono::milliseconds{200};

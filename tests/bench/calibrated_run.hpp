@@ -1,6 +1,6 @@
 #pragma once
 /// A calibration on the fly in real time: a simulated machine with a tracker at 500 Hz and encoders
-/// at 200 Hz, and abbed, each a process, in a temporary folder.
+/// of five axes at 200 Hz, and abbed, each a process, in a temporary folder.
 
 #include <fmt/format.h>
 #include <stdlib.h>
@@ -134,9 +134,12 @@ class CalibratedRun {
   }
 
  private:
+  static constexpr std::string_view kRotary = "BC";
+
   static config_tables::Machine machine() {
     auto of_demo = config_tables::case_a();
     of_demo.name = "live status";
+    of_demo.rotary = kRotary;
     return of_demo;
   }
   void write(const std::string& name, const std::string& text) const {
@@ -154,8 +157,10 @@ class CalibratedRun {
                .port = port("tracker_port"),
                .more = "weather = \"none\"\nu_scale_ppm = 0\nsigma_range_um = 2\n"
                        "sigma_angle_urad = 3\n"}) +
-           to_toml(config_tables::Encoder{
-               .peer_port = port("can_port"), .sync_period_us = 5'000, .step_nm = 10}) +
+           to_toml(config_tables::Encoder{.peer_port = port("can_port"),
+                                          .sync_period_us = 5'000,
+                                          .step_nm = 10,
+                                          .rotary = kRotary}) +
            std::string{config_tables::kDaemonInItsFolder} + std::string{kDaemon};
   }
   std::filesystem::path folder_;

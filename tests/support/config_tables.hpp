@@ -24,6 +24,7 @@ struct Machine {
   std::string name = "mill";
   std::string chain = "[w X' b Y Z (C1) t]";
   Travel x = {}, y = {}, z = {};
+  std::string_view rotary = {};  ///< a letter for each rotary axis
   std::optional<std::array<double, 3>> target_offset_mm = {};
   std::optional<double> node_spacing_mm = {};
 };
@@ -73,6 +74,7 @@ struct Encoder {
   std::uint16_t peer_port = 1;  ///< 1: no node answers on this port
   std::int64_t sync_period_us = 100'000;
   int step_nm = 1;
+  std::string_view rotary = {};  ///< a letter for each rotary axis, with 2^20 counts
 };
 
 /// [counter_card] of abbe-sim over USB/IP; its counters are zero at the current position of the
@@ -107,6 +109,8 @@ simulated = true
   std::string text =
       fmt::format("[machine]\nname = \"{}\"\nchain = \"{}\"\n", machine.name, machine.chain) +
       to_toml("X", machine.x) + to_toml("Y", machine.y) + to_toml("Z", machine.z);
+  for (const char axis : machine.rotary)
+    text += fmt::format("[axes.{}]\nkind = \"rotary\"\nmin_rad = -1.5\nmax_rad = 1.5\n", axis);
   if (const auto& t = machine.target_offset_mm)
     text += fmt::format("[target]\noffset_mm = [{}, {}, {}]\n", (*t)[0], (*t)[1], (*t)[2]);
   if (machine.node_spacing_mm)
@@ -120,6 +124,10 @@ simulated = true
 }
 
 [[nodiscard]] inline std::string to_toml(const Encoder& encoder) {
+  std::string rotary;
+  for (std::size_t i = 0; i < encoder.rotary.size(); ++i)
+    rotary += fmt::format("  {{ axis = \"{}\", node = {}, step_nrad = 5992.1124526782 }},\n",
+                          encoder.rotary[i], i + 4);
   return fmt::format(R"([encoder]
 transport = "udp"
 peer_host = "127.0.0.1"
@@ -129,10 +137,10 @@ nodes = [
   {{ axis = "X", node = 1, step_nm = {step_nm} }},
   {{ axis = "Y", node = 2, step_nm = {step_nm} }},
   {{ axis = "Z", node = 3, step_nm = {step_nm} }},
-]
+{rotary}]
 )",
                      encoder.peer_port, encoder.sync_period_us,
-                     fmt::arg("step_nm", encoder.step_nm));
+                     fmt::arg("step_nm", encoder.step_nm), fmt::arg("rotary", rotary));
 }
 
 [[nodiscard]] inline std::string to_toml(const CounterCard& card) {

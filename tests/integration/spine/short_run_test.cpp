@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <sstream>
 
 #include "spine.hpp"
@@ -14,6 +15,8 @@ using nlohmann::json;
 using testing::HasSubstr;
 
 struct ShortRun : Spine {
+  ShortRun() : Spine("BC") {}
+
   void start_everything() {
     write_path("path.csv", path());
     start_simulator();
@@ -43,6 +46,20 @@ struct ShortRun : Spine {
       if (said.is_object() && said.contains("comparison")) return said["comparison"];
     }
     return {};
+  }
+
+  /// They swing by 0.1 rad to both sides; their encoders count from 0 to 2 pi.
+  void expect_rotary_axes_swing() {
+    const auto swings = [](const json& rad) {
+      return rad.is_number() && std::abs(rad.get<double>()) < 0.1001;
+    };
+    bool moved = false;
+    EXPECT_TRUE(eventually([&] {
+      const json position = status()["position_m"];
+      if (position.size() != 5 || !swings(position[3]) || !swings(position[4])) return false;
+      moved = moved || position[3] < -0.01;
+      return moved;
+    })) << status().dump(1);
   }
 
   void expect_subscriber_sees_a_smaller_error() {
@@ -92,6 +109,7 @@ TEST_F(ShortRun, IsCalibratedPublishedRecordedAndReplayedTheSame) {
   EXPECT_TRUE(eventually([&] { return status()["model"]["state"] == "ACTIVE"; }))
       << status().dump(1);
   const json model = status()["model"];
+  expect_rotary_axes_swing();
   ASSERT_NO_FATAL_FAILURE(expect_subscriber_sees_a_smaller_error());
   EXPECT_EQ(abbed_->stop(), 0) << abbed_->err();
   ASSERT_EQ(recordings().size(), 1u);

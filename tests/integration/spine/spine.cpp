@@ -16,11 +16,12 @@ namespace {
 
 using nlohmann::json;
 
-std::string machine_table() {
+std::string machine_table(std::string_view rotary_axes) {
   return to_toml(config_tables::Machine{.name = "spine",
                                         .x = {-100, 100},
                                         .y = {-100, 100},
                                         .z = {-200, 0},
+                                        .rotary = rotary_axes,
                                         .target_offset_mm = {{20, -15, -120}},
                                         .node_spacing_mm = 100});
 }
@@ -59,10 +60,10 @@ chunk_kB = 16
 
 }  // namespace
 
-Spine::Spine() {
+Spine::Spine(std::string_view rotary_axes) : rotary_axes_(rotary_axes) {
   std::string name = testing::TempDir() + "abbe-spine-XXXXXX";
   directory_ = ::mkdtemp(name.data());
-  write("machine.toml", machine_table());
+  write("machine.toml", machine_table(rotary_axes_));
   write("sim.toml", fmt::format(kSimulator, fmt::arg("speed", ABBE_SPINE_SPEED)));
 }
 
@@ -99,14 +100,15 @@ Spine::Vertices Spine::path() {
 }
 
 void Spine::write_configuration(const std::string& dds) const {
-  write_configuration_of(
-      tracker_table() + to_toml(config_tables::Encoder{
-                            .peer_port = can_port_, .sync_period_us = 10'000, .step_nm = 10}),
-      dds);
+  write_configuration_of(tracker_table() + to_toml(config_tables::Encoder{.peer_port = can_port_,
+                                                                          .sync_period_us = 10'000,
+                                                                          .step_nm = 10,
+                                                                          .rotary = rotary_axes_}),
+                         dds);
 }
 
 void Spine::write_configuration_of(const std::string& devices, const std::string& dds) const {
-  write("abbed.toml", machine_table() + devices + daemon_tables(dds));
+  write("abbed.toml", machine_table(rotary_axes_) + devices + daemon_tables(dds));
 }
 
 std::string Spine::tracker_table() const {

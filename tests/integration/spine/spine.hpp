@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "domain_claim.hpp"
@@ -28,7 +29,8 @@ class Spine : public testing::Test {
  protected:
   using Vertices = std::vector<std::array<double, 3>>;  ///< mm
 
-  Spine();
+  /// `rotary_axes`: a letter for each; they swing, and move nothing.
+  explicit Spine(std::string_view rotary_axes = {});
   ~Spine() override;
 
   // Files of the run.
@@ -74,6 +76,7 @@ class Spine : public testing::Test {
   [[nodiscard]] bool goes_on(const std::string& name) const;
   [[nodiscard]] std::vector<std::filesystem::path> recordings() const;  ///< finished or not, sorted
 
+  std::string_view rotary_axes_;
   std::filesystem::path directory_;
   DomainClaim domain_;
   std::uint16_t tracker_port_ = 0;

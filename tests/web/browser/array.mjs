@@ -107,4 +107,4 @@ await withPage(url, out, async (context) => {
   await goTo(context, "history");
   await waitForText(context, "To activate a model or roll back, log in with the role administer", "#view");
   return faults;
-}, { size: "tablet" });
+}, { usualSize: "tablet" });

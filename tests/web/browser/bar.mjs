@@ -30,4 +30,4 @@ await withPage(url, out, async (context) => {
   }
   if (/Done|Touched/.test(await label())) faults.push(`what was touched is not known, but claimed: ${await label()}`);
   return faults;
-}, { size: "phone" });
+}, { usualSize: "phone" });

@@ -19,9 +19,12 @@ export function say(text) {
   process.stdout.write(`${text}\n`);
 }
 
-/** Opens the page at `url`; screenshots go to `out`. Errors on the console end the program. `size`: one
- * of the viewports. `everySize`: what is pressed must be reachable in all of them. */
-export async function openPage(url, out, { expectLoss = false, size = "desk", everySize = true } = {}) {
+/** Opens the page at `url`; screenshots go to `out`. Errors on the console end the program. `usualSize`:
+ * the viewport, unless the environment variable ABBE_PAGE_SIZE names one. `everySize`: what is pressed
+ * must be reachable in all of them. */
+export async function openPage(url, out, { expectLoss = false, usualSize = "desk", everySize = true } = {}) {
+  const size = process.env.ABBE_PAGE_SIZE || usualSize;
+  if (!(size in viewports)) throw new Error(`ABBE_PAGE_SIZE=${size}: must be ${Object.keys(viewports).join(", ")}`);
   const browser = await puppeteer.launch({
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true,
     args: ["--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
@@ -179,6 +182,21 @@ export async function logIn(context, user, password) {
 export async function chooseFile({ page }, selector, file) {
   const input = await page.waitForSelector(selector);
   await input.uploadFile(file);
+}
+
+/** Memory of the page, MB: `heap`, used by JavaScript after a collection of garbage; `resident`, the
+ * largest process of Chromium that draws pages. */
+export async function memory({ browser, page }) {
+  const client = await page.createCDPSession();
+  await client.send("HeapProfiler.collectGarbage");
+  const { usedSize } = await client.send("Runtime.getHeapUsage");
+  await client.detach();
+  const system = await browser.target().createCDPSession();
+  const { processInfo } = await system.send("SystemInfo.getProcessInfo");
+  await system.detach();
+  const resident_kB = processInfo.filter(({ type }) => type === "renderer").map(({ id }) =>
+    Number(/VmRSS:\s*(\d+) kB/.exec(readFileSync(`/proc/${id}/status`, "utf8"))?.[1] ?? 0));
+  return { heap: usedSize / 2 ** 20, resident: Math.max(...resident_kB) / 2 ** 10 };
 }
 
 export async function screenshot({ page, out }, name) {

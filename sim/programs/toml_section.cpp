@@ -36,14 +36,14 @@ const toml::node* TomlSection::find(std::string_view key) {
 }
 
 void TomlSection::fault(std::string_view key, std::string_view what) {
-  const toml::node* where = table_ == nullptr || key.empty() ? table_ : table_->get(key);
-  faults_.add(where != nullptr ? where : table_, path_of(key), what);
+  const toml::node* where = table_ == nullptr || key.empty() ? nullptr : table_->get(key);
+  faults_.add(where != nullptr ? where : where_, path_of(key), what);
 }
 
 TomlSection TomlSection::child(std::string_view key) {
   const toml::node* node = find(key);
   if (node != nullptr && !node->is_table()) fault(key, "must be a table");
-  return {node != nullptr ? node->as_table() : nullptr, path_of(key), faults_};
+  return {node != nullptr ? node->as_table() : nullptr, path_of(key), faults_, where_};
 }
 
 std::vector<std::string> TomlSection::keys() const {

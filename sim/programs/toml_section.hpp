@@ -43,9 +43,14 @@ inline constexpr double kMicro = 1e-6;
 
 class TomlSection {
  public:
-  /// `table` may be null: then the functions do not change their `value` argument.
-  TomlSection(const toml::table* table, std::string name, TomlFaults& faults)
-      : table_(table), name_(std::move(name)), faults_(faults) {}
+  /// `table` may be null: then the functions do not change their `value` argument, and faults are
+  /// those of the line of `parent`.
+  TomlSection(const toml::table* table, std::string name, TomlFaults& faults,
+              const toml::node* parent = nullptr)
+      : table_(table),
+        where_(table != nullptr ? table : parent),
+        name_(std::move(name)),
+        faults_(faults) {}
 
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] TomlSection child(std::string_view key);
@@ -75,6 +80,7 @@ class TomlSection {
   [[nodiscard]] std::string unknown(std::string_view key) const;
 
   const toml::table* table_;
+  const toml::node* where_;  ///< whose line is that of a fault
   std::string name_;
   TomlFaults& faults_;
   std::set<std::string, std::less<>> known_;

@@ -133,6 +133,7 @@ TEST_F(Program, RefusesAnEncoderOfAnAxisThatIsNotSimulated) {
       ": encoder.nodes.axis: must be X, Y, Z or an axis with kind = \"rotary\" in [axes]";
   EXPECT_THAT(outcome.output, HasSubstr(std::string{"abbed.toml:7"} + kReason));
   EXPECT_THAT(outcome.output, HasSubstr(std::string{"abbed.toml:8"} + kReason));
+  EXPECT_THAT(outcome.output, HasSubstr("abbed.toml:1: axes.X: needs min_mm and max_mm"));
 }
 
 TEST_F(Program, RefusesAWrongPathFile) {

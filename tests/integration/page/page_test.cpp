@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -43,6 +44,12 @@ struct Page : Run {
     ::chmod(this->file("users").c_str(), 0640);
     this->write("abbed.toml", text_of(this->file("abbed.toml")) +
                                   "[web]\nport = 0\nlive_hz = 100\nusers = \"users\"\n");
+  }
+
+  /// In a file that has a speed: `times` real time.
+  void set_speed(const std::string& name, int times) {
+    this->write(name, replaced(text_of(this->file(name)), "\nspeed = [0-9]+",
+                               fmt::format("\nspeed = {}", times)));
   }
 
   /// Starts abbe-web; after abbed, which reads the same file.
@@ -122,10 +129,6 @@ struct Page : Run {
 struct PageOnTheFly : Page<Spine> {
   /// Half as fast as other tests: Chromium without a graphics card draws few pictures in a second.
   static constexpr int kSpeed = ABBE_SPINE_SPEED / 2;
-  void slow_down(const std::string& name) {
-    write(name,
-          replaced(text_of(file(name)), "\nspeed = [0-9]+", fmt::format("\nspeed = {}", kSpeed)));
-  }
   /// Accepted models of these seeds; the first one is active. Before abbed starts.
   void add_models(const std::vector<unsigned>& seeds) const {
     auto store = daemon::ModelStore::open(file("data/models"));
@@ -149,11 +152,11 @@ struct PageOnTheFly : Page<Spine> {
   }
   void start_everything() {
     write_path("path.csv", path());
-    slow_down("sim.toml");
+    set_speed("sim.toml", kSpeed);
     ASSERT_NO_FATAL_FAILURE(start_simulator());
     hold_simulator();
     write_configuration();
-    slow_down("abbed.toml");
+    set_speed("abbed.toml", kSpeed);
     add_page();
     ASSERT_NO_FATAL_FAILURE(start_abbed());
     ASSERT_NO_FATAL_FAILURE(open_server());
@@ -219,11 +222,16 @@ TEST_F(PageOnTheFly, OpenViewsShowDrift) {
   expect_browser_ends_well();
 }
 
-struct PageBallArray : Page<TouchingRun> {};
+struct PageBallArray : Page<TouchingRun> {
+  /// abbe-web asks for the status every 0.5 s: each ball must be the next for longer.
+  static constexpr int kSpeed = std::min(ABBE_SPINE_SPEED, 10);
+};
 
 TEST_F(PageBallArray, IsCalibratedByClicking) {
+  set_speed("sim.toml", kSpeed);
   ASSERT_NO_FATAL_FAILURE(start_touching_simulator());
   write_touching_configuration();
+  set_speed("abbed.toml", kSpeed);
   add_page();
   ASSERT_NO_FATAL_FAILURE(start_abbed());
   ASSERT_NO_FATAL_FAILURE(open_server());

@@ -2,7 +2,8 @@
 // for.   array.mjs URL FOLDER CALIBRATOR.TOML PASSWORD
 // Prints "BEGUN" when the machine may touch.
 
-import { chooseFile, clickButton, goTo, logIn, say, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
+import { chooseFile, clickButton, goTo, logIn, memory, memoryFaults, say, screenshot, violations,
+  waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, calibrator, password] = process.argv.slice(2);
 
@@ -91,10 +92,12 @@ await withPage(url, out, async (context) => {
 
   await page.waitForFunction(() => globalThis.marks.some((m) => /^block/.test(m.next)));
   await screenshot(context, "array-block");
+  const before = await memory(context);
   await page.waitForFunction(() => globalThis.marks.some((m) => /^position/.test(m.frame) && m.touched.includes("ball 3")));
   await screenshot(context, "array-posed");
   await waitForText(context, "ACTIVE", "#model-state");
   await page.waitForFunction(() => document.querySelector(".space")?.dataset.end === "complete");
+  faults.push(...memoryFaults(before, await memory(context)));
   await screenshot(context, "array-done");
   faults.push(...faultsOf(await page.evaluate(() => globalThis.marks)), ...await completeFaults(context, "at the end"));
   await goTo(context, "live");

@@ -199,6 +199,15 @@ export async function memory({ browser, page }) {
   return { heap: usedSize / 2 ** 20, resident: Math.max(...resident_kB) / 2 ** 10 };
 }
 
+/** A page that is open for a shift must not grow with every event. */
+export function memoryFaults(before, after) {
+  const kMostGrowth = { heap: 20, resident: 400 };
+  const MB = (m) => `${m.heap.toFixed(1)} MB of JavaScript, ${m.resident.toFixed(0)} MB resident`;
+  say(`memory ${MB(before)}, then ${MB(after)}`);
+  return Object.entries(kMostGrowth).filter(([of, most]) => after[of] - before[of] > most)
+    .map(([of, most]) => `the memory (${of}) grew by more than ${most} MB: ${MB(before)}, then ${MB(after)}`);
+}
+
 export async function screenshot({ page, out }, name) {
   await page.screenshot({ path: `${out}/${name}.png`, fullPage: true });
 }

@@ -2,7 +2,8 @@
 // roll-back and replay.   otf.mjs URL FOLDER PATH.CSV PASSWORD
 // Prints "BEGUN" when the machine may move.
 
-import { answerQuestion, chooseFile, clickButton, goTo, logIn, say, screenshot, violations, waitForText, withPage } from "./chromium.mjs";
+import { answerQuestion, chooseFile, clickButton, goTo, logIn, memory, memoryFaults, say, screenshot,
+  violations, waitForText, withPage } from "./chromium.mjs";
 
 const [url, out, path, password] = process.argv.slice(2);
 
@@ -30,11 +31,13 @@ await withPage(url, out, async (context) => {
 
   await waitForText(context, "acquiring", "#session-state");
   const first = await drivenPoints(context, 2);
+  const before = await memory(context);
   const later = await drivenPoints(context, first + 1);
   say(`driven path ${first}, then ${later} points`);
   await screenshot(context, "otf-acquiring");
   faults.push(...await violations(context));
   await waitForText(context, "ACTIVE", "#model-state");
+  faults.push(...memoryFaults(before, await memory(context)));
   await screenshot(context, "otf-done");
 
   await goTo(context, "model");

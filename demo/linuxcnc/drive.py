@@ -250,33 +250,51 @@ def feeder_killed():
         fail("the correction did not fade: %g um" % applied_um())
 
 
-ACTIONS = {"abbe-dds killed": lambda: (write_request("kill-dds"), time.sleep(2.5)),
-           "NaN": not_a_number, "machine off": machine_off, "model not ACTIVE": model_not_active,
-           "not homed": not_homed, "model DRIFT": model_drifts, "feeder killed": feeder_killed}
+def kill_dds():
+    write_request("kill-dds")
+    time.sleep(2.5)
+
+
+def go_to_circles():
+    """To the beginning of the circles in the volume, with the correction on."""
+    if not hal.get_value("motion.motion-enabled"):
+        machine_on()
+    move("G1 X75 Y0 Z-100")
+    switch_on()
+
+
+def drive_changed_machine():
+    """The path of a calibration, which ends at the beginning of the circles. The correction is on before
+    abbed has seen the end, which takes a standstill of 1 s, so before the calibration shows that the
+    machine changed."""
+    write_request("change-machine")
+    drive_calibration("changed")
+    switch_on()
+    phase(FAULTS["model DRIFT"])
+    wait_for_end_of_path()
+
+
+def drive_circles():
+    mdi("G3 X75 Y0 I-75 J0 P60")
+    time.sleep(1.0)
+
+
+# Of each fault: what is done before it, what the machine does at it, the fault.
+ACTIONS = {"abbe-dds killed": (go_to_circles, drive_circles, kill_dds),
+           "NaN": (go_to_circles, drive_circles, not_a_number),
+           "machine off": (go_to_circles, drive_circles, machine_off),
+           "model not ACTIVE": (go_to_circles, drive_circles, model_not_active),
+           "not homed": (go_to_circles, joint_mode, not_homed),
+           "model DRIFT": (drive_changed_machine, drive_circles, model_drifts),
+           "feeder killed": (go_to_circles, drive_circles, feeder_killed)}
 
 
 def fault(name):
-    """Happens while the machine drives circles in the volume, or stands at their beginning."""
-    if name == "model DRIFT":
-        # The path ends at the beginning of the circles. The correction is on before abbed has seen the
-        # end, which takes a standstill of 1 s, so before the calibration shows that the machine changed.
-        write_request("change-machine")
-        drive_calibration("changed")
-        switch_on()
-        phase(FAULTS[name])
-        wait_for_end_of_path()
-    else:
-        if not hal.get_value("motion.motion-enabled"):
-            machine_on()
-        move("G1 X75 Y0 Z-100")
-        switch_on()
-    if name == "not homed":
-        joint_mode()
-    else:
-        mdi("G3 X75 Y0 I-75 J0 P60")
-        time.sleep(1.0)
+    prepare, drive, act = ACTIONS[name]
+    prepare()
+    drive()
     phase(FAULTS[name])
-    ACTIONS[name]()
+    act()
     time.sleep(0.5)
     phase(0)
     command.abort()

@@ -127,6 +127,18 @@ TEST_F(CliExport, RefusesAModelOfWhichTheFormatHoldsNothing) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out"));
 }
 
+TEST_F(CliExport, ReplacesNotTheModel) {
+  const std::string before = file("model.json");
+  for (const char* const out : {"model.json", "./model.json", "link.csv"}) {
+    if (std::string{out} == "link.csv")
+      std::filesystem::create_symlink("model.json", folder_.path() / out);
+    const auto ran = abbe(std::string{"model.json --to siemens-lec -o "} + out);
+    EXPECT_EQ(ran.exit, 2) << out;
+    EXPECT_THAT(ran.err, HasSubstr("this command reads this file"));
+    EXPECT_EQ(file("model.json"), before) << out;
+  }
+}
+
 TEST_F(CliExport, ReplacesNoDeviceAndNoFolder) {
   std::filesystem::create_directory(folder_.path() / "there");
   const auto ran = abbe("model.json --to siemens-lec -o there");

@@ -95,7 +95,29 @@ TEST_F(ReportCli, WritesNothingIfAnythingIsWrong) {
               AllOf(HasSubstr("bad.toml:2"), HasSubstr("bad.toml:3"), HasSubstr("machne")));
   EXPECT_EQ(report("ffff1234 -o r.html").exit, 2);
   EXPECT_EQ(report("missing.json -o r.html").exit, 4);
+  const auto nowhere = report(first_ + " -o nowhere/r.html");
+  EXPECT_EQ(nowhere.exit, 4);
+  EXPECT_THAT(nowhere.err, HasSubstr("write nowhere/r.html: there is no folder nowhere"));
   EXPECT_EQ(report(first_ + " --as-left " + second_).exit, 2) << "needs --dcc";
+  EXPECT_FALSE(fs::exists(folder_ / "r.html"));
+}
+
+TEST_F(ReportCli, ReplacesNoFileThatItReadsOrWrites) {
+  test::write_text(folder_ / "m.json", to_json(test::synthetic_document(1)));
+  test::write_text(folder_ / "details.toml", "[certificate]\nlocation = \"laboratory\"\n");
+  const std::string before = file("m.json");
+  const auto refused = [&](const std::string& arguments) {
+    const auto ran = report(arguments);
+    EXPECT_EQ(ran.exit, 2) << arguments << ran.err;
+    return ran.err;
+  };
+  EXPECT_THAT(refused("m.json -o m.json"), HasSubstr("write m.json: this command reads this file"));
+  EXPECT_THAT(refused(first_ + " --compare m.json -o m.json"), HasSubstr("reads this file"));
+  EXPECT_THAT(refused("m.json -o r.html --pdf ./m.json"), HasSubstr("reads this file"));
+  EXPECT_THAT(refused("m.json --details details.toml -o details.toml"),
+              HasSubstr("reads this file"));
+  EXPECT_THAT(refused("m.json -o r.html --dcc ./r.html"), HasSubstr("named for two outputs"));
+  EXPECT_EQ(file("m.json"), before);
   EXPECT_FALSE(fs::exists(folder_ / "r.html"));
 }
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "abbe/base/text_file.hpp"
+#include "own_files.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -54,7 +55,6 @@ Result<ExportProof> proven_and_renamed(std::span<const ExportFile> files,
 
 Result<void> require_place(const FormatFacts& facts, const fs::path& out) {
   std::error_code ignored;
-  const auto parent = out.has_parent_path() ? out.parent_path() : fs::path(".");
   const auto kind = fs::status(out, ignored).type();
   if (facts.folder && (kind == fs::file_type::not_found || kind == fs::file_type::directory))
     return {};
@@ -62,9 +62,7 @@ Result<void> require_place(const FormatFacts& facts, const fs::path& out) {
     return fail(ErrorCode::Io,
                 fmt::format("write to {}: {} needs a folder", out.string(), facts.name));
 
-  if (!fs::is_directory(parent, ignored))
-    return fail(ErrorCode::Io,
-                fmt::format("write {}: there is no folder {}", out.string(), parent.string()));
+  if (auto folder = require_folder_of(out); !folder) return folder;
   if (kind == fs::file_type::not_found || kind == fs::file_type::regular) return {};
   return fail(ErrorCode::Io, fmt::format("write {}: it exists and is not a file", out.string()));
 }

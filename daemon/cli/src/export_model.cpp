@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "export_files.hpp"
 #include "export_options.hpp"
 #include "export_report.hpp"
+#include "own_files.hpp"
 #include "terminal.hpp"
 #include "vector_option.hpp"
 
@@ -187,20 +189,23 @@ Result<ExportReport> computed_report(const ExportRequest& request,
   return report;
 }
 
-Result<void> write_files(const ExportRequest& request, const fs::path& out, ExportReport& report,
-                         std::span<const calib::ExportPlace> places) {
+Result<void> write_files(const ExportRequest& request, const ExportArguments& arguments,
+                         ExportReport& report, std::span<const calib::ExportPlace> places) {
   const auto files = write_export(request.facts->format, report.held, request.options);
   if (!files) return tl::make_unexpected(files.error());
-  const auto proof = write_when_proven(
-      *files, final_paths(*request.facts, out, *files), [&](std::span<const ExportFile> read) {
-        return prove_export(request.facts->format, read, settings_of(request), places,
-                            correction_function(report.held));
-      });
+  const auto paths = final_paths(*request.facts, arguments.out, *files);
+  if (names_a_file(arguments.model)) {
+    const std::array<fs::path, 1> read{arguments.model};
+    if (auto own = require_own_files(read, paths); !own) return own;
+  }
+  const auto proof = write_when_proven(*files, paths, [&](std::span<const ExportFile> read) {
+    return prove_export(request.facts->format, read, settings_of(request), places,
+                        correction_function(report.held));
+  });
   if (!proof) return tl::make_unexpected(proof.error());
 
   report.proof = *proof;
-  for (const auto& path : final_paths(*request.facts, out, *files))
-    report.files.push_back(path.string());
+  for (const auto& path : paths) report.files.push_back(path.string());
   return {};
 }
 
@@ -217,7 +222,7 @@ Result<ExportReport> exported(const ExportArguments& arguments) {
 
   auto report = computed_report(*request, *places);
   if (!report) return report;
-  if (auto written = write_files(*request, out, *report, *places); !written)
+  if (auto written = write_files(*request, arguments, *report, *places); !written)
     return tl::make_unexpected(written.error());
   if (request->facts->folder) {
     if (auto written = replace_file(out / "export.txt", report_text(*report)); !written)

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -11,6 +13,7 @@
 #include "abbe/report/model_report.hpp"
 #include "certificate_file.hpp"
 #include "commands.hpp"
+#include "own_files.hpp"
 #include "pdf_converter.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
@@ -69,9 +72,22 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
   return models;
 }
 
+/// The model of `option`, which must be of the same machine.
+Result<ReportSubject> other_subject(const std::string& option, const std::string& name,
+                                    const ReportSubject& subject,
+                                    const ReportArguments& arguments) {
+  auto other = subject_named(name, arguments, {});
+  if (other && other->document.machine != subject.document.machine)
+    return fail(ErrorCode::Usage,
+                fmt::format("{}: model {} is of machine \"{}\", model {} of \"{}\"", option,
+                            model_id(other->document), other->document.machine,
+                            model_id(subject.document), subject.document.machine));
+  return other;
+}
+
 Result<std::string> page_of(const ReportSubject& subject, const ReportArguments& arguments) {
   if (!arguments.compare.empty()) {
-    const auto other = subject_named(arguments.compare, arguments, {});
+    const auto other = other_subject("--compare", arguments.compare, subject, arguments);
     if (!other) return tl::make_unexpected(other.error());
     return comparison_report(subject, *other);
   }
@@ -86,13 +102,8 @@ Result<std::string> page_of(const ReportSubject& subject, const ReportArguments&
 Result<std::string> certificate_of(const ReportSubject& subject, const ReportArguments& arguments) {
   std::optional<ReportSubject> as_left;
   if (!arguments.as_left.empty()) {
-    auto other = subject_named(arguments.as_left, arguments, {});
+    auto other = other_subject("--as-left", arguments.as_left, subject, arguments);
     if (!other) return tl::make_unexpected(other.error());
-    if (other->document.machine != subject.document.machine)
-      return fail(ErrorCode::Usage,
-                  fmt::format("--as-left: model {} is of machine \"{}\", model {} of \"{}\"",
-                              model_id(other->document), other->document.machine,
-                              model_id(subject.document), subject.document.machine));
     as_left = *std::move(other);
   }
   return calibration_certificate(subject, as_left);
@@ -102,6 +113,13 @@ Result<void> write_file(const std::string& file, std::string_view text) {
   if (auto done = replace_file(file, text); !done) return done;
   fmt::print("written     {}\n", file);
   return {};
+}
+
+/// The files that the command reads; empty: from the store, or not given.
+std::array<std::filesystem::path, 4> files_read(const ReportArguments& arguments) {
+  const auto file = [](const std::string& model) { return names_a_file(model) ? model : ""; };
+  return {file(arguments.model), file(arguments.compare), file(arguments.as_left),
+          arguments.details};
 }
 
 /// The default name of the HTML file.
@@ -120,6 +138,12 @@ Result<void> write_report(const ReportArguments& arguments) {
   }
   const auto subject = subject_named(arguments.model, arguments, details);
   if (!subject) return tl::make_unexpected(subject.error());
+  const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
+  const std::array<std::filesystem::path, 3> written{out, arguments.dcc, arguments.pdf};
+  if (auto own = require_own_files(files_read(arguments), written); !own) return own;
+  for (const auto& file : written)
+    if (auto folder = file.empty() ? Result<void>{} : require_folder_of(file); !folder)
+      return folder;
 
   // Everything is made before the first file is written.
   const auto page = page_of(*subject, arguments);
@@ -128,7 +152,6 @@ Result<void> write_report(const ReportArguments& arguments) {
   if (!arguments.dcc.empty()) certificate = certificate_of(*subject, arguments);
   if (!certificate) return tl::make_unexpected(certificate.error());
 
-  const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
   if (auto done = write_file(out, *page); !done) return done;
   if (!arguments.dcc.empty())
     if (auto done = write_file(arguments.dcc, *certificate); !done) return done;

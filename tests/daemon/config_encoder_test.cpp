@@ -16,11 +16,11 @@ using ::testing::SizeIs;
 
 TEST(ConfigEncoder, PutsTheNodesInTheOrderOfTheMachinesAxes) {
   const auto config = parse_config(kMachine + kCanBus + R"(nodes = [
-  {axis = "B", node = 9}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]
+  {axis = "B", node = 9, step_nrad = 1000}, {axis = "Z", node = 3}, {axis = "W", node = 4}, {axis = "X", node = 1}, {axis = "Y", node = 2}]
 [axes.B]
 kind = "rotary"
-min_rad = -1
-max_rad = 1
+min_rad = 2
+max_rad = 3
 [axes.W]
 min_mm = 0
 max_mm = 100
@@ -31,6 +31,18 @@ max_mm = 100
   for (const auto& node : config->of<EncoderConfig>()->nodes)
     order += node.axis + std::to_string(node.node);
   EXPECT_EQ(order, "X1Y2Z3W4B9");
+  EXPECT_EQ(config->of<EncoderConfig>()->nodes.back().middle, 2.5);
+}
+
+TEST(ConfigEncoder, NeedsTheStepOfARotaryAxis) {
+  EXPECT_THAT(faults_of(kMachine + kCanBus + R"(nodes = [
+  {axis = "X", node = 1}, {axis = "Y", node = 2}, {axis = "Z", node = 3}, {axis = "B", node = 4}]
+[axes.B]
+kind = "rotary"
+min_rad = -1
+max_rad = 1
+)"),
+              ElementsAre(HasSubstr("encoder.nodes[3].step_nrad: missing")));
 }
 
 TEST(ConfigEncoder, RefusesAnEncoderWithoutXyz) {

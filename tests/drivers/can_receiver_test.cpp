@@ -321,6 +321,30 @@ TEST(EncoderReceiver, UnwrapsASingleTurnEncoderThatReportsNoRange) {
   EXPECT_EQ(line.samples[1].count[0], -10);
 }
 
+TEST(EncoderReceiver, BeginsARotaryAxisInItsTravel) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  const auto first = [&](std::optional<double> middle, double scale, std::int64_t count) {
+    EncoderReceiverOptions options;
+    options.axes = {{.name = "B",
+                     .node = 1,
+                     .kind = AxisKind::Rotary,
+                     .position = can::PositionType::Unsigned32,
+                     .scale = scale,
+                     .wrap_counts = 36000,
+                     .middle = middle}};
+    Line line{options};
+    line.sync(kStart);
+    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 10us);
+    return line.samples.at(0).position[0];
+  };
+  EXPECT_NEAR(first(0.0, kTurn / 36000, 35900), -kTurn / 360, 1e-12);
+  EXPECT_NEAR(first(0.0, kTurn / 36000, 100), kTurn / 360, 1e-12);
+  EXPECT_NEAR(first(0.0, -kTurn / 36000, 35900), kTurn / 360, 1e-12);
+  EXPECT_NEAR(first(kTurn / 2, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
+  EXPECT_NEAR(first(5 * kTurn, kTurn / 36000, 35900), kTurn * (5 - 1.0 / 360), 1e-12);
+  EXPECT_NEAR(first(std::nullopt, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
+}
+
 TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {
   Line line;
   line.cycle(kStart, 1000);

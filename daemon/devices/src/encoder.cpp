@@ -113,8 +113,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
   options.receiver.sync_period = config.sync_period;
   options.receiver.sampling_delay = config.sampling_delay;
   options.receiver.u_sampling_delay = config.u_sampling_delay;
-  options.receiver.heartbeat_timeout =
-      stretched_silence(options.receiver.heartbeat_timeout, speed);
+  options.receiver.heartbeat_timeout = stretched_silence(options.receiver.heartbeat_timeout, speed);
   options.supervisor.silence = stretched_silence(options.supervisor.silence, speed);
   options.supervisor.sdo.timeout = stretched(options.supervisor.sdo.timeout, speed);
   options.reopen_after = stretched(options.reopen_after, speed);
@@ -126,6 +125,7 @@ drivers::EncoderDeviceOptions device_options(const EncoderConfig& config, double
     axis.kind = node.kind;
     axis.scale = node.step;
     axis.offset = node.offset;
+    axis.middle = node.middle;
     axis.tpdo = static_cast<std::uint8_t>(node.tpdo);
     axis.position_byte = static_cast<std::uint8_t>(node.position_byte);
     axis.wrap_counts = static_cast<std::uint64_t>(node.wrap_counts);

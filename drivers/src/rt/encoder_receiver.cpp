@@ -76,6 +76,7 @@ EncoderReceiver::EncoderReceiver(const EncoderReceiverOptions& options)
     axis.scale_configured = from.scale.has_value();
     axis.scale = from.scale.value_or(0.0);
     axis.offset = from.offset;
+    if (from.kind == AxisKind::Rotary) axis.middle = from.middle;
     axis.wrap_configured = from.wrap_counts != 0;
     axis.modulus = from.wrap_counts;
     if (!axis.wrap_configured && from.position != can::PositionType::Signed64)
@@ -327,17 +328,26 @@ void EncoderReceiver::end_bus_off() ABBE_RT {
   restarted_pending_ = true;
 }
 
+/// The first count is used as sent (an absolute scale may be negative); that of a rotary axis may be
+/// whole ranges of the encoder away from the travel of the axis, whose middle is then nearest.
+std::int64_t EncoderReceiver::first_count(const Axis& axis, std::int64_t count) ABBE_RT {
+  if (!axis.middle || axis.modulus == 0 || axis.scale == 0.0) return count;
+  const double range = static_cast<double>(axis.modulus) * axis.scale;
+  const double reading = axis.offset + static_cast<double>(count) * axis.scale;
+  const auto ranges = static_cast<std::int64_t>(std::round((*axis.middle - reading) / range));
+  return count + ranges * static_cast<std::int64_t>(axis.modulus);
+}
+
 void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {
   auto& axis = axes_[i];
   const auto raw = on_circle(count, axis.modulus);
-  // The first count is used as sent (an absolute scale may be negative), later counts as steps from
-  // the previous one.
+  // Later counts are used as steps from the previous one.
   if (axis.seen) {
     const auto step = static_cast<std::uint64_t>(wrapped_step(axis.raw, raw, axis.modulus));
     current_.count[i] =
         static_cast<std::int64_t>(static_cast<std::uint64_t>(current_.count[i]) + step);
   } else {
-    current_.count[i] = count;
+    current_.count[i] = first_count(axis, count);
   }
   axis.raw = raw;
   axis.seen = true;

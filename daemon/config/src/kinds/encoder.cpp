@@ -82,10 +82,14 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
   const AxisConfig* axis = machine.find_axis(node.axis);
   if (named && axis == nullptr && !machine.axes.empty())
     section.fault("axis", "no such axis in [axes]");
-  if (axis != nullptr) node.kind = axis->kind;
+  if (axis != nullptr) {
+    node.kind = axis->kind;
+    node.middle = 0.5 * (axis->min + axis->max);
+  }
   section.get_integer("node", node.node, 1, 127, Need::Required);
   const bool linear = node.kind == AxisKind::Linear;
-  section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive);
+  section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive,
+              linear ? Need::Optional : Need::Required);
   check_step(section, node.step, linear);
   section.get(linear ? "offset_mm" : "offset_rad", node.offset, linear ? kMilli : kPlain, kAny);
   bool invert = false;

@@ -78,6 +78,9 @@ struct EncoderAxis {
   /// if it reports none, its revolution if it is a single-turn encoder, else 2^32 (2^64 for a
   /// position of 64 bits).
   std::uint64_t wrap_counts = 0;
+  /// Rotary: the first reading is at most half of these counts away from this one, the middle of the
+  /// travel, rad. None: it is the count as sent.
+  std::optional<double> middle{};
   std::optional<std::uint32_t> serial{};  ///< compared with the encoder's if set
 };
 
@@ -186,6 +189,7 @@ class EncoderReceiver {
     std::uint32_t bits_before = 0;  ///< offset of the mapping entry that is read next
     std::uint32_t units = 0;        ///< rotary: counts per revolution, as read
     bool single_turn = false;       ///< as the device type says
+    std::optional<double> middle;   ///< of the travel of a rotary axis
     std::chrono::nanoseconds heartbeat_timeout{};
     bool scale_configured = false;
     bool wrap_configured = false;
@@ -227,6 +231,7 @@ class EncoderReceiver {
   void read_mapping(Axis& axis, std::uint8_t sub, std::uint32_t value) ABBE_RT;
   void read_object(Axis& axis, can::ObjectId object, std::uint32_t value) ABBE_RT;
   static void wrap_at(Axis& axis, std::uint64_t counts) ABBE_RT;
+  [[nodiscard]] static std::int64_t first_count(const Axis& axis, std::int64_t count) ABBE_RT;
   void check_heartbeats(protocol::HostTime time) ABBE_RT;
   void count_bad_block() ABBE_RT { ++counters_.bad_blocks; }
 

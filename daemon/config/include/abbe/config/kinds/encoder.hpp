@@ -32,6 +32,7 @@ struct EncoderNodeConfig {
   int position_byte = 0;  ///< in the TPDO; External only, else read from the node
   /// Rotary: counts per revolution, after which the count wraps to 0. 0: read from the node.
   std::int64_t wrap_counts = 0;
+  double middle = 0.0;  ///< rotary: of the travel of the axis, rad
 };
 
 struct EncoderConfig {

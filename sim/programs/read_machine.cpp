@@ -1,5 +1,8 @@
 #include "read_machine.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -37,6 +40,8 @@ void read_linear_scale(TomlSection& section, EncoderNodeOptions& node) {
   section.number("step_nm", step_nm, 1.0, {1.0, 1e9});
   section.number("offset_mm", node.offset, kMilli);
   node.step_nm = static_cast<std::uint32_t>(step_nm);
+  if (step_nm != node.step_nm)
+    section.fault("step_nm", "must be a whole number: object 6005h has no fractions");
 }
 
 void read_rotary_scale(TomlSection& section, EncoderNodeOptions& node) {
@@ -44,6 +49,8 @@ void read_rotary_scale(TomlSection& section, EncoderNodeOptions& node) {
   if (section.number("step_nrad", step_nrad, 1.0, {2.0, 1e9}))
     node.units_per_revolution =
         static_cast<std::uint32_t>(std::lround(2e9 * std::numbers::pi / step_nrad));
+  else
+    section.fault("step_nrad", "missing, or not a number from 2 to 1e9");
   section.number("offset_rad", node.offset, 1.0);
 }
 
@@ -92,7 +99,11 @@ void read_encoder_nodes(TomlSection root, TomlSection& encoder,
                         std::vector<EncoderNodeOptions>& nodes) {
   std::vector<EncoderNodeOptions> seen;
   for (TomlSection& section : encoder.children("nodes"))
-    if (const auto node = read_encoder_node(root, section)) seen.push_back(*node);
+    if (const auto node = read_encoder_node(root, section)) {
+      if (node->node != 0 && std::ranges::count(seen, node->node, &EncoderNodeOptions::node) > 0)
+        section.fault("node", fmt::format("node id {} is used twice", node->node));
+      seen.push_back(*node);
+    }
   if (seen.empty()) return add_rotary_nodes(root, nodes);
   nodes = seen;
 }

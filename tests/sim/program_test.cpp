@@ -136,6 +136,21 @@ TEST_F(Program, RefusesAnEncoderOfAnAxisThatIsNotSimulated) {
   EXPECT_THAT(outcome.output, HasSubstr("abbed.toml:1: axes.X: needs min_mm and max_mm"));
 }
 
+TEST_F(Program, RefusesEncodersThatCannotBe) {
+  const std::string config =
+      write("abbed.toml",
+            "[machine]\nchain = \"[w X b Y Z t]\"\n[axes.X]\nmin_mm = 0\nmax_mm = "
+            "1\n[axes.Y]\nmin_mm = 0\n"
+            "max_mm = 1\n[axes.Z]\nmin_mm = 0\nmax_mm = 1\n[axes.B]\nkind = "
+            "\"rotary\"\n[encoder]\nnodes = [\n"
+            "{axis = \"X\", node = 1, step_nm = 2.5},\n{axis = \"B\", node = 1}]\n");
+  const Outcome outcome = run("run --machine " + config);
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.output, HasSubstr("abbed.toml:16: encoder.nodes.step_nm: must be a whole"));
+  EXPECT_THAT(outcome.output, HasSubstr("abbed.toml:17: encoder.nodes.step_nrad: missing"));
+  EXPECT_THAT(outcome.output, HasSubstr("encoder.nodes.node: node id 1 is used twice"));
+}
+
 TEST_F(Program, RefusesAWrongPathFile) {
   const std::string path = write("path.csv", "x_mm,y_mm,z_mm\n1,2\n1,2,up\n");
   const Outcome outcome = run("run --machine " + demo_ + "/machine.toml --path " + path);

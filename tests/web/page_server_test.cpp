@@ -325,6 +325,19 @@ TEST_F(PageServerTest, AnExpiredCertificateIsRefusedWithItsDate) {
   EXPECT_THAT(page.error().text, HasSubstr("web.pem expired on 2024-02-29"));
 }
 
+TEST_F(PageServerTest, AMissingCertificateIsAFaultOfTheConfiguration) {
+  write_config(std::string{"port = 0\n"} + kTls);
+  auto read = settings();
+  ASSERT_TRUE(read) << read.error().text;
+  const auto page = PageServer::start({.settings = std::move(*read),
+                                       .config_file = folder_ / "abbed.toml",
+                                       .report = [](const std::string&) {}});
+  ASSERT_FALSE(page);
+  EXPECT_EQ(page.error().code, daemon::ErrorCode::BadInput);
+  EXPECT_THAT(page.error().text, AllOf(HasSubstr("certificate: read "), HasSubstr("web.pem"),
+                                       HasSubstr("([web] certificate)")));
+}
+
 TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {
   write_certificate(folder_, "99991231235959Z");
   const auto dates = read_certificate(folder_ / "web.pem");

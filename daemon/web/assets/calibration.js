@@ -3,7 +3,7 @@
 import { ask } from "./ask.js";
 import { fixed, h, list, table } from "./dom.js";
 import { get, listen, post, state } from "./server.js";
-import { message } from "./main.js";
+import { message, withdraw } from "./main.js";
 import { Space } from "./space.js";
 
 const running = (session) => ["warming", "acquiring", "identifying", "judged"].includes(session.state);
@@ -377,7 +377,11 @@ function controls() {
 export async function show(place) {
   const parts = h("div"), view = h("div");
   place.append(h("h2", {}, "Session"), parts, view, controls());
+  let before = state.status?.session.state;
   const onStatus = (status) => {
+    const now = status?.session.state;
+    if (before === "warming" && now !== before) withdraw(Object.values(begun));
+    before = now;
     if (status && !parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
   };
   if (state.status) onStatus(state.status);

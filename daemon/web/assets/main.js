@@ -57,6 +57,11 @@ export function message(text) {
   find("message").textContent = text;
 }
 
+/** Removes the message if it is one of `texts`. */
+export function withdraw(texts) {
+  if (texts.includes(find("message").textContent)) message("");
+}
+
 listen("lost", (reason) => {
   document.body.classList.toggle("lost", reason !== null);
   find("connection").hidden = reason === null;

@@ -41,7 +41,9 @@ std::string day_of(sys_seconds time) {
 
 Result<CertificateDates> read_certificate(const std::filesystem::path& file) {
   const auto text = daemon::read_regular_file(file);
-  if (!text) return tl::unexpected(text.error());
+  if (!text)
+    return daemon::fail(ErrorCode::BadInput,
+                        fmt::format("certificate: {} ([web] certificate)", text.error().text));
   const std::unique_ptr<BIO, Free> bio{
       BIO_new_mem_buf(text->data(), static_cast<int>(text->size()))};
   const std::unique_ptr<X509, Free> certificate{

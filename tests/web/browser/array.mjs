@@ -99,6 +99,8 @@ await withPage(url, out, async (context) => {
   await page.waitForFunction(() => document.querySelector(".space")?.dataset.end === "complete");
   faults.push(...memoryFaults(before, await memory(context)));
   await screenshot(context, "array-done");
+  const said = await page.$eval("#message", (m) => m.innerText);
+  if (said !== "") faults.push(`after the last touch the page still says "${said}"`);
   faults.push(...faultsOf(await page.evaluate(() => globalThis.marks)), ...await completeFaults(context, "at the end"));
   await goTo(context, "live");
   await goTo(context, "calibration");

@@ -35,6 +35,8 @@ constexpr std::string_view kLongestFirstView_ms{ABBE_LONGEST_FIRST_VIEW_MS};
 /// abbe-web and a browser beside the programs of `Run`.
 template <class Run>
 struct Page : Run {
+  using Run::Run;
+
   /// After abbed.toml was written.
   void add_page() {
     std::string users;
@@ -127,6 +129,8 @@ struct Page : Run {
 };
 
 struct PageOnTheFly : Page<Spine> {
+  PageOnTheFly() : Page<Spine>("BC") {}
+
   /// Half as fast as other tests: Chromium without a graphics card draws few pictures in a second.
   static constexpr int kSpeed = ABBE_SPINE_SPEED / 2;
   /// Accepted models of these seeds; the first one is active. Before abbed starts.

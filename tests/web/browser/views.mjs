@@ -26,6 +26,16 @@ async function firstView({ page }) {
     ? [`the first view took ${took_ms.join(", ")} ms, more than ${longest_ms}`] : [];
 }
 
+/** X, Y, Z in mm; B and C, which swing by 0.1 rad, in degrees. */
+async function axesFaults({ page }) {
+  const shown = await page.$$eval(".axis", (cards) => cards.map((c) =>
+    [c.querySelector(".name").innerText, c.querySelector(".value").innerText]));
+  const [names, values] = [0, 1].map((i) => shown.map((card) => card[i]));
+  const right = names.join("") === "XYZBC" && values.every((v, i) =>
+    i < 3 ? /^-?[0-9.]+ mm$/.test(v) : /^-?[0-9.]+ \u00b0$/.test(v) && Math.abs(parseFloat(v)) < 6);
+  return right ? [] : [`the axes are shown as ${JSON.stringify(shown)}`];
+}
+
 /** A line wider than the window, which would scroll the whole page. */
 async function tooWide({ page }) {
   return page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
@@ -210,6 +220,7 @@ async function preferences(context) {
 
 await withPage(url, out, async (context) => {
   const faults = await firstView(context);
+  faults.push(...await axesFaults(context));
   await logIn(context, "administer", password);
   let checked = 0;
   for (const size of Object.keys(viewports)) {

@@ -47,13 +47,10 @@ Diagonal diagonal_of(const ErrorFunctions& functions, const LineBox& box, std::s
   }
   d.M = range_of(functions, mean);
   if (functions.has_travel()) {
-    const Eigen::MatrixXd up = diagonal_rows(functions, d, forward),
-                          down = diagonal_rows(functions, d, backward);
-    Eigen::MatrixXd both(up.rows() + down.rows(), up.cols());
-    both << up, down;
-    if (!functions.has_undetermined_travel(up - down)) {
-      d.E = range_of(functions, both);
-      d.B = largest_of(functions, up - down);
+    if (const auto both = bidirectional_of(functions, diagonal_rows(functions, d, forward),
+                                           diagonal_rows(functions, d, backward))) {
+      d.E = both->E;
+      d.B = both->B;
     }
   }
   return d;

@@ -141,4 +141,16 @@ Value largest_of(const ErrorFunctions& functions, const Eigen::MatrixXd& rows) {
   return {value.value, std::hypot(value.u, excess), !is_none(rows)};
 }
 
+std::optional<Bidirectional> bidirectional_of(const ErrorFunctions& functions,
+                                              const Eigen::MatrixXd& up,
+                                              const Eigen::MatrixXd& down) {
+  const Eigen::MatrixXd difference = up - down;
+  if (functions.has_undetermined_travel(difference)) {
+    return std::nullopt;
+  }
+  Eigen::MatrixXd both(up.rows() + down.rows(), up.cols());
+  both << up, down;
+  return Bidirectional{range_of(functions, both), largest_of(functions, difference)};
+}
+
 }  // namespace abbe::calib::iso

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "abbe/calib/iso/standard_values.hpp"
@@ -61,5 +62,15 @@ template <class Statistic>
 [[nodiscard]] Value range_of(const ErrorFunctions&, const Eigen::MatrixXd& rows);
 /// The a U with the largest |a U|.
 [[nodiscard]] Value largest_of(const ErrorFunctions&, const Eigen::MatrixXd& rows);
+
+/// Systematic deviation E and reversal B of the same positions, approached in both directions
+/// [ISO 230-2].
+struct Bidirectional {
+  Value E, B;
+};
+/// None if the measurement does not determine the difference between the directions.
+[[nodiscard]] std::optional<Bidirectional> bidirectional_of(const ErrorFunctions&,
+                                                            const Eigen::MatrixXd& up,
+                                                            const Eigen::MatrixXd& down);
 
 }  // namespace abbe::calib::iso

@@ -22,11 +22,9 @@ Positioning positioning_of(const ErrorFunctions& functions, const AxisLine& line
   if (functions.has_travel()) {
     const Eigen::MatrixXd up = line.rows(functions, component, Travel::Forward),
                           down = line.rows(functions, component, Travel::Backward);
-    Eigen::MatrixXd both(up.rows() + down.rows(), up.cols());
-    both << up, down;
-    if (!functions.has_undetermined_travel(up - down)) {
-      p.E = range_of(functions, both);
-      p.B = largest_of(functions, up - down);
+    if (const auto both = bidirectional_of(functions, up, down)) {
+      p.E = both->E;
+      p.B = both->B;
       p.mean_B = functions.with_u((up - down).colwise().mean());
     }
   }

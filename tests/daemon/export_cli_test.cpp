@@ -139,6 +139,15 @@ TEST_F(CliExport, ReplacesNotTheModel) {
   }
 }
 
+TEST_F(CliExport, ReplacesNotTheModelByItsReport) {
+  std::filesystem::create_directory(folder_.path() / "o");
+  std::filesystem::copy_file(folder_.path() / "model.json", folder_.path() / "o/export.txt");
+  const auto ran = abbe("o/export.txt --to linuxcnc-comp -o o");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, HasSubstr("write o/export.txt: this command reads this file"));
+  EXPECT_EQ(file("o/export.txt"), file("model.json"));
+}
+
 TEST_F(CliExport, ReplacesNoDeviceAndNoFolder) {
   std::filesystem::create_directory(folder_.path() / "there");
   const auto ran = abbe("model.json --to siemens-lec -o there");

@@ -98,6 +98,15 @@ TEST_F(ReportCli, WritesNothingIfAnythingIsWrong) {
   const auto nowhere = report(first_ + " -o nowhere/r.html");
   EXPECT_EQ(nowhere.exit, 4);
   EXPECT_THAT(nowhere.err, HasSubstr("write nowhere/r.html: there is no folder nowhere"));
+  const auto folder = report(first_ + " -o r.html --pdf store");
+  EXPECT_EQ(folder.exit, 4);
+  EXPECT_THAT(folder.err, HasSubstr("write store: it exists and is not a file"));
+  auto other = test::synthetic_document(3);
+  other.machine = "lathe";
+  test::write_text(folder_ / "lathe.json", to_json(other));
+  const auto two = report(first_ + " --compare lathe.json -o r.html");
+  EXPECT_EQ(two.exit, 2);
+  EXPECT_THAT(two.err, AllOf(HasSubstr("--compare: model "), HasSubstr("is of machine \"lathe\"")));
   EXPECT_EQ(report(first_ + " --as-left " + second_).exit, 2) << "needs --dcc";
   EXPECT_FALSE(fs::exists(folder_ / "r.html"));
 }
@@ -117,6 +126,12 @@ TEST_F(ReportCli, ReplacesNoFileThatItReadsOrWrites) {
   EXPECT_THAT(refused("m.json --details details.toml -o details.toml"),
               HasSubstr("reads this file"));
   EXPECT_THAT(refused("m.json -o r.html --dcc ./r.html"), HasSubstr("named for two outputs"));
+  const auto stored = ModelStore::open(folder_ / "store").value().model_path(second_);
+  const std::string model = test::text_of(stored);
+  EXPECT_THAT(refused(second_ + " -o " + stored.string()), HasSubstr("reads this file"));
+  EXPECT_THAT(refused("m.json --compare " + second_ + " -o " + stored.string()),
+              HasSubstr("reads this file"));
+  EXPECT_EQ(test::text_of(stored), model);
   EXPECT_EQ(file("m.json"), before);
   EXPECT_FALSE(fs::exists(folder_ / "r.html"));
 }

@@ -62,9 +62,7 @@ Result<void> require_place(const FormatFacts& facts, const fs::path& out) {
     return fail(ErrorCode::Io,
                 fmt::format("write to {}: {} needs a folder", out.string(), facts.name));
 
-  if (auto folder = require_folder_of(out); !folder) return folder;
-  if (kind == fs::file_type::not_found || kind == fs::file_type::regular) return {};
-  return fail(ErrorCode::Io, fmt::format("write {}: it exists and is not a file", out.string()));
+  return require_place_of(out);
 }
 
 std::vector<fs::path> final_paths(const FormatFacts& facts, const fs::path& out,

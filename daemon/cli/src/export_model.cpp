@@ -189,15 +189,20 @@ Result<ExportReport> computed_report(const ExportRequest& request,
   return report;
 }
 
+/// The report beside the files of a format that has a folder.
+fs::path report_path(const fs::path& folder) {
+  return folder / "export.txt";
+}
+
 Result<void> write_files(const ExportRequest& request, const ExportArguments& arguments,
                          ExportReport& report, std::span<const calib::ExportPlace> places) {
   const auto files = write_export(request.facts->format, report.held, request.options);
   if (!files) return tl::make_unexpected(files.error());
   const auto paths = final_paths(*request.facts, arguments.out, *files);
-  if (names_a_file(arguments.model)) {
-    const std::array<fs::path, 1> read{arguments.model};
-    if (auto own = require_own_files(read, paths); !own) return own;
-  }
+  const std::array<fs::path, 1> model{file_of_model(arguments.model, arguments.store)};
+  auto written = paths;
+  if (request.facts->folder) written.push_back(report_path(arguments.out));
+  if (auto own = require_own_files(model, written); !own) return own;
   const auto proof = write_when_proven(*files, paths, [&](std::span<const ExportFile> read) {
     return prove_export(request.facts->format, read, settings_of(request), places,
                         correction_function(report.held));
@@ -225,7 +230,7 @@ Result<ExportReport> exported(const ExportArguments& arguments) {
   if (auto written = write_files(*request, arguments, *report, *places); !written)
     return tl::make_unexpected(written.error());
   if (request->facts->folder) {
-    if (auto written = replace_file(out / "export.txt", report_text(*report)); !written)
+    if (auto written = replace_file(report_path(out), report_text(*report)); !written)
       return tl::make_unexpected(written.error());
   }
   return report;

@@ -13,8 +13,8 @@ namespace fs = std::filesystem;
 bool are_the_same(const fs::path& a, const fs::path& b) {
   std::error_code fault;
   if (fs::equivalent(a, b, fault)) return true;
-  const auto whole_a = fs::weakly_canonical(fs::absolute(a), fault);
-  return whole_a == fs::weakly_canonical(fs::absolute(b), fault);
+  const auto whole = fs::weakly_canonical(fs::absolute(a), fault);  // empty: it cannot be known
+  return !whole.empty() && whole == fs::weakly_canonical(fs::absolute(b), fault);
 }
 
 }  // namespace
@@ -36,12 +36,15 @@ Result<void> require_own_files(std::span<const fs::path> read, std::span<const f
   return {};
 }
 
-Result<void> require_folder_of(const fs::path& file) {
+Result<void> require_place_of(const fs::path& file) {
   std::error_code ignored;
   const auto folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
-  if (fs::is_directory(folder, ignored)) return {};
-  return fail(ErrorCode::Io,
-              fmt::format("write {}: there is no folder {}", file.string(), folder.string()));
+  if (!fs::is_directory(folder, ignored))
+    return fail(ErrorCode::Io,
+                fmt::format("write {}: there is no folder {}", file.string(), folder.string()));
+  const auto kind = fs::status(file, ignored).type();
+  if (kind == fs::file_type::not_found || kind == fs::file_type::regular) return {};
+  return fail(ErrorCode::Io, fmt::format("write {}: it exists and is not a file", file.string()));
 }
 
 }  // namespace abbe::daemon

@@ -12,7 +12,7 @@ namespace abbe::daemon {
 [[nodiscard]] Result<void> require_own_files(std::span<const std::filesystem::path> read,
                                              std::span<const std::filesystem::path> written);
 
-/// Io if the folder of the file does not exist.
-[[nodiscard]] Result<void> require_folder_of(const std::filesystem::path& file);
+/// Io if the folder of the file does not exist, or the file exists and is not a regular one.
+[[nodiscard]] Result<void> require_place_of(const std::filesystem::path& file);
 
 }  // namespace abbe::daemon

@@ -115,11 +115,11 @@ Result<void> write_file(const std::string& file, std::string_view text) {
   return {};
 }
 
-/// The files that the command reads; empty: from the store, or not given.
+/// The files that the command reads; empty: not given.
 std::array<std::filesystem::path, 4> files_read(const ReportArguments& arguments) {
-  const auto file = [](const std::string& model) { return names_a_file(model) ? model : ""; };
-  return {file(arguments.model), file(arguments.compare), file(arguments.as_left),
-          arguments.details};
+  return {file_of_model(arguments.model, arguments.store),
+          file_of_model(arguments.compare, arguments.store),
+          file_of_model(arguments.as_left, arguments.store), arguments.details};
 }
 
 /// The default name of the HTML file.
@@ -142,8 +142,7 @@ Result<void> write_report(const ReportArguments& arguments) {
   const std::array<std::filesystem::path, 3> written{out, arguments.dcc, arguments.pdf};
   if (auto own = require_own_files(files_read(arguments), written); !own) return own;
   for (const auto& file : written)
-    if (auto folder = file.empty() ? Result<void>{} : require_folder_of(file); !folder)
-      return folder;
+    if (auto place = file.empty() ? Result<void>{} : require_place_of(file); !place) return place;
 
   // Everything is made before the first file is written.
   const auto page = page_of(*subject, arguments);

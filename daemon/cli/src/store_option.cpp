@@ -66,6 +66,13 @@ bool names_a_file(const std::string& name) {
   return file.has_parent_path() || file.has_extension() || fs::exists(file, ignored);
 }
 
+std::filesystem::path file_of_model(const std::string& name, const StoreOption& where) {
+  if (name.empty() || names_a_file(name)) return name;
+  const auto store = open_store(where);
+  const auto id = store ? id_named(*store, name) : Result<std::string>{};
+  return store && id ? store->model_path(*id) : std::filesystem::path{};
+}
+
 Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
   if (names_a_file(name)) return read_model(name);
   const auto store = open_store(where);

@@ -323,13 +323,15 @@ TEST(EncoderReceiver, UnwrapsASingleTurnEncoderThatReportsNoRange) {
 
 TEST(EncoderReceiver, BeginsARotaryAxisInItsTravel) {
   constexpr double kTurn = 2 * std::numbers::pi;
-  const auto first = [&](std::optional<double> middle, double scale, std::int64_t count) {
+  const auto first = [&](std::optional<double> middle, double scale, std::int64_t count,
+                         double offset = 0.0) {
     EncoderReceiverOptions options;
     options.axes = {{.name = "B",
                      .node = 1,
                      .kind = AxisKind::Rotary,
                      .position = can::PositionType::Unsigned32,
                      .scale = scale,
+                     .offset = offset,
                      .wrap_counts = 36000,
                      .middle = middle}};
     Line line{options};
@@ -343,6 +345,27 @@ TEST(EncoderReceiver, BeginsARotaryAxisInItsTravel) {
   EXPECT_NEAR(first(kTurn / 2, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
   EXPECT_NEAR(first(5 * kTurn, kTurn / 36000, 35900), kTurn * (5 - 1.0 / 360), 1e-12);
   EXPECT_NEAR(first(std::nullopt, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
+  EXPECT_NEAR(first(0.0, kTurn / 36000, 35900, kTurn), -kTurn / 360, 1e-12);
+  EXPECT_EQ(first(0.0, kTurn / 36000, 0, 1e300), 1e300) << "as sent";
+}
+
+TEST(EncoderReceiver, BeginsARotaryAxisInItsTravelByTheRangeOfTheEncoder) {
+  EncoderReceiverOptions options;
+  options.axes = {{.name = "B",
+                   .node = 1,
+                   .kind = AxisKind::Rotary,
+                   .position = can::PositionType::Unsigned32,
+                   .scale = 2 * std::numbers::pi / 100,
+                   .middle = 0.0},
+                  {.name = "X", .node = 2, .scale = 1e-3, .wrap_counts = 1000, .middle = 0.0}};
+  Line line{options};
+  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}), kStart);
+  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 1, 0, 0, 0}), kStart);
+  line.sync(kStart);
+  line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, 90), kStart + 10us);
+  line.frame(can::encode_position(0x182, can::PositionType::Signed32, 900), kStart + 20us);
+  EXPECT_EQ(line.samples.at(0).count[0], -10);
+  EXPECT_EQ(line.samples.at(0).count[1], 900) << "a linear axis is absolute";
 }
 
 TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {

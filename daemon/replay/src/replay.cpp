@@ -243,11 +243,20 @@ std::optional<CountingProgress> left_progress(const RecordingReader& recording) 
   return std::nullopt;
 }
 
+/// As the live run decoded its bytes.
+Config config_of_bytes(const RecordingReader& recording, Config config) {
+  auto& encoder = config.of<EncoderConfig>();
+  if (encoder && !has_rule(recording, kRotaryTravelRule))
+    for (EncoderNodeConfig& node : encoder->nodes) node.middle.reset();
+  return config;
+}
+
 /// Decodes samples from raw bytes and delivers each in the cycle in which the live run had it.
 class FromBytes {
  public:
   FromBytes(const RecordingReader& recording, const Config& config)
-      : decoder_(config, left_progress(recording)),
+      : config_(config_of_bytes(recording, config)),
+        decoder_(config_, left_progress(recording)),
         ahead_(recording.messages()),
         next_(ahead_.next()) {
     sink_.tracker_point = [this](const auto& p, std::string_view) { expect(points_, p); };
@@ -282,6 +291,7 @@ class FromBytes {
     cycles.expect(sample.head.time, next_->taken);
   }
 
+  Config config_;  // of decoder_
   RawDecoder decoder_;
   RecordingReader::Cursor ahead_;
   std::optional<RecordedMessage> next_;

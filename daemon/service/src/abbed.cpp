@@ -174,12 +174,14 @@ struct Abbed::State {
   }
 
   Result<void> open_recorder() {
-    RecordingInfo info{
-        .machine = config.machine.name,
-        .utc_offset = utc,
-        .speed = config.daemon.speed,
-        .configuration = options.configuration_text,
-        .versions = {{"abbe", ABBE_VERSION}, {kAxisSamplesRule, "1"}, {kDatumRule, "2"}}};
+    RecordingInfo info{.machine = config.machine.name,
+                       .utc_offset = utc,
+                       .speed = config.daemon.speed,
+                       .configuration = options.configuration_text,
+                       .versions = {{"abbe", ABBE_VERSION},
+                                    {kAxisSamplesRule, "1"},
+                                    {kDatumRule, "2"},
+                                    {kRotaryTravelRule, "1"}}};
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);

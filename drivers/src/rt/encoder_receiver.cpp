@@ -332,10 +332,12 @@ void EncoderReceiver::end_bus_off() ABBE_RT {
 /// whole ranges of the encoder away from the travel of the axis, whose middle is then nearest.
 std::int64_t EncoderReceiver::first_count(const Axis& axis, std::int64_t count) ABBE_RT {
   if (!axis.middle || axis.modulus == 0 || axis.scale == 0.0) return count;
-  const double range = static_cast<double>(axis.modulus) * axis.scale;
-  const double reading = axis.offset + static_cast<double>(count) * axis.scale;
-  const auto ranges = static_cast<std::int64_t>(std::round((*axis.middle - reading) / range));
-  return count + ranges * static_cast<std::int64_t>(axis.modulus);
+  constexpr double kMostCounts = 0x1p62;
+  const double away = (*axis.middle - axis.offset) / axis.scale - static_cast<double>(count);
+  if (!(std::abs(away) < kMostCounts)) return count;
+  const auto ranges = std::llround(away / static_cast<double>(axis.modulus));
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(count) +
+                                   static_cast<std::uint64_t>(ranges) * axis.modulus);
 }
 
 void EncoderReceiver::take_position(std::size_t i, std::int64_t count) ABBE_RT {

@@ -88,8 +88,8 @@ EncoderNodeConfig read_node(Section& section, const MachineConfig& machine, Sync
   }
   section.get_integer("node", node.node, 1, 127, Need::Required);
   const bool linear = node.kind == AxisKind::Linear;
-  section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive,
-              linear ? Need::Optional : Need::Required);
+  section.get(linear ? "step_nm" : "step_nrad", node.step, kNano, kPositive);
+  if (!linear && !section.has("step_nrad")) section.implausible("step_nrad", "missing");
   check_step(section, node.step, linear);
   section.get(linear ? "offset_mm" : "offset_rad", node.offset, linear ? kMilli : kPlain, kAny);
   bool invert = false;

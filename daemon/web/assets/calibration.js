@@ -379,10 +379,13 @@ export async function show(place) {
   place.append(h("h2", {}, "Session"), parts, view, controls());
   let before = state.status?.session.state;
   const onStatus = (status) => {
-    const now = status?.session.state;
-    if (before === "warming" && now !== before) withdraw(Object.values(begun));
+    if (!status) return;
+    const now = status.session.state;
+    // Twice a second: "warming" may lie between two.
+    if (["acquiring", "identifying"].includes(now) || (before === "warming" && now !== before))
+      withdraw(Object.values(begun));
     before = now;
-    if (status && !parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
+    if (!parts.contains(document.activeElement)) parts.replaceChildren(...sessionParts(status.session));
   };
   if (state.status) onStatus(state.status);
 

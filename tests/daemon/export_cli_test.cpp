@@ -129,9 +129,8 @@ TEST_F(CliExport, RefusesAModelOfWhichTheFormatHoldsNothing) {
 
 TEST_F(CliExport, ReplacesNotTheModel) {
   const std::string before = file("model.json");
+  std::filesystem::create_symlink("model.json", folder_.path() / "link.csv");
   for (const char* const out : {"model.json", "./model.json", "link.csv"}) {
-    if (std::string{out} == "link.csv")
-      std::filesystem::create_symlink("model.json", folder_.path() / out);
     const auto ran = abbe(std::string{"model.json --to siemens-lec -o "} + out);
     EXPECT_EQ(ran.exit, 2) << out;
     EXPECT_THAT(ran.err, HasSubstr("this command reads this file"));

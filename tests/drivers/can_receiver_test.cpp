@@ -128,30 +128,6 @@ TEST(EncoderReceiver, TakesTheFirstCountOfAnAbsoluteScaleAsItIs) {
   EXPECT_DOUBLE_EQ(line.samples.at(0).position[0], -5e-5);
 }
 
-TEST(EncoderReceiver, UnwrapsARotaryEncoderAtItsOwnRange) {
-  EncoderReceiverOptions options;
-  options.axes = {{.name = "C",
-                   .node = 1,
-                   .kind = AxisKind::Rotary,
-                   .position = can::PositionType::Unsigned32,
-                   .scale = 2 * std::numbers::pi / 36000,
-                   .wrap_counts = 36000}};
-  Line line{options};
-  std::int64_t ms = 0;
-
-  for (const std::int64_t count : {35990, 10, 17990, 35970, 5}) {
-    line.sync(kStart + 1ms * ms);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
-               kStart + 1ms * ms + 10us);
-    ++ms;
-  }
-
-  ASSERT_EQ(line.samples.size(), 5u);
-  EXPECT_EQ(line.samples[1].count[0], 36010);
-  EXPECT_EQ(line.samples[4].count[0], 72005);
-  EXPECT_NEAR(line.samples[4].position[0], 2 * std::numbers::pi * 72005 / 36000, 1e-12);
-}
-
 TEST(EncoderReceiver, ReadsSixtyFourBitPositions) {
   auto options = three_axes();
   for (auto& axis : options.axes) axis.position = can::PositionType::Signed64;
@@ -270,102 +246,6 @@ TEST(EncoderReceiver, WaitsForAHeartbeatAsLongAsItsNodeStates) {
   line.cycle(kStart + 4s, 2);
   line.finish();
   EXPECT_TRUE(has(line.samples.back().head.flags, SampleFlag::DeviceError));
-}
-
-TEST(EncoderReceiver, UnwrapsARotaryEncoderWithoutScalingAtItsPhysicalRevolution) {
-  EncoderReceiverOptions options;
-  options.axes = {{.name = "C",
-                   .node = 1,
-                   .kind = AxisKind::Rotary,
-                   .position = can::PositionType::Unsigned32}};
-  Line line{options};
-  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}),
-             kStart);  // 100 counts a revolution
-  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 2, 0, 0, 0}),
-             kStart);  // 2 revolutions
-  std::int64_t ms = 0;
-
-  for (const std::int64_t count : {190, 5}) {
-    line.sync(kStart + 1ms * ms);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
-               kStart + 1ms * ms + 10us);
-    ++ms;
-  }
-
-  ASSERT_EQ(line.samples.size(), 2u);
-  EXPECT_EQ(line.samples[1].count[0], 205);
-  EXPECT_NEAR(line.samples[1].position[0], 2 * std::numbers::pi * 2.05, 1e-12);
-}
-
-TEST(EncoderReceiver, UnwrapsASingleTurnEncoderThatReportsNoRange) {
-  EncoderReceiverOptions options;
-  options.axes = {{.name = "C",
-                   .node = 1,
-                   .kind = AxisKind::Rotary,
-                   .position = can::PositionType::Unsigned32}};
-  Line line{options};
-  line.frame(can::standard_frame(0x581, {0x43, 0x00, 0x10, 0, 0x96, 0x01, 0x01, 0}),
-             kStart);  // device type: absolute single-turn encoder
-  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}),
-             kStart);  // 100 counts a revolution
-  std::int64_t ms = 0;
-
-  for (const std::int64_t count : {5, 90}) {
-    line.sync(kStart + 1ms * ms);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count),
-               kStart + 1ms * ms + 10us);
-    ++ms;
-  }
-
-  ASSERT_EQ(line.samples.size(), 2u);
-  EXPECT_EQ(line.samples[1].count[0], -10);
-}
-
-TEST(EncoderReceiver, BeginsARotaryAxisInItsTravel) {
-  constexpr double kTurn = 2 * std::numbers::pi;
-  const auto first = [&](std::optional<double> middle, double scale, std::int64_t count,
-                         double offset = 0.0) {
-    EncoderReceiverOptions options;
-    options.axes = {{.name = "B",
-                     .node = 1,
-                     .kind = AxisKind::Rotary,
-                     .position = can::PositionType::Unsigned32,
-                     .scale = scale,
-                     .offset = offset,
-                     .wrap_counts = 36000,
-                     .middle = middle}};
-    Line line{options};
-    line.sync(kStart);
-    line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, count), kStart + 10us);
-    return line.samples.at(0).position[0];
-  };
-  EXPECT_NEAR(first(0.0, kTurn / 36000, 35900), -kTurn / 360, 1e-12);
-  EXPECT_NEAR(first(0.0, kTurn / 36000, 100), kTurn / 360, 1e-12);
-  EXPECT_NEAR(first(0.0, -kTurn / 36000, 35900), kTurn / 360, 1e-12);
-  EXPECT_NEAR(first(kTurn / 2, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
-  EXPECT_NEAR(first(5 * kTurn, kTurn / 36000, 35900), kTurn * (5 - 1.0 / 360), 1e-12);
-  EXPECT_NEAR(first(std::nullopt, kTurn / 36000, 35900), kTurn * 359 / 360, 1e-12);
-  EXPECT_NEAR(first(0.0, kTurn / 36000, 35900, kTurn), -kTurn / 360, 1e-12);
-  EXPECT_EQ(first(0.0, kTurn / 36000, 0, 1e300), 1e300) << "as sent";
-}
-
-TEST(EncoderReceiver, BeginsARotaryAxisInItsTravelByTheRangeOfTheEncoder) {
-  EncoderReceiverOptions options;
-  options.axes = {{.name = "B",
-                   .node = 1,
-                   .kind = AxisKind::Rotary,
-                   .position = can::PositionType::Unsigned32,
-                   .scale = 2 * std::numbers::pi / 100,
-                   .middle = 0.0},
-                  {.name = "X", .node = 2, .scale = 1e-3, .wrap_counts = 1000, .middle = 0.0}};
-  Line line{options};
-  line.frame(can::standard_frame(0x581, {0x43, 0x01, 0x65, 0, 100, 0, 0, 0}), kStart);
-  line.frame(can::standard_frame(0x581, {0x4B, 0x02, 0x65, 0, 1, 0, 0, 0}), kStart);
-  line.sync(kStart);
-  line.frame(can::encode_position(0x181, can::PositionType::Unsigned32, 90), kStart + 10us);
-  line.frame(can::encode_position(0x182, can::PositionType::Signed32, 900), kStart + 20us);
-  EXPECT_EQ(line.samples.at(0).count[0], -10);
-  EXPECT_EQ(line.samples.at(0).count[1], 900) << "a linear axis is absolute";
 }
 
 TEST(EncoderReceiver, BusOffMakesAllAxesInvalidAtOnce) {

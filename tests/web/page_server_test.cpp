@@ -313,29 +313,30 @@ void write_certificate(const std::filesystem::path& folder, const char* until) {
 
 constexpr const char* kTls = "certificate = \"web.pem\"\nkey = \"key.pem\"\n";
 
-TEST_F(PageServerTest, AnExpiredCertificateIsRefusedWithItsDate) {
+struct RefusedCertificate : PageServerTest {
+  /// Why a page over TLS does not start.
+  [[nodiscard]] daemon::Error refusal() const {
+    write_config(std::string{"port = 0\n"} + kTls);
+    auto read = settings();
+    if (!read) return read.error();
+    const auto page = PageServer::start({.settings = std::move(*read),
+                                         .config_file = folder_ / "abbed.toml",
+                                         .report = [](const std::string&) {}});
+    EXPECT_FALSE(page);
+    return page ? daemon::Error{} : page.error();
+  }
+};
+
+TEST_F(RefusedCertificate, IsNamedWithTheDateOfItsEnd) {
   write_certificate(folder_, "240229120000Z");
-  write_config(std::string{"port = 0\n"} + kTls);
-  auto read = settings();
-  ASSERT_TRUE(read) << read.error().text;
-  const auto page = PageServer::start({.settings = std::move(*read),
-                                       .config_file = folder_ / "abbed.toml",
-                                       .report = [](const std::string&) {}});
-  ASSERT_FALSE(page);
-  EXPECT_THAT(page.error().text, HasSubstr("web.pem expired on 2024-02-29"));
+  EXPECT_THAT(refusal().text, HasSubstr("web.pem expired on 2024-02-29"));
 }
 
-TEST_F(PageServerTest, AMissingCertificateIsAFaultOfTheConfiguration) {
-  write_config(std::string{"port = 0\n"} + kTls);
-  auto read = settings();
-  ASSERT_TRUE(read) << read.error().text;
-  const auto page = PageServer::start({.settings = std::move(*read),
-                                       .config_file = folder_ / "abbed.toml",
-                                       .report = [](const std::string&) {}});
-  ASSERT_FALSE(page);
-  EXPECT_EQ(page.error().code, daemon::ErrorCode::BadInput);
-  EXPECT_THAT(page.error().text, AllOf(HasSubstr("certificate: read "), HasSubstr("web.pem"),
-                                       HasSubstr("([web] certificate)")));
+TEST_F(RefusedCertificate, ThatIsMissingIsAFaultOfTheConfiguration) {
+  const daemon::Error error = refusal();
+  EXPECT_EQ(error.code, daemon::ErrorCode::BadInput);
+  EXPECT_THAT(error.text, AllOf(HasSubstr("certificate: read "), HasSubstr("web.pem"),
+                                HasSubstr("([web] certificate)")));
 }
 
 TEST_F(PageServerTest, ACertificateMayBeValidUntilTheYear9999) {

@@ -131,6 +131,7 @@ TEST_F(ReportCli, ReplacesNoFileThatItReadsOrWrites) {
   EXPECT_THAT(refused(second_ + " -o " + stored.string()), HasSubstr("reads this file"));
   EXPECT_THAT(refused("m.json --compare " + second_ + " -o " + stored.string()),
               HasSubstr("reads this file"));
+  EXPECT_THAT(refused(first_ + " --trend -o " + stored.string()), HasSubstr("reads this file"));
   EXPECT_EQ(test::text_of(stored), model);
   EXPECT_EQ(file("m.json"), before);
   EXPECT_FALSE(fs::exists(folder_ / "r.html"));

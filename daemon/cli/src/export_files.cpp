@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "abbe/base/text_file.hpp"
-#include "own_files.hpp"
+#include "output_files.hpp"
 
 namespace abbe::daemon {
 namespace {

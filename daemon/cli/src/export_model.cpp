@@ -13,7 +13,7 @@
 #include "export_files.hpp"
 #include "export_options.hpp"
 #include "export_report.hpp"
-#include "own_files.hpp"
+#include "output_files.hpp"
 #include "terminal.hpp"
 #include "vector_option.hpp"
 

@@ -7,13 +7,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_report.hpp"
 #include "certificate_file.hpp"
 #include "commands.hpp"
-#include "own_files.hpp"
+#include "output_files.hpp"
 #include "pdf_converter.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
@@ -116,10 +117,16 @@ Result<void> write_file(const std::string& file, std::string_view text) {
 }
 
 /// The files that the command reads; empty: not given.
-std::array<std::filesystem::path, 4> files_read(const ReportArguments& arguments) {
-  return {file_of_model(arguments.model, arguments.store),
-          file_of_model(arguments.compare, arguments.store),
-          file_of_model(arguments.as_left, arguments.store), arguments.details};
+std::vector<std::filesystem::path> files_read(const ReportArguments& arguments) {
+  std::vector<std::filesystem::path> files{arguments.details};
+  for (const std::string& model : {arguments.model, arguments.compare, arguments.as_left})
+    files.push_back(file_of_model(model, arguments.store));
+  if (!arguments.trend) return files;
+  const auto store = open_store(arguments.store);
+  const auto entries = store ? store->list() : Result<std::vector<StoreEntry>>{};
+  if (entries)
+    for (const StoreEntry& entry : *entries) files.push_back(store->model_path(entry.id));
+  return files;
 }
 
 /// The default name of the HTML file.

@@ -1,4 +1,4 @@
-#include "own_files.hpp"
+#include "output_files.hpp"
 
 #include <fmt/format.h>
 

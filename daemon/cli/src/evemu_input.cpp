@@ -137,7 +137,7 @@ Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
   if (const auto valid = check_scales("identify evemu", what, *config, arguments.scales_corrected);
       !valid)
     return tl::make_unexpected(valid.error());
-  if (const auto& t = arguments.tip_offset_m) set_target(config->machine, *t);
+  if (const auto& t = arguments.tip_offset_m) set_target(*config, *t);
   if (const auto given = require_target(config->machine); !given)
     return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
   const auto machine = evemu_machine(config->machine);

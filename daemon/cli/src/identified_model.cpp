@@ -12,6 +12,7 @@
 
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/report/model_report.hpp"
@@ -49,7 +50,7 @@ void ComparisonModel::add_note(calib::Verdict& verdict) const {
 
 ComparisonModel comparison_model(const std::optional<ModelDocument>& active, const Config& config) {
   if (!active) return {};
-  if (active->machine_hash != machine_hash(config))
+  if (fit_of(*active, present_configuration(config)).kind != ConfigurationFit::Kind::Same)
     return {nullptr, std::string{kOfAnotherMachine}};
   return {&active->model, {}};
 }

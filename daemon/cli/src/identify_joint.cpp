@@ -85,6 +85,7 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const Joint
   if (!contributions) return tl::make_unexpected(error_of(contributions.error()));
 
   auto document = joint_document(input, *identified.joint, *verdict);
+  document.configuration = input.config.meaning;
   document.run = run_figures(*verdict, "legs");
   JointOutcome outcome{input,
                        std::move(identified.pairs),

@@ -44,10 +44,8 @@ Result<Config> config_for(const IdentifyOtfArguments& arguments, const Config& r
                 fmt::format("{}: was recorded on a machine with the chain {}, {} has {}",
                             arguments.recording, recorded.machine.chain, arguments.machine,
                             config->machine.chain));
-  if (recorded.machine.target_given) {
-    config->machine.target_offset_m = recorded.machine.target_offset_m;
-    config->machine.target_given = true;
-  }
+  take_recorded_readings(*config, &recorded);
+  if (recorded.machine.target_given) set_target_offset(*config, recorded.machine.target_offset_m);
   if (recorded.machine.tracker_position_m)
     config->machine.tracker_position_m = recorded.machine.tracker_position_m;
   apply(arguments, *config);

@@ -9,6 +9,7 @@
 
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "store_option.hpp"
@@ -21,7 +22,7 @@ namespace {
 struct ModelStoreArguments {
   StoreOption store;
   std::string id, why, active;
-  bool json = false, force = false;
+  bool json = false, force = false, accept_older_hash = false;
 };
 
 StoreActor actor(const ModelStoreArguments& arguments) {
@@ -35,12 +36,16 @@ std::string state_of(const StoreEntry& entry) {
   return entry.accepted ? "accepted" : "refused";
 }
 
+nlohmann::json simulated_json(std::optional<bool> simulated) {
+  return simulated ? nlohmann::json(*simulated) : nlohmann::json();
+}
+
 nlohmann::json to_json(const StoreEntry& entry) {
   return {{"id", entry.id},           {"state", state_of(entry)},
           {"active", entry.active},   {"accepted", entry.accepted},
           {"reasons", entry.reasons}, {"added", to_text(entry.added)},
           {"method", entry.method},   {"machine", entry.machine},
-          {"fault", entry.fault}};
+          {"fault", entry.fault},     {"simulated", simulated_json(entry.simulated)}};
 }
 
 void print_table(const std::vector<StoreEntry>& entries) {
@@ -53,6 +58,8 @@ void print_table(const std::vector<StoreEntry>& entries) {
     if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
     fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id,
                to_text(entry.added).substr(0, kSeconds), entry.method, entry.machine, state);
+    if (entry.simulated.value_or(false))
+      fmt::print("{:18}{}\n", "", coloured("simulated devices", kYellow, STDOUT_FILENO));
     for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
   }
 }
@@ -95,6 +102,7 @@ void print_model(const ModelDocument& document) {
     fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
   if (!document.recording_gap.empty())
     fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
+  fmt::print("devices     {}\n", devices_in_words(made_on_simulated_devices(document)));
   if (document.model.travel() != nullptr)
     fmt::print(
         "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
@@ -148,12 +156,51 @@ int show(const ModelStoreArguments& arguments) {
   return 0;
 }
 
+/// The hash of the present configuration, for which the user accepts model `id`. Refused if nothing
+/// is to be accepted, or if more differs than an earlier version did not know.
+Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
+                                           const ModelStore& store, const std::string& id) {
+  const auto config = load_config(arguments.store.config);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto document = store.load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto present = present_configuration(*config);
+  const auto fit = fit_of(*document, present);
+  if (fit.kind == ConfigurationFit::Kind::OlderHash) return present.hash;
+  return fail(
+      ErrorCode::Refused,
+      fmt::format("activate {}: {}", id,
+                  fit.sentence.empty() ? "the model is of this configuration: activate it without "
+                                         "--accept-older-hash"
+                                       : fit.sentence));
+}
+
+Result<void> check_activation(const ModelStoreArguments& arguments) {
+  if (arguments.force && arguments.why.empty())
+    return fail(ErrorCode::Usage,
+                "--force needs --why: a forced activation is recorded with its reason");
+  if (arguments.accept_older_hash && arguments.why.empty())
+    return fail(ErrorCode::Usage,
+                "--accept-older-hash needs --why: the store keeps who accepted the model and why");
+  if (arguments.accept_older_hash && arguments.store.config.empty())
+    return fail(ErrorCode::Usage,
+                "--accept-older-hash needs -c: the model is accepted for that configuration only");
+  return {};
+}
+
 int activate(const ModelStoreArguments& arguments) {
+  if (const auto valid = check_activation(arguments); !valid) return report(valid.error());
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
-  if (const auto done = store->activate(*id, actor(arguments), arguments.force); !done)
+  std::string accepted;
+  if (arguments.accept_older_hash) {
+    auto configuration = accepted_configuration(arguments, *store, *id);
+    if (!configuration) return report(configuration.error());
+    accepted = *std::move(configuration);
+  }
+  if (const auto done = store->activate(*id, actor(arguments), arguments.force, accepted); !done)
     return report(done.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -203,15 +250,16 @@ void add_model_activate(CLI::App& parent, int& exit) {
                    "model id, or the beginning of an id (at least 4 characters)")
       ->required();
   add_store_options(*command, arguments->store);
-  command->add_option("--why", arguments->why, "reason, for the record; required with --force");
+  command->add_option("--why", arguments->why,
+                      "reason, for the record; required with --force and\n--accept-older-hash");
   command->add_flag("--force", arguments->force, "activate a model that the gate refused");
 
-  command->callback([arguments, &exit] {
-    exit = arguments->force && arguments->why.empty()
-               ? report({ErrorCode::Usage,
-                         "--force needs --why: a forced activation is recorded with its reason"})
-               : activate(*arguments);
-  });
+  command->add_flag("--accept-older-hash", arguments->accept_older_hash,
+                    "accept a model of an earlier version for the configuration of -c: you have\n"
+                    "checked that the keys its hash does not contain are as they were when it was\n"
+                    "made (abbe status names them); needs -c and --why");
+
+  command->callback([arguments, &exit] { exit = activate(*arguments); });
 }
 
 void add_model_rollback(CLI::App& parent, int& exit) {

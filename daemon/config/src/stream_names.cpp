@@ -4,7 +4,7 @@
 
 namespace abbe::daemon {
 
-void StreamNames::take(const std::string& name, Section& table) {
+void StreamNames::take(const std::string& name, ClassifiedSection& table) {
   static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
   if (name.empty()) return;
   if (kOwn.contains(name))

@@ -139,7 +139,8 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   return id;
 }
 
-Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
+Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force,
+                                  std::string accepted_configuration) {
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
@@ -155,7 +156,8 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
                                   fmt::join(added->reasons, "; ")));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
 
-  return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
+  return append(folder_, std::move(*state),
+                StoreEvent{action, id, actor, accepted, {}, std::move(accepted_configuration)});
 }
 
 Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& actor) {
@@ -214,6 +216,7 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     if (const auto document = load(id)) {
       entry.method = document->method;
       entry.machine = document->machine;
+      entry.simulated = made_on_simulated_devices(*document);
     } else {
       entry.fault = document.error().text;
     }

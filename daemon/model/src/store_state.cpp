@@ -23,12 +23,21 @@ bool is_activation(const StoreEvent& event) {
   return event.action != StoreAction::Added && event.action != StoreAction::Drifted;
 }
 
+std::string accepted_configuration(const std::vector<StoreEvent>& events, std::string_view id) {
+  const auto last = std::find_if(events.rbegin(), events.rend(), [&](const StoreEvent& event) {
+    return event.id == id && !event.accepted_configuration.empty();
+  });
+  return last == events.rend() ? std::string{} : last->accepted_configuration;
+}
+
 json to_json(const StoreEvent& event) {
   json object{{"action", kActions[static_cast<std::size_t>(event.action)]},
               {"id", event.id},
               {"who", event.actor.who},
               {"why", event.actor.why},
               {"when", to_text(event.actor.when)}};
+  if (!event.accepted_configuration.empty())
+    object["accepted_configuration"] = event.accepted_configuration;
   if (event.action == StoreAction::Added) {
     object["accepted"] = event.accepted;
     object["reasons"] = event.reasons;
@@ -48,6 +57,7 @@ std::optional<StoreEvent> event_from(const json& object) {
   event.id = object.at("id").get<std::string>();
   event.actor = {object.at("who").get<std::string>(), object.at("why").get<std::string>(), *when};
 
+  event.accepted_configuration = object.value("accepted_configuration", std::string{});
   if (event.action == StoreAction::Added) {
     event.accepted = object.at("accepted").get<bool>();
     event.reasons = object.at("reasons").get<std::vector<std::string>>();
@@ -82,6 +92,7 @@ std::optional<StoreEvent> StoreState::activation() const {
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
+  event.accepted_configuration = accepted_configuration(events, *id);
   return event;
 }
 

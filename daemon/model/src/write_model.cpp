@@ -312,6 +312,24 @@ void write_artefact(JsonText& out, const calib::Expansion& artefact) {
       to_decimal(calib::u_expansion_factor(artefact), 0)));
 }
 
+std::string entries_json(const MeaningEntries& entries) {
+  std::string text;
+  for (const auto& [key, value] : entries)
+    text += fmt::format("{}\n      {}: {}", text.empty() ? "" : ",", JsonText::quoted(key),
+                        JsonText::quoted(value));
+  return text.empty() ? "{}" : "{" + text + "}";
+}
+
+void write_configuration(JsonText& out, const ModelDocument& document) {
+  const auto simulated = made_on_simulated_devices(document);
+  out.key("simulated");
+  out.raw(!simulated ? "null" : *simulated ? "true" : "false");
+  out.key("configuration");
+  out.raw(fmt::format("{{\"readings\": {},\n    \"measurements\": {}}}",
+                      entries_json(document.configuration->readings),
+                      entries_json(document.configuration->measurements)));
+}
+
 void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
   out.key("inputs");
   out.raw("[");
@@ -339,6 +357,7 @@ std::string to_json(const ModelDocument& document) {
   if (!document.mode.empty()) out.member("mode", document.mode);
   out.member("machine", document.machine);
   out.member("machine_hash", document.machine_hash);
+  if (document.configuration) write_configuration(out, document);
   out.member("chain", model.chain().text());
   out.member("gauge", name(model.gauge()));
   out.member("squareness", "travel");

@@ -30,8 +30,11 @@ std::string reason_of(const StoreEvent& activation) {
     case StoreAction::RolledBack:
       return done_by(activation.accepted ? "rolled back"
                                          : "rolled back to a model the gate did not accept,");
-    case StoreAction::Added:
     case StoreAction::Activated:
+      if (!activation.accepted_configuration.empty())
+        return done_by("accepted with the configuration hash of an earlier version");
+      break;
+    case StoreAction::Added:
     case StoreAction::Drifted:
       break;
   }
@@ -167,8 +170,8 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
   if (axes_compensated_) {
     s.status = v1::ModelStatus::MODEL_INVALID;
     s.reason = "the control already corrects these axes: axes_compensated = true";
-  } else if (!active_.made_for_this_machine) {
-    s.reason = "the model was made for another machine configuration";
+  } else if (!active_.unfit.empty()) {
+    s.reason = active_.unfit;
   } else if (!axes_known_at) {
     s.reason = "no axis positions yet";
   } else if (now - *axes_known_at > patience) {
@@ -179,6 +182,8 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
     s.reason = reason_of(active_.activation);
+    if (!active_.measured_otherwise.empty())
+      s.reason += "; since the model was made: " + active_.measured_otherwise;
     if (!active_.recording_gap.empty()) s.reason += "; " + cannot_be_checked(active_.recording_gap);
   }
 

@@ -21,6 +21,15 @@ std::optional<double> largest_U_m(const calib::VolumetricModel& model) {
   return volume ? std::optional(volume->max_U_m) : std::nullopt;
 }
 
+/// Empty if the model is for this configuration, or was accepted for it.
+std::string unfit_for(const PresentConfiguration& configuration, const ModelDocument& document,
+                      const StoreEvent& activation) {
+  const auto fit = fit_of(document, configuration);
+  const bool accepted = fit.kind == ConfigurationFit::Kind::OlderHash &&
+                        activation.accepted_configuration == configuration.hash;
+  return accepted ? std::string{} : fit.sentence;
+}
+
 std::string not_known_since(const std::string& damaged_state) {
   return fmt::format(
       "which model was active is not known: the store's state was damaged and is kept as {}; "
@@ -34,7 +43,7 @@ ModelKeeper::ModelKeeper(const std::filesystem::path& store_folder, const Config
                          protocol::UtcOffset utc)
     : store_(store_folder),
       machine_(config.machine.name),
-      machine_hash_(machine_hash(config)),
+      configuration_(std::make_shared<const PresentConfiguration>(present_configuration(config))),
       utc_(utc) {}
 
 void ModelKeeper::tidy_store(protocol::HostTime now) {
@@ -128,7 +137,8 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
 ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument document,
                                    protocol::HostTime now) const {
   ActiveModel active{.activation = activation};
-  active.made_for_this_machine = document.machine_hash == machine_hash_;
+  active.unfit = unfit_for(*configuration_, document, activation);
+  active.measured_otherwise = changed_measurements(document, *configuration_);
   active.recording_gap = document.recording_gap;
   auto model = std::make_shared<const PublishedModel>(
       PublishedModel{.id = activation.id,
@@ -139,6 +149,7 @@ ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument d
                      .active_since = std::min(now, utc_.to_host(activation.actor.when)),
                      .hash = model_hash(document),
                      .largest_U_m = largest_U_m(document.model),
+                     .simulated = made_on_simulated_devices(document).value_or(false),
                      .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 

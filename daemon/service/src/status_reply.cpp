@@ -145,6 +145,7 @@ struct SeenModel {
     hash = active.model->hash;
     created = active.model->created;
     largest_U_m = active.model->largest_U_m;
+    simulated = active.model->simulated;
   }
   v1::ModelStatus status;
   std::string reason;
@@ -152,6 +153,7 @@ struct SeenModel {
   std::string id, method, recording_sha256, hash;
   protocol::UtcTime created{};
   std::optional<double> largest_U_m;
+  bool simulated = false;
 };
 
 json model_json(const SeenModel& model) {
@@ -162,6 +164,7 @@ json model_json(const SeenModel& model) {
     out["recording_sha256"] = model.recording_sha256;
     out["hash"] = model.hash;
     out["created"] = to_text(model.created);
+    out["simulated"] = model.simulated;
     if (model.largest_U_m) out["largest_U_um"] = *model.largest_U_m * kUmPerM;
   }
   return out;
@@ -336,6 +339,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
   json out{{"ok", true},
            {"process", ::getpid()},
            {"machine", config.machine.name},
+           {"simulated", config.daemon.simulated},
            {"model", model_json(seen.model)},
            {"session", session_json(seen.session, seen.held_out)},
            {"streams", std::move(devices)}};

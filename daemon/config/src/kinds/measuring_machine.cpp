@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
@@ -9,20 +10,22 @@
 namespace abbe::daemon {
 namespace {
 
-void read_cmm(Section& root, Config& out, StreamNames& names) {
-  Section cmm = root.child("cmm");
+void read_cmm(ClassifiedSection& root, Config& out, StreamNames& names) {
+  ClassifiedSection cmm = root.child("cmm");
   if (!cmm.present()) return;
   CmmConfig config;
-  get_bounded(cmm, "name", config.name, bound_of<v1::ProbeTrigger>("device"));
-  get_host(cmm, "host", config.host, Need::Required);
-  cmm.get_integer("port", config.port, 1, 65535);
-  cmm.get("tool", config.tool);
-  cmm.get("home", config.home);
-  cmm.get_integer("probe", config.probe, 0, 1'000'000'000);
-  cmm.get("u_position_um", config.u_position_m, kMicro, kPositive);
-  cmm.get("axes_compensated", config.axes_compensated);
-  cmm.get("command_timeout_s", config.command_timeout, kPlain, kPositive);
-  cmm.get("motion_timeout_s", config.motion_timeout, kPlain, kPositive);
+  get_bounded(cmm, operation("name"), config.name, bound_of<v1::ProbeTrigger>("device"));
+  get_host(cmm, operation("host"), config.host, Need::Required);
+  cmm.get_integer(operation("port"), config.port, 1, 65535);
+  // A reported position is that of the tip of the tool.
+  const Role positions = axes_have_own_device(out) ? Role::Measurement : Role::Reading;
+  cmm.get(Key{"tool", positions}, config.tool);
+  cmm.get(operation("home"), config.home);
+  cmm.get_integer(operation("probe"), config.probe, 0, 1'000'000'000);
+  cmm.get(operation("u_position_um"), config.u_position_m, kMicro, kPositive);
+  cmm.get(Key{"axes_compensated", positions}, config.axes_compensated);
+  cmm.get(operation("command_timeout_s"), config.command_timeout, kPlain, kPositive);
+  cmm.get(operation("motion_timeout_s"), config.motion_timeout, kPlain, kPositive);
 
   if (const auto other = touch_source(out))
     cmm.fault("",
@@ -38,7 +41,7 @@ std::vector<std::string> cmm_summary(const Config& config) {
   return {fmt::format("{}:{}", cmm->host, cmm->port)};
 }
 
-std::string cmm_reading_text(const Config& config) {
+std::string former_cmm_text(const Config& config) {
   if (!cmm_reads_axes(config)) return {};
   return config.of<CmmConfig>()->axes_compensated ? "|cmm|compensated" : "|cmm|raw";
 }
@@ -64,7 +67,7 @@ std::optional<TouchSource> cmm_touches(const Config& config) {
 const ConfigKind CmmConfig::kKind{.key = "cmm",
                                   .read = &read_cmm,
                                   .summary = &cmm_summary,
-                                  .reading_text = &cmm_reading_text,
+                                  .former_text = &former_cmm_text,
                                   .moves = true,
                                   .axes = &cmm_axes,
                                   .axes_if_no_other = true,

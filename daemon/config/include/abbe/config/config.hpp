@@ -20,6 +20,7 @@
 #include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/config/device_configs.hpp"
+#include "abbe/config/meaning.hpp"
 #include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/real_time_mode.hpp"
 
@@ -245,6 +246,8 @@ struct Config {
   DriftConfig drift;
   EvemuConfig evemu;
   ControlConfig control;
+  /// Of the tables above, made while they were read.
+  Meaning meaning;
 
   /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
   template <class Kind>
@@ -278,10 +281,19 @@ struct Config {
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 
-/// SHA-256 in hex over the part of the configuration that a model depends on: the machine (name,
-/// chain, axes, target, basis, nodes) and the meaning of a scale reading (node and axis, step,
-/// offset, correction by the control). A stored model is ACTIVE only if its hash equals that of the
-/// present configuration. Noise values and transport settings are not included.
+/// SHA-256 in hex over Meaning::readings: the machine and all that gives an axis reading its
+/// meaning. A stored model is ACTIVE only if its hash equals that of the present configuration.
+/// Noise values and transport settings are not included.
 [[nodiscard]] std::string machine_hash(const Config& config);
+
+/// The hash of model files without a list of the configuration, from earlier versions. It covers
+/// the machine (name, chain, axes, target, nodes) and of the readings: correction by the control,
+/// axis, node or channel, step, offset, reference marks, expansion of the scale.
+[[nodiscard]] std::string former_machine_hash(const Config& config);
+/// The entries that the former hash did not cover.
+[[nodiscard]] MeaningEntries not_in_former_hash(MeaningEntries readings);
+
+/// Replaces [target] offset_mm, for a run whose target is known otherwise.
+void set_target_offset(Config& config, const std::array<double, 3>& offset_m);
 
 }  // namespace abbe::daemon

@@ -111,7 +111,16 @@ struct ModelDocument {
   std::optional<RunFigures> run{};
   /// Version of abbe that identified the model; empty: this one. Not in the hash.
   std::string software{};
+  /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
+  /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
+  std::optional<Meaning> configuration{};
 };
+/// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in
+/// files of earlier versions.
+[[nodiscard]] std::optional<bool> made_on_simulated_devices(const ModelDocument& document);
+/// For people: what is stated of the devices.
+[[nodiscard]] std::string_view devices_in_words(std::optional<bool> simulated);
+
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 

@@ -39,6 +39,9 @@ struct StoreEvent {
   StoreActor actor;
   bool accepted = false;             ///< Added: verdict of the gate
   std::vector<std::string> reasons;  ///< Added: reasons of a refusal
+  /// Activated, Forced: machine_hash() of the configuration for which the actor accepted a model of
+  /// an earlier version (ConfigurationFit::OlderHash); empty: none was accepted.
+  std::string accepted_configuration{};
   bool operator==(const StoreEvent&) const = default;
 };
 
@@ -48,8 +51,9 @@ struct StoreEntry {
   bool accepted = false;  ///< verdict of the gate when it was added
   std::vector<std::string> reasons;
   protocol::UtcTime added{};
-  std::string method, machine;  ///< empty if the file cannot be read
-  std::string fault;            ///< why the file cannot be read; empty: readable
+  std::string method, machine;      ///< empty if the file cannot be read
+  std::string fault;                ///< why the file cannot be read; empty: readable
+  std::optional<bool> simulated{};  ///< made_on_simulated_devices()
 };
 
 /// Identifies a version of state.json, which is always replaced, never modified. All zero: the file
@@ -93,9 +97,9 @@ class ModelStore {
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
   /// Makes a model active. Refused if the gate did not accept the model, unless `force`; an Error
-  /// if the model file is missing or damaged.
+  /// if the model file is missing or damaged. `accepted_configuration`: StoreEvent.
   [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
-                                      bool force = false);
+                                      bool force = false, std::string accepted_configuration = {});
 
   /// Records that a run found drift against model `id`; `actor.why` states what changed. No effect
   /// if another model is active, or if the same event is recorded already.
@@ -112,7 +116,8 @@ class ModelStore {
   /// because other processes may change it.
   [[nodiscard]] Result<std::optional<std::string>> active_id() const;
   /// The event that made the active model active; `accepted` is the verdict of the gate on that
-  /// model. Reads state.json at every call. nullopt: no model is active.
+  /// model, `accepted_configuration` the last one that the store has for it. Reads state.json at
+  /// every call. nullopt: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   /// What has drifted since the last activation, as add_drift() recorded it last; empty: nothing.
   [[nodiscard]] Result<std::string> drift() const;

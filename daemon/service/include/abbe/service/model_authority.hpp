@@ -75,7 +75,7 @@ class ModelAuthority {
   /// The model with which the gate compares a new one: the active model, or null if the active
   /// model was made for another machine configuration.
   [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const noexcept {
-    return active_.made_for_this_machine ? active_.model : nullptr;
+    return active_.unfit.empty() ? active_.model : nullptr;
   }
 
  private:

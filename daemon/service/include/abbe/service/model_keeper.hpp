@@ -14,6 +14,7 @@
 
 #include "abbe/calib/gate.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "abbe/publishing/model_publication.hpp"
@@ -27,8 +28,11 @@ struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const PublishedModel> model;
   ModelPublication publication;  ///< of `model`
-  bool made_for_this_machine = false;
-  std::string recording_gap;  ///< ModelDocument::recording_gap
+  /// Why the readings do not have the meaning that they had when the model was made; empty: they
+  /// have, or a person accepted it.
+  std::string unfit{};
+  std::string measured_otherwise{};  ///< changed_measurements()
+  std::string recording_gap;         ///< ModelDocument::recording_gap
   std::string drift;  ///< ModelStore::drift(); empty: no drift was found since the activation
   std::string fault;
 };
@@ -101,7 +105,7 @@ class ModelKeeper {
 
   ModelStore store_;
   std::string machine_;
-  std::string machine_hash_;
+  std::shared_ptr<const PresentConfiguration> configuration_;
   protocol::UtcOffset utc_;
 };
 

@@ -21,6 +21,9 @@ class Model:
     @property
     def method(self) -> str: ...
     @property
+    def simulated(self) -> bool | None:
+        """True: the devices were those of abbe-sim. None: not known, a file of an earlier version."""
+    @property
     def estimator(self) -> str: ...
     @property
     def created_utc_ns(self) -> int: ...

@@ -161,6 +161,8 @@ void bind_model(py::module_& module) {
       .def_property_readonly("hash", [](const ModelDocument& d) { return daemon::model_hash(d); })
       .def_property_readonly("machine", [](const ModelDocument& d) { return d.machine; })
       .def_property_readonly("method", [](const ModelDocument& d) { return d.method; })
+      .def_property_readonly(
+          "simulated", [](const ModelDocument& d) { return daemon::made_on_simulated_devices(d); })
       .def_property_readonly("estimator", [](const ModelDocument& d) { return d.estimator; })
       .def_property_readonly(
           "created_utc_ns",

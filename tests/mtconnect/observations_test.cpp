@@ -39,6 +39,18 @@ TEST(Observations, StateTheModel) {
   EXPECT_EQ(event(observed, "model_date"), status["model"]["created"]);
 }
 
+TEST(Observations, StateWhetherDevicesOrModelAreSimulated) {
+  auto status = test::status();
+  EXPECT_EQ(event(observations_of(status), "simulated"), "UNAVAILABLE") << "an older abbed";
+  status["simulated"] = false;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "NO");
+  status["model"]["simulated"] = true;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "YES");
+  status["model"]["simulated"] = false;
+  status["simulated"] = true;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "YES");
+}
+
 /// U with k = 2 in um; the data item is the standard uncertainty in mm.
 TEST(Observations, StateTheStandardUncertaintyInMillimetres) {
   const auto observed = observations_of(test::status());

@@ -159,10 +159,22 @@ void print_dds(const json& dds) {
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
 }
 
+/// Empty if neither the devices nor the active model are simulated. Older versions of abbed do not
+/// send it.
+std::string simulated_parts(const json& status) {
+  const bool devices = status.value("simulated", false);
+  const bool model = status["model"].value("simulated", false);
+  if (devices && model) return "SIMULATED devices; the model was made on simulated devices";
+  if (devices) return "SIMULATED devices";
+  return model ? "the model was made on SIMULATED devices" : "";
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
   fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  if (const auto simulated = simulated_parts(status); !simulated.empty())
+    fmt::print("           {}\n", coloured(simulated, kYellow, STDOUT_FILENO));
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);

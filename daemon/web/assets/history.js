@@ -22,6 +22,7 @@ async function activate(model, active, again) {
   const why = await ask({ title: `Activate ${model.id}?`, yes: "Activate",
     lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
       `Then: ${model.id}, added ${when(model.added)}.`,
+      ...(model.simulated ? ["It was made on simulated devices: it describes no real machine."] : []),
       ...(model.accepted ? [] : ["The gate refused this model: it may make the machine worse."])],
     reason: "Reason, for the record", required: !model.accepted });
   if (why === null) return;
@@ -43,6 +44,7 @@ function verdict(model) {
   const word = model.active ? "active" : model.accepted ? "accepted" : "refused";
   const kind = model.active ? "good" : model.accepted ? "" : "warn";
   return h("div", {}, h("span", { class: kind }, model.active && !model.accepted ? "active (forced)" : word),
+    model.simulated ? h("span", { class: "warn" }, " simulated devices") : null,
     model.reasons.length ? list(model.reasons) : null);
 }
 

@@ -78,6 +78,9 @@ listen("status", (status) => {
   if (!status) return;
   find("machine").textContent = status.machine;
   const model = status.model;
+  const simulated = status.simulated ? "Simulated devices" : model.simulated ? "Model of simulated devices" : "";
+  find("simulated").hidden = simulated === "";
+  find("simulated").replaceChildren(h("strong", { class: "warn" }, simulated));
   const good = model.state === "ACTIVE" ? "good" : model.state === "INVALID" ? "bad" : "warn";
   find("model-state").replaceChildren("Model ", h("strong", { class: good }, model.state));
   find("model-state").title = model.reason;

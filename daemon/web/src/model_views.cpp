@@ -66,6 +66,7 @@ json entry_json(const StoreEntry& entry) {
           {"added", daemon::to_text(entry.added)},
           {"method", entry.method},
           {"machine", entry.machine},
+          {"simulated", entry.simulated.value_or(false)},
           {"fault", entry.fault}};
 }
 

@@ -23,6 +23,7 @@ void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
 void read_recording(Section& root, const std::filesystem::path& base, Config& out);
+void read_models(Section& root, ModelRetention& out);
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);
 void read_gate(Section& root, Config& out);
 void read_otf(Section& root, OtfConfig& out);

@@ -33,6 +33,7 @@ std::string reason_of(const StoreEvent& activation) {
     case StoreAction::Added:
     case StoreAction::Activated:
     case StoreAction::Drifted:
+    case StoreAction::Removed:
       break;
   }
 

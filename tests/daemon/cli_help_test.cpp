@@ -98,6 +98,7 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "model show",
                                     "model activate",
                                     "model rollback",
+                                    "model prune",
                                     "dds",
                                     "dds keys",
                                     "export"}) {

@@ -316,6 +316,57 @@ TEST_F(PageLimitsTest, OneAddressLeavesPlacesForPagesOfOthers) {
   EXPECT_THAT(log(), Contains(HasSubstr("page refused: 3 are open on this computer")));
 }
 
+// Of several addresses, so that all places are taken; none of them reads or reports.
+TEST_F(PageLimitsTest, StreamsThatNobodyReadsGiveWayToAPage) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 4\n"));
+  std::vector<daemon::FileDescriptor> unread;
+  for (const char* const address : {"127.0.0.1", "127.0.0.1", "127.0.0.2", "127.0.0.2"})
+    unread.push_back(connection(page_->port(), get_request("/events"), address));
+  // From many addresses, so that none of them exceeds the limit of requests.
+  std::string status;
+  for (int i = 0; status != "200"; ++i) {
+    const std::string address = fmt::format("127.0.{}.{}", 1 + i / 200 % 200, 1 + i % 200);
+    const auto page = connection(page_->port(), get_request("/events"), address.c_str());
+    std::array<char, 12> head{};
+    (void)::recv(page.get(), head.data(), head.size(), MSG_WAITALL);
+    status = std::string{head.data() + 9, 3};
+    ASSERT_TRUE(status == "200" || status == "503") << status;
+  }
+}
+
+TEST_F(PageLimitsTest, APageThatReportsKeepsItsPlace) {
+  ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n"));
+  const auto page = connection(page_->port(), get_request("/events"));
+  std::string text;
+  std::array<char, 4096> buffer{};
+  while (text.find("event: place") == std::string::npos ||
+         text.find("}", text.find("event: place")) == std::string::npos) {
+    const ssize_t n = ::recv(page.get(), buffer.data(), buffer.size(), 0);
+    ASSERT_GT(n, 0);
+    text.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+  const auto number = text.find("\"number\":", text.find("event: place")) + 9;
+  const std::string place = text.substr(number, text.find('}', number) - number);
+  const auto reported = browser().Get("/api/reading/" + place);
+  ASSERT_TRUE(reported);
+  EXPECT_EQ(reported->status, 200);
+  EXPECT_EQ(browser().Get("/api/reading/x")->status, 400);
+}
+
+TEST_F(PageLimitsTest, EachWrongPasswordHasALineInTheLog) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  for (int i = 0; i < 8; ++i)
+    (void)browser().Post("/api/login", R"({"user": "view", "password": "wrong password"})",
+                         "application/json");
+  const auto lines = log();
+  const auto with = [&lines](const std::string& part) {
+    return std::ranges::count_if(
+        lines, [&part](const std::string& l) { return l.find(part) != std::string::npos; });
+  };
+  EXPECT_EQ(with("log in as \"view\" refused: wrong name or password"), 5);
+  EXPECT_EQ(with("log in as \"view\" refused: too many wrong passwords: wait 60 s"), 1);
+}
+
 TEST_F(PageLimitsTest, ManyConnectionsOfOneAddressLeaveAnotherItsAnswer) {
   ASSERT_NO_FATAL_FAILURE(start());
   std::vector<daemon::FileDescriptor> silent;

@@ -73,6 +73,7 @@ constexpr std::array kExamples{
     Example{"model show", "result/model.json"},
     Example{"model activate", "6ad1 --why \"verified with the step gauge\""},
     Example{"model rollback", "--why \"parts out of tolerance\""},
+    Example{"model prune", "--keep-newest 1000 --keep-days 365"},
     Example{"export", "active --to linuxcnc-comp -o compensation"},
     Example{"dds", "keys -o dds-keys"},
     Example{"dds keys", "-o dds-keys --subscribers 2"},

@@ -1,4 +1,4 @@
-/// `abbe model list|show|activate|rollback`: commands for the model store of a machine.
+/// `abbe model list|show|activate|rollback|prune`: commands for the model store of a machine.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -23,6 +23,8 @@ struct ModelStoreArguments {
   StoreOption store;
   std::string id, why, active;
   bool json = false, force = false, accept_older_hash = false;
+  std::size_t keep_newest = 0;
+  int keep_days = 0;
 };
 
 StoreActor actor(const ModelStoreArguments& arguments) {
@@ -217,6 +219,17 @@ int rollback(const ModelStoreArguments& arguments) {
   return 0;
 }
 
+int prune(const ModelStoreArguments& arguments) {
+  auto store = open_store(arguments.store);
+  if (!store) return report(store.error());
+  const ModelRetention retention{arguments.keep_newest, std::chrono::days{arguments.keep_days}};
+  const auto removed = store->remove_old(retention, actor(arguments));
+  if (!removed) return report(removed.error());
+  for (const auto& id : *removed) fmt::print("removed: {}\n", id);
+  fmt::print("{} models removed\n", removed->size());
+  return 0;
+}
+
 }  // namespace
 
 void add_model_list(CLI::App& parent, int& exit) {
@@ -274,6 +287,26 @@ void add_model_rollback(CLI::App& parent, int& exit) {
       ->type_name("ID");
   command->add_option("--why", arguments->why, "reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
+}
+
+void add_model_prune(CLI::App& parent, int& exit) {
+  auto arguments = std::make_shared<ModelStoreArguments>();
+  auto* command = parent.add_subcommand(
+      "prune",
+      "Remove the files of old models. The active model, those that a roll-back can activate, and "
+      "the record of all models are kept");
+  add_store_options(*command, arguments->store);
+  command
+      ->add_option("--keep-newest", arguments->keep_newest,
+                   "number of models, added last, that are kept at any age")
+      ->required()
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--keep-days", arguments->keep_days,
+                   "models that were added less than this before now are kept, too")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--why", arguments->why, "reason, for the record");
+  command->callback([arguments, &exit] { exit = prune(*arguments); });
 }
 
 }  // namespace abbe::daemon

@@ -106,6 +106,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_model_show(*model, exit);
   add_model_activate(*model, exit);
   add_model_rollback(*model, exit);
+  add_model_prune(*model, exit);
   add_export(app, exit);
   auto* dds = app.add_subcommand("dds", "Set up DDS Security");
   dds->require_subcommand(1);

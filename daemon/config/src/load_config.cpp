@@ -22,6 +22,7 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   read_thermal(root, config);
   read_air(root, config);
   read_recording(root, base, config);
+  read_models(root, config.models);
   read_dds(root, base, config);
   read_gate(root, config);
   read_otf(root, config.otf);

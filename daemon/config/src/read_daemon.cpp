@@ -80,6 +80,19 @@ void read_recording(ClassifiedSection& root, const std::filesystem::path& base, 
   section.close();
 }
 
+void read_models(ClassifiedSection& root, ModelRetention& out) {
+  Section section = root.operation_table("models");
+  section.get_integer("keep_newest", out.keep_newest, 0, 1'000'000);
+  int keep_days = 0;
+  if (section.get_integer("keep_days", keep_days, 0, 36'500))
+    out.keep = std::chrono::days{keep_days};
+  if (keep_days > 0 && out.keep_newest == 0)
+    section.fault("keep_days",
+                  "needs keep_newest: a clock that is ahead makes every model old, so the newest "
+                  "models are kept at any age");
+  section.close();
+}
+
 void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
   Section section = root.operation_table("dds");
   auto& dds = out.dds;

@@ -24,6 +24,7 @@ void read_thermal(ClassifiedSection& root, Config& out);
 void read_air(ClassifiedSection& root, Config& out);
 void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_recording(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+void read_models(ClassifiedSection& root, ModelRetention& out);
 void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_gate(ClassifiedSection& root, Config& out);
 void read_otf(ClassifiedSection& root, OtfConfig& out);

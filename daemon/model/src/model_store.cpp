@@ -1,12 +1,12 @@
 #include "abbe/model/model_store.hpp"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
+#include "model_index.hpp"
 #include "store_lock.hpp"
 #include "store_state.hpp"
 
@@ -54,15 +54,19 @@ Result<std::vector<std::string>> ids_on_disk(const fs::path& folder) {
   return ids;
 }
 
-/// The ids on disk, and those of all Added events: models are never removed, so an added model
-/// without a file is lost and must be listed.
+/// The ids on disk, and those of all Added events, because an added model without a file is lost
+/// and must be listed; without the models that were removed.
 Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const StoreState& state) {
   auto ids = ids_on_disk(folder);
   if (!ids) return ids;
-  for (const auto& event : state.events)
-    if (event.action == StoreAction::Added) ids->push_back(event.id);
+  const auto models = state.models();
+  for (const auto& [id, event] : models) ids->emplace_back(id);
   std::sort(ids->begin(), ids->end());
   ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
+  std::erase_if(*ids, [&models](const std::string& id) {
+    const auto known = models.find(id);
+    return known != models.end() && known->second->action == StoreAction::Removed;
+  });
   return ids;
 }
 
@@ -120,9 +124,12 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   // The model file is written first and without the lock. Another process may write the same file,
   // but with the same model, because the id is a hash of the model. A damaged file of this id is
   // replaced.
-  if (!load(id))
+  if (!load(id)) {
     if (const auto written = replace_file(model_path(id), to_json(document)); !written)
       return tl::make_unexpected(written.error());
+    const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(document)};
+    ModelIndex{folder_}.put({&indexed, 1});
+  }
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
@@ -196,30 +203,55 @@ Result<std::string> ModelStore::rollback(const StoreActor& actor, const std::str
   return id;
 }
 
+Result<std::vector<std::string>> ModelStore::remove_old(const ModelRetention& retention,
+                                                        const StoreActor& actor) {
+  if (retention.keep_newest == 0) return std::vector<std::string>{};
+  const auto lock = lock_store(folder_, lock_patience_);
+  if (!lock) return tl::make_unexpected(lock.error());
+  auto state = read_state(folder_);
+  if (!state) return tl::make_unexpected(state.error());
+
+  const auto removed = state->beyond(retention, actor.when);
+  for (const auto& id : removed)
+    state->events.push_back(StoreEvent{StoreAction::Removed, id, actor, false, {}});
+  if (!removed.empty())
+    if (const auto done = replace_file(state_file_, to_text(*state)); !done)
+      return tl::make_unexpected(done.error());
+
+  // Also the files that an earlier call could not remove.
+  for (const auto& [id, event] : state->models()) {
+    std::error_code error;
+    if (event->action != StoreAction::Removed) continue;
+    if (!fs::remove(model_path(std::string{id}), error) && error)
+      return fail(ErrorCode::Io, fmt::format("remove {}: {}", model_path(std::string{id}).string(),
+                                             error.message()));
+  }
+  return removed;
+}
+
 Result<std::vector<StoreEntry>> ModelStore::list() const {
   const auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
   const auto active = state->active();
   const auto ids = ids_in_store(folder_, *state);
   if (!ids) return tl::make_unexpected(ids.error());
+  auto found = summaries(*this, folder_, *ids);
+  const auto models = state->models();
   std::vector<StoreEntry> entries;
 
-  for (const auto& id : *ids) {
-    StoreEntry entry;
-    entry.id = id;
-    entry.active = active == id;
-    if (const StoreEvent* added = state->last_added(id); added != nullptr) {
-      entry.accepted = added->accepted;
-      entry.reasons = added->reasons;
-      entry.added = added->actor.when;
+  for (std::size_t i = 0; i < ids->size(); ++i) {
+    StoreEntry entry{.id = (*ids)[i]};
+    entry.active = active == entry.id;
+    if (const auto added = models.find(entry.id); added != models.end()) {
+      entry.accepted = added->second->accepted;
+      entry.reasons = added->second->reasons;
+      entry.added = added->second->actor.when;
     }
-    if (const auto document = load(id)) {
-      entry.method = document->method;
-      entry.machine = document->machine;
-      entry.simulated = made_on_simulated_devices(*document);
-    } else {
-      entry.fault = document.error().text;
-    }
+    entry.method = std::move(found[i].method);
+    entry.machine = std::move(found[i].machine);
+    entry.inputs = std::move(found[i].inputs);
+    entry.fault = std::move(found[i].fault);
+    entry.simulated = found[i].simulated;
     entries.push_back(std::move(entry));
   }
 
@@ -247,11 +279,7 @@ Result<std::optional<StoreEvent>> ModelStore::activation() const {
 }
 
 StoreStamp ModelStore::stamp() const noexcept {
-  struct stat status {};
-  if (::stat(state_file_.c_str(), &status) != 0) return {};
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec,
-          status.st_size};
+  return stamp_of_file(state_file_);
 }
 
 Result<std::string> ModelStore::drift() const {

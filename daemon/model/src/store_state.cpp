@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/bounded_json.hpp"
@@ -16,11 +17,12 @@ namespace {
 using nlohmann::json;
 
 constexpr std::string_view kSchema = "abbe/store/1";
-constexpr std::array<std::string_view, 5> kActions{"added", "activated", "forced", "rolled-back",
-                                                   "drifted"};
+constexpr std::array<std::string_view, 6> kActions{"added",       "activated", "forced",
+                                                   "rolled-back", "drifted",   "removed"};
 
 bool is_activation(const StoreEvent& event) {
-  return event.action != StoreAction::Added && event.action != StoreAction::Drifted;
+  return event.action == StoreAction::Activated || event.action == StoreAction::Forced ||
+         event.action == StoreAction::RolledBack;
 }
 
 std::string accepted_configuration(const std::vector<StoreEvent>& events, std::string_view id) {
@@ -104,9 +106,35 @@ std::string StoreState::drift() const {
 
 const StoreEvent* StoreState::last_added(std::string_view id) const {
   const auto found = std::find_if(events.rbegin(), events.rend(), [&](const StoreEvent& event) {
-    return event.action == StoreAction::Added && event.id == id;
+    return (event.action == StoreAction::Added || event.action == StoreAction::Removed) &&
+           event.id == id;
   });
-  return found == events.rend() ? nullptr : &*found;
+  return found == events.rend() || found->action == StoreAction::Removed ? nullptr : &*found;
+}
+
+std::unordered_map<std::string_view, const StoreEvent*> StoreState::models() const {
+  std::unordered_map<std::string_view, const StoreEvent*> last;
+  for (const auto& event : events)
+    if (event.action == StoreAction::Added || event.action == StoreAction::Removed)
+      last[event.id] = &event;
+  return last;
+}
+
+std::vector<std::string> StoreState::beyond(const ModelRetention& retention,
+                                            protocol::UtcTime now) const {
+  std::vector<const StoreEvent*> added;
+  for (const auto& [id, event] : models())
+    if (event->action == StoreAction::Added) added.push_back(event);
+  std::ranges::sort(added, std::less<>{});  // pointers into `events`: in the order of adding
+  if (added.size() <= retention.keep_newest) return {};
+  added.resize(added.size() - retention.keep_newest);
+
+  std::vector<std::string> ids;
+  const auto in_force = activations();
+  for (const StoreEvent* event : added)
+    if (event->actor.when + retention.keep <= now && std::ranges::count(in_force, event->id) == 0)
+      ids.push_back(event->id);
+  return ids;
 }
 
 std::string to_text(const StoreState& state) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "abbe/model/model_store.hpp"
@@ -21,8 +22,13 @@ struct StoreState {
   [[nodiscard]] std::optional<StoreEvent> activation() const;
   /// Reason of the last Drifted event since the last activation; empty: there is none.
   [[nodiscard]] std::string drift() const;
-  /// null if the model was never added
+  /// null if the model was never added, or was removed since
   [[nodiscard]] const StoreEvent* last_added(std::string_view id) const;
+  /// By id the last Added or Removed event of each model; the pointers are into `events`.
+  [[nodiscard]] std::unordered_map<std::string_view, const StoreEvent*> models() const;
+  /// The ids that ModelStore::remove_old() removes, oldest first.
+  [[nodiscard]] std::vector<std::string> beyond(const ModelRetention& retention,
+                                                protocol::UtcTime now) const;
 };
 
 [[nodiscard]] std::string to_text(const StoreState& state);

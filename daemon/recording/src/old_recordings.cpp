@@ -28,10 +28,8 @@ Result<std::set<std::string>> named_by_models(const fs::path& folder) {
   if (!entries) return tl::unexpected(entries.error());
 
   for (const auto& entry : *entries) {
-    const auto document = store->load(entry.id);
-    if (!document) return tl::unexpected(document.error());
-    for (const auto& input : document->inputs)
-      names.insert(input.name.substr(0, input.name.find('.')));
+    if (!entry.fault.empty()) return fail(ErrorCode::BadInput, entry.fault);
+    for (const auto& input : entry.inputs) names.insert(input.substr(0, input.find('.')));
   }
 
   return names;

@@ -48,6 +48,9 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
       case StoreAction::Drifted:
         notes.push_back("a later run found drift: " + who_and_when(event));
         break;
+      case StoreAction::Removed:
+        notes.push_back("removed from the store by " + who_and_when(event));
+        break;
     }
   }
   if (const auto& gap = subject.document.recording_gap; !gap.empty()) {

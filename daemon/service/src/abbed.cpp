@@ -42,6 +42,7 @@
 #include "abbed_options.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
+#include "store_upkeep.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -125,6 +126,7 @@ struct Abbed::State {
   LeftCounting left_counting;
   std::optional<CountingStateThread> counting_state;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
+  StoreUpkeep store_upkeep{config.daemon.models_dir(), config.models};
   // Owned by the background task, which the end of abbed does not wait for.
   const std::shared_ptr<std::atomic<bool>> stop_closing =
       std::make_shared<std::atomic<bool>>(false);
@@ -460,6 +462,7 @@ void Abbed::cycle() {
   const auto now = WallTime::clock::now();
   state_->supervise(now);
   state_->tidy_recordings(now);
+  state_->store_upkeep.cycle(now);
   state_->report_left_recordings();
 }
 

@@ -36,6 +36,7 @@ std::string reason_of(const StoreEvent& activation) {
       break;
     case StoreAction::Added:
     case StoreAction::Drifted:
+    case StoreAction::Removed:
       break;
   }
 

@@ -6,6 +6,8 @@ import { message } from "./main.js";
 import { get, listen, post, state } from "./server.js";
 import { smallChart } from "./small_charts.js";
 
+const SHOWN_MODELS = 200;  // newest; the others on request, because rows take the browser time
+
 const mayActivate = () => state.me.role === "administer";
 
 async function change(path, body, done, again) {
@@ -48,13 +50,24 @@ function verdict(model) {
     model.reasons.length ? list(model.reasons) : null);
 }
 
-function modelTable(models, again) {
-  const active = models.find((m) => m.active);
+function modelTable(models, active, again) {
   return table("models", ["model", "added (UTC)", "method", "machine", "verdict", "change"], models.map((m) => [
     m.fault ? m.id : h("a", { href: `#model/${m.id}`, class: "mono" }, m.id), when(m.added), m.method,
     m.machine, verdict(m),
     mayActivate() && !m.active && !m.fault
       ? h("button", { type: "button", "aria-label": `Activate ${m.id}`, onclick: () => activate(m, active, again) }, "Activate") : ""]));
+}
+
+// The newest models and the active one; `all`: whether the person asked for the others, too.
+function modelTables(models, all, again) {
+  const active = models.find((m) => m.active);
+  const shown = all.shown ? models : models.filter((m, i) => i < SHOWN_MODELS || m.active);
+  const left = models.length - shown.length;
+  const more = h("button", { type: "button",
+    onclick: () => { all.shown = true; place.replaceChildren(modelTable(models, active, again)); } },
+    `Show ${left} older models`);
+  const place = h("div", {}, modelTable(shown, active, again), left ? h("p", {}, more) : null);
+  return place;
 }
 
 function eventTable(events) {
@@ -99,6 +112,7 @@ const nameOf = (element) => element.getAttribute("aria-label") ?? element.textCo
 export async function show(place) {
   const tables = h("div"), trends = h("div");
   place.append(tables, trends);
+  const all = { shown: false };
   let shownHistory = "", trendAnswer = null, shownTrend = "";
   const fill = async () => {
     const answer = await get("api/history");
@@ -107,7 +121,7 @@ export async function show(place) {
     const { models, events } = answer;
     const focused = tables.contains(document.activeElement) ? nameOf(document.activeElement) : null;
     tables.replaceChildren(h("h2", {}, "Models"),
-      models.length ? modelTable(models, fill) : h("p", {}, "The store has no models yet."),
+      models.length ? modelTables(models, all, fill) : h("p", {}, "The store has no models yet."),
       mayActivate()
         ? h("p", {}, h("button", { type: "button", onclick: () => rollBack(models.find((m) => m.active), fill) }, "Roll back"))
         : h("p", { class: "weak" }, "To activate a model or roll back, log in with the role administer."),

@@ -54,6 +54,8 @@ std::string_view action_in_words(StoreAction action) {
       return "rolled back";
     case StoreAction::Drifted:
       return "drift found";
+    case StoreAction::Removed:
+      return "removed";
   }
   return "";
 }
@@ -180,14 +182,19 @@ Result<std::string> history_text(const ModelStore& store) {
   return text_of(out);
 }
 
-struct TrendModel {
-  std::string id;
-  abbe::protocol::UtcTime measured{};
-  daemon::CertifiedValues values;
-};
+/// nullopt: the model cannot be read, or has no certified values.
+std::optional<TrendModel> trend_model(const ModelStore& store, const std::string& id) {
+  const auto document = store.load(id);
+  if (!document) return std::nullopt;
+  auto values = daemon::certified_values(*document);
+  if (!values) return std::nullopt;
+  return TrendModel{id, daemon::time_of(*document), *std::move(values)};
+}
 
-/// Accepted models, the one that was measured first at the beginning.
-Result<std::vector<TrendModel>> trend_models(const ModelStore& store) {
+/// Accepted models, the one that was measured first at the beginning. `known` are those of the last
+/// call, by the stamp of their file; it becomes those of this call.
+Result<std::vector<TrendModel>> trend_models(const ModelStore& store,
+                                             std::map<std::string, TrendModel>& known) {
   auto entries = store.list();
   if (!entries) return tl::unexpected(entries.error());
   std::erase_if(*entries, [](const StoreEntry& e) { return !e.accepted || !e.fault.empty(); });
@@ -195,18 +202,23 @@ Result<std::vector<TrendModel>> trend_models(const ModelStore& store) {
   std::ranges::reverse(*entries);  // in the order of adding, which decides at the same time
 
   std::vector<TrendModel> models;
+  std::map<std::string, TrendModel> read;
   for (const StoreEntry& entry : *entries) {
-    const auto document = store.load(entry.id);
-    if (!document) continue;
-    auto values = daemon::certified_values(*document);
-    if (values) models.push_back({entry.id, daemon::time_of(*document), *std::move(values)});
+    const std::string file = stamp_of(store.model_path(entry.id));
+    const auto same = known.find(file);
+    const auto model =
+        same != known.end() ? std::optional{same->second} : trend_model(store, entry.id);
+    if (!model) continue;
+    read.emplace(file, *model);
+    models.push_back(*model);
   }
+  known = std::move(read);
   std::ranges::stable_sort(models, {}, &TrendModel::measured);
   return models;
 }
 
-Result<std::string> trend_text(const ModelStore& store) {
-  const auto found = trend_models(store);
+Result<std::string> trend_text(const ModelStore& store, std::map<std::string, TrendModel>& known) {
+  const auto found = trend_models(store, known);
   if (!found) return tl::unexpected(found.error());
 
   json models = json::array();
@@ -298,7 +310,8 @@ Result<std::string> ModelViews::model(const std::string& name) {
 
 Result<std::string> ModelViews::trend() {
   const ModelStore store{store_};
-  return kept("trend", stamp_of(store), making_trend_, [&store] { return trend_text(store); });
+  return kept("trend", stamp_of(store), making_trend_,
+              [&] { return trend_text(store, trend_models_); });
 }
 
 Result<std::string> ModelViews::report(const std::string& name) {

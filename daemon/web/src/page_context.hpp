@@ -11,12 +11,12 @@
 #include "abbe/web/daemon_feed.hpp"
 #include "abbe/web/event_board.hpp"
 #include "abbe/web/model_views.hpp"
+#include "abbe/web/page_places.hpp"
 #include "abbe/web/page_server.hpp"
 #include "abbe/web/replays.hpp"
 #include "abbe/web/sessions.hpp"
 #include "http.hpp"
 #include "limited_report.hpp"
-#include "page_places.hpp"
 #include "request_rate.hpp"
 
 namespace abbe::web {

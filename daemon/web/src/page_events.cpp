@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "abbe/web/client_network.hpp"
 #include "page_context.hpp"
@@ -20,6 +21,7 @@ struct Stream {
   PagePlaces::Held place;
   EventBoard::Reader reader;
   httplib::Request request;  ///< with the cookie
+  bool begins = true;        ///< the page does not know the number of its place yet
   Clock::time_point sent = Clock::now();
   Clock::time_point checked = Clock::now();
 };
@@ -36,11 +38,20 @@ bool may_go_on(PageContext& context, Stream& stream) {
 
 bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) {
   auto text = stream.reader.next(context.board, kHeartbeat);
+  if (stream.place.lost()) {
+    context.report.line("place " + stream.request.remote_addr,
+                        fmt::format("{}: closed: the page did not report that it reads its events, "
+                                    "and another page needed its place ([web] most_pages)",
+                                    peer_of(stream.request)));
+    text.reset();
+  }
   if (!text || !may_go_on(context, stream)) {
     sink.done();
     return true;
   }
   if (text->empty()) *text = "event: alive\ndata: {}\n\n";
+  if (std::exchange(stream.begins, false))
+    *text = fmt::format("event: place\ndata: {{\"number\":{}}}\n\n", stream.place.number()) + *text;
   if (!sink.write(text->data(), text->size())) return false;
   stream.sent = Clock::now();
   return true;
@@ -49,7 +60,7 @@ bool send_events(PageContext& context, Stream& stream, httplib::DataSink& sink) 
 /// False, with an answer, if there is no place for the page.
 bool take_place(PageContext& context, const httplib::Request& request, httplib::Response& response,
                 PagePlaces::Held& held) {
-  const auto place = context.pages.take(client_network(request.remote_addr), held);
+  const auto place = context.pages.take(client_network(request.remote_addr), Clock::now(), held);
   if (place == PagePlaces::Place::Taken) return true;
   const bool of_address = place == PagePlaces::Place::AllOfAddressTaken;
   const std::size_t most =
@@ -70,6 +81,8 @@ void answer_events(PageContext& context, const httplib::Request& request,
     return send_error(response, 505, "the stream of events needs HTTP/1.1");
   const auto stream = std::make_shared<Stream>();
   stream->request.headers = request.headers;
+  stream->request.remote_addr = request.remote_addr;
+  stream->request.remote_port = request.remote_port;
   if (!take_place(context, request, response, stream->place)) return;
   response.set_chunked_content_provider(
       "text/event-stream",

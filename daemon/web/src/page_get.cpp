@@ -2,6 +2,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -150,12 +153,25 @@ std::optional<std::string> behind(const std::string& path, std::string_view pref
   return path.substr(prefix.size());
 }
 
+/// A page reports that it reads its events, with the number of the event "place".
+void answer_reading(PageContext& context, const std::string& text, httplib::Response& response) {
+  std::uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  if (const auto read = std::from_chars(text.data(), end, number);
+      read.ec != std::errc{} || read.ptr != end)
+    return send_error(response, 400, "/api/reading/NUMBER: the number of an event \"place\"");
+  context.pages.report_reading(number, std::chrono::steady_clock::now());
+  send_json(response, json::object());
+}
+
 /// False if there is no such path.
 bool answer_data(PageContext& context, const httplib::Request& request,
                  httplib::Response& response) {
   const std::string& path = request.path;
   if (path == "/events") {
     answer_events(context, request, response);
+  } else if (const auto number = behind(path, "/api/reading/")) {
+    answer_reading(context, *number, response);
   } else if (path == "/api/status") {
     send_json(response, context.feed.status());
   } else if (path == "/api/calibration") {

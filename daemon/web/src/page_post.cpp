@@ -85,9 +85,13 @@ void log_in(PageContext& context, const httplib::Request& request, const json& b
   const auto session = context.sessions.log_in(user, body.at("password").get<std::string>(),
                                                client_network(request.remote_addr), Clock::now());
   if (!session) {
-    context.report.line("log in " + request.remote_addr,
-                        fmt::format("{}: log in as \"{}\" refused: {}", peer_of(request),
-                                    user.substr(0, 40), session.error().text));
+    const std::string line = fmt::format("{}: log in as \"{}\" refused: {}", peer_of(request),
+                                         user.substr(0, 40), session.error().text);
+    // Passwords that were checked are few, because an address must wait after five.
+    if (session.error().text == Sessions::kWrong)
+      context.report.always(line);
+    else
+      context.report.line("log in " + request.remote_addr, line);
     return send_error(response, session.error().code == ErrorCode::Refused ? 403 : 503,
                       session.error().text);
   }

@@ -34,23 +34,29 @@ Sessions::Sessions(const std::filesystem::path& users_file, SessionLimits limits
   (void)users_->users();  // reports a fault at the start
 }
 
-Result<void> Sessions::check_failures(const std::string& address, Clock::time_point now) {
+Result<std::size_t> Sessions::failures_of(const std::string& address, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   std::erase_if(failures_, [&](const auto& f) { return now - f.second.last >= limits_.pause; });
   const auto found = failures_.find(address);
-  const bool too_many = found != failures_.end() && found->second.count >= limits_.failures;
-  if (too_many)
+  const std::size_t count = found == failures_.end() ? 0 : found->second.count;
+  if (count >= limits_.failures)
     return daemon::fail(ErrorCode::Refused,
                         fmt::format("too many wrong passwords: wait {} s", limits_.pause.count()));
-  return {};
+  return count;
 }
 
 Result<WebSession> Sessions::log_in(const std::string& user, const std::string& password,
                                     const std::string& address, Clock::time_point now) {
   if (!possible())
     return daemon::fail(ErrorCode::Refused, "nobody can log in: [web] users names no file");
-  const std::lock_guard one_at_a_time(checking_);
-  if (const auto may = check_failures(address, now); !may) return tl::unexpected(may.error());
+  const auto before = failures_of(address, now);
+  if (!before) return tl::unexpected(before.error());
+  const auto turn = turns_.wait(address, *before, kPatience);
+  if (!turn)
+    return daemon::fail(ErrorCode::Io,
+                        "many passwords are being checked: try again in some seconds");
+  // Others of this address may have failed while this one waited.
+  if (const auto may = failures_of(address, now); !may) return tl::unexpected(may.error());
   const auto users = users_->users();
   if (!users) return tl::unexpected(users.error());
   const auto found = find_web_user(**users, user, password);
@@ -63,7 +69,7 @@ Result<WebSession> Sessions::log_in(const std::string& user, const std::string& 
     Failures& failures = failures_[address];
     ++failures.count;
     failures.last = now;
-    return daemon::fail(ErrorCode::Refused, "wrong name or password");
+    return daemon::fail(ErrorCode::Refused, std::string{kWrong});
   }
   // The failures stay: whoever has one password must not try others without limit.
   remove_ended(now);

@@ -133,6 +133,13 @@ struct RecordingConfig {
   std::chrono::hours keep{0};
 };
 
+/// [models]: which models the store keeps besides those in force. A model is removed only if it is
+/// neither among the newest nor younger than `keep`: a clock that is ahead removes none of the newest.
+struct ModelRetention {
+  std::size_t keep_newest = 0;  ///< models added last that are kept at any age; 0: keep all
+  std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
+};
+
 enum class Supervise { Child, Systemd, Off };
 
 /// [dds]
@@ -240,6 +247,7 @@ struct Config {
   AirConfig air;
   DaemonConfig daemon;
   RecordingConfig recording;
+  ModelRetention models;
   DdsConfig dds;
   GateConfig gate;
   OtfConfig otf;

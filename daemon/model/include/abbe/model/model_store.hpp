@@ -3,6 +3,7 @@
 ///
 ///   models/ID.json   one model.json each, never changed after it was written
 ///   state.json       all events in order (added, activated, rolled back), replaced as a whole
+///   index.sqlite     what lists need of each model.json; made again if it is missing or damaged
 ///
 /// A write creates a temporary file, syncs it to the disk and renames it: after a power failure the
 /// store has either the old or the new state. Several processes may use a store; a lock file orders
@@ -18,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/config/config.hpp"
 #include "abbe/model/model_document.hpp"
 
 namespace abbe::daemon {
@@ -30,12 +32,13 @@ struct StoreActor {
   bool operator==(const StoreActor&) const = default;
 };
 
-/// Drifted: a run found that the machine has changed since the model, which was active.
-enum class StoreAction { Added, Activated, Forced, RolledBack, Drifted };
+/// Drifted: a run found that the machine has changed since the model, which was active. Removed: the
+/// file of the model was removed because the store keeps a limited number of models.
+enum class StoreAction { Added, Activated, Forced, RolledBack, Drifted, Removed };
 
 struct StoreEvent {
   StoreAction action = StoreAction::Added;
-  std::string id;  ///< the added model, or the new active model
+  std::string id;  ///< the added or removed model, or the new active model
   StoreActor actor;
   bool accepted = false;             ///< Added: verdict of the gate
   std::vector<std::string> reasons;  ///< Added: reasons of a refusal
@@ -52,12 +55,13 @@ struct StoreEntry {
   std::vector<std::string> reasons;
   protocol::UtcTime added{};
   std::string method, machine;      ///< empty if the file cannot be read
+  std::vector<std::string> inputs;  ///< names of the files that the model was made of
   std::string fault;                ///< why the file cannot be read; empty: readable
   std::optional<bool> simulated{};  ///< made_on_simulated_devices()
 };
 
-/// Identifies a version of state.json, which is always replaced, never modified. All zero: the file
-/// does not exist.
+/// Identifies a version of state.json or of a model, which are always replaced, never modified. All
+/// zero: the file does not exist.
 struct StoreStamp {
   std::uint64_t inode = 0;
   std::int64_t modified_ns = 0;
@@ -109,6 +113,11 @@ class ModelStore {
   /// than `active` is active: a request that is repeated because its answer was lost must not go one
   /// model further back. Refused if no model was active before.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, const std::string& active);
+
+  /// Removes the models that `retention` does not keep; returns their ids, oldest first. The active
+  /// model and those that a roll-back can activate are kept. The events are kept for all models.
+  [[nodiscard]] Result<std::vector<std::string>> remove_old(const ModelRetention& retention,
+                                                            const StoreActor& actor);
 
   [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first

@@ -1,6 +1,6 @@
 #pragma once
-/// Removes recordings older than [recording] keep_days. Reads all models, so do not call it from
-/// the threads of the hub or the recorder. Not real-time.
+/// Removes recordings older than [recording] keep_days. May read all models, so do not call it
+/// from the threads of the hub or the recorder. Not real-time.
 
 #include <chrono>
 #include <filesystem>

@@ -14,8 +14,16 @@
 #include <string>
 
 #include "abbe/base/error.hpp"
+#include "abbe/report/certified_values.hpp"
 
 namespace abbe::web {
+
+/// What the trend shows of a model.
+struct TrendModel {
+  std::string id;
+  protocol::UtcTime measured{};
+  daemon::CertifiedValues values;
+};
 
 class ModelViews {
  public:
@@ -60,7 +68,8 @@ class ModelViews {
   std::atomic<bool> stopping_{false};
   // One at a time, because each takes much of a processor.
   std::mutex making_model_, making_history_, making_trend_;
-  std::mutex mutex_;  // of the members below
+  std::map<std::string, TrendModel> trend_models_;  // by the stamp of the file; under making_trend_
+  std::mutex mutex_;                                // of the members below
   std::map<std::string, Kept> kept_;
   std::uint64_t calls_ = 0;
 };

@@ -8,8 +8,10 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "abbe/base/error.hpp"
+#include "abbe/web/password_turns.hpp"
 #include "abbe/web/web_users.hpp"
 
 namespace abbe::web {
@@ -36,13 +38,17 @@ struct SessionLimits {
 class Sessions {
  public:
   using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kPatience{10};
+  /// The error of log_in() after a check.
+  static constexpr std::string_view kWrong = "wrong name or password";
   /// `report` receives a line for each fault in the file of users; any thread.
   explicit Sessions(
       const std::filesystem::path& users_file, SessionLimits limits = {},
       std::function<void(const std::string&)> report = [](const std::string&) {});
 
   /// Refused for a wrong name or password, after too many failures of `address`, and if no file of
-  /// users is configured; as UsersFile::users() if the file cannot be used. One log-in at a time.
+  /// users is configured; as UsersFile::users() if the file cannot be used. Waits for its turn in
+  /// PasswordTurns; Io after kPatience.
   [[nodiscard]] daemon::Result<WebSession> log_in(const std::string& user,
                                                   const std::string& password,
                                                   const std::string& address,
@@ -64,15 +70,16 @@ class Sessions {
     std::size_t count = 0;
     Clock::time_point last;
   };
-  [[nodiscard]] daemon::Result<void> check_failures(const std::string& address,
-                                                    Clock::time_point now);
+  /// Refused if they are too many.
+  [[nodiscard]] daemon::Result<std::size_t> failures_of(const std::string& address,
+                                                        Clock::time_point now);
   void remove_ended(Clock::time_point now);
   void make_place_for(const std::string& user);
 
   std::optional<UsersFile> users_;
   SessionLimits limits_;
-  std::mutex checking_;  // a password takes 0.1 s of one processor
-  std::mutex mutex_;     // of the members below
+  PasswordTurns turns_;
+  std::mutex mutex_;  // of the members below
   std::map<std::string, Kept> kept_;
   std::map<std::string, Failures> failures_;
 };

@@ -1,0 +1,214 @@
+#include "model_index.hpp"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <SQLiteCpp/VariadicBind.h>
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "abbe/base/sha256.hpp"
+#include "abbe/base/text_file.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+/// Another number whenever ModelSummary or the table changes: the index is then made again.
+constexpr int kIndexVersion = 1;
+/// Another process holds the file for milliseconds. Who waits longer does without the index.
+constexpr int kBusy_ms = 200;
+
+constexpr auto kTable =
+    "CREATE TABLE model(id TEXT PRIMARY KEY, inode INTEGER, modified_ns INTEGER, bytes INTEGER, "
+    "summary TEXT, sum TEXT) WITHOUT ROWID";
+
+std::string text_of(const ModelSummary& summary) {
+  return json{{"method", summary.method},
+              {"machine", summary.machine},
+              {"inputs", summary.inputs},
+              {"simulated", summary.simulated ? json(*summary.simulated) : json()},
+              {"fault", summary.fault}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+/// Throws json::exception if a member is missing or has the wrong type.
+ModelSummary summary_from(const std::string& text) {
+  const json object = json::parse(text);
+  const json& simulated = object.at("simulated");
+  return {.method = object.at("method").get<std::string>(),
+          .machine = object.at("machine").get<std::string>(),
+          .inputs = object.at("inputs").get<std::vector<std::string>>(),
+          .simulated = simulated.is_null() ? std::nullopt : std::optional{simulated.get<bool>()},
+          .fault = object.at("fault").get<std::string>()};
+}
+
+/// SQLite has no checksums, and a changed bit must not rename a machine.
+std::string checksum(const std::string& id, const StoreStamp& file, const std::string& summary) {
+  return sha256_hex(
+      fmt::format("{} {} {} {} {}", id, file.inode, file.modified_ns, file.bytes, summary));
+}
+
+bool is_regular_or_missing(const fs::path& file) {
+  std::error_code unknown;
+  const auto type = fs::symlink_status(file, unknown).type();
+  return type == fs::file_type::regular || type == fs::file_type::not_found;
+}
+
+/// The index if it can be opened and has the tables of this version. Throws SQLite::Exception.
+std::unique_ptr<SQLite::Database> open_index(const fs::path& file) {
+  auto database =
+      std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READWRITE, kBusy_ms);
+  // An index that a power failure damages is made again, so that nothing waits for the disk.
+  database->exec("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF");
+  const int version = database->execAndGet("PRAGMA user_version").getInt();
+  return version == kIndexVersion ? std::move(database) : nullptr;
+}
+
+/// Throws SQLite::Exception.
+std::unique_ptr<SQLite::Database> create_index(const fs::path& file) {
+  // An empty file is an empty database; this one has owner and mode of the store.
+  if (!replace_file(file, "")) return nullptr;
+  SQLite::Database created{file.string(), SQLite::OPEN_READWRITE, kBusy_ms};
+  SQLite::Transaction change{created};
+  created.exec(kTable);
+  created.exec(fmt::format("PRAGMA user_version = {}", kIndexVersion));
+  change.commit();
+  return open_index(file);
+}
+
+}  // namespace
+
+ModelIndex::ModelIndex(const fs::path& folder) {
+  const fs::path file = folder / "index.sqlite";
+  if (!is_regular_or_missing(file)) return;
+
+  try {
+    database_ = open_index(file);
+  } catch (const SQLite::Exception& error) {
+    if (error.getErrorCode() == SQLITE_BUSY) return;
+  }
+  if (database_ != nullptr || ::access(folder.c_str(), W_OK) != 0) return;
+  try {
+    database_ = create_index(file);
+  } catch (const SQLite::Exception&) {  // a full disk, or another process creates it now
+    database_ = nullptr;
+  }
+}
+
+ModelIndex::~ModelIndex() = default;
+
+std::unordered_map<std::string, IndexedModel> ModelIndex::rows() const {
+  std::unordered_map<std::string, IndexedModel> found;
+  if (database_ == nullptr) return found;
+
+  try {
+    SQLite::Statement row{*database_,
+                          "SELECT id, inode, modified_ns, bytes, summary, sum FROM model"};
+    while (row.executeStep()) {
+      IndexedModel model{row.getColumn(0).getString(),
+                         {static_cast<std::uint64_t>(row.getColumn(1).getInt64()),
+                          row.getColumn(2).getInt64(), row.getColumn(3).getInt64()},
+                         {}};
+      const std::string summary = row.getColumn(4).getString();
+      if (checksum(model.id, model.file, summary) != row.getColumn(5).getString()) continue;
+      model.summary = summary_from(summary);
+      std::string id = model.id;
+      found.insert_or_assign(std::move(id), std::move(model));
+    }
+  } catch (const SQLite::Exception&) {  // the rows so far have their checksums
+  } catch (const json::exception&) {    // a version of abbe with other members and the same number
+    found.clear();
+  }
+  return found;
+}
+
+void ModelIndex::put(std::span<const IndexedModel> models) {
+  if (database_ == nullptr || models.empty()) return;
+  try {
+    SQLite::Transaction change{*database_};
+    SQLite::Statement row{*database_, "INSERT OR REPLACE INTO model VALUES(?, ?, ?, ?, ?, ?)"};
+    for (const IndexedModel& model : models) {
+      const std::string summary = text_of(model.summary);
+      SQLite::bind(row, model.id, static_cast<std::int64_t>(model.file.inode),
+                   model.file.modified_ns, model.file.bytes, summary,
+                   checksum(model.id, model.file, summary));
+      row.exec();
+      row.reset();
+    }
+    change.commit();
+  } catch (const SQLite::Exception&) {  // read-only, busy or full: these models are read again
+  }
+}
+
+void ModelIndex::remove(std::span<const std::string> ids) {
+  if (database_ == nullptr || ids.empty()) return;
+  try {
+    SQLite::Transaction change{*database_};
+    SQLite::Statement row{*database_, "DELETE FROM model WHERE id = ?"};
+    for (const std::string& id : ids) {
+      row.bind(1, id);
+      row.exec();
+      row.reset();
+    }
+    change.commit();
+  } catch (const SQLite::Exception&) {  // a row without a file is not used
+  }
+}
+
+ModelSummary summary_of(const ModelDocument& document) {
+  ModelSummary summary{.method = document.method,
+                       .machine = document.machine,
+                       .simulated = made_on_simulated_devices(document)};
+  for (const InputFile& input : document.inputs) summary.inputs.push_back(input.name);
+  return summary;
+}
+
+std::vector<ModelSummary> summaries(const ModelStore& store, const fs::path& folder,
+                                    const std::vector<std::string>& ids) {
+  // Reading a model takes some 10 ms: an interrupted rebuild keeps what it has done.
+  constexpr std::size_t kModelsPerWrite = 64;
+  ModelIndex index{folder};
+  auto known = index.rows();
+  std::vector<ModelSummary> found;
+  std::vector<IndexedModel> read;
+
+  for (const std::string& id : ids) {
+    const StoreStamp file = stamp_of_file(store.model_path(id));
+    const auto row = known.extract(id);
+    if (!row.empty() && row.mapped().file == file) {
+      found.push_back(std::move(row.mapped().summary));
+      continue;
+    }
+    const auto document = store.load(id);
+    found.push_back(document ? summary_of(*document)
+                             : ModelSummary{.fault = document.error().text});
+    // What the disk refused now may be readable the next time.
+    if (document || document.error().code != ErrorCode::Io)
+      read.push_back({id, file, found.back()});
+    if (read.size() == kModelsPerWrite) index.put(std::exchange(read, {}));
+  }
+
+  index.put(read);
+  std::vector<std::string> others;
+  for (const auto& [id, row] : known) others.push_back(id);
+  index.remove(others);
+  return found;
+}
+
+StoreStamp stamp_of_file(const fs::path& file) noexcept {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return {};
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  return {status.st_ino, status.st_mtim.tv_sec * kSecond_ns + status.st_mtim.tv_nsec,
+          status.st_size};
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,70 @@
+#pragma once
+/// index.sqlite in the folder of a store: what lists of models need of each model.json, so that a
+/// list does not read all models. It is a cache. A row is used only while its file has the same
+/// inode, time and size and the row has its checksum; a missing or damaged index is made again. A
+/// process that may not write to the folder reads the index and leaves it as it is. No call fails:
+/// without a usable index there are no rows. An object must be used by one thread only.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "abbe/model/model_store.hpp"
+
+namespace SQLite {
+class Database;
+}
+
+namespace abbe::daemon {
+
+/// What lists show of a model, and what retention of recordings needs.
+struct ModelSummary {
+  std::string method{}, machine{};
+  std::vector<std::string> inputs{};  ///< names of the files that the model was made of
+  std::optional<bool> simulated{};    ///< made_on_simulated_devices()
+  std::string fault{};                ///< why the file is not a model; then all others are empty
+  bool operator==(const ModelSummary&) const = default;
+};
+
+struct IndexedModel {
+  std::string id;
+  StoreStamp file;  ///< of model.json when it was read
+  ModelSummary summary;
+};
+
+class ModelIndex {
+ public:
+  /// Opens FOLDER/index.sqlite, and creates or replaces it if it is missing, damaged or of another
+  /// version and the folder is writable.
+  explicit ModelIndex(const std::filesystem::path& folder);
+  ModelIndex(const ModelIndex&) = delete;
+  ModelIndex& operator=(const ModelIndex&) = delete;
+  ~ModelIndex();
+
+  /// All rows with a correct checksum, by id.
+  [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows() const;
+  /// Adds rows, or replaces those of the same id.
+  void put(std::span<const IndexedModel> models);
+  void remove(std::span<const std::string> ids);
+
+ private:
+  std::unique_ptr<SQLite::Database> database_;  ///< null: there is no usable index
+};
+
+/// Inode, time and size of a file; all zero if there is none.
+[[nodiscard]] StoreStamp stamp_of_file(const std::filesystem::path& file) noexcept;
+
+[[nodiscard]] ModelSummary summary_of(const ModelDocument& document);
+
+/// The summaries of the models `ids`, in their order. What the index of the store lacks is read and
+/// added to it; rows of other models are removed.
+[[nodiscard]] std::vector<ModelSummary> summaries(const ModelStore& store,
+                                                  const std::filesystem::path& folder,
+                                                  const std::vector<std::string>& ids);
+
+}  // namespace abbe::daemon

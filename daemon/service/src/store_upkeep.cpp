@@ -1,0 +1,51 @@
+#include "store_upkeep.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+
+#include "abbe/service/background_tasks.hpp"
+#include "outcome.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kPeriod = 1h;
+
+/// The removed models. The list brings the index up to date.
+Result<std::vector<std::string>> keep_up(const std::filesystem::path& folder,
+                                         const ModelRetention& retention) {
+  ModelStore store{folder};
+  const StoreActor actor{
+      "abbed",
+      fmt::format("[models] keep_newest = {}, keep_days = {}", retention.keep_newest,
+                  std::chrono::duration_cast<std::chrono::days>(retention.keep).count()),
+      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
+  auto removed = store.remove_old(retention, actor);
+  if (!removed) return removed;
+  if (const auto entries = store.list(); !entries) return tl::unexpected(entries.error());
+  return removed;
+}
+
+}  // namespace
+
+void StoreUpkeep::cycle(WallTime now) {
+  if (work_.valid() && work_.wait_for(0s) == std::future_status::ready) {
+    const auto removed = outcome_of(work_);
+    if (!removed)
+      fmt::print(stderr, "abbed: upkeep of the model store: {}\n", removed.error().text);
+    else if (!removed->empty())
+      fmt::print(stderr, "abbed: {} models removed, which [models] does not keep\n",
+                 removed->size());
+  }
+
+  if (work_.valid() || now < next_) return;
+  next_ = now + kPeriod;
+  work_ = run_abandonable(
+      [store = store_, retention = retention_] { return keep_up(store, retention); });
+}
+
+}  // namespace abbe::daemon

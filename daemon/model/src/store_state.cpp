@@ -82,6 +82,7 @@ std::optional<StoreEvent> StoreState::activation() const {
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
+  if (added != nullptr && !added->accepted) event.reasons = added->reasons;
   return event;
 }
 

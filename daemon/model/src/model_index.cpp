@@ -34,9 +34,22 @@ std::string text_of(const ModelSummary& summary) {
   return json{{"method", summary.method},
               {"machine", summary.machine},
               {"inputs", summary.inputs},
+              {"verdict", json_of(summary.verdict)},
               {"simulated", summary.simulated ? json(*summary.simulated) : json()},
               {"fault", summary.fault}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+json json_of(const std::optional<ModelVerdict>& verdict) {
+  if (!verdict) return {};
+  return {{"accepted", verdict->accepted}, {"reasons", verdict->reasons}};
+}
+
+/// Throws json::exception, as summary_from().
+std::optional<ModelVerdict> verdict_from(const json& object) {
+  if (object.is_null()) return std::nullopt;
+  return ModelVerdict{object.at("accepted").get<bool>(),
+                      object.at("reasons").get<std::vector<std::string>>()};
 }
 
 /// Throws json::exception if a member is missing or has the wrong type.
@@ -46,6 +59,7 @@ ModelSummary summary_from(const std::string& text) {
   return {.method = object.at("method").get<std::string>(),
           .machine = object.at("machine").get<std::string>(),
           .inputs = object.at("inputs").get<std::vector<std::string>>(),
+          .verdict = verdict_from(object.at("verdict")),
           .simulated = simulated.is_null() ? std::nullopt : std::optional{simulated.get<bool>()},
           .fault = object.at("fault").get<std::string>()};
 }
@@ -166,6 +180,7 @@ void ModelIndex::remove(std::span<const std::string> ids) {
 ModelSummary summary_of(const ModelDocument& document) {
   ModelSummary summary{.method = document.method,
                        .machine = document.machine,
+                       .verdict = document.verdict,
                        .simulated = made_on_simulated_devices(document)};
   for (const InputFile& input : document.inputs) summary.inputs.push_back(input.name);
   return summary;

@@ -25,9 +25,10 @@ namespace abbe::daemon {
 /// What lists show of a model, and what retention of recordings needs.
 struct ModelSummary {
   std::string method{}, machine{};
-  std::vector<std::string> inputs{};  ///< names of the files that the model was made of
-  std::optional<bool> simulated{};    ///< made_on_simulated_devices()
-  std::string fault{};                ///< why the file is not a model; then all others are empty
+  std::vector<std::string> inputs{};      ///< names of the files that the model was made of
+  std::optional<ModelVerdict> verdict{};  ///< of the file: decision and reasons
+  std::optional<bool> simulated{};        ///< made_on_simulated_devices()
+  std::string fault{};  ///< why the file is not a model; then all others are empty
   bool operator==(const ModelSummary&) const = default;
 };
 

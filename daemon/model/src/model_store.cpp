@@ -70,6 +70,31 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
+/// That of the state; where it was lost, that of the file.
+std::optional<ModelVerdict> verdict_on(const StoreState& state, const ModelDocument& document) {
+  const StoreEvent* added = state.last_added(model_id(document));
+  if (added == nullptr) return document.verdict;
+  return ModelVerdict{added->accepted, added->reasons};
+}
+
+void set_verdict(StoreEntry& entry, const std::optional<ModelVerdict>& verdict) {
+  entry.judged = verdict.has_value();
+  if (!verdict) return;
+  entry.accepted = verdict->accepted;
+  entry.reasons = verdict->reasons;
+}
+
+/// Notes may differ.
+bool same_decision(const std::optional<ModelVerdict>& a, const ModelVerdict& b) {
+  return a && a->accepted == b.accepted && a->reasons == b.reasons;
+}
+
+/// The document with its own verdict, or with `verdict` if it has another one.
+ModelDocument with_verdict(ModelDocument document, const ModelVerdict& verdict) {
+  if (!same_decision(document.verdict, verdict)) document.verdict = verdict;
+  return document;
+}
+
 constexpr std::size_t kShortestPrefix = 4;
 
 /// Why `prefix` does not name one of `candidates`, the ids that begin with it.
@@ -122,12 +147,14 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
   // The model file is written first and without the lock. Another process may write the same file,
-  // but with the same model, because the id is a hash of the model. A damaged file of this id is
-  // replaced.
-  if (!load(id)) {
-    if (const auto written = replace_file(model_path(id), to_json(document)); !written)
+  // but with the same model, because the id is a hash of the model. A file of this id that is
+  // damaged, or has another verdict, is replaced.
+  const ModelVerdict verdict{accepted, reasons};
+  if (const auto known = load(id); !known || !same_decision(known->verdict, verdict)) {
+    const ModelDocument judged = with_verdict(document, verdict);
+    if (const auto written = replace_file(model_path(id), to_json(judged)); !written)
       return tl::make_unexpected(written.error());
-    const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(document)};
+    const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(judged)};
     ModelIndex{folder_}.put({&indexed, 1});
   }
   const auto lock = lock_store(folder_, lock_patience_);
@@ -152,15 +179,16 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
-  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
-  const StoreEvent* added = state->last_added(id);
-  const bool accepted = added != nullptr && added->accepted;
+  const auto document = load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto verdict = verdict_on(*state, *document);
+  const bool accepted = verdict && verdict->accepted;
   if (!accepted && !force)
     return fail(ErrorCode::Refused,
-                added == nullptr
-                    ? fmt::format("activate {}: it has no verdict of the gate (use force)", id)
-                    : fmt::format("activate {}: the gate refused it: {}", id,
-                                  fmt::join(added->reasons, "; ")));
+                verdict
+                    ? fmt::format("activate {}: the gate refused it: {}", id,
+                                  fmt::join(verdict->reasons, "; "))
+                    : fmt::format("activate {}: it has no verdict of the gate (use force)", id));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
 
   return append(folder_, std::move(*state),
@@ -243,9 +271,10 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     StoreEntry entry{.id = (*ids)[i]};
     entry.active = active == entry.id;
     if (const auto added = models.find(entry.id); added != models.end()) {
-      entry.accepted = added->second->accepted;
-      entry.reasons = added->second->reasons;
+      set_verdict(entry, ModelVerdict{added->second->accepted, added->second->reasons});
       entry.added = added->second->actor.when;
+    } else {
+      set_verdict(entry, found[i].verdict);
     }
     entry.method = std::move(found[i].method);
     entry.machine = std::move(found[i].machine);

@@ -12,6 +12,7 @@
 #include "read_bar_figures.hpp"
 #include "read_run_figures.hpp"
 #include "read_travel.hpp"
+#include "verdict_json.hpp"
 
 namespace abbe::daemon {
 
@@ -282,6 +283,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto bar = read_bar_figures(in);
   const auto run = read_run_figures(in);
   const auto configuration = read_configuration(in);
+  const auto verdict = read_verdict(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode"),
              software = read_optional(in, "abbe_version");
   const auto method = in.text("method"), estimator = in.text("estimator"),
@@ -289,12 +291,14 @@ Result<ModelDocument> read_document(ModelReader& in) {
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
   ModelDocument document{
-      std::move(*model), method, estimator, machine,       machine_hash, *created,
-      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
-      tracker_drift,     bar,    run,       software,      configuration};
+      std::move(*model), method, estimator, machine,       machine_hash,  *created,
+      statistics,        inputs, artefact,  recording_gap, mode,          backlash,
+      tracker_drift,     bar,    run,       software,      configuration, verdict};
   check_configuration(in, document);
   if (hash != model_hash(document))
     in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+  else if (!verdict_is_whole(in, document))
+    in.fault("verdict", "is not the verdict on this model: the file was changed or damaged");
   if (!in.any()) return document;
 
   return tl::make_unexpected(in.to_error());

@@ -95,6 +95,7 @@ std::optional<StoreEvent> StoreState::activation() const {
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
   event.accepted_configuration = accepted_configuration(events, *id);
+  if (added != nullptr && !added->accepted) event.reasons = added->reasons;
   return event;
 }
 

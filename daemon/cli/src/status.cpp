@@ -159,6 +159,15 @@ void print_dds(const json& dds) {
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
 }
 
+/// The file, and how far it is behind the machine.
+void print_recording(const json& status) {
+  fmt::print("recording  {}", status["recording"].get<std::string>());
+  for (const json& stream : status["streams"])
+    if (stream.contains("behind_s"))
+      fmt::print(", {:.1f} s behind", stream["behind_s"].get<double>());
+  fmt::print("\n");
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
@@ -190,8 +199,7 @@ void print_status(const json& status) {
   if (status.contains("unmeasured_air"))
     fmt::print("tracker    {}\n",
                coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
-  if (status.contains("recording"))
-    fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("recording")) print_recording(status);
   if (status.contains("dds")) print_dds(status["dds"]);
   fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate",
              "samples", "dropped", "gaps", "faults", "last fault");

@@ -213,6 +213,10 @@ void Recorder::fail(const std::string& what) {
   if (state_->status.state != RecorderStatus::State::Closed) state_->note_fault({0, what});
 }
 
+std::optional<Recorder::WallTime> Recorder::open_chunk_since() const {
+  return state_->chunk.empty() ? std::nullopt : std::optional{state_->chunk_since};
+}
+
 RecordingDigest Recorder::digest() const {
   if (!state_->file) return {{}, 0, state_->status.file, state_->gap_of_run()};
   return {state_->file->sha256(), state_->file->size(), state_->file->path(), state_->gap_of_run()};

@@ -23,9 +23,32 @@ void sleep_until(std::chrono::steady_clock::time_point t) {
   (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
 }
 
-StreamHealth health_of(const RecorderThread& recorder) {
+/// The largest of 1, 2, 5, 10, 20, 50 ... that is not above `value`; 0 below 1. A text with it does
+/// not change every second.
+int round_down(double value) {
+  int step = 1;
+  for (const int factor : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000})
+    if (value >= factor) step = factor;
+  return value >= 1.0 ? step : 0;
+}
+
+/// Warning from twice the period in which chunks are written; empty: none.
+std::string text_of_lag(std::chrono::nanoseconds behind, std::chrono::nanoseconds chunk_period) {
+  if (behind < 2 * chunk_period) return {};
+  return fmt::format(
+      "the file is more than {} s behind the machine (chunk_period_ms = {}): what is not written "
+      "is lost if abbed ends; check the disk and the load of the computer",
+      round_down(std::chrono::duration<double>(behind).count()),
+      std::chrono::duration_cast<std::chrono::milliseconds>(chunk_period).count());
+}
+
+StreamHealth health_of(const RecorderThread& recorder, std::chrono::nanoseconds chunk_period,
+                       std::chrono::steady_clock::time_point wall) {
   const RecorderStatus& r = recorder.status();
   StreamHealth h;
+  const auto behind = recorder.behind(wall);
+  h.behind_s = std::chrono::duration<double>(behind).count();
+  h.status.condition = text_of_lag(behind, chunk_period);
   h.status.name = "recorder";
   h.status.state = name(r.state);
   h.status.connected = r.state == RecorderStatus::State::Recording;
@@ -186,7 +209,9 @@ void Hub::publish(bool fresh, HostTime now) {
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
   health_.push_back(health_of(parts_.authority, parts_.calibration));
-  if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
+  if (parts_.recorder != nullptr)
+    health_.push_back(
+        health_of(*parts_.recorder, parts_.config.recording.chunk_period, cycle_began_));
   if (parts_.publisher == nullptr) return;
   health_.push_back(health_of(*parts_.publisher));
   health_.push_back(health_of_security(*parts_.publisher));

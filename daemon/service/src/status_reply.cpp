@@ -38,24 +38,26 @@ json latency_json(const drivers::LatencyHistogram::Counts& counts) {
 
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
-  return {{"name", d.name},
-          {"state", d.state},
-          {"connected", d.connected},
-          {"rate_hz", h.rate_hz},
-          {"samples", d.samples},
-          {"dropped", d.dropped + d.raw_dropped},
-          {"gaps", d.gaps},
-          {"faults", d.faults},
-          {"condition", d.condition},
-          {"last_fault", d.last_fault},
-          {"clock",
-           {{"settled", d.clock.settled},
-            {"skew_ppm", d.clock.skew * 1e6},
-            {"residual_s", in_seconds(d.clock.residual)},
-            {"u_time_s", in_seconds(d.clock.u_time)}}},
-          {"latency_p50_s", h.latency_p50_s},
-          {"latency_p99_s", h.latency_p99_s},
-          {"latency_counts", latency_json(h.latency)}};
+  json out{{"name", d.name},
+           {"state", d.state},
+           {"connected", d.connected},
+           {"rate_hz", h.rate_hz},
+           {"samples", d.samples},
+           {"dropped", d.dropped + d.raw_dropped},
+           {"gaps", d.gaps},
+           {"faults", d.faults},
+           {"condition", d.condition},
+           {"last_fault", d.last_fault},
+           {"clock",
+            {{"settled", d.clock.settled},
+             {"skew_ppm", d.clock.skew * 1e6},
+             {"residual_s", in_seconds(d.clock.residual)},
+             {"u_time_s", in_seconds(d.clock.u_time)}}},
+           {"latency_p50_s", h.latency_p50_s},
+           {"latency_p99_s", h.latency_p99_s},
+           {"latency_counts", latency_json(h.latency)}};
+  if (h.behind_s) out["behind_s"] = *h.behind_s;
+  return out;
 }
 
 json features_json(const std::vector<FeatureToTouch>& features) {

@@ -47,12 +47,19 @@ function environment(status) {
   ])];
 }
 
+/** The file, and how far it is behind the machine. */
+function recording(status) {
+  const recorder = status.streams.find((stream) => stream.behind_s !== undefined);
+  if (!status.recording || !recorder) return status.recording;
+  return `${status.recording}, ${fixed(recorder.behind_s, 1)} s behind`;
+}
+
 function state_of(status) {
   const dds = status.dds;
   return facts("state", [
     ["model", `${status.model.id ?? "-"}: ${status.model.reason}`],
     ["session", `${status.session.state}: ${status.session.reason}`],
-    ["recording", status.recording],
+    ["recording", recording(status)],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
     ["axes not referenced", status.axes_without_zero?.join(", ")],

@@ -140,6 +140,10 @@ class Recorder {
   /// recording continues in the next file after retry_period.
   void fail(const std::string& what);
 
+  /// Since when the oldest message of the open chunk waits; nullopt: no chunk is open, all messages
+  /// are written or lost.
+  [[nodiscard]] std::optional<WallTime> open_chunk_since() const;
+
   /// The hash of everything written to the present file so far.
   [[nodiscard]] RecordingDigest digest() const;
 

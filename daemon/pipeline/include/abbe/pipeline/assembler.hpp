@@ -63,6 +63,8 @@ class Assembler {
   std::deque<protocol::AxisSample> axes_;
   EnvironmentMerge environment_;
   protocol::HostTime newest_{};
+  /// A later time is wrong: it neither makes other streams late nor is waited for.
+  protocol::HostTime latest_ = protocol::HostTime::max();
 };
 
 }  // namespace abbe::daemon

@@ -49,7 +49,7 @@ std::string with_tables(std::string text, const std::vector<std::string>& names)
 }
 
 std::string with_modbus_and_cmm() {
-  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[cmm]"});
+  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[[sensors.limit]]", "[cmm]"});
 }
 
 /// The axes come from one device.
@@ -75,6 +75,7 @@ TEST(ExampleConfig, ItsExampleTablesAreValidToo) {
   const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
   EXPECT_EQ(config.of<EnvironmentConfig>().size(), 3u);
   EXPECT_EQ(config.thermal.size(), 1u);
+  EXPECT_EQ(config.sensors.limits.size(), 1u);
   EXPECT_TRUE(config.of<CmmConfig>());
 }
 

@@ -89,6 +89,10 @@ void print_positions(const json& status) {
   for (std::size_t i = 0; i < axes.size(); ++i)
     fmt::print("{}{}", i == 0 ? "" : "  ", position_text(axes[i], positions[i]));
   fmt::print("\n");
+  for (const json& axis : axes)
+    if (const auto missing = axis.value("missing", std::string{}); !missing.empty())
+      fmt::print("           {}: {}\n", axis["axis"].get<std::string>(),
+                 coloured(missing, kYellow, STDOUT_FILENO));
 }
 
 void print_next(const json& next) {

@@ -21,6 +21,7 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
+  read_sensors(root, config);
   read_recording(root, base, config);
   read_dds(root, base, config);
   read_gate(root, config);

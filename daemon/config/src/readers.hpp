@@ -21,6 +21,7 @@ inline constexpr std::size_t kMostConfigFaults = 1000;
 void read_machine(Section& root, MachineConfig& out);
 void read_thermal(Section& root, Config& out);
 void read_air(Section& root, Config& out);
+void read_sensors(Section& root, Config& out);
 void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
 void read_recording(Section& root, const std::filesystem::path& base, Config& out);
 void read_dds(Section& root, const std::filesystem::path& base, Config& out);

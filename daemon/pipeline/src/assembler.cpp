@@ -108,7 +108,7 @@ void Assembler::emit_first_touch(std::vector<Snapshot>& out) {
   touches_.pop_front();
 }
 
-Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
+Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
   Snapshot s = begin(point.head);
   s.has_tracker_point = true;
   s.tracker_point = point;
@@ -118,7 +118,7 @@ Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
   return s;
 }
 
-Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
+Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) {
   Snapshot s = begin(touch.head);
   s.has_trigger = true;
   s.trigger = touch;
@@ -141,7 +141,7 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
 }
 
 /// Begins a snapshot: its head, and the environment values that apply at the time in the head.
-Snapshot Assembler::begin(const protocol::SampleHead& head) const {
+Snapshot Assembler::begin(const protocol::SampleHead& head) {
   Snapshot s;
   s.head = head;
   s.axes_compensated = options_.axes_compensated;

@@ -139,6 +139,8 @@ void Recorder::record(const protocol::EnvironmentSample& sample, std::string_vie
   state_->add_marked(Stream::Environment, State::dates_of(sample.head.time, taken), device,
                      state_->environment);
   state_->keep_environment(sample, device);
+  state_->sensors_at = sample.head.time;
+  (void)state_->sensors.checked(sample, state_->sensors.mask_of(device));
 }
 
 void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample,

@@ -78,6 +78,33 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
   return h;
 }
 
+/// Adds to the health of each device what is wrong with its sensors.
+void add_findings(const std::vector<SensorFinding>& findings, std::vector<StreamHealth>& health) {
+  for (const SensorFinding& finding : findings) {
+    // The first reading after a start waits for a second one that agrees; that is no fault.
+    if (finding.doubt == calib::SensorDoubt::Unconfirmed) continue;
+    for (StreamHealth& stream : health) {
+      if (stream.status.name != finding.device) continue;
+      std::string& text = stream.status.condition;
+      text += fmt::format("{}{}", text.empty() ? "" : "; ", finding.text);
+    }
+  }
+}
+
+/// Counts readings that were not used as faults of their device. A single one is over when health
+/// is collected: then its text is the last fault.
+void add_doubts(const std::vector<SensorDoubts>& doubts, std::vector<StreamHealth>& health) {
+  for (const SensorDoubts& sensor : doubts) {
+    for (StreamHealth& stream : health) {
+      if (stream.status.name != sensor.device) continue;
+      stream.status.faults += sensor.count;
+      if (sensor.latest < stream.status.last_fault_at) continue;
+      stream.status.last_fault = sensor.latest_text;
+      stream.status.last_fault_at = sensor.latest;
+    }
+  }
+}
+
 /// Text about the restarts and the last end of abbe-dds; empty if abbe-dds has not ended yet.
 std::string report_of(const DdsProcess& process) {
   const auto end = process.last_end();
@@ -142,8 +169,13 @@ Hub::WallTime Hub::last_cycle() const noexcept {
 }
 
 ActiveModelState Hub::model_state() const {
-  return parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(),
-                                      parts_.time.host(kAxesTimeout));
+  const auto patience = parts_.time.host(kAxesTimeout);
+  const auto known_at = live_.axes_known_at();
+  auto state = parts_.authority.model_state(parts_.time.now(), known_at, patience);
+  const bool known = known_at && parts_.time.now() - *known_at <= patience;
+  if (!known && state.model != nullptr && !missing_scale_.empty())
+    state.reason += ": " + missing_scale_;
+  return state;
 }
 
 void Hub::cycle(WallTime wall) {
@@ -208,6 +240,11 @@ void Hub::publish(bool fresh, HostTime now) {
 
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
+  add_findings(live_.sensor_findings(), health_);
+  add_doubts(live_.sensor_doubts(), health_);
+  missing_scale_ = {};
+  for (const auto& reason : live_.missing_scales())
+    if (missing_scale_.empty()) missing_scale_ = reason;
   health_.push_back(health_of(parts_.authority, parts_.calibration));
   if (parts_.recorder != nullptr)
     health_.push_back(

@@ -13,7 +13,8 @@ function axisCards(place, axes) {
     place.append(h("div", { class: "axis", role: "group", "aria-label": `axis ${axis.axis}` },
       h("div", { class: "name" }, axis.axis),
       h("div", { class: "value current" }, value,
-        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm"))));
+        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm")),
+      axis.missing ? h("div", { class: "warn" }, axis.missing) : ""));
     return { value, factor: rotary ? kDegrees : 1e3 };
   });
   return (positions) => values.forEach(({ value, factor }, i) => {

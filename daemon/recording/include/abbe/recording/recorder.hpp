@@ -43,6 +43,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/messages/cdr.hpp"
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/pipeline/sensor_options.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -59,6 +60,7 @@ struct RecorderOptions {
       std::chrono::seconds{5};       ///< after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
   std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
+  SensorCheckOptions sensors;        ///< of the live run: a further file begins with their state
 };
 
 struct RecorderStatus {

@@ -36,7 +36,7 @@ inline std::string with_tables(std::string text, const std::vector<std::string>&
 }
 
 inline std::string with_modbus_and_cmm() {
-  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[cmm]"});
+  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[[sensors.limit]]", "[cmm]"});
 }
 
 /// The axes come from one device.

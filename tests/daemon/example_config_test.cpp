@@ -40,6 +40,7 @@ TEST(ExampleConfig, ItsExampleTablesAreValidToo) {
   const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
   EXPECT_EQ(config.of<EnvironmentConfig>().size(), 3u);
   EXPECT_EQ(config.thermal.size(), 1u);
+  EXPECT_EQ(config.sensors.limits.size(), 1u);
   EXPECT_TRUE(config.of<CmmConfig>());
 }
 

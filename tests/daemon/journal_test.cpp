@@ -166,6 +166,19 @@ TEST_F(StateObserverTest, ARefusedDeviceIsOneWarningWithARemedy) {
   EXPECT_THAT(look(), IsEmpty());
 }
 
+TEST_F(StateObserverTest, AConditionOfAConnectedDeviceIsAWarningAndItsEndALine) {
+  tracker("streaming", true, "");
+  (void)look();
+  now_.streams[0].status.condition = "scale_x is not available (X is missing)";
+  const auto entries = look();
+  ASSERT_THAT(entries, SizeIs(1));
+  EXPECT_EQ(entries[0].urgency, Urgency::Warning);
+  EXPECT_THAT(entries[0].message, HasSubstr("streaming; scale_x is not available (X is missing)"));
+  EXPECT_EQ(field(entries[0], "ABBE_CONDITION"), "scale_x is not available (X is missing)");
+  now_.streams[0].status.condition.clear();
+  EXPECT_THAT(lines(), SizeIs(1));
+}
+
 TEST_F(StateObserverTest, FaultsThatRepeatAreALineAMinuteWithTheirCount) {
   tracker("streaming", true, "torn packet");
   EXPECT_THAT(lines(), SizeIs(1));

@@ -210,6 +210,10 @@ TEST_F(PublisherTest, EveryStreamHasItsHealth) {
   ASSERT_THAT(sent, SizeIs(2));
   EXPECT_EQ(sent[1].stream(), "encoder");
   EXPECT_EQ(sent[1].fault(), "no answer");
+  streams[1].status.condition = "X missing (node 1)";
+  publisher_->health(streams, kPublishTime);
+  EXPECT_EQ(taken<v1::Health>(Topic::Health).at(1).fault(),
+            "X missing (node 1); last fault: no answer");
 }
 
 }  // namespace

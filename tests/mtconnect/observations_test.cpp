@@ -112,6 +112,14 @@ TEST(Observations, RaiseAFaultForAModelThatMustNotBeUsed) {
   }
 }
 
+TEST(Observations, WarnOfARecordingThatIsBehindTheMachine) {
+  auto status = test::status();
+  status["streams"][2]["condition"] = "the file is more than 5 s behind the machine";
+  const auto raised = condition(observations_of(status), "system").at("recorder");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_EQ(raised.text, "the file is more than 5 s behind the machine");
+}
+
 TEST(Observations, AskForTheReleaseOfAMachine) {
   auto status = test::status();
   status["release_awaited"] = {{"reason", "collision"}, {"command", "abbe machine release"}};

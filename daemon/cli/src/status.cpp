@@ -89,6 +89,10 @@ void print_positions(const json& status) {
   for (std::size_t i = 0; i < axes.size(); ++i)
     fmt::print("{}{}", i == 0 ? "" : "  ", position_text(axes[i], positions[i]));
   fmt::print("\n");
+  for (const json& axis : axes)
+    if (const auto missing = axis.value("missing", std::string{}); !missing.empty())
+      fmt::print("           {}: {}\n", axis["axis"].get<std::string>(),
+                 coloured(missing, kYellow, STDOUT_FILENO));
 }
 
 void print_next(const json& next) {
@@ -169,6 +173,15 @@ std::string simulated_parts(const json& status) {
   return model ? "the model was made on SIMULATED devices" : "";
 }
 
+/// The file, and how far it is behind the machine.
+void print_recording(const json& status) {
+  fmt::print("recording  {}", status["recording"].get<std::string>());
+  for (const json& stream : status["streams"])
+    if (stream.contains("behind_s"))
+      fmt::print(", {:.1f} s behind", stream["behind_s"].get<double>());
+  fmt::print("\n");
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
@@ -202,8 +215,7 @@ void print_status(const json& status) {
   if (status.contains("unmeasured_air"))
     fmt::print("tracker    {}\n",
                coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
-  if (status.contains("recording"))
-    fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("recording")) print_recording(status);
   if (status.contains("dds")) print_dds(status["dds"]);
   fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate",
              "samples", "dropped", "gaps", "faults", "last fault");

@@ -58,7 +58,7 @@ struct ConfigKind {
   std::optional<TouchSource> (*touches)(const Config& config) = nullptr;
   std::optional<CountedAxes> (*counted)(const Config& config) = nullptr;
   const ReferenceMarks* (*marks)(const Config& config) = nullptr;
-  protocol::EnvironmentMask (*environment)(const Config& config) = nullptr;
+  std::vector<EnvironmentSource> (*environment)(const Config& config) = nullptr;
 };
 
 [[nodiscard]] std::span<const ConfigKind> config_kinds();

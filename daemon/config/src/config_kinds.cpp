@@ -114,10 +114,19 @@ std::optional<std::chrono::nanoseconds> time_of_axis_samples(const Config& confi
   return std::nullopt;
 }
 
+std::vector<EnvironmentSource> environment_sources(const Config& config) {
+  std::vector<EnvironmentSource> all;
+  for (const ConfigKind& kind : config_kinds()) {
+    if (kind.environment == nullptr) continue;
+    const auto sources = kind.environment(config);
+    all.insert(all.end(), sources.begin(), sources.end());
+  }
+  return all;
+}
+
 protocol::EnvironmentMask measured_environment(const Config& config) {
   protocol::EnvironmentMask all = 0;
-  for (const ConfigKind& kind : config_kinds())
-    if (kind.environment != nullptr) all |= kind.environment(config);
+  for (const auto& source : environment_sources(config)) all |= source.measured;
   return all;
 }
 

@@ -21,6 +21,7 @@ Config read_all(const Section& file, const std::filesystem::path& base) {
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
+  read_sensors(root, config);
   read_recording(root, base, config);
   read_models(root, config.models);
   read_dds(root, base, config);

@@ -22,6 +22,7 @@ inline constexpr std::size_t kMostConfigFaults = 1000;
 void read_machine(ClassifiedSection& root, MachineConfig& out);
 void read_thermal(ClassifiedSection& root, Config& out);
 void read_air(ClassifiedSection& root, Config& out);
+void read_sensors(ClassifiedSection& root, Config& out);
 void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_recording(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
 void read_models(ClassifiedSection& root, ModelRetention& out);

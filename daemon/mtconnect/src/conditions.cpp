@@ -62,8 +62,13 @@ Condition system_condition(const json& status) {
   for (const json& stream : status.at("streams")) {
     const auto name = stream.at("name").get<std::string>();
     const Part* const part = part_of(name);
-    if (part != nullptr && !stream.at("connected").get<bool>())
+    if (part == nullptr) continue;
+    const auto condition = stream.at("condition").get<std::string>();
+    if (!stream.at("connected").get<bool>()) {
       out[name] = {part->when_bad, text_of_state(stream)};
+    } else if (!condition.empty()) {
+      out[name] = {Level::Warning, condition};
+    }
   }
 
   if (status.contains("release_awaited"))

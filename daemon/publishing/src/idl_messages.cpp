@@ -225,6 +225,17 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   return m;
 }
 
+namespace {
+
+/// What is wrong now, then the last fault.
+std::string fault_text(const drivers::DeviceStatus& d) {
+  if (d.condition.empty() || d.last_fault.empty() || d.condition == d.last_fault)
+    return d.condition.empty() ? d.last_fault : d.condition;
+  return d.condition + "; last fault: " + d.last_fault;
+}
+
+}  // namespace
+
 v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double latency_p50_s,
                           double latency_p99_s, const Stamp& stamp) {
   v1::Health m;
@@ -240,7 +251,7 @@ v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double
   m.clock_residual_s(std::chrono::duration<double>(d.clock.residual).count());
   m.latency_p50_s(latency_p50_s);
   m.latency_p99_s(latency_p99_s);
-  m.fault(cut(d.last_fault, kReasonBound));
+  m.fault(cut(fault_text(d), kReasonBound));
 
   return m;
 }

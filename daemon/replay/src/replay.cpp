@@ -302,6 +302,13 @@ class FromBytes {
   LiveCycles<protocol::EnvironmentSample> weather_;
 };
 
+/// Earlier versions of abbe used the readings of sensors without checking them.
+AssemblerOptions assembling(const RecordingReader& recording, const Config& config) {
+  auto options = assembler_options(config);
+  if (!has_rule(recording, kSensorRule)) options.environment.sensors = {};
+  return options;
+}
+
 /// Gives the pipeline the batches of the live run, cycle by cycle.
 class Replay : private PipelineObserver {
  public:
@@ -314,7 +321,7 @@ class Replay : private PipelineObserver {
         datum_(std::move(attached.datum)),
         marks_(std::move(attached.marks)),
         calibrations_(recording, std::move(attached.requests), config, options),
-        pipeline_(assembler_options(config),
+        pipeline_(assembling(recording, config),
                   options.source == ReplaySource::RawBytes ? &datum_ : nullptr),
         set_up_(recording) {
     pipeline_.add(*this);
@@ -329,6 +336,14 @@ class Replay : private PipelineObserver {
   Replay(const Replay&) = delete;
   Replay& operator=(const Replay&) = delete;
 
+  /// A further file begins with the state of the sensors at the end of the previous one.
+  [[nodiscard]] Result<void> go_on() {
+    for (const auto& attachment : recording_.attachments()) {
+      if (attachment.name != kSensorStateName) continue;
+      if (auto read = pipeline_.go_on(attachment); !read) return read;
+    }
+    return {};
+  }
   [[nodiscard]] ReplayReport run() {
     const auto range = recording_.time_range();
     if (!range) return {};
@@ -457,7 +472,9 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
                             const ReplayOptions& options) {
   auto attached = attached_to(recording, config);
   if (!attached) return tl::unexpected(attached.error());
-  return Replay{recording, config, options, std::move(*attached)}.run();
+  Replay again{recording, config, options, std::move(*attached)};
+  if (const auto begun = again.go_on(); !begun) return tl::unexpected(begun.error());
+  return again.run();
 }
 
 }  // namespace abbe::daemon

@@ -183,7 +183,8 @@ struct Abbed::State {
                        .versions = {{"abbe", ABBE_VERSION},
                                     {kAxisSamplesRule, "1"},
                                     {kDatumRule, "2"},
-                                    {kRotaryTravelRule, "1"}}};
+                                    {kRotaryTravelRule, "1"},
+                                    {kSensorRule, "1"}}};
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);

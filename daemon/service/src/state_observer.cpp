@@ -56,18 +56,24 @@ ObservedPart part_of(const StreamHealth& stream) {
   const auto& d = stream.status;
   const StreamKind kind = kind_of(d.name);
   const std::uint64_t lost = d.dropped + d.raw_dropped;
-  ObservedPart part{.key = "stream " + d.name,
-                    .state = fmt::format("{}\n{}\n{}", d.state, d.connected, d.last_fault),
-                    .message = fmt::format("{}{}: {}", kind.word, d.name, d.state),
-                    .message_id = kind.message_id,
-                    .urgency = d.connected && d.last_fault.empty() ? Urgency::Info : kind.when_bad,
-                    .fields = {{"ABBE_DEVICE", d.name},
-                               {"ABBE_STATE", std::string{d.state}},
-                               {"ABBE_FAULTS", std::to_string(d.faults)},
-                               {"ABBE_LOST", std::to_string(lost)},
-                               {"ABBE_GAPS", std::to_string(d.gaps)}},
-                    .counted = d.faults + lost};
+  ObservedPart part{
+      .key = "stream " + d.name,
+      .state = fmt::format("{}\n{}\n{}\n{}", d.state, d.connected, d.condition, d.last_fault),
+      .message = fmt::format("{}{}: {}", kind.word, d.name, d.state),
+      .message_id = kind.message_id,
+      .urgency = d.connected && d.last_fault.empty() && d.condition.empty() ? Urgency::Info
+                                                                            : kind.when_bad,
+      .fields = {{"ABBE_DEVICE", d.name},
+                 {"ABBE_STATE", std::string{d.state}},
+                 {"ABBE_FAULTS", std::to_string(d.faults)},
+                 {"ABBE_LOST", std::to_string(lost)},
+                 {"ABBE_GAPS", std::to_string(d.gaps)}},
+      .counted = d.faults + lost};
 
+  if (!d.condition.empty()) {
+    part.message += fmt::format("; {}", d.condition);
+    part.fields.push_back({"ABBE_CONDITION", d.condition});
+  }
   if (!d.last_fault.empty()) {
     part.message += fmt::format("; last fault: {}", d.last_fault);
     part.fields.push_back({"ABBE_FAULT", d.last_fault});

@@ -38,24 +38,26 @@ json latency_json(const drivers::LatencyHistogram::Counts& counts) {
 
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
-  return {{"name", d.name},
-          {"state", d.state},
-          {"connected", d.connected},
-          {"rate_hz", h.rate_hz},
-          {"samples", d.samples},
-          {"dropped", d.dropped + d.raw_dropped},
-          {"gaps", d.gaps},
-          {"faults", d.faults},
-          {"condition", d.condition},
-          {"last_fault", d.last_fault},
-          {"clock",
-           {{"settled", d.clock.settled},
-            {"skew_ppm", d.clock.skew * 1e6},
-            {"residual_s", in_seconds(d.clock.residual)},
-            {"u_time_s", in_seconds(d.clock.u_time)}}},
-          {"latency_p50_s", h.latency_p50_s},
-          {"latency_p99_s", h.latency_p99_s},
-          {"latency_counts", latency_json(h.latency)}};
+  json out{{"name", d.name},
+           {"state", d.state},
+           {"connected", d.connected},
+           {"rate_hz", h.rate_hz},
+           {"samples", d.samples},
+           {"dropped", d.dropped + d.raw_dropped},
+           {"gaps", d.gaps},
+           {"faults", d.faults},
+           {"condition", d.condition},
+           {"last_fault", d.last_fault},
+           {"clock",
+            {{"settled", d.clock.settled},
+             {"skew_ppm", d.clock.skew * 1e6},
+             {"residual_s", in_seconds(d.clock.residual)},
+             {"u_time_s", in_seconds(d.clock.u_time)}}},
+           {"latency_p50_s", h.latency_p50_s},
+           {"latency_p99_s", h.latency_p99_s},
+           {"latency_counts", latency_json(h.latency)}};
+  if (h.behind_s) out["behind_s"] = *h.behind_s;
+  return out;
 }
 
 json features_json(const std::vector<FeatureToTouch>& features) {
@@ -235,7 +237,7 @@ json positions_json(const protocol::Snapshot& live, bool old) {
 /// Names and kinds of the axes of "position_m", in the same order: the axes that have an encoder or
 /// a counter, or if there are none, the first axes of the machine, which a measuring machine
 /// reports.
-json axes_json(const Config& config, std::size_t count) {
+json axes_json(const Config& config, std::size_t count, const std::vector<std::string>& missing) {
   const auto& axes_of_machine = config.machine.axes;
   auto names = config.connected_axes();
   if (names.empty())
@@ -246,7 +248,8 @@ json axes_json(const Config& config, std::size_t count) {
   for (const std::string& name : names) {
     const auto axis = std::ranges::find(axes_of_machine, name, &AxisConfig::name);
     const bool rotary = axis != axes_of_machine.end() && axis->kind == AxisKind::Rotary;
-    axes.push_back({{"axis", name}, {"kind", rotary ? "rotary" : "linear"}});
+    json& out = axes.emplace_back(json{{"axis", name}, {"kind", rotary ? "rotary" : "linear"}});
+    if (const auto& reason = missing.at(axes.size() - 1); !reason.empty()) out["missing"] = reason;
   }
 
   return axes;
@@ -292,6 +295,7 @@ struct SeenStatus {
   std::optional<calib::HeldOutFigures> held_out;
   std::deque<SessionStatus> ended;
   protocol::Snapshot live;
+  std::vector<std::string> missing_scales;
   bool positions_are_old = true;
   std::optional<SeenReference> reference;
   std::optional<std::vector<std::string>> without_zero;
@@ -314,6 +318,7 @@ SeenStatus look_at_status(const Hub& hub) {
                   .held_out = parts.calibration.held_out(),
                   .ended = parts.calibration.ended(),
                   .live = hub.live().view(),
+                  .missing_scales = hub.live().missing_scales(),
                   .positions_are_old = positions_are_old(hub),
                   .reference = {},
                   .without_zero = {},
@@ -333,6 +338,22 @@ SeenStatus look_at_status(const Hub& hub) {
   return seen;
 }
 
+/// Why each axis has no position; empty: it has one.
+std::vector<std::string> missing_reasons(const SeenStatus& seen) {
+  std::vector<std::string> reasons(seen.live.axis_count);
+  for (std::size_t axis = 0; axis < reasons.size(); ++axis) {
+    if (seen.positions_are_old)
+      reasons[axis] = "no reading of the axes arrives: see the device that reads them";
+    else if (has(seen.live.head.flags, protocol::SampleFlag::BusOff))
+      reasons[axis] = "the bus of the encoders is off";
+    else if (axis < seen.missing_scales.size() && !seen.missing_scales[axis].empty())
+      reasons[axis] = seen.missing_scales[axis];
+    else if ((seen.live.missing_mask >> axis & 1u) != 0)
+      reasons[axis] = "its encoder gives no reading, or the axis is not referenced";
+  }
+  return reasons;
+}
+
 json status_json(const SeenStatus& seen, const Config& config) {
   json devices = json::array();
   for (const auto& h : seen.streams) devices.push_back(device_json(h));
@@ -346,7 +367,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
   json& ended = out["ended_sessions"] = json::array();
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
-  out["axes"] = axes_json(config, seen.live.axis_count);
+  out["axes"] = axes_json(config, seen.live.axis_count, missing_reasons(seen));
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
   const auto tracker = tracker_source(config);
   if (const auto air = tracker ? unmeasured_air_text(config, tracker->u_scale) : std::nullopt)

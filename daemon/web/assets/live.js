@@ -13,7 +13,8 @@ function axisCards(place, axes) {
     place.append(h("div", { class: "axis", role: "group", "aria-label": `axis ${axis.axis}` },
       h("div", { class: "name" }, axis.axis),
       h("div", { class: "value current" }, value,
-        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm"))));
+        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm")),
+      axis.missing ? h("div", { class: "warn" }, axis.missing) : ""));
     return { value, factor: rotary ? kDegrees : 1e3 };
   });
   return (positions) => values.forEach(({ value, factor }, i) => {
@@ -47,12 +48,19 @@ function environment(status) {
   ])];
 }
 
+/** The file, and how far it is behind the machine. */
+function recording(status) {
+  const recorder = status.streams.find((stream) => stream.behind_s !== undefined);
+  if (!status.recording || !recorder) return status.recording;
+  return `${status.recording}, ${fixed(recorder.behind_s, 1)} s behind`;
+}
+
 function state_of(status) {
   const dds = status.dds;
   return facts("state", [
     ["model", `${status.model.id ?? "-"}: ${status.model.reason}`],
     ["session", `${status.session.state}: ${status.session.reason}`],
-    ["recording", status.recording],
+    ["recording", recording(status)],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
     ["axes not referenced", status.axes_without_zero?.join(", ")],

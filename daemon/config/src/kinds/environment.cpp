@@ -287,10 +287,13 @@ std::vector<std::string> environment_summary(const Config& config) {
   return texts;
 }
 
-protocol::EnvironmentMask measured_by_devices(const Config& config) {
-  protocol::EnvironmentMask all = 0;
-  for (const auto& device : config.of<EnvironmentConfig>())
-    for (const auto& measured : device.map.measured) all |= drivers::mask_of(measured);
+std::vector<EnvironmentSource> measured_by_devices(const Config& config) {
+  std::vector<EnvironmentSource> all;
+  for (const auto& device : config.of<EnvironmentConfig>()) {
+    auto& source =
+        all.emplace_back(EnvironmentSource{.device = device.name, .period = device.period});
+    for (const auto& measured : device.map.measured) source.measured |= drivers::mask_of(measured);
+  }
   return all;
 }
 

@@ -192,6 +192,7 @@ std::optional<TrackerSource> points_of_tracker(const Config& config) {
   const auto& tracker = config.of<TrackerConfig>();
   if (!tracker) return std::nullopt;
   TrackerSource source{.key = TrackerConfig::kKind.key,
+                       .device = tracker->name,
                        .point_rate_hz = tracker->point_rate_hz,
                        .u_scale = tracker->u_scale};
   if (tracker->mode == TrackerModeConfig::Stationary)

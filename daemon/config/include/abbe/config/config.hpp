@@ -95,6 +95,32 @@ struct AirConfig {
   std::optional<double> assumed_index;
 };
 
+/// [[sensors.limit]]: what the readings of one sensor are checked against, in K, Pa or as a ratio.
+/// nullopt: the default of the kind of sensor (sensor_options.hpp of pipeline).
+struct SensorLimitConfig {
+  /// one of Config::temperatures, "air_temperature", "air_pressure" or "relative_humidity"
+  std::string name;
+  std::optional<double> lowest, highest;
+  std::optional<double> most_per_s;
+  std::optional<double> tolerance;
+  std::string twin;  ///< the temperature at the same place; empty: none
+  double most_twin_difference_K = 1.0;
+};
+
+/// [sensors]: checks of the readings of all environment sensors.
+struct SensorsConfig {
+  bool check = true;
+  /// for this time the last good value is used instead of readings that are refused
+  std::chrono::nanoseconds hold{std::chrono::seconds{60}};
+  /// after this time without a reading the history of a sensor is discarded
+  std::chrono::nanoseconds forget{std::chrono::minutes{10}};
+  /// largest difference of a first reading from the median of scales and air
+  double start_spread_K = 15.0;
+  /// limit of the rate at which the temperature that corrects a scale follows the sensor
+  double correction_K_per_s = 1.0 / 60.0;
+  std::vector<SensorLimitConfig> limits;
+};
+
 using drivers::RealTimeMode;
 
 /// [daemon]
@@ -245,6 +271,7 @@ struct Config {
   std::vector<std::string> temperatures;
   std::vector<ThermalConfig> thermal;
   AirConfig air;
+  SensorsConfig sensors;
   DaemonConfig daemon;
   RecordingConfig recording;
   ModelRetention models;

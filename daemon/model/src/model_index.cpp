@@ -30,6 +30,11 @@ constexpr auto kTable =
     "CREATE TABLE model(id TEXT PRIMARY KEY, inode INTEGER, modified_ns INTEGER, bytes INTEGER, "
     "summary TEXT, sum TEXT) WITHOUT ROWID";
 
+json json_of(const std::optional<ModelVerdict>& verdict) {
+  if (!verdict) return {};
+  return {{"accepted", verdict->accepted}, {"reasons", verdict->reasons}};
+}
+
 std::string text_of(const ModelSummary& summary) {
   return json{{"method", summary.method},
               {"machine", summary.machine},
@@ -38,11 +43,6 @@ std::string text_of(const ModelSummary& summary) {
               {"simulated", summary.simulated ? json(*summary.simulated) : json()},
               {"fault", summary.fault}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-json json_of(const std::optional<ModelVerdict>& verdict) {
-  if (!verdict) return {};
-  return {{"accepted", verdict->accepted}, {"reasons", verdict->reasons}};
 }
 
 /// Throws json::exception, as summary_from().

@@ -22,7 +22,8 @@ async function activate(model, active, again) {
   const why = await ask({ title: `Activate ${model.id}?`, yes: "Activate",
     lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
       `Then: ${model.id}, added ${when(model.added)}.`,
-      ...(model.accepted ? [] : ["The gate refused this model: it may make the machine worse."])],
+      ...(model.accepted ? [] : [model.judged ? "The gate refused this model: it may make the machine worse."
+        : "The gate has not judged this model: it may make the machine worse."])],
     reason: "Reason, for the record", required: !model.accepted });
   if (why === null) return;
   await change("api/activate", { id: model.id, why, force: !model.accepted },
@@ -40,7 +41,7 @@ async function rollBack(active, again) {
 
 function verdict(model) {
   if (model.fault) return h("span", { class: "bad" }, `damaged: ${model.fault}`);
-  const word = model.active ? "active" : model.accepted ? "accepted" : "refused";
+  const word = model.active ? "active" : model.accepted ? "accepted" : model.judged ? "refused" : "not judged";
   const kind = model.active ? "good" : model.accepted ? "" : "warn";
   return h("div", {}, h("span", { class: kind }, model.active && !model.accepted ? "active (forced)" : word),
     model.reasons.length ? list(model.reasons) : null);

@@ -176,6 +176,24 @@ TEST(CalibrationCertificate, AcceptsLocalDaysBesideThoseOfUtc) {
   EXPECT_FALSE(calibration_certificate(subject)) << "22:00 in the east is the 17th";
 }
 
+TEST(CalibrationCertificate, OfARefusedModelIsRefusedUnlessForcedAndThenStatesIt) {
+  ReportSubject subject = certified_subject(3);
+  subject.document.verdict = ModelVerdict{.reasons = {"larger by 418 um/m"}};
+  const auto refused = calibration_certificate(subject);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("refused by the gate: larger by 418 um/m")));
+  subject.forced = StoreActor{"anna", "customer insists", {}};
+  const std::string text = calibration_certificate(subject).value();
+  EXPECT_EQ(schema_faults(text), "");
+  const auto statements = text.find("<dcc:statements>");
+  ASSERT_NE(statements, std::string::npos);
+  EXPECT_LT(text.find("larger by 418 um/m", statements), text.find(">Gauge<"));
+  EXPECT_LT(text.find("forced by anna", statements), text.find(">Gauge<"));
+  EXPECT_THAT(text, HasSubstr("customer insists"));
+}
+
 /// dcc:norm states that the measurement followed the standard.
 TEST(CalibrationCertificate, NamesNoStandardWhoseTestWasNotMade) {
   const std::string text = calibration_certificate(certified_subject(3)).value();

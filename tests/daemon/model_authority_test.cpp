@@ -169,8 +169,10 @@ TEST_F(ModelAuthorityTest, AForcedModelNamesUserAndReasonAlsoAfterARestart) {
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(id, actor("crane test"), true));
   ASSERT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_state(authority).reason, "forced by anna: crane test");
-  EXPECT_EQ(fresh_state(open()).reason, "forced by anna: crane test");
+  const std::string reason = "forced by anna: crane test; the gate had refused it: 3 mm";
+  EXPECT_EQ(fresh_state(authority).reason, reason);
+  EXPECT_EQ(fresh_state(open()).reason, reason);
+  EXPECT_EQ(fresh_state(open()).refused, "3 mm");
 }
 
 TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {

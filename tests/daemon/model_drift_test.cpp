@@ -229,7 +229,7 @@ TEST_F(DriftingMachine, RaisesDriftBeforeTheNewModelIsActive) {
   EXPECT_THAT(service_->status().reason,
               HasSubstr("drift since the active model: EC0Y changed by"));
   const auto kept = store().load(model().model->id).value();
-  EXPECT_THAT(kept.run->notes,
+  EXPECT_THAT(kept.verdict->notes,
               ::testing::Contains(HasSubstr("drift since the active model: EC0Y changed by")));
 }
 
@@ -292,7 +292,7 @@ TEST_F(DriftingMachine, ARunUpdatesTheActiveModelAndNamesBothParents) {
   EXPECT_EQ(store().load(of_run)->statistics, document.statistics);
   EXPECT_FALSE(store().load(of_run)->run->held_out_cells.empty());
   EXPECT_TRUE(document.run->held_out_cells.empty());
-  EXPECT_THAT(document.run->notes, ::testing::Contains(HasSubstr("was updated with the run")));
+  EXPECT_THAT(document.verdict->notes, ::testing::Contains(HasSubstr("was updated with the run")));
   EXPECT_LT(document.model.parameters().back().u, store().load(first)->model.parameters().back().u);
 }
 

@@ -112,6 +112,16 @@ TEST(Observations, RaiseAFaultForAModelThatMustNotBeUsed) {
   }
 }
 
+TEST(Observations, WarnOfAModelThatAPersonActivatedAgainstTheGate) {
+  auto status = test::status();
+  EXPECT_FALSE(condition(observations_of(status), "calibration").contains("MODEL_REFUSED"));
+  status["model"]["reason"] = "forced by anna: crane test; the gate had refused it: 3 mm";
+  status["model"]["refused"] = "3 mm";
+  const auto raised = condition(observations_of(status), "calibration").at("MODEL_REFUSED");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_EQ(raised.text, status["model"]["reason"]);
+}
+
 TEST(Observations, AskForTheReleaseOfAMachine) {
   auto status = test::status();
   status["release_awaited"] = {{"reason", "collision"}, {"command", "abbe machine release"}};

@@ -66,6 +66,33 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
+/// That of the state; where it was lost, that of the file.
+std::optional<ModelVerdict> verdict_on(const StoreState& state, const ModelDocument& document) {
+  const StoreEvent* added = state.last_added(model_id(document));
+  if (added == nullptr) return document.verdict;
+  return ModelVerdict{added->accepted, added->reasons};
+}
+
+void set_verdict(StoreEntry& entry, const std::optional<ModelVerdict>& verdict) {
+  entry.judged = verdict.has_value();
+  if (!verdict) return;
+  entry.accepted = verdict->accepted;
+  entry.reasons = verdict->reasons;
+}
+
+/// Notes may differ.
+bool same_decision(const std::optional<ModelVerdict>& a, const ModelVerdict& b) {
+  return a && a->accepted == b.accepted && a->reasons == b.reasons;
+}
+
+/// model.json of the document with its own verdict, or with `verdict` if it has another one.
+std::string judged_text(const ModelDocument& document, const ModelVerdict& verdict) {
+  if (same_decision(document.verdict, verdict)) return to_json(document);
+  ModelDocument judged = document;
+  judged.verdict = verdict;
+  return to_json(judged);
+}
+
 constexpr std::size_t kShortestPrefix = 4;
 
 /// Why `prefix` does not name one of `candidates`, the ids that begin with it.
@@ -118,10 +145,11 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
   // The model file is written first and without the lock. Another process may write the same file,
-  // but with the same model, because the id is a hash of the model. A damaged file of this id is
-  // replaced.
-  if (!load(id))
-    if (const auto written = replace_file(model_path(id), to_json(document)); !written)
+  // but with the same model, because the id is a hash of the model. A file of this id that is
+  // damaged, or has another verdict, is replaced.
+  const ModelVerdict verdict{accepted, reasons};
+  if (const auto known = load(id); !known || !same_decision(known->verdict, verdict))
+    if (const auto written = replace_file(model_path(id), judged_text(document, verdict)); !written)
       return tl::make_unexpected(written.error());
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
@@ -145,15 +173,16 @@ Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
-  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
-  const StoreEvent* added = state->last_added(id);
-  const bool accepted = added != nullptr && added->accepted;
+  const auto document = load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto verdict = verdict_on(*state, *document);
+  const bool accepted = verdict && verdict->accepted;
   if (!accepted && !force)
     return fail(ErrorCode::Refused,
-                added == nullptr
-                    ? fmt::format("activate {}: it has no verdict of the gate (use force)", id)
-                    : fmt::format("activate {}: the gate refused it: {}", id,
-                                  fmt::join(added->reasons, "; ")));
+                verdict
+                    ? fmt::format("activate {}: the gate refused it: {}", id,
+                                  fmt::join(verdict->reasons, "; "))
+                    : fmt::format("activate {}: it has no verdict of the gate (use force)", id));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
 
   return append(folder_, std::move(*state),
@@ -208,15 +237,16 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     StoreEntry entry;
     entry.id = id;
     entry.active = active == id;
-    if (const StoreEvent* added = state->last_added(id); added != nullptr) {
-      entry.accepted = added->accepted;
-      entry.reasons = added->reasons;
+    const StoreEvent* added = state->last_added(id);
+    if (added != nullptr) {
+      set_verdict(entry, ModelVerdict{added->accepted, added->reasons});
       entry.added = added->actor.when;
     }
     if (const auto document = load(id)) {
       entry.method = document->method;
       entry.machine = document->machine;
       entry.simulated = made_on_simulated_devices(*document);
+      if (added == nullptr) set_verdict(entry, document->verdict);
     } else {
       entry.fault = document.error().text;
     }

@@ -12,6 +12,7 @@
 #include "read_bar_figures.hpp"
 #include "read_run_figures.hpp"
 #include "read_travel.hpp"
+#include "verdict_json.hpp"
 
 namespace abbe::daemon {
 
@@ -281,6 +282,7 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto tracker_drift = read_tracker_drift(in);
   const auto bar = read_bar_figures(in);
   const auto run = read_run_figures(in);
+  const auto verdict = read_verdict(in);
   const auto configuration = read_configuration(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode"),
              software = read_optional(in, "abbe_version");
@@ -291,10 +293,12 @@ Result<ModelDocument> read_document(ModelReader& in) {
   ModelDocument document{
       std::move(*model), method, estimator, machine,       machine_hash, *created,
       statistics,        inputs, artefact,  recording_gap, mode,         backlash,
-      tracker_drift,     bar,    run,       software,      configuration};
+      tracker_drift,     bar,    run,       software,      verdict,      configuration};
   check_configuration(in, document);
   if (hash != model_hash(document))
     in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+  else if (!verdict_is_whole(in, document))
+    in.fault("verdict", "is not the verdict on this model: the file was changed or damaged");
   if (!in.any()) return document;
 
   return tl::make_unexpected(in.to_error());

@@ -83,6 +83,9 @@ Condition model_condition(const json& status) {
     out["MODEL_" + state] = {state == "INVALID" ? Level::Fault : Level::Warning,
                              model.at("reason").get<std::string>()};
 
+  if (model.contains("refused"))
+    out["MODEL_REFUSED"] = {Level::Warning, model.at("reason").get<std::string>()};
+
   const json& session = status.at("session");
   if (session.at("state") == "refused")
     out["REFUSED_" + upper(session.at("code").get<std::string>())] = {

@@ -52,9 +52,9 @@ std::vector<calib::otf::Backlash> determined_backlash(const calib::VolumetricMod
   return all;
 }
 
-/// The notes of the verdict on a stored model are in the model, for its report.
-void keep_notes(ModelDocument& document, const calib::Verdict& verdict) {
-  if (document.run) document.run->notes = verdict.notes;
+/// The verdict is in the model: who gets its file knows it.
+void keep_verdict(ModelDocument& document, const calib::Verdict& verdict) {
+  document.verdict = model_verdict(verdict);
 }
 
 /// The document of an update: that of the run with the updated model. Its parents, the run and the
@@ -106,7 +106,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
                       .actor = {.who = who, .why = std::move(why), .when = created}}};
   add_notes(*model);
   if (active) compare_with_active(*model, run);
-  keep_notes(model->document, model->verdict);
+  keep_verdict(model->document, model->verdict);
   return model;
 }
 
@@ -140,7 +140,7 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
     return;
   }
 
-  keep_notes(model.document, model.verdict);
+  keep_verdict(model.document, model.verdict);
   model.beside.run = model.document;
   model.beside.run_accepted = model.verdict.accepted;
   model.beside.run_reasons = model.verdict.reasons;

@@ -38,7 +38,11 @@ class ModelAuthorityTest : public ::testing::Test {
   }
   ~ModelAuthorityTest() override { fs::remove_all(folder_); }
 
-  ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow); }
+  /// The wall clock at kNow.
+  static WallClock clock() {
+    return WallClock{[] { return ClockReading{.utc = kUtc.to_utc(kNow).time_since_epoch()}; }};
+  }
+  ModelAuthority open() { return ModelAuthority::open(folder_, config_, clock(), kNow); }
   /// The store as a command in another process opens it.
   ModelStore store() { return ModelStore::open(folder_).value(); }
   std::string active_id() { return store().active_id().value().value(); }

@@ -122,6 +122,14 @@ TEST(Observations, WarnOfAModelThatAPersonActivatedAgainstTheGate) {
   EXPECT_EQ(raised.text, status["model"]["reason"]);
 }
 
+TEST(Observations, WarnOfAClockThatWasSet) {
+  auto status = test::status();
+  status["clock"] = {"the wall clock was set forward by 200 d 0 h"};
+  const auto raised = condition(observations_of(status), "system").at("CLOCK");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_THAT(raised.text, HasSubstr("200 d"));
+}
+
 TEST(Observations, AskForTheReleaseOfAMachine) {
   auto status = test::status();
   status["release_awaited"] = {{"reason", "collision"}, {"command", "abbe machine release"}};

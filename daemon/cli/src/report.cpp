@@ -153,6 +153,7 @@ Result<void> write_report(const ReportArguments& arguments) {
     if (!read) return tl::make_unexpected(read.error());
     details = *std::move(read);
   }
+  details.now = actor_now({}).when;
   const auto subject = subject_named(arguments.model, arguments, details);
   if (!subject) return tl::make_unexpected(subject.error());
   const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
@@ -160,6 +161,10 @@ Result<void> write_report(const ReportArguments& arguments) {
   if (auto own = require_own_files(files_read(arguments), written); !own) return own;
   for (const auto& file : written)
     if (auto place = file.empty() ? Result<void>{} : require_place_of(file); !place) return place;
+
+  if (auto wrong = contradictory_dates(*subject, nullptr); arguments.dcc.empty() && !wrong.empty())
+    return tl::make_unexpected(
+        Error{ErrorCode::BadInput, "report: dates are impossible", std::move(wrong)});
 
   // Everything is made before the first file is written.
   const auto page = page_of(*subject, arguments);

@@ -66,6 +66,9 @@ Condition system_condition(const json& status) {
       out[name] = {part->when_bad, text_of_state(stream)};
   }
 
+  if (status.contains("clock"))
+    out["CLOCK"] = {Level::Warning, status.at("clock").at(0).get<std::string>()};
+
   if (status.contains("release_awaited"))
     out["release"] = {Level::Fault,
                       fmt::format("{}; a person checks the machine, then: {}",

@@ -92,10 +92,10 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   RecordingDigest recording =
       digest.valid() ? digest_of(digest, state->stopped) : RecordingDigest{};
   cite(recording, inputs);
-  const auto created = utc.to_utc(state->now);
+  const auto created = clock.now();
   auto document = document_of(*candidate, *config, std::move(inputs), created);
   document.recording_gap = std::move(recording.gap);
-  add_measured(document, observed(run), utc);
+  add_measured(document, observed(run), clock.offset(state->now));
   auto id = model_id(document);
   auto why = fmt::format("calibrate {}", method_of(*candidate));
 
@@ -115,6 +115,8 @@ void IdentificationTask::add_notes(JudgedModel& model) const {
   if (active_left_out) notes.emplace_back(kOfAnotherMachine);
   if (const auto& gap = model.document.recording_gap; !gap.empty())
     notes.push_back(cannot_be_checked(gap));
+  for (std::string& change : in_words(clock.since_start(), "abbed started"))
+    notes.push_back(std::move(change));
 }
 
 /// Adds drift of the active model to the verdict. With [drift] continuous, an update of the active

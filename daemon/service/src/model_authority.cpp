@@ -60,9 +60,9 @@ ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
     : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
 
 ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
-                                    protocol::UtcOffset utc, HostTime now) {
-  ModelKeeper keeper{store_folder, config, utc};
-  keeper.tidy_store(now);
+                                    WallClock clock, HostTime now) {
+  ModelKeeper keeper{store_folder, config, std::move(clock)};
+  keeper.tidy_store();
   ModelAuthority authority{std::move(keeper), config.axes_compensated()};
   if (auto active = authority.keeper_.read_active(now)) {
     authority.set_active(std::move(*active));

@@ -369,8 +369,12 @@ json status_json(const SeenStatus& seen, const Config& config) {
 }  // namespace
 
 Reply status_reply(const Hub& hub) {
-  return [seen = look_at_status(hub), &config = hub.parts().config] {
-    return status_json(seen, config);
+  return [seen = look_at_status(hub), &config = hub.parts().config,
+          &clock = hub.parts().calibration.clock()] {
+    json out = status_json(seen, config);
+    if (const auto changes = in_words(clock.since_start(), "abbed started"); !changes.empty())
+      out["clock"] = changes;
+    return out;
   };
 }
 

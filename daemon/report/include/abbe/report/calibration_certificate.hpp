@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abbe/report/model_report.hpp"
 
@@ -18,5 +19,11 @@ namespace abbe::daemon {
 /// a forced one states this first. DataInsufficient as model_report().
 [[nodiscard]] Result<std::string> calibration_certificate(
     const ReportSubject& as_found, const std::optional<ReportSubject>& as_left = {});
+
+/// Dates of the details that no calendar has, that contradict each other, the measurements or the
+/// identification of the models, or that are in the future. A report with them is wrong, too.
+/// `as_left` may be null.
+[[nodiscard]] std::vector<std::string> contradictory_dates(const ReportSubject& as_found,
+                                                           const ReportSubject* as_left);
 
 }  // namespace abbe::daemon

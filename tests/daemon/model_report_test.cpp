@@ -29,6 +29,7 @@ ReportSubject reported(unsigned seed, bool accepted = true) {
   subject.entry = StoreEntry{
       .id = model_id(subject.document), .active = accepted, .accepted = accepted, .reasons = {}};
   if (!accepted) subject.entry->reasons = {"held out: no better than no compensation"};
+  subject.document.verdict = ModelVerdict{accepted, subject.entry->reasons};
   subject.events.push_back({.action = StoreAction::Added,
                             .id = subject.entry->id,
                             .actor = {"turner", "", subject.document.created},
@@ -115,6 +116,7 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
                             .actor = {"abbed", "EXX changed", {}}});
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("Yellow: accepted, but"));
   drifted.entry.reset();
+  drifted.document.verdict.reset();
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("No verdict"));
 }
 

@@ -123,6 +123,39 @@ TEST(ModelUse, AnAcceptedModelStatesItsVerdictAndItsGap) {
                                             cannot_be_checked(document.recording_gap)));
 }
 
+ModelDocument simulated_document() {
+  ModelDocument document = judged_document(ModelVerdict{.accepted = true});
+  document.configuration.emplace();
+  set_entry(document.configuration->readings, "daemon.simulated", "true");
+  document.machine_hash = hash_of(document.configuration->readings);
+  return document;
+}
+
+TEST(ModelUse, OfSimulatedDevicesNoCertificateIsMadeAndEveryFileStatesIt) {
+  const ModelDocument document = simulated_document();
+  const auto certificate =
+      obstacles_to_use({.document = document, .purpose = ModelPurpose::Certificate});
+  EXPECT_THAT(certificate.refusals, ElementsAre(HasSubstr("SIMULATED")));
+  for (const auto purpose : {ModelPurpose::Control, ModelPurpose::Look}) {
+    const auto found = obstacles_to_use({.document = document, .purpose = purpose});
+    EXPECT_THAT(found.refusals, IsEmpty());
+    EXPECT_THAT(found.statements, ElementsAre(HasSubstr("accepted"), HasSubstr("SIMULATED")));
+  }
+}
+
+TEST(ModelUse, AModelOfAnEarlierVersionIsNotStaleWhereItWasAccepted) {
+  const ModelDocument document = judged_document(ModelVerdict{.accepted = true});
+  StoreEvent accepted = event_of(document, StoreAction::Activated, "checked");
+  accepted.accepted_configuration = "ab";
+  const std::vector events{accepted};
+  const auto refusals_for = [&](const std::string& machine_hash) {
+    return obstacles_to_use({.document = document, .events = events, .machine_hash = machine_hash})
+        .refusals;
+  };
+  EXPECT_THAT(refusals_for("ab"), IsEmpty());
+  EXPECT_THAT(refusals_for("cd"), ElementsAre(HasSubstr("STALE")));
+}
+
 TEST(ModelUse, LookingAtAModelIsNeverRefused) {
   const ModelDocument document = judged_document(refused_verdict());
   const auto found = obstacles_to_use({.document = document, .purpose = ModelPurpose::Look});

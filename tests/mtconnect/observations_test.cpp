@@ -120,6 +120,24 @@ TEST(Observations, WarnOfARecordingThatIsBehindTheMachine) {
   EXPECT_EQ(raised.text, "the file is more than 5 s behind the machine");
 }
 
+TEST(Observations, WarnOfAModelThatAPersonActivatedAgainstTheGate) {
+  auto status = test::status();
+  EXPECT_FALSE(condition(observations_of(status), "calibration").contains("MODEL_REFUSED"));
+  status["model"]["reason"] = "forced by anna: crane test; the gate had refused it: 3 mm";
+  status["model"]["refused"] = "3 mm";
+  const auto raised = condition(observations_of(status), "calibration").at("MODEL_REFUSED");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_EQ(raised.text, status["model"]["reason"]);
+}
+
+TEST(Observations, WarnOfAClockThatWasSet) {
+  auto status = test::status();
+  status["clock"] = {"the wall clock was set forward by 200 d 0 h"};
+  const auto raised = condition(observations_of(status), "system").at("CLOCK");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_THAT(raised.text, HasSubstr("200 d"));
+}
+
 TEST(Observations, AskForTheReleaseOfAMachine) {
   auto status = test::status();
   status["release_awaited"] = {{"reason", "collision"}, {"command", "abbe machine release"}};

@@ -14,6 +14,7 @@
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/method.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/touches_not_seen.hpp"
 #include "abbe/tables/travel_faults.hpp"
@@ -179,7 +180,7 @@ Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
   input.recording_gap = recording->reader.damage();
   input.observed = run->observed;
-  input.utc = recording->reader.info().utc_offset;
+  input.utc = recorded_clock(recording->reader).dates;
   input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
                            calib::Verdict& verdict) { judge_recording(*reader, verdict); };
 

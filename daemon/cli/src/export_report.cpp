@@ -112,6 +112,7 @@ std::string report_text(const ExportReport& report) {
   const auto& facts = *report.facts;
   const auto& origin = report.written.origin;
   std::string text = fmt::format("{}: {}\n", facts.name, facts.control);
+  for (const auto& sentence : origin.use) text += sentence + "\n";
   text += fmt::format("model {}\nmachine {}\nvolume {}, tool offset {}\n", origin.model_hash,
                       origin.machine, origin.volume, origin.tool);
   text += fmt::format("sign: a positive value moves the axis in the {} direction ({})\n",
@@ -134,6 +135,7 @@ std::string report_json(const ExportReport& report) {
   const auto& origin = report.written.origin;
   const nlohmann::json out{{"format", report.facts->name},
                            {"model_hash", origin.model_hash},
+                           {"use", origin.use},
                            {"files", report.files},
                            {"positive_moves", report.written.positive_moves},
                            {"places", report.proof.places},

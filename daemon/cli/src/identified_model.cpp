@@ -84,8 +84,10 @@ ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdic
 
 }  // namespace
 
-Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
+Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& identified,
                             const calib::Verdict& verdict, const ResultFiles& more) {
+  ModelDocument document = identified;
+  document.verdict = model_verdict(verdict);
   const std::filesystem::path folder = place.out;
   if (auto made = create_folder(folder); !made) return made;
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;

@@ -44,7 +44,7 @@ struct ResultPlace {
 /// File name to text.
 using ResultFiles = std::map<std::string, std::string>;
 
-/// Writes model.json, `more` and report.html, adds the model to the store with the user, and writes
+/// Writes model.json with the verdict, `more` and report.html, adds the model to the store with the user, and writes
 /// report.html again. Nothing is stored if a file cannot be written or the report cannot be made.
 /// With a store it is the report that `abbe report` makes of the stored model; else it has the
 /// verdict, and states that the model is not active. Error Io, or that of the store.

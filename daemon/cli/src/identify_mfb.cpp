@@ -21,6 +21,7 @@
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
@@ -91,7 +92,7 @@ Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   input.task.plan = std::move(run->plan);
   input.task.passes = std::move(run->passes);
   input.observed = run->observed;
-  input.utc = recording->reader.info().utc_offset;
+  input.utc = recorded_clock(recording->reader).dates;
   return input;
 }
 

@@ -6,6 +6,7 @@
 
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf/method.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/replay/replay.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -97,7 +98,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   if (!recorded) return tl::make_unexpected(recorded.error());
   other.add_note(recorded->candidate.verdict);
   auto outcome = outcome_of(std::move(recorded->candidate), recording->config, {recording->source});
-  add_measured(outcome.document, recorded->observed, recording->reader.info().utc_offset);
+  add_measured(outcome.document, recorded->observed, recorded_clock(recording->reader).dates);
   outcome.document.recording_gap = recording->reader.damage();
 
   return outcome;

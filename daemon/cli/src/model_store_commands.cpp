@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/configuration_fit.hpp"
+#include "abbe/model/stored_model.hpp"
 #include "commands.hpp"
-#include "daemon_socket.hpp"
+#include "force_option.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 
@@ -21,20 +21,17 @@ namespace {
 
 struct ModelStoreArguments {
   StoreOption store;
-  std::string id, why, active;
-  bool json = false, force = false, accept_older_hash = false;
+  ForceOption force;
+  std::string id, active;
+  bool json = false, accept_older_hash = false;
   std::size_t keep_newest = 0;
   int keep_days = 0;
 };
 
-StoreActor actor(const ModelStoreArguments& arguments) {
-  return {user_name(), arguments.why,
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
-}
-
 std::string state_of(const StoreEntry& entry) {
   if (!entry.fault.empty()) return "damaged";
   if (entry.active) return entry.accepted ? "active" : "active (forced)";
+  if (!entry.judged) return std::string{name(VerdictState::NotJudged)};
   return entry.accepted ? "accepted" : "refused";
 }
 
@@ -112,16 +109,8 @@ void print_model(const ModelDocument& document) {
   fmt::print("\n{}", to_tables_csv(document.model, document.backlash));
 }
 
-Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
-  const auto entries = store.list();
-  if (!entries) return tl::make_unexpected(entries.error());
-  for (const auto& entry : *entries)
-    if (entry.id == id) return entry;
-  return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
-}
-
-/// Shows a model file. It need not be in a store; without a store the state of the model and the
-/// verdict of the gate are not known.
+/// Shows a model file. It need not be in a store; without a store it is not known whether the model
+/// is active.
 int show_file(const ModelStoreArguments& arguments) {
   const auto document = read_model(arguments.id);
   if (!document) return report(document.error());
@@ -129,7 +118,8 @@ int show_file(const ModelStoreArguments& arguments) {
   if (arguments.json) {
     fmt::print("{}", to_json(*document));
   } else {
-    fmt::print("id          {}\nfile        {}\n", model_id(*document), arguments.id);
+    fmt::print("id          {}\nfile        {}\nverdict     {}\n", model_id(*document),
+               arguments.id, in_one_line(document->verdict));
     print_model(*document);
   }
   return 0;
@@ -142,18 +132,18 @@ int show(const ModelStoreArguments& arguments) {
   if (!store) return report(store.error());
   const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
-  const auto document = store->load(*id);
-  if (!document) return report(document.error());
+  const auto stored = stored_model(*store, *id);
+  if (!stored) return report(stored.error());
 
   if (arguments.json) {
-    fmt::print("{}", to_json(*document));
+    fmt::print("{}", to_json(stored->document));
     return 0;
   }
 
-  const auto entry = entry_of(*store, *id);
-  if (!entry) return report(entry.error());
-  print_entry(*entry);
-  print_model(*document);
+  print_entry(stored->entry);
+  if (const auto& verdict = stored->document.verdict; verdict && verdict->forced)
+    fmt::print("forced by   {}\n", who_and_when(*verdict->forced));
+  print_model(stored->document);
 
   return 0;
 }
@@ -178,10 +168,9 @@ Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
 }
 
 Result<void> check_activation(const ModelStoreArguments& arguments) {
-  if (arguments.force && arguments.why.empty())
-    return fail(ErrorCode::Usage,
-                "--force needs --why: a forced activation is recorded with its reason");
-  if (arguments.accept_older_hash && arguments.why.empty())
+  if (const auto forced = forced_by(arguments.force); !forced)
+    return tl::make_unexpected(forced.error());
+  if (arguments.accept_older_hash && arguments.force.why.empty())
     return fail(ErrorCode::Usage,
                 "--accept-older-hash needs --why: the store keeps who accepted the model and why");
   if (arguments.accept_older_hash && arguments.store.config.empty())
@@ -202,7 +191,9 @@ int activate(const ModelStoreArguments& arguments) {
     if (!configuration) return report(configuration.error());
     accepted = *std::move(configuration);
   }
-  if (const auto done = store->activate(*id, actor(arguments), arguments.force, accepted); !done)
+  if (const auto done =
+          store->activate(*id, actor_now(arguments.force.why), arguments.force.force, accepted);
+      !done)
     return report(done.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -213,7 +204,7 @@ int rollback(const ModelStoreArguments& arguments) {
   if (!store) return report(store.error());
   const auto active = id_named(*store, arguments.active);
   if (!active) return report(active.error());
-  const auto id = store->rollback(actor(arguments), *active);
+  const auto id = store->rollback(actor_now(arguments.force.why), *active);
   if (!id) return report(id.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -223,7 +214,7 @@ int prune(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const ModelRetention retention{arguments.keep_newest, std::chrono::days{arguments.keep_days}};
-  const auto removed = store->remove_old(retention, actor(arguments));
+  const auto removed = store->remove_old(retention, actor_now(arguments.force.why));
   if (!removed) return report(removed.error());
   for (const auto& id : *removed) fmt::print("removed: {}\n", id);
   fmt::print("{} models removed\n", removed->size());
@@ -263,10 +254,8 @@ void add_model_activate(CLI::App& parent, int& exit) {
                    "model id, or the beginning of an id (at least 4 characters)")
       ->required();
   add_store_options(*command, arguments->store);
-  command->add_option("--why", arguments->why,
-                      "reason, for the record; required with --force and\n--accept-older-hash");
-  command->add_flag("--force", arguments->force, "activate a model that the gate refused");
-
+  add_force_options(*command, arguments->force, "activate a model that the gate refused",
+                    "reason, for the record; required with --force and --accept-older-hash");
   command->add_flag("--accept-older-hash", arguments->accept_older_hash,
                     "accept a model of an earlier version for the configuration of -c: you have\n"
                     "checked that the keys its hash does not contain are as they were when it was\n"
@@ -285,7 +274,7 @@ void add_model_rollback(CLI::App& parent, int& exit) {
                    "id of the model to leave; refused if another one is active, so that a "
                    "repeated command does not go one model further back")
       ->type_name("ID");
-  command->add_option("--why", arguments->why, "reason, for the record");
+  command->add_option("--why,--reason", arguments->force.why, "reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
 }
 
@@ -305,7 +294,7 @@ void add_model_prune(CLI::App& parent, int& exit) {
       ->add_option("--keep-days", arguments->keep_days,
                    "models that were added less than this before now are kept, too")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--why", arguments->why, "reason, for the record");
+  command->add_option("--why,--reason", arguments->force.why, "reason, for the record");
   command->callback([arguments, &exit] { exit = prune(*arguments); });
 }
 

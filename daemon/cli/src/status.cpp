@@ -190,6 +190,8 @@ void print_status(const json& status) {
     fmt::print("           {}\n", coloured(simulated, kYellow, STDOUT_FILENO));
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
+  for (const json& change : status.value("clock", json::array()))
+    fmt::print("clock      {}\n", coloured(change.get<std::string>(), kYellow, STDOUT_FILENO));
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
   const json& session = status["session"];
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),

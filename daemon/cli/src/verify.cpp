@@ -112,8 +112,9 @@ Result<verify::Observations> observed_in(const VerifyArguments& arguments,
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());
-  auto document = model_named(arguments.models.front(), arguments.store);
-  if (!document) return tl::make_unexpected(document.error());
+  auto found = found_model(arguments.models.front(), arguments.store);
+  if (!found) return tl::make_unexpected(found.error());
+  ModelDocument* const document = &found->document;
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
 
@@ -141,6 +142,7 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   v.lines = std::move(file.lines);
   if (cut_short) v.cut_short = cut_short->text;
 
+  v.cautions = cautions_of(*found);
   return VerifyOutcome{std::move(*document), std::move(v)};
 }
 
@@ -163,6 +165,7 @@ void print_json(const VerifyOutcome& outcome) {
   nlohmann::json object{
       {"effect", effect_name(verify::effect_at_points(c))},
       {"model", model_id(outcome.document)},
+      {"cautions", outcome.verification.cautions},
       {"points", outcome.verification.observations.readings_m.size()},
       {"inside", c.inside.size()},
       {"before", vector_figures(c.before)},
@@ -203,6 +206,7 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
   fmt::print("verdict     {}\n", verdict_text(c));
   fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document),
              outcome.document.machine, outcome.document.method);
+  for (const std::string& caution : v.cautions) fmt::print("caution     {}\n", caution);
   fmt::print("points      {}, {} of them where the model is valid\n",
              v.observations.readings_m.size(), c.inside.size());
   fmt::print(

@@ -59,6 +59,7 @@ void print_predictions_json(const std::vector<Predicted>& all, std::size_t point
   for (const auto& [model, at_points] : all)
     object["models"].push_back({{"name", model->name},
                                 {"model", model_id(model->document)},
+                                {"cautions", model->cautions},
                                 {"effect", effect_name(verify::effect_at_points(at_points))},
                                 {"before", vector_figures(at_points.before)},
                                 {"after", vector_figures(at_points.after)}});
@@ -80,6 +81,8 @@ void print_predictions(const std::vector<Predicted>& all, std::size_t points,
   for (const auto& [model, at_points] : all)
     print_prediction(model->name, effect_name(verify::effect_at_points(at_points)),
                      at_points.after);
+  for (const auto& [model, at_points] : all)
+    for (const std::string& caution : model->cautions) fmt::print("{}: {}\n", model->name, caution);
 }
 
 }  // namespace
@@ -88,11 +91,12 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
                                              const StoreOption& store, const std::string& tool) {
   std::vector<NamedModel> models;
   for (const std::string& name : names) {
-    auto document = model_named(name, store);
-    if (!document) return tl::make_unexpected(document.error());
-    const auto tool_m = tool_of(tool, document->model);
+    auto found = found_model(name, store);
+    if (!found) return tl::make_unexpected(found.error());
+    const auto tool_m = tool_of(tool, found->document.model);
     if (!tool_m) return tl::make_unexpected(tool_m.error());
-    models.push_back({name, std::move(*document), *tool_m});
+    auto cautions = cautions_of(*found);
+    models.push_back({name, std::move(found->document), std::move(cautions), *tool_m});
   }
 
   constexpr double kSameTool_m = 1e-6;

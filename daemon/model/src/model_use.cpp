@@ -32,13 +32,30 @@ void add_verdict(const ModelInUse& use, Obstacles& out) {
   (verdict && !verdict->accepted ? out.refusals : out.statements).push_back(text);
 }
 
+/// A person accepted the model of an earlier version for this configuration.
+bool accepted_for(std::span<const StoreEvent> events, const std::string& machine_hash) {
+  return std::ranges::any_of(events, [&machine_hash](const StoreEvent& event) {
+    return event.accepted_configuration == machine_hash;
+  });
+}
+
+/// Nobody signs a certificate of a machine that does not exist. A control file of such a model may be
+/// for a simulated control; it states where the model comes from.
+void add_simulated(const ModelInUse& use, Obstacles& out) {
+  if (!made_on_simulated_devices(use.document).value_or(false)) return;
+  auto& list = use.purpose == ModelPurpose::Certificate ? out.refusals : out.statements;
+  list.emplace_back(
+      "SIMULATED: the model was made on simulated devices and describes no real machine");
+}
+
 /// A model that is no longer that of its machine: an obstacle to a correction, but not to a
 /// certificate of what was measured.
 void add_later_changes(const ModelInUse& use, Obstacles& out) {
   auto& list = use.purpose == ModelPurpose::Control ? out.refusals : out.statements;
   if (const StoreEvent* drift = drift_of(use.events); drift != nullptr)
     list.push_back("a later run found drift: " + who_and_when(drift->actor));
-  if (use.machine_hash && *use.machine_hash != use.document.machine_hash)
+  if (use.machine_hash && *use.machine_hash != use.document.machine_hash &&
+      !accepted_for(use.events, *use.machine_hash))
     list.emplace_back("STALE: the model was made for another machine configuration");
 }
 
@@ -47,6 +64,7 @@ void add_later_changes(const ModelInUse& use, Obstacles& out) {
 Obstacles obstacles_to_use(const ModelInUse& use) {
   Obstacles found;
   add_verdict(use, found);
+  add_simulated(use, found);
   add_later_changes(use, found);
   if (const auto& gap = use.document.recording_gap; !gap.empty())
     found.statements.push_back(cannot_be_checked(gap));

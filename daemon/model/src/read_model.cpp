@@ -282,8 +282,8 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto tracker_drift = read_tracker_drift(in);
   const auto bar = read_bar_figures(in);
   const auto run = read_run_figures(in);
-  const auto configuration = read_configuration(in);
   const auto verdict = read_verdict(in);
+  const auto configuration = read_configuration(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode"),
              software = read_optional(in, "abbe_version");
   const auto method = in.text("method"), estimator = in.text("estimator"),
@@ -291,9 +291,9 @@ Result<ModelDocument> read_document(ModelReader& in) {
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
   ModelDocument document{
-      std::move(*model), method, estimator, machine,       machine_hash,  *created,
-      statistics,        inputs, artefact,  recording_gap, mode,          backlash,
-      tracker_drift,     bar,    run,       software,      configuration, verdict};
+      std::move(*model), method, estimator, machine,       machine_hash, *created,
+      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
+      tracker_drift,     bar,    run,       software,      verdict,      configuration};
   check_configuration(in, document);
   if (hash != model_hash(document))
     in.fault("hash", "is not the hash of the content: the file was changed or damaged");

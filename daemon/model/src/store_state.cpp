@@ -94,8 +94,8 @@ std::optional<StoreEvent> StoreState::activation() const {
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
-  event.accepted_configuration = accepted_configuration(events, *id);
   if (added != nullptr && !added->accepted) event.reasons = added->reasons;
+  event.accepted_configuration = accepted_configuration(events, *id);
   return event;
 }
 

@@ -354,11 +354,11 @@ std::string to_json(const ModelDocument& document) {
   if (!document.mode.empty()) out.member("mode", document.mode);
   out.member("machine", document.machine);
   out.member("machine_hash", document.machine_hash);
-  if (document.configuration) write_configuration(out, document);
   if (document.verdict) {
     out.key("verdict");
     out.raw(verdict_to_json(document));
   }
+  if (document.configuration) write_configuration(out, document);
   out.member("chain", model.chain().text());
   out.member("gauge", name(model.gauge()));
   out.member("squareness", "travel");

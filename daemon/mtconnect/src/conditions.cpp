@@ -71,6 +71,9 @@ Condition system_condition(const json& status) {
     }
   }
 
+  if (status.contains("clock"))
+    out["CLOCK"] = {Level::Warning, status.at("clock").at(0).get<std::string>()};
+
   if (status.contains("release_awaited"))
     out["release"] = {Level::Fault,
                       fmt::format("{}; a person checks the machine, then: {}",
@@ -87,6 +90,9 @@ Condition model_condition(const json& status) {
   if (state != "ACTIVE")
     out["MODEL_" + state] = {state == "INVALID" ? Level::Fault : Level::Warning,
                              model.at("reason").get<std::string>()};
+
+  if (model.contains("refused"))
+    out["MODEL_REFUSED"] = {Level::Warning, model.at("reason").get<std::string>()};
 
   const json& session = status.at("session");
   if (session.at("state") == "refused")

@@ -18,6 +18,7 @@
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/pipeline.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
@@ -457,6 +458,8 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) 
   if (recording.configuration_check() == MetadataCheck::Unchecked)
     verdict.notes.emplace_back(
         "the recorded configuration has no checksum: damage in it would not be detected");
+  for (std::string& change : in_words(recorded_clock(recording).change, "abbed started"))
+    verdict.notes.push_back(std::move(change));
 }
 
 Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {

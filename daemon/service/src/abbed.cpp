@@ -34,6 +34,7 @@
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "abbe/service/control_api.hpp"
 #include "abbe/service/counting_state_thread.hpp"
@@ -56,13 +57,6 @@ constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer fo
 // for the control socket (3 s at most), the journal and the hub to end
 constexpr auto kEndTimeout = 5s;
 constexpr int kHubHangs = number(ExitCode::Internal);
-
-/// UTC minus host time, both read now. The only conversion between the two clocks.
-protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
-  const auto utc = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) -
-          time.now().time_since_epoch()};
-}
 
 /// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, unique for each daemon process.
 std::string recording_name() {
@@ -97,7 +91,8 @@ struct Abbed::State {
   Config config;
   AbbedOptions options;
   drivers::MonotonicTime time;
-  protocol::UtcOffset utc;
+  WallClock clock;          // first reading: the start of abbed
+  protocol::UtcOffset utc;  // of recordings and messages, constant
   std::vector<std::string> warnings;
   std::optional<drivers::CpuLatencyBound> cpu_latency;
   std::optional<ModelAuthority> authority;
@@ -132,15 +127,17 @@ struct Abbed::State {
       std::make_shared<std::atomic<bool>>(false);
   std::future<Result<std::vector<LeftRecording>>> closing_left;
   const std::string recording = recording_name();
-  ClockSteps clock_steps{read_clocks()};
-  bool tidies = true;  // false after the clock was set
+  ClockSteps clock_steps{clock.read()};
+  ClockChange clock_change{};  // as reported
+  bool tidies = true;          // false after the clock was set
   WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
       : config(std::move(c)),
         options(std::move(o)),
         time(config.daemon.speed),
-        utc(utc_offset(time)) {}
+        clock(options.clock),
+        utc(clock.offset(time.now())) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
@@ -194,7 +191,7 @@ struct Abbed::State {
   }
 
   Result<void> open_models() {
-    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now()));
+    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, clock, time.now()));
     if (!authority->fault().empty()) warnings.push_back(authority->fault());
     return {};
   }
@@ -277,7 +274,7 @@ struct Abbed::State {
   }
 
   Result<void> run() {
-    calibration.emplace(config, *authority, recorder.get(), utc);
+    calibration.emplace(config, *authority, recorder.get(), clock);
     std::optional<Counting> left;
     if (left_counting.state) {
       recorder->attach(to_attachment(*left_counting.state), time.now());
@@ -365,6 +362,28 @@ struct Abbed::State {
     return now;
   }
 
+  /// Reports and records each change of the wall clock once: the dates of the recording are those of
+  /// the start.
+  void follow_clock() {
+    const ClockChange change = clock.since_start();
+    const auto further = [](auto a, auto b) {
+      return std::chrono::abs(a - b) >= kLeastClockChange;
+    };
+    if (!further(change.step, clock_change.step) &&
+        !further(change.suspended, clock_change.suspended))
+      return;
+    const auto attached = hub->call(
+        [this, attachment = to_attachment(change)]() mutable {
+          recorder->attach(std::move(attachment), time.now());
+          return true;
+        },
+        kHubTimeout);
+    if (!attached) return;  // again in the next cycle
+    clock_change = change;
+    for (const std::string& text : in_words(change, "abbed started"))
+      fmt::print(stderr, "abbed: {}\n", text);
+  }
+
   void supervise(WallTime now) {
     if (!supervisor) return;
     supervisor->poll(now);
@@ -385,7 +404,7 @@ struct Abbed::State {
                    config.recording.keep.count());
     }
 
-    if (clock_steps.look(read_clocks()) && std::exchange(tidies, false))
+    if (clock_steps.look(clock.read()) && std::exchange(tidies, false))
       fmt::print(stderr,
                  "abbed: the clock was set: no old recordings are removed until the next start\n");
     if (!tidies || tidying.valid() || now < next_tidying) return;
@@ -462,6 +481,7 @@ Abbed::~Abbed() = default;
 void Abbed::cycle() {
   const auto now = WallTime::clock::now();
   state_->supervise(now);
+  state_->follow_clock();
   state_->tidy_recordings(now);
   state_->store_upkeep.cycle(now);
   state_->report_left_recordings();

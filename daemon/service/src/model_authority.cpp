@@ -1,6 +1,7 @@
 #include "abbe/service/model_authority.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
@@ -16,12 +17,19 @@ using protocol::HostTime;
 // or restore it from a backup, which does not change the stamp of the store.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
+/// Why the gate refused the active model; empty: it accepted it, or its reasons are not known.
+std::string refusal_of(const StoreEvent& activation) {
+  return fmt::format("{}", fmt::join(activation.reasons, "; "));
+}
+
 /// The reason of the state ACTIVE: the gate accepted the model, or a user, who is named, forced its
 /// activation.
 std::string reason_of(const StoreEvent& activation) {
-  const auto done_by = [&activation](std::string_view what) {
+  const std::string refused = refusal_of(activation);
+  const auto done_by = [&](std::string_view what) {
     const auto& [who, why, when] = activation.actor;
-    return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
+    return fmt::format("{} by {}{}{}{}{}", what, who, why.empty() ? "" : ": ", why,
+                       refused.empty() ? "" : "; the gate had refused it: ", refused);
   };
 
   switch (activation.action) {
@@ -53,9 +61,9 @@ ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
     : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
 
 ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
-                                    protocol::UtcOffset utc, HostTime now) {
-  ModelKeeper keeper{store_folder, config, utc};
-  keeper.tidy_store(now);
+                                    WallClock clock, HostTime now) {
+  ModelKeeper keeper{store_folder, config, std::move(clock)};
+  keeper.tidy_store();
   ModelAuthority authority{std::move(keeper), config.axes_compensated()};
   if (auto active = authority.keeper_.read_active(now)) {
     authority.set_active(std::move(*active));
@@ -161,6 +169,7 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
                                                 std::chrono::nanoseconds patience) const {
   ActiveModelState s{.model = active_model(), .revision = revision_};
   if (s.model != nullptr) s.publication = &active_.publication;
+  if (s.model != nullptr) s.refused = refusal_of(active_.activation);
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
     s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;

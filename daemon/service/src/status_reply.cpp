@@ -139,7 +139,10 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
 /// A copy of the active model's state.
 struct SeenModel {
   explicit SeenModel(const ActiveModelState& active)
-      : status(active.status), reason(active.reason), known(active.model != nullptr) {
+      : status(active.status),
+        reason(active.reason),
+        refused(active.refused),
+        known(active.model != nullptr) {
     if (!known) return;
     id = active.model->id;
     method = active.model->method;
@@ -150,7 +153,7 @@ struct SeenModel {
     simulated = active.model->simulated;
   }
   v1::ModelStatus status;
-  std::string reason;
+  std::string reason, refused;
   bool known;
   std::string id, method, recording_sha256, hash;
   protocol::UtcTime created{};
@@ -167,6 +170,7 @@ json model_json(const SeenModel& model) {
     out["hash"] = model.hash;
     out["created"] = to_text(model.created);
     out["simulated"] = model.simulated;
+    if (!model.refused.empty()) out["refused"] = model.refused;
     if (model.largest_U_m) out["largest_U_um"] = *model.largest_U_m * kUmPerM;
   }
   return out;
@@ -386,8 +390,12 @@ json status_json(const SeenStatus& seen, const Config& config) {
 }  // namespace
 
 Reply status_reply(const Hub& hub) {
-  return [seen = look_at_status(hub), &config = hub.parts().config] {
-    return status_json(seen, config);
+  return [seen = look_at_status(hub), &config = hub.parts().config,
+          &clock = hub.parts().calibration.clock()] {
+    json out = status_json(seen, config);
+    if (const auto changes = in_words(clock.since_start(), "abbed started"); !changes.empty())
+      out["clock"] = changes;
+    return out;
   };
 }
 

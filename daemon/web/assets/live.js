@@ -63,6 +63,7 @@ function state_of(status) {
     ["recording", recording(status)],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
+    ["clock", status.clock?.join("; ")],
     ["axes not referenced", status.axes_without_zero?.join(", ")],
     ["tracker", status.unmeasured_air],
   ]);

@@ -112,11 +112,11 @@ struct ModelDocument {
   std::optional<RunFigures> run{};
   /// Version of abbe that identified the model; empty: this one. Not in the hash.
   std::string software{};
+  /// Decision on the model; nullopt: not judged, as in files of earlier versions. Not in the hash.
+  std::optional<ModelVerdict> verdict{};
   /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
   /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
   std::optional<Meaning> configuration{};
-  /// Decision on the model; nullopt: not judged, as in files of earlier versions. Not in the hash.
-  std::optional<ModelVerdict> verdict{};
 };
 /// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in
 /// files of earlier versions.

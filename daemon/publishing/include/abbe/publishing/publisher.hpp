@@ -41,6 +41,8 @@ struct ActiveModelState {
   const PublishedModel* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< of `model`
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
+  /// Why the gate refused the model that a person activated nevertheless; empty: it accepted it.
+  std::string refused{};
 };
 
 class Publisher {

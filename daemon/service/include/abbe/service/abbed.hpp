@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/drivers/time_source.hpp"
 
@@ -17,6 +18,7 @@ namespace abbe::daemon {
 struct AbbedOptions {
   std::string configuration_text;  ///< text of the configuration file; stored in the recording
   std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child
+  WallClock clock{};        ///< of all dates
 };
 
 class Abbed {

@@ -32,7 +32,7 @@ class ModelAuthority {
   /// permission, damage) is reported in fault(), and follow_store() reads it again: acquisition
   /// does not wait for it.
   [[nodiscard]] static ModelAuthority open(const std::filesystem::path& store_folder,
-                                           const Config& config, protocol::UtcOffset utc,
+                                           const Config& config, WallClock clock,
                                            protocol::HostTime now);
 
   /// A copy of the keeper, with which another thread stores a model. The hub's thread then calls

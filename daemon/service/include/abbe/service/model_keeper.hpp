@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/gate.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/model/configuration_fit.hpp"
@@ -59,12 +60,11 @@ struct KeptBeside {
 class ModelKeeper {
  public:
   /// Does not access the disk.
-  ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
-              protocol::UtcOffset utc);
+  ModelKeeper(const std::filesystem::path& store_folder, const Config& config, WallClock clock);
 
   /// For the start of the daemon: removes files that killed processes left in the store, and
   /// renames a damaged state file. Ignores errors; read_active() returns them.
-  void tidy_store(protocol::HostTime now);
+  void tidy_store();
 
   /// As ModelStore::set_lock_timeout().
   void set_lock_timeout(std::chrono::nanoseconds patience) noexcept {
@@ -106,7 +106,7 @@ class ModelKeeper {
   ModelStore store_;
   std::string machine_;
   std::shared_ptr<const PresentConfiguration> configuration_;
-  protocol::UtcOffset utc_;
+  WallClock clock_;
 };
 
 }  // namespace abbe::daemon

@@ -138,6 +138,13 @@ void print_release_awaited(const json& awaited) {
       awaited["command"].get<std::string>());
 }
 
+void print_machine_stop(const json& stop) {
+  const auto outcome = stop["outcome"].get<std::string>();
+  fmt::print("stop       {}: {}\n",
+             outcome == "stopped" ? outcome : coloured(outcome, kRed, STDOUT_FILENO),
+             stop["text"].get<std::string>());
+}
+
 void print_dds(const json& dds) {
   const bool connected = dds["connected"].get<bool>();
   const auto state = dds.value("state", std::string{});  // older versions of abbed do not send it
@@ -166,6 +173,7 @@ void print_status(const json& status) {
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
+  if (status.contains("machine_stop")) print_machine_stop(status["machine_stop"]);
   const json& session = status["session"];
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),

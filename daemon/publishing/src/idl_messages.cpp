@@ -240,7 +240,8 @@ v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double
   m.clock_residual_s(std::chrono::duration<double>(d.clock.residual).count());
   m.latency_p50_s(latency_p50_s);
   m.latency_p99_s(latency_p99_s);
-  m.fault(cut(d.last_fault, kReasonBound));
+  const bool both = !d.condition.empty() && !d.last_fault.empty();
+  m.fault(cut(d.condition + (both ? "; " : "") + d.last_fault, kReasonBound));
 
   return m;
 }

@@ -55,6 +55,7 @@ function state_of(status) {
     ["recording", status.recording],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
+    ["stop", status.machine_stop ? `${status.machine_stop.outcome}: ${status.machine_stop.text}` : ""],
     ["axes not referenced", status.axes_without_zero?.join(", ")],
     ["tracker", status.unmeasured_air],
   ]);

@@ -36,6 +36,10 @@ std::string footer() {
        {ExitCode::Usage},
        {ExitCode::BadInput, "the configuration is invalid or cannot be read"},
        {ExitCode::Io, "the system refused a socket, directory, port or priority"},
+       {ExitCode::StopNotConfirmed,
+        "abbed has ended, but the measuring machine did not confirm its stop: it may be moving"},
+       {ExitCode::StopNotSent,
+        "abbed has ended without a connection to the measuring machine: it may be moving"},
        {ExitCode::Internal,
         "the hub hangs, or does not end within 5 s after a signal, or an internal error: systemd "
         "restarts abbed"}});
@@ -124,6 +128,25 @@ int run(Abbed& abbed, const sigset_t& stop) {
   }
 }
 
+/// Ends abbed and reports it. Returns the exit code: `code`, or another one if the measuring machine
+/// may be moving on.
+int end(Abbed& abbed, int code) {
+  using Outcome = abbe::drivers::IppStopOutcome;
+  const auto machine = abbed.end();
+  if (!machine || machine->outcome == Outcome::Stopped) {
+    fmt::print(stderr, "abbed: stopped\n");
+    return code;
+  }
+  fmt::print(
+      stderr,
+      "abbed: ended, but the stop of the measuring machine is {}: {}; check the machine, use "
+      "its emergency stop\n",
+      name_of(machine->outcome), machine->text);
+  if (code != kDone) return code;
+  return number(machine->outcome == Outcome::NotSent ? ExitCode::StopNotSent
+                                                     : ExitCode::StopNotConfirmed);
+}
+
 int abbed_main(int argc, char** argv) {
   CLI::App app{
       "Acquires data from a machine tool or measuring machine, identifies its geometric errors and "
@@ -161,10 +184,10 @@ int abbed_main(int argc, char** argv) {
   fmt::print(stderr, "abbed: running, configuration {}\n", file);
   notify_ready("running");
 
-  const int code = run(**abbed, stop);
+  const int ended_with = run(**abbed, stop);
   notify_stopping();
+  const int code = end(**abbed, ended_with);
   abbed->reset();
-  fmt::print(stderr, "abbed: stopped\n");
 
   // A running identification checks its stop flag only from time to time, so the process ends
   // without waiting for it.

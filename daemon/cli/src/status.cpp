@@ -142,6 +142,13 @@ void print_release_awaited(const json& awaited) {
       awaited["command"].get<std::string>());
 }
 
+void print_machine_stop(const json& stop) {
+  const auto outcome = stop["outcome"].get<std::string>();
+  fmt::print("stop       {}: {}\n",
+             outcome == "stopped" ? outcome : coloured(outcome, kRed, STDOUT_FILENO),
+             stop["text"].get<std::string>());
+}
+
 void print_dds(const json& dds) {
   const bool connected = dds["connected"].get<bool>();
   const auto state = dds.value("state", std::string{});  // older versions of abbed do not send it
@@ -193,6 +200,7 @@ void print_status(const json& status) {
   for (const json& change : status.value("clock", json::array()))
     fmt::print("clock      {}\n", coloured(change.get<std::string>(), kYellow, STDOUT_FILENO));
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
+  if (status.contains("machine_stop")) print_machine_stop(status["machine_stop"]);
   const json& session = status["session"];
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),

@@ -47,7 +47,7 @@ struct ConfigKind {
   std::string (*former_text)(const Config& config) = nullptr;
 
   // Capabilities; see capabilities.hpp.
-  bool moves = false;  ///< it moves and touches points under its own control
+  std::optional<MotionSource> (*motion)(const Config& config) = nullptr;
   std::optional<AxisReadings> (*axes)(const Config& config) = nullptr;
   /// True: the positions of the device are the axis readings only if no other kind of device reads
   /// the axes.

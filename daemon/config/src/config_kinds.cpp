@@ -47,7 +47,7 @@ bool has(const ConfigKind& kind, Capability capability) {
     case Capability::Errors:
       return kind.points != nullptr || kind.touches != nullptr;
     case Capability::Motion:
-      return kind.moves;
+      return kind.motion != nullptr;
     case Capability::Environment:
       return kind.environment != nullptr;
   }
@@ -95,6 +95,10 @@ std::optional<TrackerSource> tracker_source(const Config& config) {
 
 std::optional<TouchSource> touch_source(const Config& config) {
   return first_with(&ConfigKind::touches, config);
+}
+
+std::optional<MotionSource> motion_source(const Config& config) {
+  return first_with(&ConfigKind::motion, config);
 }
 
 std::optional<CountedAxes> counted_axes(const Config& config) {

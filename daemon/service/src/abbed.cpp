@@ -58,6 +58,16 @@ constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer fo
 constexpr auto kEndTimeout = 5s;
 constexpr int kHubHangs = number(ExitCode::Internal);
 
+/// nullopt until the outcome of the latest request to stop the machine is known.
+std::optional<ObservedStop> observed_stop(const drivers::IppStop& stop) {
+  using enum drivers::IppStopOutcome;
+  if (stop.outcome == None || stop.outcome == Pending) return std::nullopt;
+  return ObservedStop{.number = stop.number,
+                      .outcome = name_of(stop.outcome),
+                      .text = stop.text,
+                      .confirmed = stop.outcome == Stopped};
+}
+
 /// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, unique for each daemon process.
 std::string recording_name() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
@@ -130,6 +140,7 @@ struct Abbed::State {
   ClockSteps clock_steps{clock.read()};
   ClockChange clock_change{};  // as reported
   bool tidies = true;          // false after the clock was set
+  bool has_ended = false;
   WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
@@ -140,11 +151,17 @@ struct Abbed::State {
         utc(clock.offset(time.now())) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
-  ~State() {
+  ~State() { (void)end(); }
+
+  /// The first call ends everything.
+  std::optional<drivers::IppStop> end() {
+    if (std::exchange(has_ended, true)) return {};
     if (devices) devices->end_machine();  // first: the machine must stop even if a later step hangs
     *stop_closing = true;
     end_hub();
+    const auto machine = devices ? devices->finish_machine() : std::nullopt;
     counting_state.reset();  // waits for the disk
+    return machine;
   }
 
   void end_hub() {
@@ -352,7 +369,8 @@ struct Abbed::State {
                           .session = calibration->status(),
                           .model = {.state = std::string{status_name(active.status)},
                                     .id = active.model != nullptr ? active.model->id : "",
-                                    .reason = active.reason}};
+                                    .reason = active.reason},
+                          .stop = observed_stop(devices->machine_stop())};
         },
         kHubTimeout);
     Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
@@ -485,6 +503,10 @@ void Abbed::cycle() {
   state_->tidy_recordings(now);
   state_->store_upkeep.cycle(now);
   state_->report_left_recordings();
+}
+
+std::optional<drivers::IppStop> Abbed::end() {
+  return state_->end();
 }
 
 bool Abbed::alive() const {

@@ -28,6 +28,7 @@ constexpr std::string_view kSecurityId = "4ac1f08b65d24e3d9b7f20e6c85a31d4";
 constexpr std::string_view kSessionId = "e84a05c3f1d74b9c92b6d7e30f5a1c68";
 constexpr std::string_view kModelId = "93d6f7b20a4c4e81b5e9c20d8f1a7346";
 constexpr std::string_view kParticipantId = "70c5e2a9d6b84f13a1d4f8067b3e9c25";
+constexpr std::string_view kStopId = "3ed07b5c94f14d6a8b12e7f05a6c8d9e";
 constexpr std::string_view kHubId = "b64f1d83e7a0495c8e2b0c9f53d7a61e";
 
 struct StreamKind {
@@ -117,6 +118,17 @@ ObservedPart part_of(const ObservedModel& model) {
       .fields = {{"ABBE_MODEL", model.id}, {"ABBE_STATE", model.state}}};
 }
 
+ObservedPart part_of(const ObservedStop& stop) {
+  return {.key = "stop",
+          .state = fmt::format("{}\n{}", stop.number, stop.outcome),
+          .message = fmt::format(
+              "measuring machine: {}{}: {}{}", stop.confirmed ? "" : "stop ", stop.outcome,
+              stop.text, stop.confirmed ? "" : "; check the machine, use its emergency stop"),
+          .message_id = kStopId,
+          .urgency = stop.confirmed ? Urgency::Notice : Urgency::Error,
+          .fields = {{"ABBE_STATE", stop.outcome}}};
+}
+
 ObservedPart part_of(const ObservedParticipant& participant) {
   ObservedPart part{.key = "participant",
                     .state = fmt::format("{}\n{}", participant.restarts, participant.start_fault),
@@ -163,6 +175,7 @@ std::vector<ObservedPart> parts_of(const Observed& now) {
   if (now.participant) parts.push_back(part_of(*now.participant));
   if (!now.hub_answers) return parts;
   for (const auto& stream : now.streams) parts.push_back(part_of(stream));
+  if (now.stop) parts.push_back(part_of(*now.stop));
   parts.push_back(part_of(now.session));
   parts.push_back(part_of(now.model));
   return parts;

@@ -17,6 +17,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "model_status_name.hpp"
+#include "motion_requests.hpp"
 #include "tracker_requests.hpp"
 
 namespace abbe::daemon {
@@ -304,6 +305,7 @@ struct SeenStatus {
   std::optional<SeenReference> reference;
   std::optional<std::vector<std::string>> without_zero;
   std::optional<std::string> release_awaited, recording;
+  drivers::IppStop machine_stop;
   std::optional<SeenTracker> tracker;
   std::optional<SeenLink> dds;
 };
@@ -328,6 +330,7 @@ SeenStatus look_at_status(const Hub& hub) {
                   .without_zero = {},
                   .release_awaited = parts.devices.release_awaited(),
                   .recording = {},
+                  .machine_stop = parts.devices.machine_stop(),
                   .tracker = look_at_tracker(parts),
                   .dds = {}};
 
@@ -381,6 +384,10 @@ json status_json(const SeenStatus& seen, const Config& config) {
   if (seen.release_awaited)
     out["release_awaited"] = {{"reason", *seen.release_awaited},
                               {"command", "abbe machine release"}};
+  if (const auto machine = motion_source(config)) out["measuring_machine"] = machine->device;
+  json stopped = json::object();
+  add_stop(stopped, seen.machine_stop);
+  if (stopped.contains("stop")) out["machine_stop"] = stopped["stop"];
   if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
   if (seen.recording) out["recording"] = *seen.recording;
   if (seen.dds) out["dds"] = dds_json(*seen.dds);

@@ -64,6 +64,7 @@ function state_of(status) {
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
     ["clock", status.clock?.join("; ")],
+    ["stop", status.machine_stop ? `${status.machine_stop.outcome}: ${status.machine_stop.text}` : ""],
     ["axes not referenced", status.axes_without_zero?.join(", ")],
     ["tracker", status.unmeasured_air],
   ]);

@@ -24,6 +24,8 @@ int status_of(ErrorCode code) {
     case ErrorCode::DataInsufficient:
       return 422;
     case ErrorCode::Io:
+    case ErrorCode::StopNotConfirmed:
+    case ErrorCode::StopNotSent:
       return 503;
   }
   return 500;

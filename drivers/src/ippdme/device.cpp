@@ -1,10 +1,19 @@
 #include "abbe/drivers/ippdme/device.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
 namespace abbe::drivers {
+namespace {
+
+/// Host time. A state that is not stored after this is reported; a healthy disk needs some ms.
+constexpr std::chrono::seconds kSavedSoon{1};
+constexpr auto kOutcomes = static_cast<std::uint64_t>(IppStopOutcome::NotSent) + 1;
+
+}  // namespace
 
 Result<std::unique_ptr<IppDevice>> IppDevice::create(const IppDeviceOptions& options,
                                                      const TimeSource& time) {
@@ -29,28 +38,37 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
 
 IppDevice::~IppDevice() {
   try {
-    handle(IppStopRequested{});
-    await_standstill();
-    leave(IppStopRequested{});
+    finish();
   } catch (...) {  // NOLINT(bugprone-empty-catch)
     // Out of memory: the connection closes, and the server ends the session of a lost client.
   }
+}
+
+IppStop IppDevice::finish() {
+  handle(IppStopRequested{});
+  await_standstill();
+  leave(IppStopRequested{});
+  report_machine();
+  show_session();
+  return session().stop();
 }
 
 /// Waits until AbortE is answered: if the connection were closed before, the machine might not
 /// stop.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
-  const auto& time_out = options_.session.command_timeout;
+  const auto time_out = options_.session.connect_timeout + options_.session.command_timeout;
   const auto until = std::chrono::steady_clock::now() + time_.wall(time_out);
-  while (session().state() == IppState::Aborting && std::chrono::steady_clock::now() < until) {
+  while (session().stopping_motion() && std::chrono::steady_clock::now() < until) {
     wait(time_.host(kLook));
     receive();
   }
 }
 
-void IppDevice::abort() {
-  requests_.put(IppAbortRequested{});
+std::uint64_t IppDevice::abort() {
+  const auto number = stops_asked_.fetch_add(1, std::memory_order_relaxed) + 1;
+  requests_.put(IppAbortRequested{number});
+  return number;
 }
 
 void IppDevice::end() {
@@ -65,18 +83,21 @@ void IppDevice::measure(std::span<const ProbePoint> points) {
   asked_.fetch_add(points.size(), std::memory_order_relaxed);
   // put() also orders the increment of asked_ before the device thread counts these points as
   // finished.
-  requests_.put(std::vector<ProbePoint>{points.begin(), points.end()});
+  requests_.put(IppPath{points.begin(), points.end()});
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
+  constexpr std::chrono::milliseconds kLookAtStore{1};
   handle_posted_messages();
   read_requests();
+  begin_stored_motion();
   if (!reads_before_due()) {
     handle(IppTick{});
-    poll(at_most);
+    const bool storing = session().state() == IppState::Storing;
+    poll(storing ? std::min(at_most, time_.host(kLookAtStore)) : at_most);
   }
-  show_session();
   report_machine();
+  show_session();
   count_points();
 }
 
@@ -84,13 +105,67 @@ void IppDevice::show_session() {
   show();
   held_.store(session().held(), std::memory_order_relaxed);
   releasable_.store(session().releasable(), std::memory_order_relaxed);
+  show_stop();
+  show_condition();
+}
+
+void IppDevice::show_stop() {
+  const IppStop& now = session().stop();
+  if (now.number == stop_.number && now.outcome == stop_.outcome) return;
+  stop_ = now;
+  stop_text_.set(time_.now(), now.text);
+  // release: pairs with the acquire in last_stop()
+  stop_shown_.store(now.number * kOutcomes + static_cast<std::uint64_t>(now.outcome),
+                    std::memory_order_release);
+}
+
+IppStop IppDevice::last_stop() const {
+  const auto shown = stop_shown_.load(std::memory_order_acquire);  // pairs with show_stop()
+  return {.number = shown / kOutcomes,
+          .outcome = static_cast<IppStopOutcome>(shown % kOutcomes),
+          .text = stop_text_.read().text};
+}
+
+/// What a person must know at once: that the machine may be moving, or that a restart would not
+/// know its state.
+void IppDevice::show_condition() {
+  std::string condition = session().danger();
+  const auto add = [&condition](std::string_view what) {
+    condition += fmt::format("{}{}", condition.empty() ? "" : "; ", what);
+  };
+  const IppStored now = stored();
+  if (now.done || machine_ == IppMachine{})
+    unsaved_since_.reset();
+  else if (!unsaved_since_)
+    unsaved_since_ = time_.now();
+  if (unsaved_since_ && !now.fault.empty())
+    add(fmt::format("not saved, a restart of abbed would not await a release: {}", now.fault));
+  else if (unsaved_since_ && time_.now() - *unsaved_since_ > kSavedSoon)
+    add("not saved yet, a restart of abbed would not await a release: the disk does not answer");
+  if (condition == condition_) return;
+  condition_ = std::move(condition);
+  board_.set_condition(time_.now(), condition_);
 }
 
 void IppDevice::report_machine() {
-  const IppMachine machine{session().hold_reason(), session().moving()};
+  const IppMachine machine{session().hold_reason(), session().may_move()};
   if (machine == machine_) return;
   machine_ = machine;
   if (options_.machine_changed) options_.machine_changed(machine);
+}
+
+IppStored IppDevice::stored() const {
+  return options_.machine_stored ? options_.machine_stored() : IppStored{.done = true, .fault = {}};
+}
+
+void IppDevice::begin_stored_motion() {
+  report_machine();
+  if (session().state() != IppState::Storing) return;
+  const IppStored now = stored();
+  if (now.done)
+    handle(IppMotionStored{});
+  else if (!now.fault.empty())
+    handle(IppMotionNotStored{now.fault});
 }
 
 DeviceStatus IppDevice::status() const {
@@ -108,11 +183,11 @@ void IppDevice::read_requests() {
   const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), stops).base();
 
   for (auto request = requests.begin(); request != requests.end(); ++request) {
-    if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
-      taken_ += points->size();
-      if (request >= after_last_stop) request_points(*points);  // earlier points are not begun
-    } else if (is_abort(*request)) {
-      handle(IppAbortRequested{});
+    if (const auto* path = std::get_if<IppPath>(&*request)) {
+      taken_ += path->size();
+      if (request >= after_last_stop) handle(*path);  // earlier points are not begun
+    } else if (const auto* abort = std::get_if<IppAbortRequested>(&*request)) {
+      handle(*abort);
     } else if (is_end(*request)) {
       handle(IppStopRequested{});
     } else {
@@ -121,20 +196,12 @@ void IppDevice::read_requests() {
   }
 }
 
-/// Passes points to the session. If one of them causes a fault, the remaining ones are discarded.
-void IppDevice::request_points(const std::vector<ProbePoint>& points) {
-  const auto faults_before = session().fault().count;
-  for (const ProbePoint& point : points)
-    if (session().fault().count == faults_before) handle(point);
-}
-
 void IppDevice::count_points() {
   // release: pairs with the acquire in points_left()
   finished_.store(taken_ - session().points_left(), std::memory_order_release);
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
-  report_machine();  // the state is stored before the machine moves
   const auto bytes = std::as_bytes(std::span{command.line});
   const protocol::HostTime now = time_.now();  // one value: a replay has only the recorded time
   raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
@@ -9,6 +12,24 @@
 
 namespace abbe::daemon {
 namespace {
+
+/// Both corners or none; each coordinate of the upper one above that of the lower one.
+void read_volume(ClassifiedSection& cmm, CmmConfig& config) {
+  std::vector<double> min_m, max_m;
+  const bool low = cmm.get(operation("volume_min_mm"), min_m, kMilli);
+  const bool high = cmm.get(operation("volume_max_mm"), max_m, kMilli);
+  if (!low && !high) return;
+  MotionBox volume;
+  if (min_m.size() != volume.min_m.size() || max_m.size() != volume.max_m.size())
+    return cmm.fault("volume_min_mm",
+                     "volume_min_mm and volume_max_mm must both be three numbers, x, y, z");
+  std::ranges::copy(min_m, volume.min_m.begin());
+  std::ranges::copy(max_m, volume.max_m.begin());
+  for (std::size_t i = 0; i < volume.min_m.size(); ++i)
+    if (!(volume.min_m[i] < volume.max_m[i]))
+      return cmm.fault("volume_max_mm", "must be above volume_min_mm in each coordinate");
+  config.volume = volume;
+}
 
 void read_cmm(ClassifiedSection& root, Config& out, StreamNames& names) {
   ClassifiedSection cmm = root.child("cmm");
@@ -26,6 +47,7 @@ void read_cmm(ClassifiedSection& root, Config& out, StreamNames& names) {
   cmm.get(Key{"axes_compensated", positions}, config.axes_compensated);
   cmm.get(operation("command_timeout_s"), config.command_timeout, kPlain, kPositive);
   cmm.get(operation("motion_timeout_s"), config.motion_timeout, kPlain, kPositive);
+  read_volume(cmm, config);
 
   if (const auto other = touch_source(out))
     cmm.fault("",
@@ -62,13 +84,19 @@ std::optional<TouchSource> cmm_touches(const Config& config) {
                      .compensated = cmm->axes_compensated};
 }
 
+std::optional<MotionSource> cmm_motion(const Config& config) {
+  const auto& cmm = config.of<CmmConfig>();
+  if (!cmm) return std::nullopt;
+  return MotionSource{.key = CmmConfig::kKind.key, .device = cmm->name, .volume = cmm->volume};
+}
+
 }  // namespace
 
 const ConfigKind CmmConfig::kKind{.key = "cmm",
                                   .read = &read_cmm,
                                   .summary = &cmm_summary,
                                   .former_text = &former_cmm_text,
-                                  .moves = true,
+                                  .motion = &cmm_motion,
                                   .axes = &cmm_axes,
                                   .axes_if_no_other = true,
                                   .touches = &cmm_touches};

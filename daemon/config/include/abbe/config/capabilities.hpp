@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/config/motion_box.hpp"
 #include "abbe/config/reference_marks.hpp"
 #include "abbe/config/usb_card.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -50,6 +51,14 @@ struct TouchSource {
   bool compensated = false;  ///< the device corrects the positions that it reports
 };
 [[nodiscard]] std::optional<TouchSource> touch_source(const Config& config);
+
+/// The device that moves and touches points under its own control.
+struct MotionSource {
+  std::string_view key;             ///< of its table
+  std::string device;               ///< its name
+  std::optional<MotionBox> volume;  ///< nullopt: its table sets none
+};
+[[nodiscard]] std::optional<MotionSource> motion_source(const Config& config);
 
 /// The card whose counters read the axes. When the card is set up its counters start at 0, so the
 /// axis readings have an unknown offset until the axes are referenced; see Datum.

@@ -4,12 +4,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/base/error.hpp"
 #include "abbe/base/wall_clock.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
@@ -28,8 +30,12 @@ class Abbed {
   [[nodiscard]] static Result<std::unique_ptr<Abbed>> start(Config config, AbbedOptions options);
   Abbed(const Abbed&) = delete;
   Abbed& operator=(const Abbed&) = delete;
-  /// Stops the parts in reverse order and closes the recording.
+  /// As end(), and closes the recording.
   ~Abbed();
+
+  /// Stops the measuring machine, then the other parts. Returns whether the machine is stopped;
+  /// nullopt: there is none. The last call.
+  std::optional<drivers::IppStop> end();
 
   /// Call at least every 50 ms from the thread that called start(). Supervises abbe-dds, removes
   /// old recordings in the background and logs which recordings of a killed daemon were closed.

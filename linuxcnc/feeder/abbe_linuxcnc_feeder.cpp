@@ -39,6 +39,7 @@ volatile sig_atomic_t stop_requested = 0;
 struct Options {
   dds::ParticipantOptions participant;
   std::string machine;
+  std::string machine_id;
   std::vector<double> tool_offset_mm;
   double clamp_mm = 0.2;
   long period_us = 1000;
@@ -127,7 +128,8 @@ int run(const Options& options) {
 
   const auto& t = options.tool_offset_mm;
   linuxcnc::Subscription subscription(
-      {options.machine, calib::Vector3(t[0], t[1], t[2]) * kMillimetre}, *readers);
+      {options.machine, calib::Vector3(t[0], t[1], t[2]) * kMillimetre, options.machine_id},
+      *readers);
   Latest latest;
   std::jthread deciding([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) latest.set(subscription.poll(kDecisionPeriod));
@@ -153,6 +155,9 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "abbe-linuxcnc-feeder " ABBE_VERSION);
   Options options;
   app.add_option("--machine", options.machine, "name of the machine in abbed.toml")->required();
+  app.add_option("--machine-id", options.machine_id,
+                 "identity of the machine, from `abbe machine identity` (default: the first one "
+                 "that publishes under the name, while the feeder runs)");
   app.add_option("--tool-offset-mm", options.tool_offset_mm,
                  "tool offset x y z for which the model must be valid")
       ->required()

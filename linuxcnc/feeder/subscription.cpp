@@ -61,9 +61,25 @@ void Subscription::take(const dds::Arrival& arrival) {
   if (!key || key->machine != options_.machine) return;
 
   const auto from = dds::participant_of(arrival.writer);
-  pin_.heard(from, Clock::now());
+  judge(arrival, from);
   keep(arrival, publishers_[from]);
   std::erase_if(publishers_, [this](const auto& p) { return !pin_.remembers(p.first); });
+}
+
+void Subscription::judge(const dds::Arrival& arrival, const dds::ParticipantId& from) {
+  using Verdict = dds::PublisherPin::Verdict;
+  auto verdict = Verdict::Waiting;
+  if (arrival.topic == Topic::Identity) {
+    with<v1::Identity>(arrival, [&](v1::Identity&& identity) {
+      verdict = pin_.identified(from, identity.machine_id(), identity.twin(), Clock::now());
+    });
+  } else {
+    verdict = pin_.heard(from, Clock::now());
+  }
+  if (verdict == Verdict::OtherMachine)
+    why_none_ = "machine_id " + pin_.stated_by(from).value_or("") + " is another machine";
+  if (verdict == Verdict::Ambiguous)
+    why_none_ = "several machines have this name: give --machine-id";
 }
 
 void Subscription::keep(const dds::Arrival& arrival, Publisher& publisher) {
@@ -96,7 +112,8 @@ std::string Subscription::why_not() const {
   const auto pinned = pin_.pinned();
   const auto found = pinned ? publishers_.find(*pinned) : publishers_.end();
   if (found == publishers_.end())
-    return "nothing received about machine \"" + options_.machine + "\"";
+    return "nothing received about machine \"" + options_.machine + "\"" +
+           (why_none_.empty() ? "" : ": " + why_none_);
 
   const Publisher& publisher = found->second;
   const auto decision = publisher.model.decide(alive(publisher));

@@ -20,17 +20,18 @@ namespace abbe::linuxcnc {
 struct SubscriptionOptions {
   std::string machine;
   calib::Vector3 tool_offset_m;  ///< of the tool in the spindle
+  std::string machine_id = {};   ///< of the machine; empty: the first one of this name is pinned
 };
 
 class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::array kTopics{daemon::Topic::ModelState, daemon::Topic::ErrorModel,
-                                      daemon::Topic::ErrorGrid};
+  static constexpr std::array kTopics{daemon::Topic::Identity, daemon::Topic::ModelState,
+                                      daemon::Topic::ErrorModel, daemon::Topic::ErrorGrid};
 
   /// `readers` must outlive the subscription and read kTopics.
   Subscription(SubscriptionOptions options, dds::Readers& readers)
-      : options_(std::move(options)), readers_(readers) {}
+      : options_(std::move(options)), readers_(readers), pin_(options_.machine_id) {}
 
   /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
   /// replaced only when the decision changes. Never null.
@@ -44,6 +45,8 @@ class Subscription {
   };
 
   void take(const dds::Arrival& arrival);
+  /// Passes the sample to the pin; notes why a publisher is not used.
+  void judge(const dds::Arrival& arrival, const dds::ParticipantId& from);
   void keep(const dds::Arrival& arrival, Publisher& publisher);
   [[nodiscard]] bool alive(const Publisher& publisher) const;
   [[nodiscard]] std::string why_not() const;
@@ -53,6 +56,7 @@ class Subscription {
   dds::Readers& readers_;
   dds::PublisherPin pin_;
   std::map<dds::ParticipantId, Publisher> publishers_;
+  std::string why_none_;  ///< why the last publisher that was heard is not used
   bool grid_changed_ = false;
   std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
 };

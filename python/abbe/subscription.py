@@ -23,14 +23,19 @@ class Decision:
 
 
 class Subscription:
-    """Iterates over the samples of all topics as dicts; a context manager. One thread."""
+    """Iterates over the samples of all topics as dicts; a context manager. One thread.
+
+    machine_id: the identity of `machine`, as `abbe machine identity` prints it. Without it the first
+    one that publishes under the name is used, and no other one while this object exists.
+    """
 
     def __init__(self, machine: str | None = None, domain: int = 0, *, config: str | None = None,
                  profile: str | None = None, keys: str | None = None, timeout_s: float | None = None,
+                 machine_id: str | None = None,
                  program: str = "abbe-watch"):
         command = [program, "--json"]
         command += ["--config", config] if config is not None else ["--domain", str(domain)]
-        for name, value in (("--machine", machine), ("--profile", profile), ("--security", keys),
+        for name, value in (("--machine", machine), ("--machine-id", machine_id), ("--profile", profile), ("--security", keys),
                             ("--timeout", timeout_s)):
             if value is not None:
                 command += [name, str(value)]

@@ -72,6 +72,21 @@ class DdsLinkTest : public testing::Test {
   std::optional<DdsLink> link_;
 };
 
+TEST_F(DdsLinkTest, ReportsATwinWhateverThePartsInWhichItArrives) {
+  const FarEnd far(path_);
+  link_->poll();
+  const std::string report{'\0', '\1', '\3', '\0', 'a', 'b', 'c'};  // after the answer to a beat
+  for (const char c : report) {
+    EXPECT_EQ(link_->twin(), "");
+    ASSERT_EQ(::send(far.fd, &c, 1, 0), 1);
+    link_->poll();
+  }
+  EXPECT_EQ(link_->twin(), "abc");
+  far.report_twin("");
+  link_->poll();
+  EXPECT_EQ(link_->twin(), "");
+}
+
 TEST_F(DdsLinkTest, AnAbbeDdsThatDoesNotAnswerIsNotReportedAsConnected) {
   EXPECT_STREQ(link_->state(), "waiting");
   const FarEnd hung(path_);

@@ -17,6 +17,7 @@
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
+#include "abbe/dds/twin_watch.hpp"
 #include "abbe/dds/writers.hpp"
 #include "abbe/messages/dds_bridge.hpp"
 
@@ -141,11 +142,18 @@ std::optional<int> publish(const Options& options) {
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);
   abbe::dds::Announcer announcer(*participant, *writers);
+  abbe::dds::TwinWatch twins(*participant);
+  if (!twins.looks())
+    std::fputs(
+        "abbe-dds: other machines of this name are not noticed: the permissions of the keys do not "
+        "allow abbe-dds to read abbe/v1/Identity; `abbe dds keys` makes keys that do\n",
+        stderr);
   bool alive = false;
 
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.cycle();
     announcer.cycle(Clock::now());
+    feed.report_twin(twins.cycle(writers->identity(), Clock::now()));
     manager.cycle(Clock::now());
     log_source_change(bridge, alive);
     if (const auto added = interfaces.cycle(participant->allowed_addresses(), Clock::now())) {

@@ -53,11 +53,11 @@ std::string footer() {
               {ExitCode::Internal}});
 }
 
-/// In the order in which the readers are read. ModelState is first, because Readers::take() reads
-/// topic by topic: every other sample is then judged by the latest ModelState.
-constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
-                             Topic::Snapshot,        Topic::Health,     Topic::Compensation,
-                             Topic::CalibrationEvent};
+/// In the order in which the readers are read. Identity and ModelState are first, because
+/// Readers::take() reads topic by topic: every other sample is then judged by the latest of them.
+constexpr std::array kTopics{Topic::Identity,     Topic::ModelState,      Topic::ErrorModel,
+                             Topic::ErrorGrid,    Topic::Snapshot,        Topic::Health,
+                             Topic::Compensation, Topic::CalibrationEvent};
 
 /// If no sample has arrived for this time, a message tells the user what may be wrong. The time
 /// exceeds the second after which ModelState is repeated.
@@ -250,7 +250,12 @@ int main(int argc, char** argv) {
                  "in daemon/ those in subscriber-1/ beside it are used")
       ->excludes(domain)
       ->excludes(profile);
-  app.add_option("--machine", options.show.machine, "only this machine (default: all)");
+  auto* const machine =
+      app.add_option("--machine", options.show.machine, "only this machine (default: all)");
+  app.add_option("--machine-id", options.show.machine_id,
+                 "identity of this machine, from `abbe machine identity` (default: the first one "
+                 "that publishes under the name, while abbe-watch runs)")
+      ->needs(machine);
   app.add_flag("--json", options.show.json, "print one line with a JSON object per sample");
   app.add_flag("--until-model", options.until_model,
                "exit with code 0 as soon as a model that may be applied has arrived");

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/publisher_pin.hpp"
@@ -18,8 +19,9 @@
 namespace abbe::dds {
 
 struct WatchOptions {
-  std::string machine;  ///< empty: all machines
-  bool json = false;    ///< one line with a JSON object per sample, instead of text
+  std::string machine;     ///< empty: all machines
+  std::string machine_id;  ///< of this machine; empty: the first one is pinned
+  bool json = false;       ///< one line with a JSON object per sample, instead of text
 };
 
 /// Keeps the received data of every machine, and prints what has changed.
@@ -49,6 +51,8 @@ class WatchedMachines {
     std::optional<WriterId> state_from;  ///< writer of the last valid ModelState
     WallClock::time_point state_at{};    ///< when that ModelState arrived
     std::string position;
+    /// The last samples of the durable topics, until the publisher is pinned, for --json.
+    std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;
     Delay delay;
     std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
   };
@@ -61,34 +65,47 @@ class WatchedMachines {
     bool shown_alive = false;
     std::string shown_state, shown_model;
     WallClock::time_point last_live{};
-    std::optional<WallClock::time_point> foreign_reported;
+    std::optional<WallClock::time_point> ignored_reported;
+    /// Why no publisher is pinned.
+    std::string why_none = "no publisher has stated its identity (topic abbe/v1/Identity)";
 
-    /// Valid once a sample of the machine was received.
-    [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
+    /// nullptr: no publisher is pinned.
+    [[nodiscard]] const Publisher* pinned() const {
+      const auto found = pin.pinned() ? publishers.find(*pin.pinned()) : publishers.end();
+      return found == publishers.end() ? nullptr : &found->second;
+    }
 
     Publisher& publisher(const ParticipantId& id) {
       const auto [found, is_new] = publishers.try_emplace(id);
-      if (is_new && pin.pinned() != id) found->second.delay = pinned().delay.for_next_publisher();
+      if (is_new && pin.pinned() != id && pinned() != nullptr)
+        found->second.delay = pinned()->delay.for_next_publisher();
       if (is_new) std::erase_if(publishers, [&](const auto& p) { return !pin.remembers(p.first); });
       return found->second;
     }
   };
 
-  [[nodiscard]] bool alive(const Publisher& publisher) const;
+  [[nodiscard]] bool alive(const Publisher* publisher) const;
   /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
   /// Shows a sample of the pinned publisher, after keep().
   void show(const Arrival& arrival, const std::string& name, Machine& machine,
             const Publisher& publisher);
-  void print_json(daemon::Topic topic, std::span<const std::byte> payload);
+  void print_sample(daemon::Topic topic, std::span<const std::byte> payload);
   void print(const std::string& line);
   void show_liveness(const std::string& name, Machine& machine);
   /// Participant id and announced addresses; the addresses are not verified.
   [[nodiscard]] std::string described(const ParticipantId& id) const;
   void show_successor(const std::string& name, const ParticipantId& id,
                       const ParticipantId& former);
-  void report_foreign_publisher(const std::string& name, Machine& machine, const ParticipantId& id);
+  /// Keeps a sample of a publisher that is not pinned until show_kept().
+  void keep_for_later(const Arrival& arrival, Publisher& publisher);
+  /// Shows what arrived before the publisher was pinned.
+  void show_kept(const std::string& name, Machine& machine, Publisher& publisher);
+  [[nodiscard]] static PublisherPin::Verdict judge(const Arrival& arrival, PublisherPin& pin);
+  /// Reports, every 10 s, why the samples of `id` are not used.
+  void report_ignored_publisher(const std::string& name, Machine& machine, const ParticipantId& id,
+                                PublisherPin::Verdict verdict);
   void show_state(const std::string& name, Machine& machine, const Publisher& publisher);
   void show_model(Machine& machine, const Publisher& publisher);
   void show_health(const v1::Health& h);

@@ -94,6 +94,18 @@ Json fields(const v1::ModelState& m) {
       FIELD(reason),  FIELD(model_id),        FIELD(age_ns),       FIELD(validity_ns)};
 }
 
+Json fields(const v1::Identity& m) {
+  return {FIELD(machine),
+          FIELD(sequence_number),
+          FIELD(host_time_ns),
+          FIELD(machine_id),
+          FIELD(twin),
+          FIELD(twin_seen),
+          FIELD(model_id),
+          FIELD(model_simulated),
+          FIELD(devices_simulated)};
+}
+
 Json fields(const v1::Health& m) {
   return {FIELD(machine), FIELD(stream),           FIELD(sequence_number), FIELD(host_time_ns),
           FIELD(state),   FIELD(rate_hz),          FIELD(samples),         FIELD(dropped),
@@ -136,6 +148,8 @@ daemon::Result<std::string> json_line(Topic topic, std::span<const std::byte> pa
       return line<v1::Health>(payload);
     case Topic::CalibrationEvent:
       return line<v1::CalibrationEvent>(payload);
+    case Topic::Identity:
+      return line<v1::Identity>(payload);
   }
 
   return daemon::fail(daemon::ErrorCode::BadInput, "unknown topic");

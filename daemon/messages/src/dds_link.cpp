@@ -67,6 +67,7 @@ struct DdsLink::State {
   RetainedPayloads<WallTime> live;
   WallTime last_beat{};
   Beats beats;
+  AnswerReader answers;
   DdsLinkCounters counters;
 
   void accept_newest();
@@ -95,17 +96,18 @@ void DdsLink::State::accept_newest() {
     peer = std::move(accepted);
     ++counters.connections;
     beats = {};
+    answers = {};
     last_beat = {};  // the next beat is sent at once
     for (auto& entry : durable.entries()) entry.extra.to_send = true;
   }
 }
 
-/// Reads the answers to beats. abbe-dds sends one byte for each beat that it has read, and nothing
-/// else.
+/// Reads the answers to beats, and reports of twins.
 void DdsLink::State::read_answers() {
-  std::array<std::byte, 64> bytes{};
+  std::array<std::byte, 512> bytes{};
   const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
   if (n > 0) beats.answered();
+  if (n > 0) answers.take(std::span(bytes).first(static_cast<std::size_t>(n)));
   if (n > 0 && process != nullptr) process->answered(WallTime::clock::now());
   if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) disconnect();
 }
@@ -241,6 +243,10 @@ bool DdsLink::connected() const noexcept {
 
 bool DdsLink::answers() const noexcept {
   return connected() && state_->beats.silence() <= kUnanswered;
+}
+
+const std::string& DdsLink::twin() const noexcept {
+  return state_->answers.twin();
 }
 
 const char* DdsLink::state() const noexcept {

@@ -15,7 +15,7 @@ using std::chrono::nanoseconds;
 constexpr std::size_t kNodesPerSlice = 456;   // ErrorGrid::nodes in the IDL
 constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: the number a late joiner receives at once
 constexpr std::size_t kHullBound = 512;       // ErrorModel::validity_hull
-constexpr std::size_t kReasonBound = 256;     // ModelState::reason, Health::fault
+constexpr std::size_t kReasonBound = 256;  // ModelState::reason, Health::fault, Identity::twin_seen
 constexpr std::size_t kEventReasonBound = 512;
 
 std::int64_t ns(protocol::HostTime t) {
@@ -187,6 +187,23 @@ v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
     m.age_ns((stamp.now - active->active_since).count());
   }
   m.validity_ns(validity.count());
+  return m;
+}
+
+v1::Identity identity_message(const PublishedIdentity& identity, const PublishedModel* active,
+                              const Stamp& stamp) {
+  v1::Identity m;
+  m.machine(std::string{stamp.machine});
+  m.sequence_number(stamp.sequence_number);
+  m.host_time_ns(ns(stamp.now));
+  m.machine_id(identity.machine_id);
+  m.twin(!identity.twin_seen.empty());
+  m.twin_seen(cut(identity.twin_seen, kReasonBound));
+  if (active != nullptr) {
+    m.model_id(active->id);
+    m.model_simulated(active->simulated);
+  }
+  m.devices_simulated(identity.devices_simulated);
   return m;
 }
 

@@ -30,7 +30,8 @@ PublisherOptions publisher_options(const Config& config) {
           .validity = config.dds.validity,
           .security_warning = dds_is_secured(config.dds.security, config.dds.profile)
                                   ? std::string{}
-                                  : dds_security_is_off(config.dds.domain)};
+                                  : dds_security_is_off(config.dds.domain),
+          .identity = {.devices_simulated = config.daemon.simulated}};
 }
 
 DdsSupervisor::Options abbe_dds_options(const Config& config, const std::string& program,

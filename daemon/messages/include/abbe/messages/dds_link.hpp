@@ -80,6 +80,9 @@ class DdsLink {
   /// hangs or is not connected.
   [[nodiscard]] bool answers() const noexcept;
   static constexpr std::chrono::seconds kUnanswered{1};
+  /// Another publisher in the domain that claims to be this machine, as abbe-dds sees it; empty:
+  /// there is none.
+  [[nodiscard]] const std::string& twin() const noexcept;
   /// One of the literals "connected", "does not answer", "waiting" (not connected).
   [[nodiscard]] const char* state() const noexcept;
   [[nodiscard]] const DdsLinkCounters& counters() const noexcept;

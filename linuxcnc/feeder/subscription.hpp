@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// Subscribes to the model of one machine and decides by the rule of abbe_v1.idl whether its grid
-/// may be applied. Used by one thread.
+/// may be applied: the tool is compared by the loop of the feeder. Used by one thread.
 
 #include <chrono>
 #include <map>
@@ -17,11 +17,6 @@
 
 namespace abbe::linuxcnc {
 
-struct SubscriptionOptions {
-  std::string machine;
-  calib::Vector3 tool_offset_m;  ///< of the tool in the spindle
-};
-
 class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
@@ -29,8 +24,8 @@ class Subscription {
                                       daemon::Topic::ErrorGrid};
 
   /// `readers` must outlive the subscription and read kTopics.
-  Subscription(SubscriptionOptions options, dds::Readers& readers)
-      : options_(std::move(options)), readers_(readers) {}
+  Subscription(std::string machine, dds::Readers& readers)
+      : machine_(std::move(machine)), readers_(readers) {}
 
   /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
   /// replaced only when the decision changes. Never null.
@@ -49,7 +44,7 @@ class Subscription {
   [[nodiscard]] std::string why_not() const;
   [[nodiscard]] std::string why_not_model(const Publisher& publisher) const;
 
-  SubscriptionOptions options_;
+  std::string machine_;
   dds::Readers& readers_;
   dds::PublisherPin pin_;
   std::map<dds::ParticipantId, Publisher> publishers_;

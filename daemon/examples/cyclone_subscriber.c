@@ -3,7 +3,8 @@
 
      cyclone_subscriber DOMAIN [KEYS] [--machine NAME MACHINE_ID]
 
-   It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
+   It prints for every Compensation of every machine whether it may be applied, and when one that may
+   be applied may no longer be, because nothing newer has arrived. KEYS is the folder
    of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. With --machine only
    the machine NAME is used, and only if its identity is MACHINE_ID (`abbe machine identity`);
    without it the first machine of each name, and no other one while the program runs. The program
@@ -55,6 +56,9 @@ struct machine {
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
   int64_t ignored_reported_ns;
+  abbe_v1_Compensation applied; /* the last vector, while it may be applied */
+  int64_t applied_age_ns;       /* when it arrived */
+  int64_t applied_ns;           /* its arrival; 0: none may be applied */
 };
 static struct machine machines[MOST_MACHINES];
 
@@ -303,11 +307,28 @@ static void decide(const abbe_v1_Compensation* c, dds_entity_t reader,
     return;
   }
   const char* reason = why_not(c, age_ns, p);
+  m->applied_ns = 0;
   if (reason != NULL) {
     printf("%s: do not apply: %s\n", c->machine, reason);
   } else {
+    m->applied = *c;
+    m->applied_age_ns = age_ns;
+    m->applied_ns = now_in_ns();
     printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c->machine, c->vector_m[0] * 1e6,
            c->vector_m[1] * 1e6, c->vector_m[2] * 1e6, (double)age_ns * 1e-6);
+  }
+}
+
+/* Call it every few milliseconds: a publisher that has ended sends nothing more, so that no sample
+   shows that its last vector may not be applied any more. */
+static void withdraw(void) {
+  for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
+    if (m->applied_ns == 0) continue;
+    const int64_t since_ns = now_in_ns() - m->applied_ns;
+    const char* reason = why_not(&m->applied, m->applied_age_ns + since_ns, m->pinned);
+    if (reason == NULL) continue;
+    printf("%s: do not apply: %s\n", m->name, reason);
+    m->applied_ns = 0;
   }
 }
 
@@ -426,7 +447,7 @@ int main(int argc, char** argv) {
   dds_waitset_attach(waitset, dds_create_readcondition(vectors, DDS_ANY_STATE), 0);
   puts("waiting");
   for (;;) {
-    dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(50));
+    dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(5));
     discard_dead_states();
     while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
       if (info.valid_data) identify(identity, identities, info.publication_handle);
@@ -437,5 +458,6 @@ int main(int argc, char** argv) {
     while (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
       if (info.valid_data) decide(vector, vectors, info.publication_handle);
     }
+    withdraw();
   }
 }

@@ -3,14 +3,13 @@
 //
 //   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]] [--machine NAME MACHINE_ID]
 //
-// It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
+// It prints for every Compensation of every machine whether it may be applied, and when one that may
+// be applied may no longer be, because nothing newer has arrived. KEYS is the folder
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. Fast DDS calls the
 // listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp and
 // message_filter (daemon/dds).
-#include <unistd.h>
-
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
@@ -29,6 +28,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 
 #include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/publisher_pin.hpp"
@@ -95,12 +95,20 @@ struct Publisher {
   Delay delay;
 };
 
+/// The last vector of a machine, while it may be applied.
+struct Applied {
+  Compensation vector;
+  std::int64_t age_ns;  ///< when it arrived
+  SteadyClock::time_point arrived;
+};
+
 /// One of the machines whose data are published in the domain. Only samples of its pinned publisher
 /// are used (publisher_pin.hpp).
 struct Machine {
   PublisherPin pin;
   std::map<ParticipantId, Publisher> publishers;
   std::optional<SteadyClock::time_point> ignored_publisher_reported;
+  std::optional<Applied> applied;
 };
 
 /// The rule of abbe_v1.idl: nullptr if the vector may be applied, else the reason. `alive`: the
@@ -125,6 +133,23 @@ class Listener : public DataReaderListener {
   /// `machine_ids`: identities by machine name, for machines whose identity is given.
   explicit Listener(std::map<std::string, std::string> machine_ids)
       : machine_ids_(std::move(machine_ids)) {}
+
+  /// Call it every few milliseconds: a publisher that has ended sends nothing more, so that no
+  /// sample shows that its last vector may not be applied any more.
+  void withdraw() {
+    const std::lock_guard lock(mutex_);
+    for (auto& [name, machine] : machines_) {
+      if (!machine.applied) continue;
+      const Publisher& publisher = machine.publishers[*machine.pin.pinned()];
+      const Applied& applied = *machine.applied;
+      const std::chrono::nanoseconds since = SteadyClock::now() - applied.arrived;
+      const char* reason =
+          why_not(applied.vector, applied.age_ns + since.count(), publisher, is_alive(publisher));
+      if (reason == nullptr) continue;
+      std::printf("%s: do not apply: %s\n", name.c_str(), reason);
+      machine.applied.reset();
+    }
+  }
 
  private:
   /// Called by Fast DDS when a writer of ModelState loses or regains its liveliness. The state from
@@ -251,15 +276,21 @@ class Listener : public DataReaderListener {
     const auto [publisher, pinned] = heard(c.machine(), writer);
     const std::int64_t age_ns = c.age_ns() + publisher.delay.of_ns(c);
     if (!pinned) return;
-    const bool alive = alive_.contains(publisher.state_from) &&
-                       SteadyClock::now() - publisher.heard < kLongestSilence;
-    if (const char* reason = why_not(c, age_ns, publisher, alive)) {
+    auto& applied = machines_[c.machine()].applied;
+    applied.reset();
+    if (const char* reason = why_not(c, age_ns, publisher, is_alive(publisher))) {
       std::printf("%s: do not apply: %s\n", c.machine().c_str(), reason);
     } else {
+      applied = {c, age_ns, SteadyClock::now()};
       const double age_ms = static_cast<double>(age_ns) * 1e-6;
       std::printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c.machine().c_str(),
                   c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6, c.vector_m()[2] * 1e6, age_ms);
     }
+  }
+
+  [[nodiscard]] bool is_alive(const Publisher& publisher) const {
+    return alive_.contains(publisher.state_from) &&
+           SteadyClock::now() - publisher.heard < kLongestSilence;
   }
 
   std::map<std::string, std::string> machine_ids_;
@@ -363,5 +394,8 @@ int main(int argc, char** argv) {
                  "abbe/v1/Compensation", live, &listener);
   if (!ok) return 4;
   std::puts("waiting; end with Ctrl-C");
-  for (;;) ::pause();
+  for (;;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+    listener.withdraw();
+  }
 }

@@ -49,7 +49,9 @@ struct Options {
 /// The component in HAL, attached to the stream of a sampler.
 class SamplerStream {
  public:
-  explicit SamplerStream(int channel) : id_(hal_init("abbe-encoder")) {
+  /// The name is that of this process: after a program that was killed its name stays in HAL.
+  explicit SamplerStream(int channel)
+      : id_(hal_init(("abbe-encoder-" + std::to_string(::getpid())).c_str())) {
     if (id_ < 0) return;
     hal_ready(id_);
     attached_ = hal_stream_attach(&stream_, id_, kSamplerKey + channel, kColumns) >= 0;

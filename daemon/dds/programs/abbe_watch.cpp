@@ -181,7 +181,7 @@ int watch(const Options& options, dds::Readers& readers, const dds::ParticipantA
   bool silence_reported = false;
   while (stop_requested == 0 &&
          std::chrono::duration<double>(WallClock::now() - start).count() < options.timeout_s) {
-    readers.wait(std::chrono::milliseconds{100});
+    readers.wait(machines.until_next_loss(std::chrono::milliseconds{100}));
     readers.take([&](const dds::Arrival& arrival) { machines.take(arrival); });
     machines.notice_losses();
 

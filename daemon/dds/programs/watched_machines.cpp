@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -121,7 +122,44 @@ void WatchedMachines::notice_losses() {
     for (auto& [id, publisher] : machine.publishers)
       if (!alive(&publisher)) publisher.state_from.reset();
     show_liveness(name, machine);
+    withdraw(name, machine);
   }
+}
+
+std::chrono::milliseconds WatchedMachines::until_next_loss(
+    std::chrono::milliseconds at_most) const {
+  const auto now = WallClock::now();
+  for (const auto& [name, machine] : machines_) {
+    if (!machine.applied) continue;
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(machine.applied->valid_until - now);
+    at_most = std::clamp(left, std::chrono::milliseconds{1}, at_most);
+  }
+  return at_most;
+}
+
+Decision WatchedMachines::decide_on(Machine& machine, const Publisher& publisher,
+                                    const v1::Compensation& c) const {
+  const auto now = WallClock::now();
+  auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(&publisher));
+  machine.applied.reset();
+  if (decision.apply) machine.applied = {c, *publisher.last_delay, now, now + decision.valid_for};
+  return decision;
+}
+
+void WatchedMachines::withdraw(const std::string& name, Machine& machine) {
+  if (!machine.applied) return;
+  const Applied& a = *machine.applied;
+  const Publisher* const publisher = machine.pinned();
+  const auto decision =
+      decide(a.vector, a.delay + (WallClock::now() - a.arrived),
+             publisher == nullptr ? std::nullopt : publisher->model.state(), alive(publisher));
+  if (decision.apply) return;
+
+  if (options_.json) print_decision(a.vector, decision);
+  print(fmt::format("{}  do not apply: {}", name, decision.reason));
+  machine.shown_apply = false;
+  machine.applied.reset();
 }
 
 const ReceivedModel* WatchedMachines::applicable() const {
@@ -290,25 +328,28 @@ void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
   if (std::exchange(calibration_[e.machine()], line) != line) print(line);
 }
 
-/// The decision on the vector of the line before.
-void WatchedMachines::print_decision(const Publisher& publisher, const v1::Compensation& c) {
-  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(&publisher));
-  print_json({{"machine", c.machine()},
-              {"decision",
-               {{"sequence_number", c.sequence_number()},
-                {"apply", decision.apply},
-                {"reason", decision.reason}}}});
+void WatchedMachines::print_decision(const v1::Compensation& c, const Decision& decision) {
+  const auto now = WallClock::now().time_since_epoch();
+  const nlohmann::ordered_json line{{"machine", c.machine()},
+                                    {"decision",
+                                     {{"sequence_number", c.sequence_number()},
+                                      {"apply", decision.apply},
+                                      {"reason", decision.reason},
+                                      {"monotonic_ns", std::chrono::nanoseconds(now).count()},
+                                      {"valid_for_ns", decision.valid_for.count()}}}};
+  std::printf("%s\n", line.dump().c_str());
+  std::fflush(stdout);
 }
 
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
                                   const v1::Compensation& c) {
-  if (options_.json) return print_decision(publisher, c);
+  const auto decision = decide_on(machine, publisher, c);
+  if (options_.json) return print_decision(c, decision);
   const auto now = WallClock::now();
-  if (now - machine.last_live <
-      (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
-    return;
+  const auto period = on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1};
+  if (decision.apply == machine.shown_apply && now - machine.last_live < period) return;
   machine.last_live = now;
-  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(&publisher));
+  machine.shown_apply = decision.apply;
   const std::string line =
       fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                   decision.apply ? "apply" : "do not apply: " + decision.reason);

@@ -35,8 +35,11 @@ class WatchedMachines {
   [[nodiscard]] bool received() const { return received_; }
   void take(const Arrival& arrival);
   /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
-  /// that becomes alive again repeats its ModelState within a second.
+  /// that becomes alive again repeats its ModelState within a second. Withdraws the decision to apply
+  /// the last vector when it is no longer true, also when nothing arrives any more.
   void notice_losses();
+  /// When the next of these vectors becomes older than its validity, at most `at_most` from now.
+  [[nodiscard]] std::chrono::milliseconds until_next_loss(std::chrono::milliseconds at_most) const;
   /// The first received model that is complete and may be applied; nullptr if there is none.
   [[nodiscard]] const ReceivedModel* applicable() const;
   /// Why applicable() is nullptr, for each machine.
@@ -57,6 +60,13 @@ class WatchedMachines {
     std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
   };
 
+  /// The last vector of a machine, while it may be applied.
+  struct Applied {
+    v1::Compensation vector;
+    std::chrono::nanoseconds delay;  ///< when it arrived
+    WallClock::time_point arrived, valid_until;
+  };
+
   /// Several participants of a domain may publish data of the same machine. Only the data of the
   /// pinned publisher is shown and used.
   struct Machine {
@@ -64,6 +74,8 @@ class WatchedMachines {
     std::map<ParticipantId, Publisher> publishers;
     bool shown_alive = false;
     std::string shown_state, shown_model;
+    std::optional<Applied> applied;
+    bool shown_apply = false;
     WallClock::time_point last_live{};
     std::optional<WallClock::time_point> ignored_reported;
     /// Why no publisher is pinned.
@@ -110,7 +122,12 @@ class WatchedMachines {
   void show_model(Machine& machine, const Publisher& publisher);
   void show_health(const v1::Health& h);
   void show_event(const v1::CalibrationEvent& e);
-  void print_decision(const Publisher& publisher, const v1::Compensation& c);
+  /// Decides on a vector that has just arrived, and keeps it while it may be applied.
+  Decision decide_on(Machine& machine, const Publisher& publisher, const v1::Compensation& c) const;
+  /// Shows that the vector that was to be applied may not be applied any more.
+  void withdraw(const std::string& name, Machine& machine);
+  /// One line of JSON, with the instant of CLOCK_MONOTONIC and the validity from then on.
+  static void print_decision(const v1::Compensation& c, const Decision& decision);
   /// Prints the line with position, vector and decision. On a terminal the line is updated in
   /// place; otherwise a new line is printed once a second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c);

@@ -9,7 +9,7 @@ namespace abbe::dds {
 namespace {
 
 Decision refuse(std::string reason) {
-  return {false, std::move(reason)};
+  return {false, std::move(reason), {}};
 }
 
 Decision decide_by_state(const std::optional<v1::ModelState>& state, bool publisher_alive) {
@@ -19,7 +19,7 @@ Decision decide_by_state(const std::optional<v1::ModelState>& state, bool publis
     return refuse(std::string("ModelState is ") + name_of(state->state()) +
                   (state->reason().empty() ? "" : ": " + state->reason()));
   }
-  return {true, name_of(state->state())};
+  return {true, name_of(state->state()), {}};
 }
 
 }  // namespace
@@ -80,6 +80,7 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
   // The values may come from any participant, so the comparison avoids sums, which could overflow.
   if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - delay->count())
     return refuse("older than its validity");
+  decision.valid_for = std::chrono::nanoseconds{c.validity_ns() - delay->count() - c.age_ns()};
   return decision;
 }
 

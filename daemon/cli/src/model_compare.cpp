@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
@@ -85,7 +86,7 @@ int run(const ModelCompareArguments& arguments) {
     const nlohmann::json object{{"points", found->points},
                                 {"as_stated", vector_figures(d.as_stated)},
                                 {"rigid_free", vector_figures(d.rigid_free)}};
-    fmt::print("{}\n", object.dump(1));
+    fmt::print("{}\n", indented_json_text(object));
     return 0;
   }
 

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
@@ -26,7 +27,7 @@ class JsonText {
     text_ += quoted(text);
   }
   [[nodiscard]] static std::string quoted(std::string_view text) {
-    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    return json_text(nlohmann::json(text));
   }
   [[nodiscard]] std::string finish() { return text_ + "\n}\n"; }
 

@@ -19,6 +19,8 @@
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/readers.hpp"
+#include "abbe/protocol/option_values.hpp"
+#include "abbe/protocol/printable.hpp"
 #include "correction_field.hpp"
 #include "hal_pins.hpp"
 #include "subscription.hpp"
@@ -113,7 +115,7 @@ void feed(const Options& options, HalPins& pins, const Latest& latest) {
 int run(const Options& options) {
   using daemon::ExitCode;
   const auto failed = [](const std::string& text, ExitCode code) {
-    std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", text.c_str());
+    std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", abbe::protocol::printable(text).c_str());
     return number(code);
   };
 
@@ -173,6 +175,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   try {
+    abbe::protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : number(daemon::ExitCode::Usage);

@@ -8,6 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/messages/cdr.hpp"
 
@@ -35,12 +38,17 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
   return text + " mm";
 }
 
+void print_object(const nlohmann::ordered_json& object) {
+  std::printf("%s\n", daemon::json_text(object).c_str());
+  std::fflush(stdout);
+}
+
 template <class T, class F>
 void with(std::span<const std::byte> payload, F&& use) {
   if (auto value = daemon::decode<T>(payload)) {
     use(*value);
   } else {
-    std::fprintf(stderr, "abbe-watch: %s\n", value.error().text.c_str());
+    daemon::print_message("abbe-watch", value.error().text);
   }
 }
 
@@ -152,7 +160,7 @@ void WatchedMachines::print_json(Topic topic, std::span<const std::byte> payload
 
 void WatchedMachines::print(const std::string& line) {
   if (options_.json) return;
-  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", line.c_str());
+  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", daemon::printable_line(line).c_str());
   std::fflush(stdout);
 }
 
@@ -160,8 +168,7 @@ void WatchedMachines::show_liveness(const std::string& name, Machine& machine) {
   const bool now = alive(machine.pinned());
   if (std::exchange(machine.shown_alive, now) == now) return;
   if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"publisher_alive\":{}}}\n", name, now);
-    std::fflush(stdout);
+    print_object({{"machine", name}, {"publisher_alive", now}});
   }
   print(fmt::format("{}  {}", name,
                     now ? "publisher is alive" : "publisher is not alive: do not apply"));
@@ -175,9 +182,7 @@ std::string WatchedMachines::described(const ParticipantId& id) const {
 void WatchedMachines::show_successor(const std::string& name, const ParticipantId& id,
                                      const ParticipantId& former) {
   if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name, text_of(id),
-               text_of(former));
-    std::fflush(stdout);
+    print_object({{"machine", name}, {"publisher", text_of(id)}, {"former", text_of(former)}});
   }
   print(fmt::format("{}  publisher is now {}: {} sends no more", name, described(id),
                     text_of(former)));
@@ -190,9 +195,7 @@ void WatchedMachines::report_foreign_publisher(const std::string& name, Machine&
   if (machine.foreign_reported && now - *machine.foreign_reported < kReportPeriod) return;
   machine.foreign_reported = now;
   if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name, text_of(id),
-               addresses_.of(id));
-    std::fflush(stdout);
+    print_object({{"machine", name}, {"rival", text_of(id)}, {"address", addresses_.of(id)}});
   }
   print(
       fmt::format("{}  another publisher {}: ignored; stop it, or use DDS Security (abbe dds keys)",
@@ -232,13 +235,11 @@ void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
 /// The decision on the vector of the line before.
 void WatchedMachines::print_decision(const Publisher& publisher, const v1::Compensation& c) {
   const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
-  const nlohmann::ordered_json line{{"machine", c.machine()},
-                                    {"decision",
-                                     {{"sequence_number", c.sequence_number()},
-                                      {"apply", decision.apply},
-                                      {"reason", decision.reason}}}};
-  std::printf("%s\n", line.dump().c_str());
-  std::fflush(stdout);
+  print_object({{"machine", c.machine()},
+                {"decision",
+                 {{"sequence_number", c.sequence_number()},
+                  {"apply", decision.apply},
+                  {"reason", decision.reason}}}});
 }
 
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,

@@ -403,6 +403,8 @@ class Replay : private PipelineObserver {
     if (bytes_) set_up_.apply(batch, datum_);
   }
   void on_samples(const Batch& batch) override {
+    report_.samples += batch.points.size() + batch.axes.size() + batch.touches.size() +
+                       batch.environment.size() + batch.measured_environment.size();
     if (options_.samples) options_.samples(batch, begin_);
   }
   void on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime /*taken*/) override {
@@ -457,7 +459,9 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
                             const ReplayOptions& options) {
   auto attached = attached_to(recording, config);
   if (!attached) return tl::unexpected(attached.error());
-  return Replay{recording, config, options, std::move(*attached)}.run();
+  auto report = Replay{recording, config, options, std::move(*attached)}.run();
+  if (auto intact = recording.intact(); !intact) return tl::unexpected(intact.error());
+  return report;
 }
 
 }  // namespace abbe::daemon

@@ -325,7 +325,9 @@ static void withdraw(void) {
   for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
     if (m->applied_ns == 0) continue;
     const int64_t since_ns = now_in_ns() - m->applied_ns;
-    const char* reason = why_not(&m->applied, m->applied_age_ns + since_ns, m->pinned);
+    const char* reason = m->pinned == NULL
+                             ? "the publisher states another machine"
+                             : why_not(&m->applied, m->applied_age_ns + since_ns, m->pinned);
     if (reason == NULL) continue;
     printf("%s: do not apply: %s\n", m->name, reason);
     m->applied_ns = 0;

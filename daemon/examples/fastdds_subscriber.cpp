@@ -140,11 +140,7 @@ class Listener : public DataReaderListener {
     const std::lock_guard lock(mutex_);
     for (auto& [name, machine] : machines_) {
       if (!machine.applied) continue;
-      const Publisher& publisher = machine.publishers[*machine.pin.pinned()];
-      const Applied& applied = *machine.applied;
-      const std::chrono::nanoseconds since = SteadyClock::now() - applied.arrived;
-      const char* reason =
-          why_not(applied.vector, applied.age_ns + since.count(), publisher, is_alive(publisher));
+      const char* reason = why_not_any_more(machine);
       if (reason == nullptr) continue;
       std::printf("%s: do not apply: %s\n", name.c_str(), reason);
       machine.applied.reset();
@@ -152,6 +148,16 @@ class Listener : public DataReaderListener {
   }
 
  private:
+  /// nullptr: the last vector may still be applied.
+  const char* why_not_any_more(Machine& machine) const {
+    const auto pinned = machine.pin.pinned();
+    if (!pinned) return "the publisher states another machine";
+    const Publisher& publisher = machine.publishers[*pinned];
+    const Applied& applied = *machine.applied;
+    const std::chrono::nanoseconds since = SteadyClock::now() - applied.arrived;
+    return why_not(applied.vector, applied.age_ns + since.count(), publisher, is_alive(publisher));
+  }
+
   /// Called by Fast DDS when a writer of ModelState loses or regains its liveliness. The state from
   /// a writer that lost it is discarded; a writer that regains it repeats its state within a
   /// second.

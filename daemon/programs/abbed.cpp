@@ -13,6 +13,9 @@
 #include <string>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
@@ -48,8 +51,7 @@ std::string footer() {
 constexpr auto kCycle = 20ms;  // period of the main loop, which supervises abbe-dds
 
 int refuse(const Error& error) {
-  fmt::print(stderr, "abbed: {}\n", error.text);
-  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  print_error("abbed", error);
   return error.code == ErrorCode::Io ? kIo : kBadInput;
 }
 
@@ -82,9 +84,9 @@ int check(const std::string& file) {
     return refuse(usable.error());
 
   fmt::print("{}: valid\n", file);
-  for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", line);
+  for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", printable(line));
   if (!checked->warnings.empty()) fmt::print("warnings:\n");
-  for (const auto& warning : checked->warnings) fmt::print("  {}\n", warning);
+  for (const auto& warning : checked->warnings) fmt::print("  {}\n", printable(warning));
   return kDone;
 }
 
@@ -111,8 +113,8 @@ int run(Abbed& abbed, const sigset_t& stop) {
 
     if (const bool hung = !abbed.alive(); hung != hangs) {
       hangs = hung;
-      fmt::print(stderr, "abbed: {}\n",
-                 hangs ? "the hub hangs: it has completed no cycle for 1 s" : "the hub runs again");
+      print_message("abbed", hangs ? "the hub hangs: it has completed no cycle for 1 s"
+                                   : "the hub runs again");
     }
     if (hangs) {
       // The hub hangs. Without a watchdog nothing would restart abbed, so it continues: the threads
@@ -134,14 +136,13 @@ int end(Abbed& abbed, int code) {
   using Outcome = abbe::drivers::IppStopOutcome;
   const auto machine = abbed.end();
   if (!machine || machine->outcome == Outcome::Stopped) {
-    fmt::print(stderr, "abbed: stopped\n");
+    print_message("abbed", "stopped");
     return code;
   }
-  fmt::print(
-      stderr,
-      "abbed: ended, but the stop of the measuring machine is {}: {}; check the machine, use "
-      "its emergency stop\n",
-      name_of(machine->outcome), machine->text);
+  print_message("abbed",
+                fmt::format("ended, but the stop of the measuring machine is {}: {}; check "
+                            "the machine, use its emergency stop",
+                            name_of(machine->outcome), machine->text));
   if (code != kDone) return code;
   return number(machine->outcome == Outcome::NotSent ? ExitCode::StopNotSent
                                                      : ExitCode::StopNotConfirmed);
@@ -160,6 +161,7 @@ int abbed_main(int argc, char** argv) {
                "only check the configuration, print all of its errors, or what was understood and "
                "what is improbable, and exit");
   try {
+    check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
@@ -180,8 +182,8 @@ int abbed_main(int argc, char** argv) {
   if (!abbed) return refuse(abbed.error());
 
   for (const auto& warning : (*abbed)->warnings())
-    fmt::print(stderr, "abbed: warning: {}\n", warning);
-  fmt::print(stderr, "abbed: running, configuration {}\n", file);
+    print_message("abbed", fmt::format("warning: {}", warning));
+  print_message("abbed", fmt::format("running, configuration {}", file));
   notify_ready("running");
 
   const int ended_with = run(**abbed, stop);
@@ -205,7 +207,7 @@ int main(int argc, char** argv) {
   try {
     return abbed_main(argc, argv);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "abbed: internal error: {}\n", error.what());
+    print_message("abbed", fmt::format("internal error: {}", error.what()));
     return kInternal;
   }
 }

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "abbe/protocol/exit_codes.hpp"
+#include "abbe/protocol/option_values.hpp"
 #include "encoder_frames.hpp"
 
 namespace {
@@ -219,6 +220,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   try {
+    abbe::protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

@@ -21,6 +21,8 @@
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/readers.hpp"
+#include "abbe/protocol/option_values.hpp"
+#include "abbe/protocol/printable.hpp"
 #include "control_link.hpp"
 #include "correction_field.hpp"
 #include "latest_usable.hpp"
@@ -55,7 +57,7 @@ struct Options {
 };
 
 int fail(const std::string& text, daemon::ExitCode code) {
-  std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", text.c_str());
+  std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", protocol::printable_line(text).c_str());
   return number(code);
 }
 
@@ -256,6 +258,7 @@ int main(int argc, char** argv) {
   add_options(app, options);
 
   try {
+    abbe::protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : number(ExitCode::Usage);

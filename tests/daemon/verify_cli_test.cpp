@@ -121,6 +121,32 @@ TEST_F(VerifyCli, TakesAModelOfTables) {
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
 }
 
+TEST_F(VerifyCli, NamesTheLineOfAPointThatAloneDoesNotFit) {
+  auto points = tracker_points(study::table3_machine());
+  const calib::Vector3 right_m = points[7].measured_m;
+  for (const calib::Vector3& wrong_m :
+       {calib::Vector3(0, 0, 0), calib::Vector3(-9.999, -9.999, -9.999),
+        calib::Vector3(1e27, 1e27, 1e27),
+        calib::Vector3(right_m.x() + 0.5e-3, right_m.y(), right_m.z())}) {
+    points[7].measured_m = wrong_m;
+    write("off.csv", to_verification_csv(points));
+    const auto ran = abbe("verify model.json --points off.csv");
+    EXPECT_THAT(ran.out + ran.err, HasSubstr("off.csv:9: alone does not fit"))
+        << wrong_m.transpose();
+    EXPECT_THAT(ran.out + ran.err, Not(HasSubstr("off.csv:10"))) << wrong_m.transpose();
+  }
+  const auto right = abbe("verify model.json --points verification.csv --json");
+  EXPECT_TRUE(nlohmann::json::parse(right.out)["points_off"].empty());
+}
+
+TEST_F(VerifyCli, PrintsJsonAlsoForFileNamesInLatin1) {
+  const std::string name = "b\xfc.json";
+  fs::copy_file(folder_ / "model.json", folder_ / name);
+  const auto ran = abbe("verify model.json '" + name + "' --points verification.csv --json");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["models"][1]["name"], "b\xef\xbf\xbd.json");
+}
+
 TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {
   const auto good = test::synthetic_document(3), other = test::synthetic_document(4);
   write("good.json", to_json(good));

@@ -16,6 +16,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/protocol/printable.hpp"
 #include "json_line.hpp"
 
 namespace abbe::daemon {
@@ -71,6 +72,15 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
   }
 }
 
+/// Replaces control characters, which a device may have sent to the daemon and which a terminal
+/// would execute. The depth of `value` is bounded by parse_json().
+void replace_control_characters(json& value) {
+  if (value.is_string())
+    value = protocol::without_control_characters(value.get_ref<const std::string&>());
+  if (value.is_structured())
+    for (json& element : value) replace_control_characters(element);
+}
+
 }  // namespace
 
 Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& request,
@@ -108,6 +118,7 @@ Result<json> ControlConnection::exchange(const json& request, std::chrono::milli
   if (!parsed) return tl::unexpected(no_answer(path_, parsed.error().text));
   if (!parsed->is_object())
     return tl::unexpected(no_answer(path_, "the answer is not a JSON object"));
+  replace_control_characters(*parsed);
   return std::move(*parsed);
 }
 

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -13,6 +12,7 @@
 
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/protocol/printable.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -68,9 +68,7 @@ class TextJournal final : public JournalSink {
       if (name != "ABBE_FAULT")  // the message contains it
         line += fmt::format("{}={} ", name, value);
     line.back() = ']';
-    std::ranges::replace_if(
-        line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-    line += '\n';
+    line = protocol::printable_line(line) + '\n';
     (void)!::write(fd_, line.data(), line.size());
   }
 

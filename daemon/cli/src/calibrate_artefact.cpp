@@ -13,6 +13,7 @@
 #include <numbers>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/calib/evemu/artefact_touches.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -135,7 +136,7 @@ int print(const evemu::Calibrator& found, const evemu::Calibrator& nominal,
   }
 
   if (arguments.json)
-    fmt::print("{}\n", json{{"calibrator", arguments.out}, {"balls", balls}}.dump(1));
+    fmt::print("{}\n", indented_json_text(json{{"calibrator", arguments.out}, {"balls", balls}}));
   return 0;
 }
 

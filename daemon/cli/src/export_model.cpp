@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -33,14 +34,6 @@ struct ExportRequest {
   std::optional<calib::estimation::AxisTravel> travel;
   WriteOptions options;
 };
-
-/// A name from a file, for a terminal and a comment: no control characters.
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
-  }
-  return text;
-}
 
 std::string volume_text(const calib::ExportBox& box) {
   const calib::Vector3 low = kMmPerM * box.min_m, high = kMmPerM * box.max_m;
@@ -112,7 +105,7 @@ Result<ExportRequest> request_of(const ExportArguments& arguments) {
   auto& origin = request.options.origin;
   origin.model_hash = model_hash(request.document);
   origin.use = *std::move(use);
-  origin.machine = one_line(request.document.machine);
+  origin.machine = printable_line(request.document.machine);
   origin.volume = volume_text(request.box);
   const calib::Vector3 tool_mm = kMmPerM * *tool_m;
   origin.tool = fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", tool_mm[0], tool_mm[1], tool_mm[2]);

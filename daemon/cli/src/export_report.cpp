@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 
 namespace abbe::daemon {
@@ -147,7 +148,7 @@ std::string report_json(const ExportReport& report) {
                            {"tables", tables_json(report.held)},
                            {"errors", by_error_json(report.by_error)},
                            {"not_held", report.not_held}};
-  return out.dump() + "\n";
+  return json_text(out) + "\n";
 }
 
 }  // namespace abbe::daemon

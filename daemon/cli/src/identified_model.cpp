@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/model/configuration_fit.hpp"
@@ -113,8 +114,8 @@ void print_verdict(const calib::Verdict& verdict) {
   fmt::print("gate        {}\n", verdict.accepted
                                      ? coloured("would accept", kGreen, STDOUT_FILENO)
                                      : coloured("would refuse", kYellow, STDOUT_FILENO));
-  for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
-  for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
+  for (const auto& reason : verdict.reasons) fmt::print("            {}\n", printable_line(reason));
+  for (const auto& note : verdict.notes) fmt::print("note        {}\n", printable_line(note));
 }
 
 int exit_code(const calib::Verdict& verdict) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -224,7 +225,7 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
     object["tracker_drift"] = tracker_drift_json(*outcome.document.tracker_drift);
   if (outcome.synchronisation)
     object["clocks"] = clock_json(*outcome.synchronisation, arguments.encoder_u_time_us);
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
@@ -91,7 +92,7 @@ int run(const ModelCompareArguments& arguments) {
                                 {"rigid_free", vector_figures(d.rigid_free)},
                                 {"cautions_a", found->cautions_a},
                                 {"cautions_b", found->cautions_b}};
-    fmt::print("{}\n", object.dump(1));
+    fmt::print("{}\n", indented_json_text(object));
     return 0;
   }
 

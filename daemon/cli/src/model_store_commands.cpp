@@ -6,6 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/configuration_fit.hpp"
@@ -54,12 +56,14 @@ void print_table(const std::vector<StoreEntry>& entries) {
   for (const auto& entry : entries) {
     auto state = state_of(entry);
     if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
-    if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
+    if (!entry.fault.empty())
+      state = coloured(state, kRed, STDOUT_FILENO) + ": " + printable_line(entry.fault);
     fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id,
-               to_text(entry.added).substr(0, kSeconds), entry.method, entry.machine, state);
+               to_text(entry.added).substr(0, kSeconds), entry.method,
+               printable_line(entry.machine), state);
     if (entry.simulated.value_or(false))
       fmt::print("{:18}{}\n", "", coloured("simulated devices", kYellow, STDOUT_FILENO));
-    for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
+    for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", printable_line(reason));
   }
 }
 
@@ -71,7 +75,7 @@ int list(const ModelStoreArguments& arguments) {
   if (arguments.json) {
     nlohmann::json array = nlohmann::json::array();
     for (const auto& entry : *entries) array.push_back(to_json(entry));
-    fmt::print("{}\n", array.dump(1));
+    fmt::print("{}\n", indented_json_text(array));
   } else if (entries->empty()) {
     fmt::print(
         "the store has no models; `abbe calibrate` and `abbe identify ... --keep DIR` add "
@@ -85,20 +89,21 @@ int list(const ModelStoreArguments& arguments) {
 void print_entry(const StoreEntry& entry) {
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
              to_text(entry.added));
-  for (const auto& reason : entry.reasons) fmt::print("            {}\n", reason);
+  for (const auto& reason : entry.reasons) fmt::print("            {}\n", printable_line(reason));
 }
 
 void print_model(const ModelDocument& document) {
   const auto& s = document.statistics;
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
-             to_text(document.created), document.machine, document.model.chain().text(),
-             document.method, document.estimator, name(document.model.gauge()));
+             to_text(document.created), printable_line(document.machine),
+             document.model.chain().text(), document.method, document.estimator,
+             name(document.model.gauge()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
   for (const auto& input : document.inputs)
-    fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
+    fmt::print("input       {}  sha256 {}\n", printable_line(input.name), input.sha256);
   if (!document.recording_gap.empty())
     fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
   fmt::print("devices     {}\n", devices_in_words(made_on_simulated_devices(document)));

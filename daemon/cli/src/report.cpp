@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_report.hpp"
@@ -68,7 +69,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
   std::vector<ReportSubject> models;
   for (const StoreEntry& entry : *entries) {
     if (!entry.fault.empty()) {
-      fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, entry.fault);
+      fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, printable_line(entry.fault));
       continue;
     }
     if (entry.machine != subject.document.machine) continue;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/option_values.hpp"
 #include "commands.hpp"
 #include "dds_keys.hpp"
 #include "examples.hpp"
@@ -127,6 +128,7 @@ int parse_and_run(const std::vector<std::string>& words) {
   app.require_subcommand(1);
   add_commands(app, exit);
   add_examples(app);
+  check_option_values(app);
 
   const std::vector<std::string> programs{kPrograms.begin(), kPrograms.end()};
   if (asks_for_help(words)) {

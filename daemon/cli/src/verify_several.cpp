@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/verify/compare.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -63,7 +64,7 @@ void print_predictions_json(const std::vector<Predicted>& all, std::size_t point
                                 {"effect", effect_name(verify::effect_at_points(at_points))},
                                 {"before", vector_figures(at_points.before)},
                                 {"after", vector_figures(at_points.after)}});
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_prediction(const std::string& name, const char* effect,

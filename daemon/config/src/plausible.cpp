@@ -7,6 +7,7 @@
 #include <string>
 
 #include "abbe/base/units.hpp"
+#include "abbe/protocol/printable.hpp"
 
 namespace abbe::daemon {
 
@@ -52,20 +53,13 @@ std::string fault_of_host(const std::string& host) {
   return "";
 }
 
-/// Replaces control characters, which a terminal would execute, by '?'.
-std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; }, '?');
-  return text;
-}
-
 }  // namespace
 
 bool get_host(ClassifiedSection& section, Key key, std::string& out, Need need) {
   if (!section.get(key, out, need)) return false;
   const std::string fault = fault_of_host(out);
   if (!fault.empty())
-    section.implausible(key.name, fmt::format("\"{}\" {}", printable(out), fault));
+    section.implausible(key.name, fmt::format("\"{}\" {}", protocol::printable_line(out), fault));
   return true;
 }
 

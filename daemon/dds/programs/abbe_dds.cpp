@@ -12,6 +12,8 @@
 #include <string>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
@@ -60,8 +62,7 @@ void stop_on_signals() {
 }
 
 int refuse(const Error& error) {
-  std::fprintf(stderr, "abbe-dds: %s\n", error.text.c_str());
-  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
+  abbe::daemon::print_error("abbe-dds", error);
   switch (error.code) {
     case ErrorCode::Usage:
       return kUsage;
@@ -210,6 +211,7 @@ int main(int argc, char** argv) {
                  "process id; exit when it is no longer the parent process (set by abbed)");
 
   try {
+    abbe::daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
@@ -226,7 +228,7 @@ int main(int argc, char** argv) {
     if (const auto code = publish(options)) return *code;
     return start_again(argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "abbe-dds: internal error: %s\n", e.what());
+    abbe::daemon::print_message("abbe-dds", std::string("internal error: ") + e.what());
     return kInternal;
   }
 }

@@ -16,6 +16,8 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/known_errors.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/participant.hpp"
@@ -79,8 +81,7 @@ struct Options {
 };
 
 int exit_code_of(const Error& error) {
-  std::fprintf(stderr, "abbe-watch: %s\n", error.text.c_str());
-  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
+  daemon::print_error("abbe-watch", error);
   switch (error.code) {
     case ErrorCode::DataInsufficient:
       return kNoAnswer;
@@ -198,8 +199,7 @@ int watch(const Options& options, dds::Readers& readers, const dds::ParticipantA
   }
 
   if (!options.ends_with_model()) return kDone;
-  std::fprintf(stderr, "abbe-watch: no model that may be applied: %s\n",
-               machines.why_not().c_str());
+  daemon::print_message("abbe-watch", "no model that may be applied: " + machines.why_not());
   return kNoAnswer;
 }
 
@@ -269,6 +269,7 @@ int main(int argc, char** argv) {
                  "errors V in this CSV file: x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
 
   try {
+    daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

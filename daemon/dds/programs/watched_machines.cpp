@@ -9,6 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/messages/cdr.hpp"
 
@@ -40,8 +43,8 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
 }
 
 /// Texts may come from any participant and need not be valid UTF-8.
-void print_json(const nlohmann::ordered_json& line) {
-  std::printf("%s\n", line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+void print_object(const nlohmann::ordered_json& object) {
+  std::printf("%s\n", daemon::json_text(object).c_str());
   std::fflush(stdout);
 }
 
@@ -50,7 +53,7 @@ void with(std::span<const std::byte> payload, F&& use) {
   if (auto value = daemon::decode<T>(payload)) {
     use(*value);
   } else {
-    std::fprintf(stderr, "abbe-watch: %s\n", value.error().text.c_str());
+    daemon::print_message("abbe-watch", value.error().text);
   }
 }
 
@@ -242,14 +245,14 @@ void WatchedMachines::print_sample(Topic topic, std::span<const std::byte> paylo
 
 void WatchedMachines::print(const std::string& line) {
   if (options_.json) return;
-  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", line.c_str());
+  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", daemon::printable_line(line).c_str());
   std::fflush(stdout);
 }
 
 void WatchedMachines::show_liveness(const std::string& name, Machine& machine) {
   const bool now = alive(machine.pinned());
   if (std::exchange(machine.shown_alive, now) == now) return;
-  if (options_.json) print_json({{"machine", name}, {"publisher_alive", now}});
+  if (options_.json) print_object({{"machine", name}, {"publisher_alive", now}});
   print(fmt::format("{}  {}", name,
                     now ? "publisher is alive" : "publisher is not alive: do not apply"));
 }
@@ -262,7 +265,7 @@ std::string WatchedMachines::described(const ParticipantId& id) const {
 void WatchedMachines::show_successor(const std::string& name, const ParticipantId& id,
                                      const ParticipantId& former) {
   if (options_.json)
-    print_json({{"machine", name}, {"publisher", text_of(id)}, {"former", text_of(former)}});
+    print_object({{"machine", name}, {"publisher", text_of(id)}, {"former", text_of(former)}});
   print(fmt::format("{}  publisher is now {}: {} sends no more", name, described(id),
                     text_of(former)));
 }
@@ -290,11 +293,11 @@ void WatchedMachines::report_ignored_publisher(const std::string& name, Machine&
   if (machine.ignored_reported && now - *machine.ignored_reported < kReportPeriod) return;
   machine.ignored_reported = now;
   if (options_.json)
-    print_json({{"machine", name},
-                {"rival", text_of(id)},
-                {"address", addresses_.of(id)},
-                {"machine_id", stated},
-                {"reason", why}});
+    print_object({{"machine", name},
+                  {"rival", text_of(id)},
+                  {"address", addresses_.of(id)},
+                  {"machine_id", stated},
+                  {"reason", why}});
   print(name + "  " + why);
 }
 
@@ -330,15 +333,13 @@ void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
 
 void WatchedMachines::print_decision(const v1::Compensation& c, const Decision& decision) {
   const auto now = WallClock::now().time_since_epoch();
-  const nlohmann::ordered_json line{{"machine", c.machine()},
-                                    {"decision",
-                                     {{"sequence_number", c.sequence_number()},
-                                      {"apply", decision.apply},
-                                      {"reason", decision.reason},
-                                      {"monotonic_ns", std::chrono::nanoseconds(now).count()},
-                                      {"valid_for_ns", decision.valid_for.count()}}}};
-  std::printf("%s\n", line.dump().c_str());
-  std::fflush(stdout);
+  print_object({{"machine", c.machine()},
+                {"decision",
+                 {{"sequence_number", c.sequence_number()},
+                  {"apply", decision.apply},
+                  {"reason", decision.reason},
+                  {"monotonic_ns", std::chrono::nanoseconds(now).count()},
+                  {"valid_for_ns", decision.valid_for.count()}}}});
 }
 
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,

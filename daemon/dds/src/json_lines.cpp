@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/dds/received_model.hpp"
 #include "abbe/messages/cdr.hpp"
 
@@ -127,7 +128,7 @@ daemon::Result<std::string> line(std::span<const std::byte> payload) {
   Json object{{"topic", daemon::topic_name<T>()}};
   object.update(fields(*value));
   // The text may come from any participant and need not be valid UTF-8.
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return daemon::json_text(object);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 
@@ -36,13 +37,12 @@ json json_of(const std::optional<ModelVerdict>& verdict) {
 }
 
 std::string text_of(const ModelSummary& summary) {
-  return json{{"method", summary.method},
-              {"machine", summary.machine},
-              {"inputs", summary.inputs},
-              {"verdict", json_of(summary.verdict)},
-              {"simulated", summary.simulated ? json(*summary.simulated) : json()},
-              {"fault", summary.fault}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  return json_text(json{{"method", summary.method},
+                        {"machine", summary.machine},
+                        {"inputs", summary.inputs},
+                        {"verdict", json_of(summary.verdict)},
+                        {"simulated", summary.simulated ? json(*summary.simulated) : json()},
+                        {"fault", summary.fault}});
 }
 
 /// Throws json::exception, as summary_from().

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/utc_text.hpp"
 
 namespace abbe::daemon {
@@ -145,7 +146,7 @@ std::string to_text(const StoreState& state) {
   json root{{"schema", kSchema},
             {"active", active ? json(*active) : json()},
             {"events", std::move(events)}};
-  return root.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+  return indented_json_text(root) + "\n";
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/utc_text.hpp"
 
@@ -65,7 +66,7 @@ StoreActor read_forced(ModelReader& in, const ModelJson& entry) {
 }  // namespace
 
 std::string quoted_json(std::string_view text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(nlohmann::json(text));
 }
 
 std::string verdict_to_json(const ModelDocument& document) {

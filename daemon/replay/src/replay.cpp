@@ -419,6 +419,8 @@ class Replay : private PipelineObserver {
     if (bytes_) set_up_.apply(batch, datum_);
   }
   void on_samples(const Batch& batch) override {
+    report_.samples += batch.points.size() + batch.axes.size() + batch.touches.size() +
+                       batch.environment.size() + batch.measured_environment.size();
     if (options_.samples) options_.samples(batch, begin_);
   }
   void on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime /*taken*/) override {
@@ -477,7 +479,9 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
   if (!attached) return tl::unexpected(attached.error());
   Replay again{recording, config, options, std::move(*attached)};
   if (const auto begun = again.go_on(); !begun) return tl::unexpected(begun.error());
-  return again.run();
+  auto report = again.run();
+  if (auto intact = recording.intact(); !intact) return tl::unexpected(intact.error());
+  return report;
 }
 
 }  // namespace abbe::daemon

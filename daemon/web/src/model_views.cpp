@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
@@ -38,7 +39,7 @@ constexpr std::size_t kMostEvents = 200;       ///< the newest
 
 /// Invalid UTF-8, which names of files may contain, is replaced.
 std::string text_of(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+  return daemon::json_text(value);
 }
 
 std::string_view action_in_words(StoreAction action) {

@@ -40,7 +40,7 @@ class JournalSink {
     const std::filesystem::path& socket = "/run/systemd/journal/socket");
 
 /// Writes lines "abbed: MESSAGE [ABBE_DEVICE=tracker ...]". A control character, which a device may
-/// have sent, is written as '?'.
+/// have sent, is written as an escape: "\u{1B}".
 [[nodiscard]] std::unique_ptr<JournalSink> text_journal(int fd);
 
 /// The journal if this process's stderr is connected to it (JOURNAL_STREAM, systemd.exec(5)), else

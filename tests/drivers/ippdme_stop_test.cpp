@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <stdexcept>
 #include <thread>
 
 #include "ippdme_stage.hpp"
@@ -19,6 +20,55 @@ using drivers::IppDeviceOptions;
 using drivers::ProbePoint;
 using protocol::TouchFlag;
 using testing::HasSubstr;
+
+/// A stage whose device throws when the machine begins to be held: after AbortE counts as sent,
+/// before it is sent.
+struct ThrowingStage : MovingStage {
+  ThrowingStage() : MovingStage(options()) {
+    inject(sim::FaultKind::EmergencyStop);
+    EXPECT_THROW(cycles_for(10s), std::runtime_error);
+  }
+  static IppDeviceOptions options() {
+    IppDeviceOptions options;
+    options.machine_changed = [](const drivers::IppMachine& machine) {
+      if (!machine.held.empty()) throw std::runtime_error("no memory");
+    };
+    return options;
+  }
+};
+
+TEST(IppStop, AnExceptionWhileMovingIsFollowedByAnAbortAtOnce) {
+  ThrowingStage stage;
+  const auto before = stage.times_heard("AbortE()");
+  EXPECT_TRUE(stage.device->stop_after_failure()) << "its end is not confirmed yet";
+  stage.peer.serve(stage.time.now());  // no cycle of the device in between
+  EXPECT_GT(stage.times_heard("AbortE()"), before);
+  EXPECT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_FALSE(stage.device->stop_after_failure());
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_TRUE(stage.device->held());
+}
+
+TEST(IppStop, AMachineThatStandsIsLeftAloneAfterAnException) {
+  IppStage stage;
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  EXPECT_FALSE(stage.device->stop_after_failure());
+  stage.cycles_for(1s);
+  EXPECT_EQ(stage.times_heard("AbortE()"), 0);
+  EXPECT_EQ(stage.state(), "ready");
+}
+
+TEST(IppStop, AProcessThatEndsStopsTheMachineWithoutItsDevice) {
+  MovingStage stage;
+  stage.peer.serve(stage.time.now());
+  const auto done = drivers::send_emergency_stops({});
+  EXPECT_EQ(done.sent, 1);
+  stage.peer.serve(stage.time.now());
+  EXPECT_EQ(stage.times_heard("AbortE()"), 1);
+  stage.time.advance(1s);
+  stage.peer.serve(stage.time.now());
+  EXPECT_FALSE(stage.peer.machine().moving());
+}
 
 TEST(IppStop, AnUnknownTagWhileMovingIsAbortedFirst) {
   MovingStage stage;

@@ -103,6 +103,7 @@ void IppDevice::wait(std::chrono::nanoseconds at_most) {
 
 void IppDevice::show_session() {
   show();
+  emergency_stop_.set_moving(session().moving());
   held_.store(session().held(), std::memory_order_relaxed);
   releasable_.store(session().releasable(), std::memory_order_relaxed);
   show_stop();
@@ -172,6 +173,19 @@ DeviceStatus IppDevice::status() const {
   return board_.read(options_.name, touches_.dropped() + positions_.dropped(), raw_.dropped());
 }
 
+/// First without the session, whose state is unknown after an exception: it may count AbortE as sent
+/// although it is not. A second AbortE changes nothing. A message of the server that caused the
+/// exception is not handled again.
+bool IppDevice::stop_after_failure() {
+  if (!session().moving()) return false;
+  emergency_stop_.set_moving(true);
+  (void)send_emergency_stops({});
+  discard_posted_messages();
+  handle(IppAbortRequested{});
+  show_session();
+  return session().moving();
+}
+
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
   const auto is_abort = [](const Request& r) {
@@ -202,6 +216,7 @@ void IppDevice::count_points() {
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
+  emergency_stop_.set_moving(session().moving());
   const auto bytes = std::as_bytes(std::span{command.line});
   const protocol::HostTime now = time_.now();  // one value: a replay has only the recorded time
   raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);
@@ -211,6 +226,7 @@ std::span<const std::byte> IppDevice::encode(const IppSend& command) {
 
 /// The receiver must be reset for the new connection before the first command on it.
 void IppDevice::connected() {
+  emergency_stop_.set_socket(descriptor());
   raw_.push_bytes(arrival_, protocol::RawBlock::Direction::FromDevice, {});
   receiver_.push({}, arrival_);
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "abbe/drivers/device.hpp"
+#include "abbe/drivers/emergency_stop.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/mailbox.hpp"
@@ -90,6 +91,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
+  /// Sends AbortE for a motion in progress, on a new connection if the present one is lost.
+  [[nodiscard]] bool stop_after_failure() override;
 
   /// Any thread. Moves the machine to the point and touches there. Points are measured in the order
   /// of the calls; each touch gives one ProbeTrigger, numbered from 1 in that order. Points that
@@ -141,7 +144,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   [[nodiscard]] std::span<const std::byte> encode(const IppSend& command);
   void connected();
-  void disconnected() {}
+  void disconnected() { emergency_stop_.set_socket(-1); }
   void read_requests();
   void await_standstill();
   void count_points();
@@ -173,6 +176,7 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   // relaxed: independent values
   std::atomic<bool> held_{false};
   std::atomic<bool> releasable_{false};
+  EmergencyStop emergency_stop_{"E0002 AbortE()\r\n", "E0002 %"};
   IppMachine machine_;                               ///< last value passed to machine_changed
   std::string condition_;                            ///< last value shown
   std::optional<protocol::HostTime> unsaved_since_;  ///< machine_ is not stored since then

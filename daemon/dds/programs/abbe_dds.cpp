@@ -13,6 +13,7 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
@@ -163,6 +164,7 @@ std::optional<int> publish(const Options& options) {
 
 /// Replaces this process by a new one with the same arguments. Returns only if that fails.
 int start_again(char** argv) {
+  abbe::daemon::drain_stderr();
   ::close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
   ::execv("/proc/self/exe", argv);
   std::perror("abbe-dds: /proc/self/exe");
@@ -172,6 +174,7 @@ int start_again(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-dds");
   CLI::App app{
       "Publishes over DDS the data that abbed sends over its local socket, and publishes "
       "ModelState INVALID when abbed is lost."};

@@ -17,6 +17,7 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/web/page_server.hpp"
 #include "abbe/web/web_users.hpp"
 
@@ -169,6 +170,7 @@ int serve(const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-web");
   CLI::App app{
       "Serves the page of abbe: live axes, calibration, models, recordings. Asks abbed over its "
       "control socket. Read-only unless a user logs in."};

@@ -197,10 +197,25 @@ OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubPart
   };
 }
 
+/// The axes that a request names. The hub compares them with those of the counter card, so there
+/// are at most as many as a card counts.
+Result<std::vector<std::string>> axes_of(const json& request) {
+  const auto named = request.find("axes");
+  if (named == request.end()) return {};
+  if (named->is_array() && named->size() > protocol::kMaxAxes)
+    return fail(ErrorCode::Usage,
+                fmt::format("reference: {} axes are named: at most {} are counted", named->size(),
+                            protocol::kMaxAxes));
+  auto axes = named->get<std::vector<std::string>>();
+  for (auto& name : axes) name = remark_of(std::move(name));
+  return axes;
+}
+
 Result<OnHub> reference_here(const HubParts&, const json& request) {
-  return with_reference([axes = request.value("axes", std::vector<std::string>{}),
-                         u = request.value("u", SetDatumHere::kByEye)](ReferenceService& service,
-                                                                       const HubParts& parts) {
+  auto axes = axes_of(request);
+  if (!axes) return tl::unexpected(axes.error());
+  return with_reference([axes = std::move(*axes), u = request.value("u", SetDatumHere::kByEye)](
+                            ReferenceService& service, const HubParts& parts) {
     return service.set_datum_here(stand_here(parts, axes, u));
   });
 }

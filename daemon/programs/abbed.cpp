@@ -10,15 +10,21 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <string>
+#include <utility>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/service/abbed.hpp"
 #include "abbe/service/background_tasks.hpp"
+#include "abbe/service/process_signals.hpp"
 
 namespace {
 
@@ -32,13 +38,14 @@ constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
 std::string footer() {
   return exit_codes_text(
       {{ExitCode::Done,
-        "stopped by SIGTERM or SIGINT (--check-config: the configuration is valid)"},
+        "stopped by SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGPWR or SIGXCPU (--check-config: the "
+        "configuration is valid)"},
        {ExitCode::Usage},
        {ExitCode::BadInput, "the configuration is invalid or cannot be read"},
        {ExitCode::Io, "the system refused a socket, directory, port or priority"},
        {ExitCode::Internal,
-        "the hub hangs, or does not end within 5 s after a signal, or an internal error: systemd "
-        "restarts abbed"}});
+        "the hub hangs, or abbed does not end within 25 s after a signal (the hub: 5 s), or an "
+        "internal error: systemd restarts abbed"}});
 }
 
 constexpr auto kCycle = 20ms;  // period of the main loop, which supervises abbe-dds
@@ -62,7 +69,8 @@ std::string dds_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
-Result<void> check_dds_keys(const std::filesystem::path& security) {
+Result<void> check_dds_keys(const DdsConfig& dds) {
+  const auto& security = dds.security;
   if (security.empty()) return {};
   const auto identity =
       find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
@@ -74,8 +82,7 @@ Result<void> check_dds_keys(const std::filesystem::path& security) {
 int check(const std::string& file) {
   const auto checked = check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
   if (!checked) return refuse({ErrorCode::BadInput, checked.error().text, checked.error().details});
-  if (auto usable = check_dds_keys(checked->config.dds.security); !usable)
-    return refuse(usable.error());
+  if (auto usable = check_dds_keys(checked->config.dds); !usable) return refuse(usable.error());
 
   fmt::print("{}: valid\n", file);
   for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", line);
@@ -84,17 +91,7 @@ int check(const std::string& file) {
   return kDone;
 }
 
-/// Blocks SIGINT and SIGTERM before any thread is started, so that only the main thread receives
-/// them.
-sigset_t block_stop_signals() {
-  sigset_t stop;
-  sigemptyset(&stop);
-  sigaddset(&stop, SIGTERM);
-  sigaddset(&stop, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &stop, nullptr);
-  return stop;
-}
-
+/// Runs until a signal or a hub that hangs ends abbed.
 int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
@@ -102,13 +99,20 @@ int run(Abbed& abbed, const sigset_t& stop) {
   const timespec period{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kCycle}.count()};
 
   for (;;) {
-    if (sigtimedwait(&stop, nullptr, &period) > 0) return kDone;
+    if (const int number = sigtimedwait(&stop, nullptr, &period); number > 0) {
+      fmt::print(stderr, "abbed: ends in order after {}\n", signal_name(number));
+      return kDone;
+    }
     abbed.cycle();
 
     if (const bool hung = !abbed.alive(); hung != hangs) {
       hangs = hung;
       fmt::print(stderr, "abbed: {}\n",
-                 hangs ? "the hub hangs: it has completed no cycle for 1 s" : "the hub runs again");
+                 hangs
+                     ? "the hub hangs: it has completed no cycle for 1 s; a measuring machine that "
+                       "moves is stopped"
+                     : "the hub runs again");
+      if (hangs) abbed.stop_machine();
     }
     if (hangs) {
       // The hub hangs. Without a watchdog nothing would restart abbed, so it continues: the threads
@@ -122,6 +126,19 @@ int run(Abbed& abbed, const sigset_t& stop) {
       next_feed = now + *feed_period;
     }
   }
+}
+
+/// Stops all parts. Ends the process at once if that takes too long.
+void end_in_order(std::unique_ptr<Abbed> abbed) {
+  notify_stopping();
+  const ExitDeadline deadline{
+      kLongestEnd, kInternal,
+      fmt::format(
+          "abbed: does not end within {} s, for example because a disk does not answer: exit "
+          "code {}\n",
+          kLongestEnd.count(), kInternal),
+      &stop_machines_at_once};
+  abbed.reset();
 }
 
 int abbed_main(int argc, char** argv) {
@@ -148,12 +165,10 @@ int abbed_main(int argc, char** argv) {
   // although only a person can repair the file.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
 
-  const sigset_t stop = block_stop_signals();
-  // At a file size limit (RLIMIT_FSIZE, LimitFSIZE=) the write of the recorder fails with EFBIG,
-  // and the recorder reports it like a full disk. The default action of SIGXFSZ would end abbed.
-  ::signal(SIGXFSZ, SIG_IGN);
-  auto abbed = Abbed::start(std::move(*config),
-                            {.configuration_text = text_of(file), .dds_program = dds_program()});
+  const sigset_t stop = prepare_signals();
+  auto abbed = Abbed::start(
+      std::move(*config),
+      {.configuration_text = text_of(file), .dds_program = dds_program()});
   if (!abbed) return refuse(abbed.error());
 
   for (const auto& warning : (*abbed)->warnings())
@@ -162,14 +177,14 @@ int abbed_main(int argc, char** argv) {
   notify_ready("running");
 
   const int code = run(**abbed, stop);
-  notify_stopping();
-  abbed->reset();
+  end_in_order(std::move(*abbed));
   fmt::print(stderr, "abbed: stopped\n");
 
   // A running identification checks its stop flag only from time to time, so the process ends
   // without waiting for it.
   if (background_tasks_running()) {
     std::fflush(nullptr);
+    drain_stderr();
     ::_exit(code);
   }
 
@@ -179,6 +194,7 @@ int abbed_main(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  unblock_stderr("abbed");
   try {
     return abbed_main(argc, argv);
   } catch (const std::exception& error) {

@@ -57,6 +57,16 @@ TEST(ConfigCmm, IsReadInSi) {
   EXPECT_FALSE(config->of<CmmConfig>()->home);
 }
 
+// A longer time would outlast systemd's TimeoutStopSec: abbed waits for AbortE at its end.
+TEST(ConfigCmm, BoundsItsTimeOuts) {
+  const std::string cmm = kMachine + "[cmm]\nhost = \"10.0.0.9\"\n";
+  EXPECT_TRUE(parse_config(cmm + "command_timeout_s = 5\nmotion_timeout_s = 3600\n", "abbed.toml"));
+  EXPECT_THAT(faults_of(cmm + "command_timeout_s = 5.1\n"),
+              ElementsAre(HasSubstr("cmm.command_timeout_s")));
+  EXPECT_THAT(faults_of(cmm + "motion_timeout_s = 1e9\n"),
+              ElementsAre(HasSubstr("cmm.motion_timeout_s")));
+}
+
 TEST(ConfigCmm, NeedsAHost) {
   EXPECT_THAT(faults_of(kMachine + "[cmm]\nport = 1294\n"), ElementsAre(HasSubstr("cmm.host")));
 }

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -19,9 +20,11 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/text_file.hpp"
@@ -39,6 +42,7 @@
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
+#include "abbe/service/process_signals.hpp"
 #include "abbed_options.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
@@ -52,8 +56,7 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // period of the search for old recordings
 constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
 constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer for this long it hangs
-// for the control socket (3 s at most), the journal and the hub to end
-constexpr auto kEndTimeout = 5s;
+constexpr auto kNameServiceTimeout = 1s;  // at the start
 constexpr int kHubHangs = number(ExitCode::Internal);
 
 /// UTC minus host time, both read now. The only conversion between the two clocks.
@@ -150,10 +153,11 @@ struct Abbed::State {
 
   void end_hub() {
     const ExitDeadline deadline{
-        kEndTimeout, kHubHangs,
+        kLongestHubEnd, kHubHangs,
         fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
                     "recorded stays readable in {}.mcap.part\n",
-                    std::chrono::seconds{kEndTimeout}.count(), kHubHangs, recording)};
+                    kLongestHubEnd.count(), kHubHangs, recording),
+        &stop_machines_at_once};
     control.reset();
     journal.reset();  // both call the hub a last time
 
@@ -270,6 +274,10 @@ struct Abbed::State {
     auto listener = listen_unix(config.control.socket);
     if (!listener) return tl::unexpected(listener.error());
     control_listener = std::move(*listener);
+    // So that the first requests find the groups of a name service that answers in time.
+    const std::array groups{config.control.look_group, config.control.change_group,
+                            config.control.move_group};
+    account_names().look_up(groups, kNameServiceTimeout);
     return {};
   }
 
@@ -424,6 +432,7 @@ struct Abbed::State {
     try {
       hub->run();
     } catch (const std::exception& error) {  // alive() then returns false
+      devices->stop_machine();  // without the hub nothing notices that its operator is gone
       fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
     }
   }
@@ -461,6 +470,10 @@ void Abbed::cycle() {
   state_->supervise(now);
   state_->tidy_recordings(now);
   state_->report_left_recordings();
+}
+
+void Abbed::stop_machine() {
+  state_->devices->stop_machine();
 }
 
 bool Abbed::alive() const {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "abbe/base/end_limits.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
@@ -21,8 +22,9 @@ void read_cmm(Section& root, Config& out, StreamNames& names) {
   cmm.get_integer("probe", config.probe, 0, 1'000'000'000);
   cmm.get("u_position_um", config.u_position_m, kMicro, kPositive);
   cmm.get("axes_compensated", config.axes_compensated);
-  cmm.get("command_timeout_s", config.command_timeout, kPlain, kPositive);
-  cmm.get("motion_timeout_s", config.motion_timeout, kPlain, kPositive);
+  cmm.get("command_timeout_s", config.command_timeout, kPlain,
+          {0.01, std::chrono::duration<double>{kLongestMachineAnswer}.count()});
+  cmm.get("motion_timeout_s", config.motion_timeout, kPlain, {0.1, 3600.0});
 
   if (const auto other = touch_source(out))
     cmm.fault("",

@@ -105,7 +105,7 @@ void read_tracker_mode(Section& tracker, TrackerConfig& out) {
 void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
   tracker.get("max_constant_delay_us", out.max_constant_delay, kMicro, kNotNegative);
   tracker.get("connect_timeout_s", out.connect_timeout, kPlain, kPositive);
-  tracker.get("command_timeout_s", out.command_timeout, kPlain, kPositive);
+  tracker.get("command_timeout_s", out.command_timeout, kPlain, {0.01, 600.0});
   tracker.get("initialize_timeout_s", out.initialize_timeout, kPlain, kPositive);
   tracker.get("silence_timeout_s", out.silence_timeout, kPlain, kPositive);
 }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -69,9 +70,13 @@ std::string dds_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
+/// Keys that belong to the user of abbe-dds can be checked by root only: abbe-dds checks them itself.
 Result<void> check_dds_keys(const DdsConfig& dds) {
   const auto& security = dds.security;
   if (security.empty()) return {};
+  if (dds.supervise != Supervise::Child && ::access(security.c_str(), R_OK | X_OK) != 0 &&
+      errno == EACCES)
+    return {};
   const auto identity =
       find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
   if (!identity) return tl::unexpected(identity.error());
@@ -148,11 +153,15 @@ int abbed_main(int argc, char** argv) {
   app.footer(footer());
   app.set_version_flag("--version", ABBE_VERSION);
   std::string file = "/etc/abbe/abbed.toml";
-  bool check_only = false;
+  bool check_only = false, dds_unit = false;
   app.add_option("-c,--config", file, "configuration file")->capture_default_str();
   app.add_flag("--check-config", check_only,
                "only check the configuration, print all of its errors, or what was understood and "
                "what is improbable, and exit");
+  app.add_flag(
+      "--dds-unit", dds_unit,
+      "unless [dds] supervise is given: systemd runs abbe-dds, as abbe-dds.service (set by "
+      "abbed.service); otherwise abbed starts it as a child");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -168,7 +177,7 @@ int abbed_main(int argc, char** argv) {
   const sigset_t stop = prepare_signals();
   auto abbed = Abbed::start(
       std::move(*config),
-      {.configuration_text = text_of(file), .dds_program = dds_program()});
+      {.configuration_text = text_of(file), .dds_program = dds_program(), .dds_unit = dds_unit});
   if (!abbed) return refuse(abbed.error());
 
   for (const auto& warning : (*abbed)->warnings())

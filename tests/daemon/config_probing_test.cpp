@@ -1,4 +1,4 @@
-/// [probe] and [cmm] of a configuration.
+/// [probe], [cmm] and [dds] of a configuration.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,6 +65,27 @@ TEST(ConfigCmm, BoundsItsTimeOuts) {
               ElementsAre(HasSubstr("cmm.command_timeout_s")));
   EXPECT_THAT(faults_of(cmm + "motion_timeout_s = 1e9\n"),
               ElementsAre(HasSubstr("cmm.motion_timeout_s")));
+}
+
+TEST(ConfigDds, RunsAbbeDdsAsAUnitUnderSystemd) {
+  auto unit = parse_config(kMachine, "abbed.toml");
+  ASSERT_TRUE(unit);
+  auto child = *unit;
+  use_dds_unit(*unit, true);
+  use_dds_unit(child, false);
+  EXPECT_EQ(unit->dds.supervise, Supervise::Systemd);
+  EXPECT_EQ(unit->dds.socket, "/run/abbe-dds/dds.sock");
+  EXPECT_EQ(child.dds.supervise, Supervise::Child);
+  EXPECT_EQ(child.dds.socket, "/run/abbe/dds.sock");
+}
+
+TEST(ConfigDds, AnExplicitChoiceStays) {
+  auto config = parse_config(
+      kMachine + "[dds]\nsupervise = \"child\"\nsocket = \"/run/x/dds.sock\"\n", "abbed.toml");
+  ASSERT_TRUE(config);
+  use_dds_unit(*config, true);
+  EXPECT_EQ(config->dds.supervise, Supervise::Child);
+  EXPECT_EQ(config->dds.socket, "/run/x/dds.sock");
 }
 
 TEST(ConfigCmm, NeedsAHost) {

@@ -108,6 +108,7 @@ struct Abbed::State {
   std::optional<ReferenceService> reference;
   std::optional<VerificationService> verification;
   DdsProcess dds_process;
+  std::optional<uid_t> network_user;  ///< of abbe-dds, if it has a user of its own
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
@@ -202,9 +203,14 @@ struct Abbed::State {
 
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
+    if (options.dds_unit && config.dds.supervise == Supervise::Child)
+      warnings.emplace_back(
+          "[dds] supervise = \"child\": abbe-dds, which reads the network, runs with the rights of "
+          "abbed; remove this line, and it runs as a user of its own");
     const bool supervised = config.dds.supervise == Supervise::Child;
-    auto link =
-        DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
+    const auto peer = dds_peer();
+    if (!peer) return tl::unexpected(peer.error());
+    auto link = DdsLink::listen(config.dds.socket, *peer);
     if (!link) return tl::unexpected(link.error());
     publisher.emplace(std::move(*link), publisher_options(config), utc);
     check_dds_security();
@@ -217,12 +223,27 @@ struct Abbed::State {
     return {};
   }
 
+  /// The process that may connect to the socket for abbe-dds.
+  Result<DdsLinkPeer> dds_peer() {
+    if (config.dds.supervise == Supervise::Child) return DdsLinkPeer{.process = &dds_process};
+    if (config.dds.user.empty()) return DdsLinkPeer{};
+    const auto account = account_of(config.dds.user);
+    if (!account)
+      return fail(
+          ErrorCode::Io,
+          fmt::format("[dds] user: there is no user \"{}\", as which systemd runs abbe-dds: "
+                      "systemd-sysusers makes it",
+                      config.dds.user));
+    if (account->uid != ::geteuid()) network_user = account->uid;
+    return DdsLinkPeer{.user = account};
+  }
+
   /// Warns only: acquisition and recording do not need abbe-dds, and abbe-dds itself refuses
   /// unusable keys.
   void check_dds_security() {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
-    } else if (!config.dds.security.empty()) {
+    } else if (!config.dds.security.empty() && !network_user) {  // else only abbe-dds can read it
       const auto identity =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
       if (!identity)
@@ -305,7 +326,8 @@ struct Abbed::State {
                          .touching = &*touching,
                          .verification = &*verification,
                          .tracker = &*tracker,
-                         .store_changes = &*store_changes});
+                         .store_changes = &*store_changes,
+                         .network_user = network_user});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 
@@ -443,6 +465,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   auto state = std::make_unique<State>(std::move(config), std::move(options));
   prepare_background_tasks();
 
+  use_dds_unit(state->config, state->options.dds_unit);
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {

@@ -359,11 +359,15 @@ Result<const Verb*> verb_of(const json& request) {
 }
 
 /// The task for the request. Refused if `peer` does not have the role that the request requires.
-Result<Verb::Task> task_of(const json& request, const ControlPeer& peer,
-                           const ControlConfig& control) {
+Result<Verb::Task> task_of(const json& request, const ControlPeer& peer, const HubParts& parts) {
+  if (parts.network_user && peer.uid == *parts.network_user && peer.uid != 0)
+    return fail(ErrorCode::Refused,
+                fmt::format("{} is the user of abbe-dds, which reads the network: it may request "
+                            "nothing here",
+                            peer.user));
   const auto verb = verb_of(request);
   if (!verb) return tl::unexpected(verb.error());
-  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, control); !may)
+  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, parts.config.control); !may)
     return tl::unexpected(may.error());
   return (*verb)->task;
 }
@@ -378,7 +382,7 @@ std::vector<ControlVerb> control_verbs() {
 }
 
 json answer_on_hub(const Hub& hub, const json& request, const ControlPeer& peer) {
-  const auto task = task_of(request, peer, hub.parts().config.control);
+  const auto task = task_of(request, peer, hub.parts());
   if (!task) return refusal(task.error());
   const auto on_hub = (*task)(hub.parts(), request);
   return on_hub ? (*on_hub)(hub)() : refusal(on_hub.error());
@@ -386,7 +390,7 @@ json answer_on_hub(const Hub& hub, const json& request, const ControlPeer& peer)
 
 json answer_request(Hub& hub, const json& request, const ControlPeer& peer,
                     std::chrono::milliseconds time_out) {
-  const auto task = task_of(request, peer, hub.parts().config.control);
+  const auto task = task_of(request, peer, hub.parts());
   if (!task) return refusal(task.error());
   auto on_hub = (*task)(hub.parts(), request);
   if (!on_hub) return refusal(on_hub.error());

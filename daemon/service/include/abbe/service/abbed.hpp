@@ -17,6 +17,7 @@ namespace abbe::daemon {
 struct AbbedOptions {
   std::string configuration_text;  ///< text of the configuration file; stored in the recording
   std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child
+  bool dds_unit = false;    ///< systemd runs abbe-dds, unless the configuration decides
 };
 
 class Abbed {

@@ -5,23 +5,31 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/printable.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/config/check_config.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/messages/dds_security.hpp"
 #include "abbe/service/abbed.hpp"
 #include "abbe/service/background_tasks.hpp"
+#include "abbe/service/process_signals.hpp"
 
 namespace {
 
@@ -35,7 +43,8 @@ constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
 std::string footer() {
   return exit_codes_text(
       {{ExitCode::Done,
-        "stopped by SIGTERM or SIGINT (--check-config: the configuration is valid)"},
+        "stopped by SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGPWR or SIGXCPU (--check-config: the "
+        "configuration is valid)"},
        {ExitCode::Usage},
        {ExitCode::BadInput, "the configuration is invalid or cannot be read"},
        {ExitCode::Io, "the system refused a socket, directory, port or priority"},
@@ -44,8 +53,8 @@ std::string footer() {
        {ExitCode::StopNotSent,
         "abbed has ended without a connection to the measuring machine: it may be moving"},
        {ExitCode::Internal,
-        "the hub hangs, or does not end within 5 s after a signal, or an internal error: systemd "
-        "restarts abbed"}});
+        "the hub hangs, or abbed does not end within 25 s after a signal (the hub: 5 s), or an "
+        "internal error: systemd restarts abbed"}});
 }
 
 constexpr auto kCycle = 20ms;  // period of the main loop, which supervises abbe-dds
@@ -68,8 +77,13 @@ std::string dds_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "abbe-dds";
 }
 
-Result<void> check_dds_keys(const std::filesystem::path& security) {
+/// Keys that belong to the user of abbe-dds can be checked by root only: abbe-dds checks them itself.
+Result<void> check_dds_keys(const DdsConfig& dds) {
+  const auto& security = dds.security;
   if (security.empty()) return {};
+  if (dds.supervise != Supervise::Child && ::access(security.c_str(), R_OK | X_OK) != 0 &&
+      errno == EACCES)
+    return {};
   const auto identity =
       find_dds_identity(security, DdsRole::Daemon, std::chrono::system_clock::now());
   if (!identity) return tl::unexpected(identity.error());
@@ -80,8 +94,7 @@ Result<void> check_dds_keys(const std::filesystem::path& security) {
 int check(const std::string& file) {
   const auto checked = check_config(file, static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)));
   if (!checked) return refuse({ErrorCode::BadInput, checked.error().text, checked.error().details});
-  if (auto usable = check_dds_keys(checked->config.dds.security); !usable)
-    return refuse(usable.error());
+  if (auto usable = check_dds_keys(checked->config.dds); !usable) return refuse(usable.error());
 
   fmt::print("{}: valid\n", file);
   for (const auto& line : summary_of(checked->config)) fmt::print("  {}\n", printable(line));
@@ -90,17 +103,7 @@ int check(const std::string& file) {
   return kDone;
 }
 
-/// Blocks SIGINT and SIGTERM before any thread is started, so that only the main thread receives
-/// them.
-sigset_t block_stop_signals() {
-  sigset_t stop;
-  sigemptyset(&stop);
-  sigaddset(&stop, SIGTERM);
-  sigaddset(&stop, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &stop, nullptr);
-  return stop;
-}
-
+/// Runs until a signal or a hub that hangs ends abbed.
 int run(Abbed& abbed, const sigset_t& stop) {
   const auto feed_period = watchdog_period();
   auto next_feed = std::chrono::steady_clock::now();
@@ -108,13 +111,19 @@ int run(Abbed& abbed, const sigset_t& stop) {
   const timespec period{.tv_sec = 0, .tv_nsec = std::chrono::nanoseconds{kCycle}.count()};
 
   for (;;) {
-    if (sigtimedwait(&stop, nullptr, &period) > 0) return kDone;
+    if (const int number = sigtimedwait(&stop, nullptr, &period); number > 0) {
+      print_message("abbed", fmt::format("ends in order after {}", signal_name(number)));
+      return kDone;
+    }
     abbed.cycle();
 
     if (const bool hung = !abbed.alive(); hung != hangs) {
       hangs = hung;
-      print_message("abbed", hangs ? "the hub hangs: it has completed no cycle for 1 s"
-                                   : "the hub runs again");
+      print_message("abbed", hangs
+                                 ? "the hub hangs: it has completed no cycle for 1 s; a measuring "
+                                   "machine that moves is stopped"
+                                 : "the hub runs again");
+      if (hangs) abbed.stop_machine();
     }
     if (hangs) {
       // The hub hangs. Without a watchdog nothing would restart abbed, so it continues: the threads
@@ -130,11 +139,10 @@ int run(Abbed& abbed, const sigset_t& stop) {
   }
 }
 
-/// Ends abbed and reports it. Returns the exit code: `code`, or another one if the measuring machine
-/// may be moving on.
-int end(Abbed& abbed, int code) {
+/// Reports the end. Returns the exit code: `code`, or another one if the measuring machine may be
+/// moving on.
+int report_end(const std::optional<abbe::drivers::IppStop>& machine, int code) {
   using Outcome = abbe::drivers::IppStopOutcome;
-  const auto machine = abbed.end();
   if (!machine || machine->outcome == Outcome::Stopped) {
     print_message("abbed", "stopped");
     return code;
@@ -148,6 +156,22 @@ int end(Abbed& abbed, int code) {
                                                      : ExitCode::StopNotConfirmed);
 }
 
+/// Stops all parts and reports it; returns the exit code. Ends the process at once if that takes too
+/// long.
+int end_in_order(std::unique_ptr<Abbed> abbed, int code) {
+  notify_stopping();
+  const ExitDeadline deadline{
+      kLongestEnd, kInternal,
+      fmt::format(
+          "abbed: does not end within {} s, for example because a disk does not answer: exit "
+          "code {}\n",
+          kLongestEnd.count(), kInternal),
+      &stop_machines_at_once};
+  const int reported = report_end(abbed->end(), code);
+  abbed.reset();
+  return reported;
+}
+
 int abbed_main(int argc, char** argv) {
   CLI::App app{
       "Acquires data from a machine tool or measuring machine, identifies its geometric errors and "
@@ -155,11 +179,15 @@ int abbed_main(int argc, char** argv) {
   app.footer(footer());
   app.set_version_flag("--version", ABBE_VERSION);
   std::string file = "/etc/abbe/abbed.toml";
-  bool check_only = false;
+  bool check_only = false, dds_unit = false;
   app.add_option("-c,--config", file, "configuration file")->capture_default_str();
   app.add_flag("--check-config", check_only,
                "only check the configuration, print all of its errors, or what was understood and "
                "what is improbable, and exit");
+  app.add_flag(
+      "--dds-unit", dds_unit,
+      "unless [dds] supervise is given: systemd runs abbe-dds, as abbe-dds.service (set by "
+      "abbed.service); otherwise abbed starts it as a child");
   try {
     check_option_values(app);
     app.parse(argc, argv);
@@ -173,12 +201,10 @@ int abbed_main(int argc, char** argv) {
   // although only a person can repair the file.
   if (!config) return refuse({ErrorCode::BadInput, config.error().text, config.error().details});
 
-  const sigset_t stop = block_stop_signals();
-  // At a file size limit (RLIMIT_FSIZE, LimitFSIZE=) the write of the recorder fails with EFBIG,
-  // and the recorder reports it like a full disk. The default action of SIGXFSZ would end abbed.
-  ::signal(SIGXFSZ, SIG_IGN);
-  auto abbed = Abbed::start(std::move(*config),
-                            {.configuration_text = text_of(file), .dds_program = dds_program()});
+  const sigset_t stop = prepare_signals();
+  auto abbed = Abbed::start(
+      std::move(*config),
+      {.configuration_text = text_of(file), .dds_program = dds_program(), .dds_unit = dds_unit});
   if (!abbed) return refuse(abbed.error());
 
   for (const auto& warning : (*abbed)->warnings())
@@ -187,14 +213,13 @@ int abbed_main(int argc, char** argv) {
   notify_ready("running");
 
   const int ended_with = run(**abbed, stop);
-  notify_stopping();
-  const int code = end(**abbed, ended_with);
-  abbed->reset();
+  const int code = end_in_order(std::move(*abbed), ended_with);
 
   // A running identification checks its stop flag only from time to time, so the process ends
   // without waiting for it.
   if (background_tasks_running()) {
     std::fflush(nullptr);
+    drain_stderr();
     ::_exit(code);
   }
 
@@ -204,6 +229,7 @@ int abbed_main(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  unblock_stderr("abbed");
   try {
     return abbed_main(argc, argv);
   } catch (const std::exception& error) {

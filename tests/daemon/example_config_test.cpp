@@ -90,7 +90,8 @@ TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
 }
 
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
-  const auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
+  auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
+  use_dds_unit(plain, true);  // the defaults of [dds] are those under abbed.service
   const auto full = parse_config(uncommented(), "/etc/abbe/abbed.toml").value();
 
   EXPECT_EQ(machine_hash(full), machine_hash(plain));
@@ -113,6 +114,8 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.recording.chunk_bytes, plain.recording.chunk_bytes);
   EXPECT_EQ(full.recording.min_free_bytes, plain.recording.min_free_bytes);
   EXPECT_EQ(full.dds.socket, plain.dds.socket);
+  EXPECT_EQ(full.dds.supervise, plain.dds.supervise);
+  EXPECT_EQ(full.dds.user, plain.dds.user);
   EXPECT_EQ(full.dds.validity, plain.dds.validity);
   EXPECT_EQ(full.gate.max_error_m, plain.gate.max_error_m);
   EXPECT_EQ(full.gate.max_gradient, plain.gate.max_gradient);

@@ -100,8 +100,10 @@ TEST(Journal, WithoutASocketIsAnError) {
 TEST(Journal, AsTextIsOneLineWithTheSameContent) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
-  text_journal(ends[1])->write(kEntry);
-  ::close(ends[1]);
+  std::FILE* const stream = ::fdopen(ends[1], "w");
+  ASSERT_NE(stream, nullptr);
+  text_journal(stream)->write(kEntry);
+  ASSERT_EQ(std::fclose(stream), 0);
   std::array<char, 1024> buffer{};
   const ssize_t n = ::read(ends[0], buffer.data(), buffer.size());
   ::close(ends[0]);

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <utility>
 
@@ -60,7 +61,7 @@ class NativeJournal final : public JournalSink {
 
 class TextJournal final : public JournalSink {
  public:
-  explicit TextJournal(int fd) : fd_(fd) {}
+  explicit TextJournal(std::FILE* stream) : stream_(stream) {}
 
   void write(const JournalEntry& entry) override {
     std::string line = fmt::format("abbed: {} [", entry.message);
@@ -69,11 +70,12 @@ class TextJournal final : public JournalSink {
         line += fmt::format("{}={} ", name, value);
     line.back() = ']';
     line = protocol::printable_line(line) + '\n';
-    (void)!::write(fd_, line.data(), line.size());
+    (void)!std::fwrite(line.data(), 1, line.size(), stream_);
+    (void)std::fflush(stream_);
   }
 
  private:
-  int fd_;
+  std::FILE* stream_;
 };
 
 /// JOURNAL_STREAM is "DEVICE:INODE" of the stream that is connected to the journal.
@@ -93,14 +95,14 @@ Result<std::unique_ptr<JournalSink>> native_journal(const std::filesystem::path&
   return std::make_unique<NativeJournal>(std::move(*connected));
 }
 
-std::unique_ptr<JournalSink> text_journal(int fd) {
-  return std::make_unique<TextJournal>(fd);
+std::unique_ptr<JournalSink> text_journal(std::FILE* stream) {
+  return std::make_unique<TextJournal>(stream);
 }
 
 std::unique_ptr<JournalSink> open_journal() {
   if (stderr_leads_to_journal())
     if (auto journal = native_journal()) return std::move(*journal);
-  return text_journal(STDERR_FILENO);
+  return text_journal(stderr);
 }
 
 }  // namespace abbe::daemon

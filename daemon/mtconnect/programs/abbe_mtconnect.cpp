@@ -17,6 +17,7 @@
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/config/mtconnect_config.hpp"
 #include "abbe/mtconnect/daemon_poll.hpp"
 #include "abbe/mtconnect/limited_log.hpp"
@@ -167,6 +168,7 @@ void add_options(CLI::App& app, Options& out) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-mtconnect");
   CLI::App app{
       "MTConnect adapter: sends calibration, uncertainty and health of the machine as SHDR to "
       "agents."};

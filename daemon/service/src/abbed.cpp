@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -19,9 +20,11 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/text_file.hpp"
@@ -40,6 +43,7 @@
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
+#include "abbe/service/process_signals.hpp"
 #include "abbed_options.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
@@ -54,8 +58,7 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // period of the search for old recordings
 constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
 constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer for this long it hangs
-// for the control socket (3 s at most), the journal and the hub to end
-constexpr auto kEndTimeout = 5s;
+constexpr auto kNameServiceTimeout = 1s;  // at the start
 constexpr int kHubHangs = number(ExitCode::Internal);
 
 /// nullopt until the outcome of the latest request to stop the machine is known.
@@ -111,6 +114,7 @@ struct Abbed::State {
   std::optional<ReferenceService> reference;
   std::optional<VerificationService> verification;
   DdsProcess dds_process;
+  std::optional<uid_t> network_user;  ///< of abbe-dds, if it has a user of its own
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
@@ -166,10 +170,11 @@ struct Abbed::State {
 
   void end_hub() {
     const ExitDeadline deadline{
-        kEndTimeout, kHubHangs,
+        kLongestHubEnd, kHubHangs,
         fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
                     "recorded stays readable in {}.mcap.part\n",
-                    std::chrono::seconds{kEndTimeout}.count(), kHubHangs, recording)};
+                    kLongestHubEnd.count(), kHubHangs, recording),
+        &stop_machines_at_once};
     control.reset();
     journal.reset();  // both call the hub a last time
 
@@ -215,9 +220,14 @@ struct Abbed::State {
 
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
+    if (options.dds_unit && config.dds.supervise == Supervise::Child)
+      warnings.emplace_back(
+          "[dds] supervise = \"child\": abbe-dds, which reads the network, runs with the rights of "
+          "abbed; remove this line, and it runs as a user of its own");
     const bool supervised = config.dds.supervise == Supervise::Child;
-    auto link =
-        DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
+    const auto peer = dds_peer();
+    if (!peer) return tl::unexpected(peer.error());
+    auto link = DdsLink::listen(config.dds.socket, *peer);
     if (!link) return tl::unexpected(link.error());
     publisher.emplace(std::move(*link), publisher_options(config), utc);
     check_dds_security();
@@ -230,12 +240,27 @@ struct Abbed::State {
     return {};
   }
 
+  /// The process that may connect to the socket for abbe-dds.
+  Result<DdsLinkPeer> dds_peer() {
+    if (config.dds.supervise == Supervise::Child) return DdsLinkPeer{.process = &dds_process};
+    if (config.dds.user.empty()) return DdsLinkPeer{};
+    const auto account = account_of(config.dds.user);
+    if (!account)
+      return fail(
+          ErrorCode::Io,
+          fmt::format("[dds] user: there is no user \"{}\", as which systemd runs abbe-dds: "
+                      "systemd-sysusers makes it",
+                      config.dds.user));
+    if (account->uid != ::geteuid()) network_user = account->uid;
+    return DdsLinkPeer{.user = account};
+  }
+
   /// Warns only: acquisition and recording do not need abbe-dds, and abbe-dds itself refuses
   /// unusable keys.
   void check_dds_security() {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
-    } else if (!config.dds.security.empty()) {
+    } else if (!config.dds.security.empty() && !network_user) {  // else only abbe-dds can read it
       const auto identity =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
       if (!identity)
@@ -287,6 +312,10 @@ struct Abbed::State {
     auto listener = listen_unix(config.control.socket);
     if (!listener) return tl::unexpected(listener.error());
     control_listener = std::move(*listener);
+    // So that the first requests find the groups of a name service that answers in time.
+    const std::array groups{config.control.look_group, config.control.change_group,
+                            config.control.move_group};
+    account_names().look_up(groups, kNameServiceTimeout);
     return {};
   }
 
@@ -314,7 +343,8 @@ struct Abbed::State {
                          .touching = &*touching,
                          .verification = &*verification,
                          .tracker = &*tracker,
-                         .store_changes = &*store_changes});
+                         .store_changes = &*store_changes,
+                         .network_user = network_user});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 
@@ -464,6 +494,7 @@ struct Abbed::State {
     try {
       hub->run();
     } catch (const std::exception& error) {  // alive() then returns false
+      devices->stop_machine();  // without the hub nothing notices that its operator is gone
       fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
     }
   }
@@ -474,6 +505,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   auto state = std::make_unique<State>(std::move(config), std::move(options));
   prepare_background_tasks();
 
+  use_dds_unit(state->config, state->options.dds_unit);
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {
@@ -507,6 +539,10 @@ void Abbed::cycle() {
 
 std::optional<drivers::IppStop> Abbed::end() {
   return state_->end();
+}
+
+void Abbed::stop_machine() {
+  (void)state_->devices->stop_machine();
 }
 
 bool Abbed::alive() const {

@@ -19,6 +19,7 @@
 #include "abbe/base/message.hpp"
 #include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/web/page_server.hpp"
 #include "abbe/web/web_users.hpp"
 
@@ -170,6 +171,7 @@ int serve(const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-web");
   CLI::App app{
       "Serves the page of abbe: live axes, calibration, models, recordings. Asks abbed over its "
       "control socket. Read-only unless a user logs in."};

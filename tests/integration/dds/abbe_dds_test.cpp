@@ -67,7 +67,7 @@ TEST_F(AbbeDds, WithoutAnInterfaceOfItsProfileItEndsWithFour) {
 
 TEST_F(AbbeDds, AsAServiceItRefusesAConfigurationThatMakesItAChild) {
   write_config("child");
-  EXPECT_EQ(exit_code({"--config", config}), 3);
+  EXPECT_EQ(exit_code({"--config", config}), 5);
 }
 
 TEST_F(AbbeDds, AsAServiceItFindsSocketDomainAndProfileInTheConfiguration) {

@@ -4,12 +4,11 @@
 #include <signal.h>
 
 #include "hung_hub.hpp"
-#include "slow_machine.hpp"
+#include "moving_machine.hpp"
 
 namespace abbe::test {
 namespace {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 bool moves_or_clears(const std::string& command) {
@@ -18,7 +17,7 @@ bool moves_or_clears(const std::string& command) {
          command.starts_with("ClearAllErrors");
 }
 
-struct KilledWhileMoving : SlowMachine {
+struct KilledWhileMoving : MovingMachine {
   /// Killed in `motion`, started again: the machine receives AbortE first, stops, and waits for
   /// a release.
   void expect_stopped_by_the_next_start(MachineInAThread& machine, const std::string& motion) {
@@ -53,9 +52,7 @@ struct KilledWhileMoving : SlowMachine {
 TEST_F(KilledWhileMoving, ATouchIsAbortedByTheNextStart) {
   MachineInAThread machine{slow_machine()};
   ASSERT_NO_FATAL_FAILURE(start_at(machine));
-  ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
-  ASSERT_TRUE(
-      eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  ASSERT_NO_FATAL_FAILURE(begin_touch(machine));
   expect_stopped_by_the_next_start(machine, "PtMeas");
 }
 
@@ -72,9 +69,7 @@ TEST_F(KilledWhileMoving, HomingIsAbortedByTheNextStart) {
 TEST_F(KilledWhileMoving, AHubThatHangsDoesNotKeepTheEndFromStoppingTheMachine) {
   MachineInAThread machine{slow_machine()};
   ASSERT_NO_FATAL_FAILURE(start_at(machine));
-  ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
-  ASSERT_TRUE(
-      eventually([&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  ASSERT_NO_FATAL_FAILURE(begin_touch(machine));
   const pid_t hub = thread_of(abbed_->pid(), "abbe-hub");
   ASSERT_GT(hub, 0);
   if (!stop_thread(hub)) GTEST_SKIP() << "ptrace is not allowed here";

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "slow_machine.hpp"
+#include "moving_machine.hpp"
 
 namespace abbe::test {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-struct StoppedMachine : SlowMachine {
+struct StoppedMachine : MovingMachine {
   [[nodiscard]] Outcome stop() const {
     return run({ABBE_PROGRAM, "machine", "stop", "--socket", file("run/control.sock")});
   }

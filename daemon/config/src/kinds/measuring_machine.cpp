@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "abbe/base/end_limits.hpp"
 #include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
@@ -45,8 +46,9 @@ void read_cmm(ClassifiedSection& root, Config& out, StreamNames& names) {
   cmm.get_integer(operation("probe"), config.probe, 0, 1'000'000'000);
   cmm.get(operation("u_position_um"), config.u_position_m, kMicro, kPositive);
   cmm.get(Key{"axes_compensated", positions}, config.axes_compensated);
-  cmm.get(operation("command_timeout_s"), config.command_timeout, kPlain, kPositive);
-  cmm.get(operation("motion_timeout_s"), config.motion_timeout, kPlain, kPositive);
+  cmm.get(operation("command_timeout_s"), config.command_timeout, kPlain,
+          {0.01, std::chrono::duration<double>{kLongestMachineAnswer}.count()});
+  cmm.get(operation("motion_timeout_s"), config.motion_timeout, kPlain, {0.1, 3600.0});
   read_volume(cmm, config);
 
   if (const auto other = touch_source(out))

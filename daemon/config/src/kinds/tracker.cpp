@@ -106,7 +106,7 @@ void read_tracker_mode(ClassifiedSection& tracker, TrackerConfig& out) {
 void read_tracker_timeouts(ClassifiedSection& tracker, Role points, TrackerConfig& out) {
   tracker.get(Key{"max_constant_delay_us", points}, out.max_constant_delay, kMicro, kNotNegative);
   tracker.get(operation("connect_timeout_s"), out.connect_timeout, kPlain, kPositive);
-  tracker.get(operation("command_timeout_s"), out.command_timeout, kPlain, kPositive);
+  tracker.get(operation("command_timeout_s"), out.command_timeout, kPlain, {0.01, 600.0});
   tracker.get(operation("initialize_timeout_s"), out.initialize_timeout, kPlain, kPositive);
   tracker.get(operation("silence_timeout_s"), out.silence_timeout, kPlain, kPositive);
 }

@@ -166,7 +166,9 @@ struct ModelRetention {
   std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
 };
 
-enum class Supervise { Child, Systemd, Off };
+/// Who runs abbe-dds. ByStart: systemd if abbed runs as abbed.service, else abbed itself; use_dds_unit()
+/// decides it.
+enum class Supervise { ByStart, Child, Systemd, Off };
 
 /// [dds]
 struct DdsConfig {
@@ -175,12 +177,16 @@ struct DdsConfig {
   double compensation_hz = 100.0;  ///< maximum rate; 0: with every hub cycle that has new data
   /// A subscriber must not apply a compensation vector older than this.
   std::chrono::nanoseconds validity{std::chrono::milliseconds{500}};
-  Supervise supervise = Supervise::Child;
+  Supervise supervise = Supervise::ByStart;
+  /// With Systemd: the user as which abbe-dds runs, which alone may connect; empty: that of abbed.
+  std::string user = "abbe-dds";
   int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: not SCHED_FIFO
   std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
   /// Folder of keys made by `abbe dds keys`; empty: the profile decides.
   std::filesystem::path security;
-  std::filesystem::path socket;  ///< default: runtime_dir/dds.sock
+  /// Default: runtime_dir/dds.sock; with Systemd dds.sock in the folder "RUNTIME_DIR-dds", which
+  /// abbe-dds may enter.
+  std::filesystem::path socket;
 };
 
 /// [gate]: the conditions that a model must satisfy before it may become active.
@@ -301,6 +307,10 @@ struct Config {
   /// True if the control already corrects the readings of any axis.
   [[nodiscard]] bool axes_compensated() const;
 };
+
+/// Decides [dds] supervise, if the configuration does not, and the socket that follows from it.
+/// `unit`: abbed runs as abbed.service, beside abbe-dds.service.
+void use_dds_unit(Config& config, bool unit);
 
 /// Reads and checks a whole file. Io if the file cannot be read, else BadInput with one line per
 /// fault in Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with

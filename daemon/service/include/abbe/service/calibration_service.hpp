@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
@@ -51,7 +52,7 @@ class CalibrationService {
   /// Takes kStopTimeout at most. A background task that is still running then continues without
   /// access to this object; see background_tasks_running(). A lost model is reported on stderr.
   ~CalibrationService();
-  static constexpr std::chrono::seconds kStopTimeout{4};
+  static constexpr std::chrono::seconds kStopTimeout = kLongestWorkEnd;
   /// The part of kStopTimeout for which the last attempt to store a model waits for the lock of the
   /// store.
   static constexpr std::chrono::seconds kLastTry{1};

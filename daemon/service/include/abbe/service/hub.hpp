@@ -52,6 +52,8 @@ struct HubParts {
   VerificationService* verification = nullptr;
   TrackerService* tracker = nullptr;
   StoreChanges* store_changes = nullptr;
+  /// The user of abbe-dds, which reads the network: it has no role on the control socket.
+  std::optional<uid_t> network_user = {};
 };
 
 class Hub : private PipelineObserver {

@@ -1,6 +1,5 @@
 #pragma once
-/// A simulated measuring machine in a thread of the test, so slow that it is in motion while
-/// something happens to abbed.
+/// A measuring machine that moves slowly at the command of abbed: what happens to it is seen.
 
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -65,7 +64,10 @@ class MachineInAThread {
   std::thread thread_;
 };
 
-struct SlowMachine : Spine {
+class MovingMachine : public Spine {
+ protected:
+  using json = nlohmann::json;
+
   /// Slow: each of its motions takes a minute.
   static sim::IppDmeOptions slow_machine() {
     sim::IppDmeOptions machine;
@@ -80,23 +82,26 @@ struct SlowMachine : Spine {
     write("abbed.toml", replaced(text_of(file("abbed.toml")), "\nspeed = [0-9]+", "\nspeed = 1"));
     ASSERT_NO_FATAL_FAILURE(start_abbed());
   }
-  [[nodiscard]] auto ask(const nlohmann::json& request) const {
+  [[nodiscard]] auto ask(const json& request) const {
     return daemon::ask_daemon(directory_ / "run" / "control.sock", request);
   }
-  /// The top of the sphere.
-  static nlohmann::json touch_request() {
-    return {{"do", "touch"},
-            {"points",
-             {{{"way", nlohmann::json::array()},
-               {"at_m", {0.05, 0.05, -0.1355}},
-               {"normal", {0.0, 0.0, 1.0}}}}}};
-  }
-  /// In the touch of touch_request().
-  void start_touching(MachineInAThread& machine) {
-    ASSERT_NO_FATAL_FAILURE(start_at(machine));
+  /// abbed has sent a touch, and the machine is on its way: for a minute.
+  void begin_touch(MachineInAThread& machine) const {
     ASSERT_TRUE(eventually([&] { return ask(touch_request()).has_value(); })) << status().dump(1);
     ASSERT_TRUE(eventually(
         [&] { return machine.moving() && machine.heard().back().starts_with("PtMeas"); }));
+  }
+  /// Starts abbed, and then a touch.
+  void start_touching(MachineInAThread& machine) {
+    ASSERT_NO_FATAL_FAILURE(start_at(machine));
+    ASSERT_NO_FATAL_FAILURE(begin_touch(machine));
+  }
+  /// The top of the sphere.
+  static json touch_request() {
+    return {
+        {"do", "touch"},
+        {"points",
+         {{{"way", json::array()}, {"at_m", {0.05, 0.05, -0.1355}}, {"normal", {0.0, 0.0, 1.0}}}}}};
   }
 };
 

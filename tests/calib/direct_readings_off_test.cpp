@@ -5,11 +5,11 @@
 #include <cmath>
 #include <random>
 
+namespace abbe::calib::direct {
 namespace {
-using namespace abbe::calib::direct;
 
 /// 13 positions, forward and backward, offsets of 50 um between the passes, noise of 0.3 um.
-MeasuredError measured(int runs, unsigned seed = 1) {
+MeasuredError measured_in_runs(int runs, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   MeasuredError error{.name = "EXX", .readings = {}};
@@ -25,54 +25,56 @@ MeasuredError measured(int runs, unsigned seed = 1) {
   return error;
 }
 
-std::vector<std::size_t> found(const MeasuredError& error) {
+std::vector<std::size_t> readings_found(const MeasuredError& error) {
   std::vector<std::size_t> readings;
   for (const ReadingOff& off : readings_off(error)) readings.push_back(off.reading);
   return readings;
 }
 
-using Readings = std::vector<std::size_t>;
+using ReadingNumbers = std::vector<std::size_t>;
 
 TEST(ReadingsOff, AreSentinelsAtAnyPosition) {
   for (const double value : {-9999e-6, 1e24, 200e-6})
     for (const std::size_t at : {0u, 1u, 2u, 7u, 11u, 12u, 13u, 30u}) {
-      MeasuredError error = measured(3);
+      MeasuredError error = measured_in_runs(3);
       error.readings[at].value = value;
-      EXPECT_EQ(found(error), Readings{at}) << value << " at " << at;
+      EXPECT_EQ(readings_found(error), ReadingNumbers{at}) << value << " at " << at;
     }
 }
 
 TEST(ReadingsOff, AreNotTheInnocentOnes) {
   for (unsigned seed = 1; seed <= 200; ++seed)
-    for (const int runs : {1, 2, 3, 5}) EXPECT_EQ(found(measured(runs, seed)), Readings{}) << seed;
+    for (const int runs : {1, 2, 3, 5})
+      EXPECT_EQ(readings_found(measured_in_runs(runs, seed)), ReadingNumbers{}) << seed;
 }
 
 TEST(ReadingsOff, AreNotAStepThatAllRunsShow) {
-  MeasuredError error = measured(3);
+  MeasuredError error = measured_in_runs(3);
   for (Reading& r : error.readings)
     if (std::abs(r.position_m) < 1e-6) r.value += 100e-6;
-  EXPECT_EQ(found(error), Readings{});
+  EXPECT_EQ(readings_found(error), ReadingNumbers{});
 }
 
 TEST(ReadingsOff, AreFoundWhenThereAreTwo) {
   for (const std::size_t second : {5u, 6u, 9u, 20u, 60u}) {
-    MeasuredError error = measured(3);
+    MeasuredError error = measured_in_runs(3);
     error.readings[4].value = -9999e-6;
     error.readings[second].value = -9999e-6;
-    EXPECT_EQ(found(error), (Readings{4, second})) << second;
+    EXPECT_EQ(readings_found(error), (ReadingNumbers{4, second})) << second;
   }
 }
 
 TEST(ReadingsOff, AreFoundInOneRun) {
-  MeasuredError error = measured(1);
+  MeasuredError error = measured_in_runs(1);
   error.readings[6].value = -9999e-6;
-  EXPECT_EQ(found(error), Readings{6});
+  EXPECT_EQ(readings_found(error), ReadingNumbers{6});
 }
 
 TEST(ReadingsOff, OfFewPositionsAreNotTested) {
   const MeasuredError error{.name = "EXX", .readings = {{0.0, 0.0, 1, true}, {0.1, 1.0, 1, true}}};
-  EXPECT_EQ(found(error), Readings{});
-  EXPECT_EQ(found({.name = "EC0Y", .readings = {{0.0, 1e-6, 1, true}}}), Readings{});
+  EXPECT_EQ(readings_found(error), ReadingNumbers{});
+  EXPECT_EQ(readings_found({.name = "EC0Y", .readings = {{0.0, 1e-6, 1, true}}}), ReadingNumbers{});
 }
 
 }  // namespace
+}  // namespace abbe::calib::direct

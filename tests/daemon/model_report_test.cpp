@@ -156,6 +156,16 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   EXPECT_EQ(times(model_report(subject).value(), "Not recorded."), 2u);
 }
 
+TEST(ModelReport, StatesWhetherTheDevicesWereSimulatedAndWhatMeasured) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("not known whether they were simulated"));
+  auto& configuration = subject.document.configuration.emplace();
+  set_entry(configuration.readings, "daemon.simulated", "true");
+  set_entry(configuration.measurements, "tracker.reflector", "ball 1.5");
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("SIMULATED"), HasSubstr("tracker.reflector = ball 1.5")));
+}
+
 /// Its statistics are those of the held-out test: rms only, no samples.
 TEST(ModelReport, OfAJointModelDoesNotPresentTheHeldOutTestAsResidualsOfAFit) {
   ReportSubject subject = reported(3);

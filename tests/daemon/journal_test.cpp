@@ -108,7 +108,7 @@ TEST(Journal, AsTextIsOneLineWithTheSameContent) {
   const ssize_t n = ::read(ends[0], buffer.data(), buffer.size());
   ::close(ends[0]);
   EXPECT_EQ((std::string{buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))}),
-            "abbed: device tracker: connecting; last fault: a?b [ABBE_DEVICE=tracker "
+            "abbed: device tracker: connecting; last fault: a\\u{A}b [ABBE_DEVICE=tracker "
             "ABBE_STATE=connecting]\n");
 }
 

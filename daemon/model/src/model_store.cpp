@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
@@ -284,8 +285,11 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     entries.push_back(std::move(entry));
   }
 
-  std::stable_sort(entries.begin(), entries.end(),
-                   [](const auto& a, const auto& b) { return a.added > b.added; });
+  // In the order of the events, not of their dates: the clock may have been set back in between.
+  std::ranges::stable_sort(entries, std::greater<>{}, [&models](const StoreEntry& entry) {
+    const auto added = models.find(entry.id);
+    return added == models.end() ? nullptr : added->second;
+  });
   return entries;
 }
 

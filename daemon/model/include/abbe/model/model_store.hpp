@@ -115,7 +115,7 @@ class ModelStore {
   [[nodiscard]] Result<std::vector<std::string>> remove_old(const ModelRetention& retention,
                                                             const StoreActor& actor);
 
-  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
+  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< added last first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
   /// The id of the active model; nullopt if no model is active. Reads state.json at every call,
   /// because other processes may change it.

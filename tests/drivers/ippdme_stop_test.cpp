@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "ippdme_stage.hpp"
 
@@ -57,7 +58,7 @@ struct MovingStage : IppStage {
   }
 };
 
-/// A stage whose device throws when the machine begins to be held: after AbortE counts as sent,
+/// A stage whose device throws once, when the machine begins to be held: after AbortE counts as sent,
 /// before it is sent.
 struct ThrowingStage : MovingStage {
   ThrowingStage() : MovingStage(options()) {
@@ -66,8 +67,9 @@ struct ThrowingStage : MovingStage {
   }
   static IppDeviceOptions options() {
     IppDeviceOptions options;
-    options.machine_changed = [](const drivers::IppMachine& machine) {
-      if (!machine.held.empty()) throw std::runtime_error("no memory");
+    options.machine_changed = [thrown = false](const drivers::IppMachine& machine) mutable {
+      if (!machine.held.empty() && !std::exchange(thrown, true))
+        throw std::runtime_error("no memory");
     };
     return options;
   }

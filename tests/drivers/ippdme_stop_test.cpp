@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "ippdme_stage.hpp"
 
@@ -21,7 +22,7 @@ using drivers::ProbePoint;
 using protocol::TouchFlag;
 using testing::HasSubstr;
 
-/// A stage whose device throws when the machine begins to be held: after AbortE counts as sent,
+/// A stage whose device throws once, when the machine begins to be held: after AbortE counts as sent,
 /// before it is sent.
 struct ThrowingStage : MovingStage {
   ThrowingStage() : MovingStage(options()) {
@@ -30,8 +31,9 @@ struct ThrowingStage : MovingStage {
   }
   static IppDeviceOptions options() {
     IppDeviceOptions options;
-    options.machine_changed = [](const drivers::IppMachine& machine) {
-      if (!machine.held.empty()) throw std::runtime_error("no memory");
+    options.machine_changed = [thrown = false](const drivers::IppMachine& machine) mutable {
+      if (!machine.held.empty() && !std::exchange(thrown, true))
+        throw std::runtime_error("no memory");
     };
     return options;
   }

@@ -37,9 +37,9 @@ drivers::IppDeviceOptions machine_options(const CmmConfig& config, double speed)
 // Wall time. A tip position older than this is not used; a machine that is ready to move reports
 // ten positions in this time.
 constexpr auto kPositionIsOld = std::chrono::seconds{1};
-// Largest delay until the device thread handles a request to stop. At 200 mm/s the machine moves 2
+// Largest delay until the device thread handles a request to stop. At 200 mm/s the machine moves 1
 // mm in this time.
-constexpr auto kMostStopDelay = std::chrono::milliseconds{10};
+constexpr auto kMostStopDelay = std::chrono::milliseconds{5};
 
 /// A measuring machine behind an I++ DME server, as source of touches, and also of axis samples if
 /// the configuration has no other device that reads the axes.

@@ -188,7 +188,10 @@ TEST_F(ArtefactRun, EndsTheTouchingWhenInterrupted) {
     ASSERT_TRUE(eventually([&] { return touches()["running"] == true && has_touched(); }));
     running.signal(signal);
     EXPECT_EQ(running.wait_for_end(), 1);
-    EXPECT_THAT(running.err(), HasSubstr("cancelled; the tip was reported at X "));
+    EXPECT_THAT(running.err(),
+                testing::ContainsRegex(
+                    "cancelled; the machine is stopped: AbortE was answered.*the tip was "
+                    "reported at X "));
     expect_standing_until_released();
     release();
     EXPECT_LT(touches_aside(), kBalls * 100u);

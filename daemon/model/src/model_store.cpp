@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
@@ -64,6 +65,14 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   std::sort(ids->begin(), ids->end());
   ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
   return ids;
+}
+
+/// From 1: place of the last Added event of each model.
+std::map<std::string, std::size_t> order_of_adding(const StoreState& state) {
+  std::map<std::string, std::size_t> order;
+  for (std::size_t i = 0; i < state.events.size(); ++i)
+    if (state.events[i].action == StoreAction::Added) order[state.events[i].id] = i + 1;
+  return order;
 }
 
 /// That of the state; where it was lost, that of the file.
@@ -253,8 +262,14 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     entries.push_back(std::move(entry));
   }
 
+  // In the order of the events, not of their dates: the clock may have been set back in between.
+  const auto order = order_of_adding(*state);
+  const auto rank = [&order](const StoreEntry& entry) {
+    const auto found = order.find(entry.id);
+    return found == order.end() ? 0 : found->second;
+  };
   std::stable_sort(entries.begin(), entries.end(),
-                   [](const auto& a, const auto& b) { return a.added > b.added; });
+                   [&rank](const auto& a, const auto& b) { return rank(a) > rank(b); });
   return entries;
 }
 

@@ -106,7 +106,7 @@ class ModelStore {
   /// model further back. Refused if no model was active before.
   [[nodiscard]] Result<std::string> rollback(const StoreActor& actor, const std::string& active);
 
-  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
+  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< added last first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
   /// The id of the active model; nullopt if no model is active. Reads state.json at every call,
   /// because other processes may change it.

@@ -41,6 +41,7 @@ TEST(Observations, StateTheModel) {
 
 TEST(Observations, StateWhetherDevicesOrModelAreSimulated) {
   auto status = test::status();
+  status.erase("simulated");
   EXPECT_EQ(event(observations_of(status), "simulated"), "UNAVAILABLE") << "an older abbed";
   status["simulated"] = false;
   EXPECT_EQ(event(observations_of(status), "simulated"), "NO");

@@ -14,6 +14,7 @@
 #include "abbe/tables/parts_file.hpp"
 #include "evemu_input.hpp"
 #include "identify_otf.hpp"
+#include "opened_recording.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -81,12 +82,23 @@ void note_unshared_offsets(const std::vector<RunFiles>& runs, std::vector<PartFa
   }
 }
 
+/// A recorded part gives the readings their meaning. One part of simulated devices makes the whole
+/// model one of simulated devices.
+void take_readings_of(const Config& part, Config& config) {
+  constexpr std::string_view kSimulated = "daemon.simulated";
+  const auto* earlier = value_of(config.meaning.readings, kSimulated);
+  const std::string devices = earlier != nullptr ? *earlier : "false";
+  take_recorded_readings(config, &part);
+  if (devices != "false") set_entry(config.meaning.readings, kSimulated, devices);
+}
+
 Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& files,
                      JointInput& input, ProgressBar& bar) {
   const IdentifyOtfArguments of_run = arguments_of(arguments, files);
   auto run = files.recording.empty() ? identify_files(of_run, std::nullopt, bar)
                                      : identify_recorded(of_run, bar);
   if (!run) return tl::make_unexpected(in_part(files.name, run.error()));
+  if (!files.recording.empty()) take_readings_of(run->config, input.config);
   const auto& solution = run->found.solution;
   if (!input.common) {
     auto common = calib::joint::tables_of(solution.model);

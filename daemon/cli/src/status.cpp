@@ -91,6 +91,20 @@ void print_positions(const json& status) {
   fmt::print("\n");
 }
 
+/// Earlier versions of abbed send none; nothing is printed then.
+void print_identity(const json& identity) {
+  if (identity.empty()) return;
+  const auto id = identity.value("machine_id", std::string{});
+  fmt::print("identity   {}{}\n", id.empty() ? "-" : id,
+             identity.value("confirmed", false) ? "" : "  not confirmed");
+  const auto show = [](const std::string& text) {
+    if (!text.empty()) fmt::print("           {}\n", coloured(text, kYellow, STDOUT_FILENO));
+  };
+  show(identity.value("reason", std::string{}));
+  if (const auto twin = identity.value("twin", std::string{}); !twin.empty())
+    show("another machine publishes with " + twin);
+}
+
 void print_next(const json& next) {
   const std::string of = next.contains("measurement")
                              ? fmt::format("measurement {}", next["measurement"].get<std::string>())
@@ -163,6 +177,7 @@ void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
   fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  print_identity(status.value("identity", json::object()));
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);

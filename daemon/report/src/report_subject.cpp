@@ -1,3 +1,4 @@
+#include "abbe/model/machine_identity.hpp"
 #include "abbe/report/model_report.hpp"
 
 namespace abbe::daemon {
@@ -24,6 +25,10 @@ Result<ReportSubject> report_subject(const ModelStore& store, const std::string&
                                  .method = subject.document.method,
                                  .machine = subject.document.machine};
   }
+  // The store of abbed is DATA_DIR/models. A report is made also where the identity cannot be read.
+  const auto data_dir = store.model_path(id).parent_path().parent_path().parent_path();
+  if (const auto identity = read_identity(data_dir); identity && *identity)
+    subject.machine_id = (*identity)->machine_id_at(subject.document.created);
   return subject;
 }
 

@@ -119,8 +119,10 @@ Hub::WallTime Hub::last_cycle() const noexcept {
 }
 
 ActiveModelState Hub::model_state() const {
-  return parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(),
-                                      parts_.time.host(kAxesTimeout));
+  auto state = parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(),
+                                            parts_.time.host(kAxesTimeout));
+  if (parts_.identity != nullptr) parts_.identity->restrict(state);
+  return state;
 }
 
 void Hub::cycle(WallTime wall) {
@@ -177,16 +179,29 @@ void Hub::publish(bool fresh, HostTime now) {
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
     (void)parts_.authority.follow_store(now);
+    follow_identity(wall);
     collect_health(now);
     if (publisher != nullptr) publisher->health(health_, now);
   }
   if (publisher != nullptr) publisher->model(model_state(), now, wall);
 }
 
+void Hub::follow_identity(WallTime wall) {
+  if (parts_.identity == nullptr) return;
+  parts_.identity->follow(wall);
+  if (parts_.publisher == nullptr) return;
+  auto identity = parts_.publisher->identity();
+  identity.machine_id = parts_.identity->known().machine_id;
+  parts_.publisher->set_identity(std::move(identity));
+}
+
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
   health_.push_back(health_of(parts_.authority, parts_.calibration));
   if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
+  if (parts_.identity != nullptr)
+    health_.push_back(parts_.identity->health(
+        parts_.publisher != nullptr ? parts_.publisher->link().twin() : std::string{}));
   if (parts_.publisher == nullptr) return;
   health_.push_back(health_of(*parts_.publisher));
   health_.push_back(health_of_security(*parts_.publisher));

@@ -155,7 +155,8 @@ ActiveModelState ModelAuthority::model_state(HostTime now, std::optional<HostTim
 
 ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const {
-  ActiveModelState s{.model = active_model(), .revision = revision_};
+  ActiveModelState s{
+      .model = active_model(), .revision = revision_, .activated = active_.activation.actor.when};
   if (s.model != nullptr) s.publication = &active_.publication;
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;

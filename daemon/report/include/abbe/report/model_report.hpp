@@ -19,6 +19,8 @@ struct ReportSubject {
   std::optional<StoreEntry> entry{};  ///< nullopt: a file, not in a store; no verdict is known
   std::vector<StoreEvent> events{};   ///< of this model, oldest first
   CertificateDetails details{};
+  /// Of the machine, when the model was identified; empty: the store is not in a data folder of abbed.
+  std::string machine_id{};
 };
 
 /// A model of the store with its verdict and its events.

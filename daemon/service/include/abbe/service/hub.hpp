@@ -28,6 +28,7 @@
 #include "abbe/publishing/publisher.hpp"
 #include "abbe/recording/recorder_thread.hpp"
 #include "abbe/service/calibration_service.hpp"
+#include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
 #include "abbe/service/store_changes.hpp"
@@ -52,6 +53,7 @@ struct HubParts {
   VerificationService* verification = nullptr;
   TrackerService* tracker = nullptr;
   StoreChanges* store_changes = nullptr;
+  IdentityWatch* identity = nullptr;
 };
 
 class Hub : private PipelineObserver {
@@ -97,6 +99,7 @@ class Hub : private PipelineObserver {
   void on_snapshots(std::span<const protocol::Snapshot> snapshots,
                     protocol::HostTime taken) override;
   void publish(bool fresh, protocol::HostTime now);
+  void follow_identity(WallTime wall);
   void collect_health(protocol::HostTime now);
   void touch(std::size_t points_left, WallTime wall);
 

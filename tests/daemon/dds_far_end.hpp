@@ -39,9 +39,9 @@ struct FarEnd {
 
   /// What abbe-dds sends when it sees another publisher of this machine.
   void report_twin(const std::string& text) const {
-    std::string bytes{'\1', static_cast<char>(text.size()), '\0'};
-    bytes += text;
-    EXPECT_EQ(::send(fd, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));
+    std::string report{'\1', static_cast<char>(text.size()), '\0'};
+    report += text;
+    EXPECT_EQ(::send(fd, report.data(), report.size(), 0), static_cast<ssize_t>(report.size()));
   }
 
   /// Every whole frame that has arrived by now.

@@ -83,8 +83,11 @@ int show_machine(const DaemonSocket& where) {
 
 void add_machine(CLI::App& parent, int& exit) {
   auto* group = parent.add_subcommand(
-      "machine", "Control the measuring machine of the running daemon: where, stop, release");
+      "machine",
+      "Control the measuring machine of the running daemon: where, stop, release; identity of the "
+      "machine: identity");
   group->require_subcommand(1);
+  add_machine_identity(*group, exit);
 
   const auto add = [&](const char* name, const std::string& text, int (*run)(const DaemonSocket&)) {
     auto where = std::make_shared<DaemonSocket>();

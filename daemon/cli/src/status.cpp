@@ -95,6 +95,20 @@ void print_positions(const json& status) {
                  coloured(missing, kYellow, STDOUT_FILENO));
 }
 
+/// Earlier versions of abbed send none; nothing is printed then.
+void print_identity(const json& identity) {
+  if (identity.empty()) return;
+  const auto id = identity.value("machine_id", std::string{});
+  fmt::print("identity   {}{}\n", id.empty() ? "-" : id,
+             identity.value("confirmed", false) ? "" : "  not confirmed");
+  const auto show = [](const std::string& text) {
+    if (!text.empty()) fmt::print("           {}\n", coloured(text, kYellow, STDOUT_FILENO));
+  };
+  show(identity.value("reason", std::string{}));
+  if (const auto twin = identity.value("twin", std::string{}); !twin.empty())
+    show("another machine publishes with " + twin);
+}
+
 void print_next(const json& next) {
   const std::string of = next.contains("measurement")
                              ? fmt::format("measurement {}", next["measurement"].get<std::string>())
@@ -193,6 +207,7 @@ void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
   fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  print_identity(status.value("identity", json::object()));
   if (const auto simulated = simulated_parts(status); !simulated.empty())
     fmt::print("           {}\n", coloured(simulated, kYellow, STDOUT_FILENO));
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),

@@ -5,7 +5,7 @@
 namespace abbe::daemon {
 
 void StreamNames::take(const std::string& name, ClassifiedSection& table) {
-  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
+  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security", "identity"};
   if (name.empty()) return;
   if (kOwn.contains(name))
     table.fault("name", fmt::format("\"{}\" is reserved for a part of the daemon", name));

@@ -18,7 +18,8 @@ constexpr std::size_t kHeaderBytes = 20, kSubmessageHeaderBytes = 4;
 constexpr std::size_t kLongestMessage = 65536;  // a UDP datagram
 constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09,
                        kAckNack = 0x06, kHeartbeat = 0x07, kGap = 0x08, kNackFrag = 0x12,
-                       kHeartbeatFrag = 0x13, kStatistics = 0x80;
+                       kHeartbeatFrag = 0x13, kSecurePrefix = 0x31, kSecureMessagePrefix = 0x33,
+                       kStatistics = 0x80;
 constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08,
                        kNoTimestamp = 0x02;
 /// Replaces the kind of a submessage that must not be read. The kind is not assigned, so a receiver
@@ -106,6 +107,8 @@ struct Submessage {
   std::uint8_t& kind;
   std::uint8_t& flags;
   Bytes body;
+  /// Signed by DDS Security: a change would make the receiver drop it. Its sender is trusted.
+  bool is_signed = false;
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };
@@ -197,6 +200,12 @@ void replace_by_gap(const Submessage& data) {
   data.flags &= kLittleEndian;
 }
 
+/// The encapsulation of every message of abbe, in one of the two byte orders: 00 00 or 00 01.
+/// Generated code throws at another one.
+bool is_plain_cdr(Bytes payload) {
+  return payload[0] == 0 && payload[1] <= 1;
+}
+
 /// False: the message must be dropped.
 bool check_data(const Submessage& data) {
   constexpr std::size_t kWriterAt = 8, kNumberAt = 12, kShortest = 20;
@@ -206,10 +215,12 @@ bool check_data(const Submessage& data) {
   if (announces_endpoint(writer)) return blank_types(data);
 
   const bool users = is_users(writer);
-  const auto layout = read_data(data, users);
+  const auto layout = read_data(data, users && !data.is_signed);
   if (!layout) return false;
   const std::size_t payload = data.body.size() - std::min(layout->payload, data.body.size());
-  if (users && (layout->not_alive || !data.has(kWithData) || data.has(kWithKey))) {
+  const bool sample = data.has(kWithData) && !data.has(kWithKey) && !layout->not_alive &&
+                      payload >= 4 && is_plain_cdr(data.body.subspan(layout->payload));
+  if (users && !sample && !data.is_signed) {
     replace_by_gap(data);
   } else if (data.has(kWithData | kWithKey)) {
     const bool short_liveliness =
@@ -282,7 +293,7 @@ bool check(const Submessage& submessage) {
       // Without time stamps the sample that arrives last is the newest. With them a sample dated in
       // the future would keep all later ones of its instance out of the history, and Fast DDS 2.9
       // loses the memory of each sample that it does not add for this reason.
-      submessage.flags |= kNoTimestamp;
+      if (!submessage.is_signed) submessage.flags |= kNoTimestamp;
       return true;
     default:
       return true;
@@ -292,8 +303,10 @@ bool check(const Submessage& submessage) {
 /// Passes the bytes of the low-level transport through the filter to Fast DDS.
 class MessageFilter final : public rtps::ChainingTransport {
  public:
-  explicit MessageFilter(const rtps::ChainingTransportDescriptor& descriptor)
-      : ChainingTransport(descriptor), descriptor_(descriptor.low_level_descriptor) {}
+  MessageFilter(const rtps::ChainingTransportDescriptor& descriptor, bool secured)
+      : ChainingTransport(descriptor),
+        descriptor_(descriptor.low_level_descriptor),
+        secured_(secured) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override { return descriptor_.get(); }
 
@@ -313,26 +326,30 @@ class MessageFilter final : public rtps::ChainingTransport {
     thread_local std::vector<std::uint8_t> buffer(2 * kLongestMessage);
     if (size > kLongestMessage) return;
     std::copy_n(bytes, size, buffer.begin());
-    const std::size_t passed = filter_message(std::span(buffer).first(size));
+    const std::size_t passed = filter_message(std::span(buffer).first(size), secured_);
     if (passed > 0)
       next->OnDataReceived(buffer.data(), static_cast<std::uint32_t>(passed), local, remote);
   }
 
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> descriptor_;
+  bool secured_;
 };
 
 struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
-  using ChainingTransportDescriptor::ChainingTransportDescriptor;
+  FilterDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool is_secured)
+      : ChainingTransportDescriptor(std::move(low_level)), secured(is_secured) {}
   [[nodiscard]] rtps::TransportInterface* create_transport() const override {
-    return new MessageFilter(*this);
+    return new MessageFilter(*this, secured);
   }
+  bool secured;
 };
 
 }  // namespace
 
-std::size_t filter_message(std::span<std::uint8_t> message) noexcept {
+std::size_t filter_message(std::span<std::uint8_t> message, bool secured) noexcept {
   if (message.size() < kHeaderBytes) return 0;
+  bool is_signed = false;
   for (std::size_t at = kHeaderBytes; at + kSubmessageHeaderBytes <= message.size();) {
     std::uint8_t &kind = message[at], &flags = message[at + 1];
     std::size_t length = Reader(message, (flags & kLittleEndian) != 0).u16(at + 2);
@@ -346,15 +363,16 @@ std::size_t filter_message(std::span<std::uint8_t> message) noexcept {
     if (!last && length % 4 != 0) return 0;
 
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
-    if (!check({kind, flags, message.subspan(at, length)})) return 0;
+    is_signed |= secured && (kind == kSecurePrefix || kind == kSecureMessagePrefix);
+    if (!check({kind, flags, message.subspan(at, length), is_signed})) return 0;
     at += length;
   }
   return message.size();
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_message_filter(
-    std::shared_ptr<rtps::TransportDescriptorInterface> low_level) {
-  return std::make_shared<FilterDescriptor>(std::move(low_level));
+    std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool secured) {
+  return std::make_shared<FilterDescriptor>(std::move(low_level), secured);
 }
 
 }  // namespace abbe::dds

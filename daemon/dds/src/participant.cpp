@@ -120,7 +120,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
 
   auto allowed = white_list(*qos);
   for (auto& transport : qos->transport().user_transports)
-    transport = with_message_filter(transport);
+    transport = with_message_filter(transport, has_security(*qos));
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
 

@@ -20,7 +20,8 @@ struct Part {
   Level when_bad;
 };
 constexpr std::array kParts{Part{"recorder", Level::Fault}, Part{"models", Level::Fault},
-                            Part{"dds", Level::Warning}, Part{"dds_security", Level::Warning}};
+                            Part{"dds", Level::Warning}, Part{"dds_security", Level::Warning},
+                            Part{"identity", Level::Warning}};
 
 const Part* part_of(const std::string& stream) {
   const auto* const part = std::ranges::find(kParts, stream, &Part::stream);

@@ -55,6 +55,7 @@ Facts facts_of(const ReportSubject& subject) {
   Facts facts;
   add_if(facts, "certificate", d.number);
   facts.emplace_back("machine", document.machine);
+  add_if(facts, "machine_id", subject.machine_id);
   add_if(facts, "manufacturer, model, serial number",
          joined({d.machine_manufacturer, d.machine_model, d.machine_serial}));
   facts.emplace_back("kinematic chain (ISO 10791-6)", document.model.chain().text());

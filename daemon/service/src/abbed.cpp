@@ -109,6 +109,7 @@ struct Abbed::State {
   std::vector<std::string> warnings;
   std::optional<drivers::CpuLatencyBound> cpu_latency;
   std::optional<ModelAuthority> authority;
+  std::optional<IdentityWatch> machine_identity;
   std::unique_ptr<RecorderThread> recorder;
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
@@ -218,6 +219,23 @@ struct Abbed::State {
     return {};
   }
 
+  /// Nothing is refused: acquisition and recording do not need the identity.
+  Result<void> open_machine_identity() {
+    const auto now = std::chrono::system_clock::now();
+    machine_identity.emplace(
+        IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(),
+                            std::chrono::time_point_cast<std::chrono::nanoseconds>(now)));
+    const auto& known = machine_identity->known();
+    if (!known.machine_id.empty())
+      fmt::print(stderr, "abbed: machine {}, machine_id {}\n", config.machine.name,
+                 known.machine_id);
+    if (!known.doubt.empty()) warnings.push_back(known.doubt);
+    if (known.doubt.empty() && !known.fault.empty())
+      warnings.push_back(
+          fmt::format("the machine has no identity beside its name: {}", known.fault));
+    return {};
+  }
+
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
     if (options.dds_unit && config.dds.supervise == Supervise::Child)
@@ -229,7 +247,9 @@ struct Abbed::State {
     if (!peer) return tl::unexpected(peer.error());
     auto link = DdsLink::listen(config.dds.socket, *peer);
     if (!link) return tl::unexpected(link.error());
-    publisher.emplace(std::move(*link), publisher_options(config), utc);
+    auto publishes = publisher_options(config);
+    publishes.identity.machine_id = machine_identity->known().machine_id;
+    publisher.emplace(std::move(*link), std::move(publishes), utc);
     check_dds_security();
     if (!supervised) return {};
     auto started = DdsSupervisor::start(abbe_dds_options(config, options.dds_program, dds_process),
@@ -261,10 +281,10 @@ struct Abbed::State {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
     } else if (!config.dds.security.empty() && !network_user) {  // else only abbe-dds can read it
-      const auto identity =
+      const auto keys =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
-      if (!identity)
-        warnings.push_back(identity.error().text +
+      if (!keys)
+        warnings.push_back(keys.error().text +
                            "; nothing is published over DDS until this is corrected");
     }
   }
@@ -344,7 +364,8 @@ struct Abbed::State {
                          .verification = &*verification,
                          .tracker = &*tracker,
                          .store_changes = &*store_changes,
-                         .network_user = network_user});
+                         .network_user = network_user,
+                         .identity = &*machine_identity});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 
@@ -516,9 +537,9 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   using Step = Result<void> (State::*)();
   // The recorder is the last step that can fail: repeated failed starts then leave no files.
   for (const Step step :
-       {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
-        &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
-        &State::listen_control, &State::open_recorder, &State::run}) {
+       {&State::refuse_second_daemon, &State::open_models, &State::open_machine_identity,
+        &State::open_dds, &State::bound_cpu_latency, &State::start_devices,
+        &State::start_hub_thread, &State::listen_control, &State::open_recorder, &State::run}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
 

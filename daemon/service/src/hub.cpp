@@ -175,6 +175,7 @@ ActiveModelState Hub::model_state() const {
   const bool known = known_at && parts_.time.now() - *known_at <= patience;
   if (!known && state.model != nullptr && !missing_scale_.empty())
     state.reason += ": " + missing_scale_;
+  if (parts_.identity != nullptr) parts_.identity->restrict(state);
   return state;
 }
 
@@ -232,10 +233,20 @@ void Hub::publish(bool fresh, HostTime now) {
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
     (void)parts_.authority.follow_store(now);
+    follow_identity(wall);
     collect_health(now);
     if (publisher != nullptr) publisher->health(health_, now);
   }
   if (publisher != nullptr) publisher->model(model_state(), now, wall);
+}
+
+void Hub::follow_identity(WallTime wall) {
+  if (parts_.identity == nullptr) return;
+  parts_.identity->follow(wall);
+  if (parts_.publisher == nullptr) return;
+  auto identity = parts_.publisher->identity();
+  identity.machine_id = parts_.identity->known().machine_id;
+  parts_.publisher->set_identity(std::move(identity));
 }
 
 void Hub::collect_health(HostTime now) {
@@ -249,6 +260,9 @@ void Hub::collect_health(HostTime now) {
   if (parts_.recorder != nullptr)
     health_.push_back(
         health_of(*parts_.recorder, parts_.config.recording.chunk_period, cycle_began_));
+  if (parts_.identity != nullptr)
+    health_.push_back(parts_.identity->health(
+        parts_.publisher != nullptr ? parts_.publisher->link().twin() : std::string{}));
   if (parts_.publisher == nullptr) return;
   health_.push_back(health_of(*parts_.publisher));
   health_.push_back(health_of_security(*parts_.publisher));

@@ -167,7 +167,8 @@ ActiveModelState ModelAuthority::model_state(HostTime now, std::optional<HostTim
 
 ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const {
-  ActiveModelState s{.model = active_model(), .revision = revision_};
+  ActiveModelState s{
+      .model = active_model(), .revision = revision_, .activated = active_.activation.actor.when};
   if (s.model != nullptr) s.publication = &active_.publication;
   if (s.model != nullptr) s.refused = refusal_of(active_.activation);
   if (!active_.model) {

@@ -24,6 +24,7 @@ constexpr std::string_view kDeviceId = "5f0c8a7be4f94c0f9d0e6a3f1b7c2d41";
 constexpr std::string_view kRecorderId = "8d3b1f6a27c54e0b9a4f7c5e2d1a6b93";
 constexpr std::string_view kStoreId = "c1e7d0948b3a4f52a6f0b9d47e5c8132";
 constexpr std::string_view kLinkId = "2b9f64d1c08e4a7785d3e1f6a4b0c957";
+constexpr std::string_view kIdentityId = "0f6b8f3c1c5e4b0fa7d2f4b2f1e09a6d";
 constexpr std::string_view kSecurityId = "4ac1f08b65d24e3d9b7f20e6c85a31d4";
 constexpr std::string_view kSessionId = "e84a05c3f1d74b9c92b6d7e30f5a1c68";
 constexpr std::string_view kModelId = "93d6f7b20a4c4e81b5e9c20d8f1a7346";
@@ -47,6 +48,9 @@ StreamKind kind_of(const std::string& stream) {
             Urgency::Warning};
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
+
+  if (stream == "identity")
+    return {"", kIdentityId, "see `abbe machine identity`", Urgency::Warning};
 
   return {"device ", kDeviceId,
           "check its power, its cable and its table in the configuration; abbed tries again",

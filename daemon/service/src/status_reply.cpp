@@ -292,6 +292,14 @@ json dds_json(const SeenLink& link) {
   return out;
 }
 
+json identity_json(const IdentityWatch::Known& identity, const std::string& twin) {
+  json out{{"machine_id", identity.machine_id}, {"confirmed", identity.doubt.empty()}};
+  if (const auto& why = identity.doubt.empty() ? identity.fault : identity.doubt; !why.empty())
+    out["reason"] = why;
+  if (!twin.empty()) out["twin"] = twin;
+  return out;
+}
+
 /// What `status` reports, copied on the hub's thread.
 struct SeenStatus {
   std::vector<StreamHealth> streams;
@@ -308,6 +316,8 @@ struct SeenStatus {
   drivers::IppStop machine_stop;
   std::optional<SeenTracker> tracker;
   std::optional<SeenLink> dds;
+  std::optional<IdentityWatch::Known> identity;
+  std::string twin;
 };
 
 bool positions_are_old(const Hub& hub) {
@@ -332,7 +342,9 @@ SeenStatus look_at_status(const Hub& hub) {
                   .recording = {},
                   .machine_stop = parts.devices.machine_stop(),
                   .tracker = look_at_tracker(parts),
-                  .dds = {}};
+                  .dds = {},
+                  .identity = {},
+                  .twin = {}};
 
   if (const auto* reference = parts.reference; reference != nullptr) {
     if (reference->configured())
@@ -342,6 +354,8 @@ SeenStatus look_at_status(const Hub& hub) {
 
   if (parts.recorder != nullptr) seen.recording = parts.recorder->status().file.string();
   if (parts.publisher != nullptr) seen.dds.emplace(*parts.publisher);
+  if (parts.publisher != nullptr) seen.twin = parts.publisher->link().twin();
+  if (parts.identity != nullptr) seen.identity = parts.identity->known();
   return seen;
 }
 
@@ -391,6 +405,7 @@ json status_json(const SeenStatus& seen, const Config& config) {
   if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
   if (seen.recording) out["recording"] = *seen.recording;
   if (seen.dds) out["dds"] = dds_json(*seen.dds);
+  if (seen.identity) out["identity"] = identity_json(*seen.identity, seen.twin);
 
   return out;
 }

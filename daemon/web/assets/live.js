@@ -87,7 +87,8 @@ export function show(place) {
     }
     // A table that has the focus, for scrolling, is replaced later.
     if (!streams.contains(document.activeElement))
-      streams.replaceChildren(table("streams", streamColumns, status.streams.map(streamRow)));
+      streams.replaceChildren(table("streams", streamColumns, status.streams.map(streamRow)),
+        ...(status.identity ? [h("p", {}, `Identity of the machine: ${status.identity.machine_id || "-"}`)] : []));
     if (!below.contains(document.activeElement))
       below.replaceChildren(h("h2", {}, "State"), state_of(status), ...environment(status));
   };

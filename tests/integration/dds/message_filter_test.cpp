@@ -184,6 +184,16 @@ TEST(MessageFilterOfSamples, ReplacesADisposedInstanceByAGapOfItsNumber) {
   }
 }
 
+TEST(MessageFilterOfSamples, ReplacesASampleThatIsNotPlainCdr) {
+  for (const auto& [first, second, passes] :
+       {std::tuple{0, 0, true}, {0, 1, true}, {0, 3, false}, {0, 7, false}, {7, 1, false}}) {
+    Bytes message = users_data(
+        5, {static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(second), 0, 0, 1, 2, 3, 4});
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], passes ? 0x15 : 0x08) << first << " " << second;
+  }
+}
+
 TEST(MessageFilterOfSamples, AGapOfALargeNumberInTheOtherByteOrderIsRight) {
   Bytes message = users_data(2, {0, 0x71, 0, 4, 0, 0, 0, 1, 0, 1, 0, 0});
   const Bytes number{0, 0, 0, 7, 0xff, 0xff, 0xff, 0xff};
@@ -279,6 +289,18 @@ TEST(MessageFilterOfSamples, TakesTimeStampsAway) {
                 0,   0,   0,   0,   0x09, 1, 8, 0,  0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0};
   EXPECT_EQ(filter_message(message), message.size());
   EXPECT_EQ(message[kKindAt + 1], 3);
+}
+
+/// A change would break the signature. Without DDS Security the prefix means nothing.
+TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured) {
+  Bytes message = users_data(3, kDisposed);
+  const Bytes prefix{0x33, 1, 4, 0, 0, 0, 0, 0};
+  message.insert(message.begin() + kKindAt, prefix.begin(), prefix.end());
+  const Bytes before = message;
+  EXPECT_EQ(filter_message(message, true), message.size());
+  EXPECT_EQ(message, before);
+  EXPECT_EQ(filter_message(message, false), message.size());
+  EXPECT_EQ(message[kKindAt + prefix.size()], 0x08);
 }
 
 TEST(MessageFilterOfSamples, SkipsAShortLivelinessMessage) {

@@ -13,6 +13,7 @@
 ///   find its key. abbe's subscribers do not need such samples; the filter replaces them by a GAP,
 ///   so that a reliable reader does not wait for them. Key hashes are blanked: Fast DDS then reads
 ///   the key from the content.
+///   So are samples of another encapsulation than plain CDR.
 /// - Fragments of samples, which Fast DDS checks insufficiently. A message of abbe fits into one
 ///   datagram, so the filter skips those of users' writers.
 /// - A GAP of more numbers than any history covers, which Fast DDS marks one by one.
@@ -39,11 +40,14 @@ namespace abbe::dds {
 
 /// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
 /// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
-[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message) noexcept;
+/// `secured`: the participant uses DDS Security. Then samples and time stamps behind a signature's
+/// prefix are not changed: Fast DDS drops what a stranger puts there.
+[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message,
+                                         bool secured = false) noexcept;
 
 /// Wraps `low_level`: a transport that passes received messages through the filter to Fast DDS.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>
 with_message_filter(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level);
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level, bool secured);
 
 }  // namespace abbe::dds

@@ -28,6 +28,7 @@
 #include "abbe/publishing/publisher.hpp"
 #include "abbe/recording/recorder_thread.hpp"
 #include "abbe/service/calibration_service.hpp"
+#include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
 #include "abbe/service/store_changes.hpp"
@@ -54,6 +55,7 @@ struct HubParts {
   StoreChanges* store_changes = nullptr;
   /// The user of abbe-dds, which reads the network: it has no role on the control socket.
   std::optional<uid_t> network_user = {};
+  IdentityWatch* identity = nullptr;
 };
 
 class Hub : private PipelineObserver {
@@ -99,6 +101,7 @@ class Hub : private PipelineObserver {
   void on_snapshots(std::span<const protocol::Snapshot> snapshots,
                     protocol::HostTime taken) override;
   void publish(bool fresh, protocol::HostTime now);
+  void follow_identity(WallTime wall);
   void collect_health(protocol::HostTime now);
   void touch(std::size_t points_left, WallTime wall);
 

@@ -177,13 +177,13 @@ DeviceStatus IppDevice::status() const {
 /// although it is not. A second AbortE changes nothing. A message of the server that caused the
 /// exception is not handled again.
 bool IppDevice::stop_after_failure() {
-  if (!session().moving()) return false;
+  if (!session().may_move()) return false;
   emergency_stop_.set_moving(true);
   (void)send_emergency_stops({});
   discard_posted_messages();
   handle(IppAbortRequested{});
   show_session();
-  return session().moving();
+  return session().may_move();
 }
 
 void IppDevice::read_requests() {

@@ -140,9 +140,9 @@ TEST_F(MachineHoldWriting, AMotionWaitsForADiskThatDoesNotAnswerAndAStopDoesNot)
       << health().last_fault;
   EXPECT_EQ(outcome_of_a_stop(), IppStopOutcome::Stopped);
   EXPECT_FALSE(machine_.heard("GoTo"));
-  EXPECT_TRUE(machine_.serve_until(
-      [&] { return health().condition.find("not saved yet") != std::string::npos; }))
-      << health().condition;
+  EXPECT_TRUE(machine_.serve_until([&] {
+    return health().condition.find("not saved yet") != std::string::npos;
+  })) << health().condition;
 }
 
 TEST_F(MachineHoldWriting, AbortIsSentWhileTheWriterWaitsForTheDisk) {
@@ -160,9 +160,9 @@ TEST_F(MachineHoldWriting, AbortIsSentWhileTheWriterWaitsForTheDisk) {
   ASSERT_TRUE(machine_.serve_until([&] { return machine_.heard("AbortE"); }))
       << health().last_fault;
   EXPECT_TRUE(machine_.serve_until([&] { return health().state == "awaiting release"; }));
-  EXPECT_TRUE(machine_.serve_until(
-      [&] { return health().condition.find("not saved yet") != std::string::npos; }))
-      << health().condition;
+  EXPECT_TRUE(machine_.serve_until([&] {
+    return health().condition.find("not saved yet") != std::string::npos;
+  })) << health().condition;
 }
 
 TEST_F(MachineHoldWriting, AHoldThatCannotBeWrittenIsNamedAndWrittenLater) {

@@ -149,7 +149,7 @@ ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument d
       .active_since = std::min(now, clock_.offset(now).to_host(activation.actor.when)),
       .hash = model_hash(document),
       .largest_U_m = largest_U_m(document.model),
-       .simulated = made_on_simulated_devices(document).value_or(false),
+      .simulated = made_on_simulated_devices(document).value_or(false),
       .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 

@@ -31,7 +31,8 @@ inline constexpr std::chrono::seconds kLeastClockChange{2};
 
 /// Sentences without full stop: "the wall clock was set forward by 200 d 3 h". `since`: "abbed
 /// started". Empty: nothing happened.
-[[nodiscard]] std::vector<std::string> in_words(const ClockChange& change, const std::string& since);
+[[nodiscard]] std::vector<std::string> in_words(const ClockChange& change,
+                                                const std::string& since);
 
 class ClockSteps {
  public:

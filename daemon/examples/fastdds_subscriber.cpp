@@ -400,7 +400,11 @@ int main(int argc, char** argv) {
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
   DataReaderQos live;  // best effort, volatile, keep last 1
-  DataReaderQos durable;
+  // One instance per machine, and those that strangers make up: where the table is full (10 by
+  // default), Fast DDS 2.9 may abort.
+  live.resource_limits().max_samples = live.resource_limits().max_instances = 1024;
+  live.resource_limits().max_samples_per_instance = 1;
+  DataReaderQos durable = live;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
   const DataReaderQos retained = durable;

@@ -259,7 +259,7 @@ void check_fragment(const Submessage& fragment) {
 /// history of abbe covers fewer numbers than kLongestGap.
 bool is_short_gap(const Submessage& gap) {
   constexpr std::size_t kStartAt = 8, kBaseAt = 16, kShortest = 28;
-  constexpr std::uint64_t kLongestGap = 8192;
+  constexpr std::uint64_t kLongestGap = 1024;
   if (gap.body.size() < kShortest) return false;
   const Reader reader = gap.reader();
   const std::uint64_t start = reader.sequence_number(kStartAt),

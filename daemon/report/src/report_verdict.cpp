@@ -60,7 +60,7 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
         notes.push_back("a later run found drift: " + who_and_when(event.actor));
         break;
       case StoreAction::Removed:
-        notes.push_back("removed from the store by " + who_and_when(event));
+        notes.push_back("removed from the store by " + who_and_when(event.actor));
         break;
     }
   }

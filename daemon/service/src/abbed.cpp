@@ -515,7 +515,7 @@ struct Abbed::State {
     try {
       hub->run();
     } catch (const std::exception& error) {  // alive() then returns false
-      devices->stop_machine();  // without the hub nothing notices that its operator is gone
+      (void)devices->stop_machine();  // without the hub nothing notices that its operator is gone
       fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
     }
   }

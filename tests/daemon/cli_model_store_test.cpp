@@ -132,12 +132,12 @@ class CliRefusedModel : public CliModelStore {
  protected:
   CliRefusedModel() {
     auto document = test::synthetic_document(1);
-    write("accepted.json", to_json(document));
+    (void)write("accepted.json", to_json(document));
     document.verdict = ModelVerdict{.reasons = {kReason}};
-    write("refused.json", to_json(document));
+    (void)write("refused.json", to_json(document));
     document.verdict.reset();
-    write("earlier.json", to_json(document));
-    write("points.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
+    (void)write("earlier.json", to_json(document));
+    (void)write("points.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
     id_ = store().add(test::synthetic_document(2), false, {kReason}, {"test", "", {}}).value();
   }
   [[nodiscard]] ModelStore store() const { return ModelStore::open(folder_ / "store").value(); }
@@ -186,7 +186,7 @@ TEST_F(CliRefusedModel, ShownFromAFileOrAStoreHasItsVerdict) {
 TEST_F(CliRefusedModel, AStoreOfAnEarlierVersionListsItAsNotJudgedWithoutItsState) {
   auto document = test::synthetic_document(2);
   document.verdict.reset();
-  write("store/models/" + id_ + ".json", to_json(document));
+  (void)write("store/models/" + id_ + ".json", to_json(document));
   fs::remove(folder_ / "store" / "state.json");
   EXPECT_THAT(abbe("model list --store store").out, HasSubstr("not judged"));
 }

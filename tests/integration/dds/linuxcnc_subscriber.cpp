@@ -23,7 +23,6 @@ int main(int argc, char** argv) {
   linuxcnc::SubscriptionOptions options;
   options.machine = argv[2];
   options.machine_id = argc > 3 ? argv[3] : "";
-  options.tool_offset_m = calib::Vector3(0.0, 0.0, -0.1);  // of the sample model
   linuxcnc::Subscription subscription(options, *readers);
   for (std::string shown;;) {
     const auto usable = subscription.poll(std::chrono::milliseconds{20});

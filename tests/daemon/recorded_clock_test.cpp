@@ -57,8 +57,7 @@ TEST(RecordedClock, AModelOfTheRecordingHasTheDatesAfterTheChangeAndANote) {
     std::filesystem::create_directory(folder.path() / name);
     (void)test::record_synthetic_run(folder.path() / name, std::nullopt, change);
     const auto ran =
-        test::run_abbe(folder.path(), "identify otf --recording " + name +
-                                          "/run.mcap --accept-path-orientation -o " + name);
+        test::run_abbe(folder.path(), "identify otf --recording " + name + "/run.mcap -o " + name);
     EXPECT_TRUE(ran.exit == 0 || ran.exit == 5) << ran.err;
     return read_model(folder.path() / name / "model.json").value();
   };

@@ -102,7 +102,7 @@ TEST_F(StrangeCells, AControlCharacterNeverReachesTheTerminal) {
   test::write_text(folder_.path() / "m.toml", "[machine]\nname = \"a\\u001b[31m\"\n");
   for (const std::string arguments :
        {"identify otf --machine m.toml --path p.csv --tracker p.csv -o o", "replay '\x1b[31m.mcap'",
-        "model eval '\x1b]0;x\x07' --points p.csv", "status --socket '\x1b[31m'"}) {
+        "model eval '\x1b]0;x\x07.json' --points p.csv", "status --socket '\x1b[31m'"}) {
     const auto ran = test::run_abbe(folder_.path(), arguments);
     EXPECT_NE(ran.exit, 0) << arguments;
     EXPECT_THAT(ran.out + ran.err, Not(HasSubstr("\x1b"))) << arguments;

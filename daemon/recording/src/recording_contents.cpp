@@ -95,7 +95,9 @@ void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
 /// True if the indexes list everything that the statistics count. MCAP requires neither.
 bool indexes_are_complete(const mcap::Summary& summary) {
   const auto& counted = summary.statistics;
-  return counted && counted->chunk_count == summary.chunks.size() &&
+  const bool channels = counted && summary.channels.size() >= counted->channel_count &&
+                        (counted->message_count == 0 || !summary.channels.empty());
+  return channels && counted->chunk_count == summary.chunks.size() &&
          counted->metadata_count == summary.metadata.size() &&
          counted->attachment_count == summary.attachments.size();
 }

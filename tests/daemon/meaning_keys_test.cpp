@@ -160,6 +160,9 @@ const std::map<std::string, std::string> kValues{
     {"model.node_spacing_mm", "25"},
     {"web.host_names", R"(["mill"])"},
     {"air.assumed_index", "1.0002"},
+    {"models.keep_days", ""},  // needs keep_newest
+    {"sensors.limit.name", ""},
+    {"sensors.limit.twin", ""},
     {"axes.kind", ""},
     {"model.basis", R"("cubic")"},
     {"gate.accept", R"(["scale-change"])"},

@@ -40,7 +40,7 @@ TEST(ModelDocument, KeepsWhatTheRunLeftOutsideItsHash) {
                             .places_m = {{{0.1 / 3, 0.2, -0.3}, {0.0, 0.1 / 7, 0.0}}, {}}};
   const auto text = to_json(document);
   const auto read = parse_model(text, "model.json");
-  ASSERT_TRUE(read) << read.error().text << read.error().details.front();
+  ASSERT_TRUE(read) << read.error().text << text;
   EXPECT_EQ(read->run, document.run);
   EXPECT_EQ(model_hash(*read), hash);
   EXPECT_EQ(to_json(*read), text);

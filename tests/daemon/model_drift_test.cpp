@@ -278,7 +278,8 @@ TEST_F(DriftingMachine, DatesAreThoseOfAWallClockThatWasSetAfterTheStart) {
     const auto [first, last] = document.run->conditions->measured.value();
     EXPECT_GT(first, before);
     EXPECT_LT(last, document.created);
-    for (const StoreEvent& event : store().history().value()) {
+    const auto events = store().history().value();
+    for (const StoreEvent& event : events) {
       if (event.id == model().model->id) EXPECT_EQ(event.actor.when, document.created);
     }
     EXPECT_THAT(

@@ -236,7 +236,8 @@ TEST_F(StoredVerdict, OutlivesALostStateFile) {
   ModelDocument other = synthetic_document(4);
   const auto refused = add(other, false, {"too large"});
   std::filesystem::remove(folder_ / "state.json");
-  for (const StoreEntry& entry : open().list().value()) {
+  const auto entries = open().list().value();
+  for (const StoreEntry& entry : entries) {
     EXPECT_TRUE(entry.judged);
     EXPECT_EQ(entry.accepted, entry.id == accepted);
   }

@@ -186,7 +186,7 @@ TEST_F(CliExport, RefusesWrongOptionsByName) {
   EXPECT_THAT(message("--to linuxcnc-comp --positive plus"), HasSubstr("is fixed"));
   EXPECT_THAT(message("--to linuxcnc-comp --step 1"), HasSubstr("601 nodes on axis X"));
   EXPECT_THAT(message("--to csv-grid --step 0"), HasSubstr("must be positive"));
-  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be positive"));
+  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be finite"));
   EXPECT_THAT(message("--to csv-grid --step 0.5"), HasSubstr("nodes of the grid"));
   EXPECT_THAT(message("--to csv-grid --volume=-300,300,-300,300,-400,0"),
               HasSubstr("Z -400 to 0 mm; the model is valid from -400 to -100 mm"));

@@ -77,7 +77,7 @@ class Reporter {
     while (!stop.stop_requested()) {
       std::string line = current();
       if (!line.empty() && line != reported) {
-        std::printf("abbe-linuxcnc-feeder: %s\n", line.c_str());
+        std::printf("abbe-linuxcnc-feeder: %s\n", protocol::printable_line(line).c_str());
         reported = std::move(line);
       }
       std::this_thread::sleep_for(kReportPeriod);

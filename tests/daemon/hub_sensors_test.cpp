@@ -12,6 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::messages;
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;

@@ -354,7 +354,7 @@ void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
   const std::string line =
       fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                   decision.apply ? "apply" : "do not apply: " + decision.reason);
-  std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", line.c_str());
+  std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", daemon::printable_line(line).c_str());
   std::fflush(stdout);
 }
 

@@ -39,6 +39,9 @@ void ReceivedModel::state(v1::ModelState state) {
 void ReceivedModel::slice(v1::ErrorGrid slice) {
   // Enough for the model that ModelState names, the next one, and remaining slices of old models.
   constexpr std::size_t kMostModels = 4;
+  // Several times what abbe-dds sends for the largest grid: a stranger must not fill the memory.
+  constexpr std::uint32_t kMostSlices = 64;
+  if (slice.slices() == 0 || slice.slices() > kMostSlices || slice.slice() >= slice.slices()) return;
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
     std::erase_if(slices_,
                   [this](const auto& of) { return !state_ || of.first != state_->model_id(); });

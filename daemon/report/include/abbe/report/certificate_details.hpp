@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "abbe/protocol/time.hpp"
+#include "abbe/base/utc_text.hpp"
 
 namespace abbe::daemon {
 

@@ -249,6 +249,15 @@ TEST(ThermalConfiguration, IsPartOfTheMachineHash) {
   EXPECT_EQ(plain, hash("scale_x", "8", "1"));  // how well it is known changes no reading
 }
 
+TEST(ThermalConfiguration, DecidesWhichSensorsGiveAReadingItsMeaning) {
+  auto config = config_of(kScales);
+  EXPECT_THAT(environment_meaning(config).readings, IsEmpty());
+  config.thermal.push_back({.axis = "X", .temperature = 1});
+  const auto readings = environment_meaning(config).readings;
+  ASSERT_EQ(readings.size(), 1u);
+  EXPECT_EQ(readings[0].key, "environment." + config.temperatures[1] + ".register");
+}
+
 TEST(ThermalConfiguration, RefusesATemperatureThatIsNotMeasured) {
   EXPECT_THAT(
       fault_text_of(kScales +

@@ -8,6 +8,7 @@
 
 #include "abbe/service/background_tasks.hpp"
 #include "abbe_command.hpp"
+#include "synthetic_model.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -32,9 +33,9 @@ class IdentityWatchTest : public testing::Test {
   IdentityWatch open(const ComputerMarks& here) {
     return IdentityWatch::open(folder_, here, kStart);
   }
-  static ActiveModelState restricted(const IdentityWatch& watch, protocol::UtcTime activated,
+  static ActiveModelState restricted(const IdentityWatch& watch,
                                      ModelStatus status = ModelStatus::MODEL_ACTIVE) {
-    ActiveModelState state{.status = status, .reason = "accepted", .activated = activated};
+    ActiveModelState state{.status = status, .reason = "accepted"};
     watch.restrict(state);
     return state;
   }
@@ -56,7 +57,7 @@ TEST_F(IdentityWatchTest, OnTheComputerWhereItWasMadeAModelStaysActive) {
   const auto made = open(kHere);
   const auto again = open(kHere);
   EXPECT_EQ(again.known().machine_id, made.known().machine_id);
-  EXPECT_EQ(restricted(again, kStart).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(restricted(again).status, ModelStatus::MODEL_ACTIVE);
   EXPECT_TRUE(again.health("").status.connected);
 }
 
@@ -65,26 +66,43 @@ TEST_F(IdentityWatchTest, OnAnotherComputerNoModelIsActiveBeforeAPersonConfirmsI
   auto copied = open(kElsewhere);
   EXPECT_EQ(copied.known().machine_id, machine_id);
   for (const auto status : {ModelStatus::MODEL_ACTIVE, ModelStatus::MODEL_DRIFT})
-    EXPECT_EQ(restricted(copied, kStart, status).status, ModelStatus::MODEL_STALE);
-  EXPECT_THAT(restricted(copied, kStart).reason, HasSubstr("abbe machine identity keep"));
+    EXPECT_EQ(restricted(copied, status).status, ModelStatus::MODEL_STALE);
+  EXPECT_THAT(restricted(copied).reason, HasSubstr("abbe machine identity keep"));
   EXPECT_THAT(copied.health("").status.last_fault, HasSubstr("another computer"));
   EXPECT_FALSE(copied.health("").status.connected);
 
   ASSERT_TRUE(decide_identity(folder_, kElsewhere, {.action = IdentityAction::Kept}));
   EXPECT_TRUE(follows(copied, [&] { return copied.known().doubt.empty(); }));
   EXPECT_EQ(copied.known().machine_id, machine_id);
-  EXPECT_EQ(restricted(copied, kStart).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(restricted(copied).status, ModelStatus::MODEL_ACTIVE);
 }
 
-TEST_F(IdentityWatchTest, AfterNewOnlyAModelThatWasActivatedLaterIsActive) {
+/// The clock is wrong when the person decides, and a roll-back does not make a model one of this
+/// machine.
+TEST_F(IdentityWatchTest, AfterNewOnlyAModelThatWasActivatedLaterMayBeUsed) {
+  auto store = ModelStore::open(folder_ / "models").value();
+  const auto activate = [&store](unsigned seed) {
+    const StoreActor actor{"tester", "", kStart};
+    const auto id = store.add(test::synthetic_document(seed), true, {}, actor).value();
+    EXPECT_TRUE(store.activate(id, actor));
+    return id;
+  };
   const auto machine_id = open(kHere).known().machine_id;
+  const auto copied_model = activate(1);
   auto copied = open(kElsewhere);
   ASSERT_TRUE(decide_identity(folder_, kElsewhere,
                               {.action = IdentityAction::Renewed, .when = kStart + 1h}));
+  const auto own_model = activate(2);
+  ASSERT_TRUE(store.rollback({"tester", "", kStart + 2h}, own_model));
+
   ASSERT_TRUE(follows(copied, [&] { return copied.known().machine_id != machine_id; }));
-  EXPECT_EQ(restricted(copied, kStart).status, ModelStatus::MODEL_STALE);
-  EXPECT_THAT(restricted(copied, kStart).reason, HasSubstr("abbe model activate"));
-  EXPECT_EQ(restricted(copied, kStart + 2h).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_THAT(copied.objection_to(copied_model), HasSubstr("abbe model activate"));
+  EXPECT_EQ(copied.objection_to(own_model), "");
+  EXPECT_THAT(identity_doubt(store, copied_model, kElsewhere), HasSubstr("data folder was copied"));
+  EXPECT_EQ(identity_doubt(store, own_model, kElsewhere), "");
+
+  (void)activate(1);
+  EXPECT_TRUE(follows(copied, [&] { return copied.objection_to(copied_model).empty(); }));
 }
 
 TEST_F(IdentityWatchTest, ATwinIsReportedAndDoesNotStopTheModel) {
@@ -92,14 +110,14 @@ TEST_F(IdentityWatchTest, ATwinIsReportedAndDoesNotStopTheModel) {
   const auto health = watch.health("the same name, machine_id 4711, from DDS participant 01");
   EXPECT_STREQ(std::string(health.status.state).c_str(), "twin");
   EXPECT_THAT(health.status.last_fault, HasSubstr("machine_id 4711"));
-  EXPECT_EQ(restricted(watch, kStart).status, ModelStatus::MODEL_ACTIVE);
+  EXPECT_EQ(restricted(watch).status, ModelStatus::MODEL_ACTIVE);
 }
 
 TEST_F(IdentityWatchTest, ADamagedFileLetsNoModelBecomeActive) {
   ASSERT_FALSE(open(kHere).known().machine_id.empty());
   std::filesystem::resize_file(identity_file(folder_), 10);
   const auto damaged = open(kHere);
-  EXPECT_EQ(restricted(damaged, kStart).status, ModelStatus::MODEL_STALE);
+  EXPECT_EQ(restricted(damaged).status, ModelStatus::MODEL_STALE);
   EXPECT_THAT(damaged.health("").status.last_fault, HasSubstr("identity.json"));
 }
 

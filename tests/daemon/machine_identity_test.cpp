@@ -111,7 +111,7 @@ TEST_F(MachineIdentityTest, KeepBindsTheIdentityToTheNewComputer) {
   EXPECT_EQ(kept->machine_id, before.machine_id);
   const auto read = open_identity(data, there, kDay).value();
   EXPECT_EQ(why_not_confirmed(read, there), "");
-  EXPECT_EQ(read.renewed(), std::nullopt);
+  EXPECT_EQ(read.renewal(), nullptr);
   ASSERT_EQ(read.events.size(), 2u);
   EXPECT_EQ(read.events[1].who, "anna");
   EXPECT_EQ(read.events[1].why, "new PC");
@@ -127,12 +127,33 @@ TEST_F(MachineIdentityTest, NewMakesAnotherMachineAndSaysSinceWhen) {
   ASSERT_TRUE(renewed) << renewed.error().text;
   EXPECT_NE(renewed->machine_id, before.machine_id);
   const auto read = open_identity(data, there, kDay).value();
-  EXPECT_EQ(read.renewed(), kDay + 1h);
+  ASSERT_NE(read.renewal(), nullptr);
+  EXPECT_EQ(read.renewal()->when, kDay + 1h);
+  EXPECT_EQ(read.renewal()->store, StorePlace{});
   EXPECT_EQ(read.machine_id_at(kDay - 24h), before.machine_id);
   EXPECT_EQ(read.machine_id_at(kDay + 30min), before.machine_id);
   EXPECT_EQ(read.machine_id_at(kDay + 1h), read.machine_id);
   EXPECT_EQ(read.events[0].machine_id, before.machine_id);
   EXPECT_EQ(read.events[1].machine_id, read.machine_id);
+}
+
+TEST_F(MachineIdentityTest, AModelIsOfTheMachineByItsPlaceInTheStoreAndNotByItsDate) {
+  const auto event = [](StoreAction action, const char* id) {
+    return StoreEvent{.action = action, .id = id, .actor = {"tester", "", kDay}};
+  };
+  std::vector history{event(StoreAction::Added, "a"), event(StoreAction::Activated, "a")};
+  const MachineIdentity identity{.machine_id = "new",
+                                 .events = {{.machine_id = "old"},
+                                            {.action = IdentityAction::Renewed,
+                                             .machine_id = "new",
+                                             .when = kDay + 24h,
+                                             .store = end_of(history)}}};
+  history.push_back(event(StoreAction::Added, "b"));
+  history.push_back(event(StoreAction::Activated, "b"));
+  history.push_back(event(StoreAction::RolledBack, "a"));
+  EXPECT_EQ(models_of_other_machine(identity, history), std::vector<std::string>{"a"});
+  EXPECT_EQ(machine_id_of_model(identity, history, "a"), "old");
+  EXPECT_EQ(machine_id_of_model(identity, history, "b"), "new");
 }
 
 TEST_F(MachineIdentityTest, ADamagedFileIsRefusedAndCanBeRenewed) {

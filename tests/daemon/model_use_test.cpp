@@ -177,6 +177,16 @@ TEST(ModelUse, DriftAndAnotherMachineStandAgainstACorrectionButNotAgainstACertif
               ElementsAre(HasSubstr("accepted"), HasSubstr("EXX changed"), HasSubstr("STALE")));
 }
 
+TEST(ModelUse, ADoubtOfTheIdentityStandsAgainstACorrectionOnly) {
+  const ModelDocument document = judged_document(ModelVerdict{.accepted = true});
+  ModelInUse use{.document = document, .identity_doubt = "of another machine"};
+  EXPECT_THAT(obstacles_to_use(use).refusals, ElementsAre(HasSubstr("of another machine")));
+  use.purpose = ModelPurpose::Certificate;
+  EXPECT_THAT(obstacles_to_use(use).refusals, IsEmpty());
+  EXPECT_THAT(obstacles_to_use(use).statements,
+              ElementsAre(HasSubstr("accepted"), HasSubstr("of another machine")));
+}
+
 TEST(ModelUse, ADriftBeforeAnActivationByAPersonIsNoObstacle) {
   const ModelDocument document = judged_document(ModelVerdict{.accepted = true});
   const std::vector events{event_of(document, StoreAction::Drifted, "EXX changed"),

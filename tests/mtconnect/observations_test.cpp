@@ -82,12 +82,14 @@ TEST(Observations, RaiseAConditionForEachDevice) {
 
 TEST(Observations, SeparateDevicesFromPartsOfTheDaemon) {
   auto status = test::status();
+  status["streams"].push_back(test::stream("identity", "not confirmed", true));
   for (auto& stream : status["streams"]) stream["connected"] = false;
   const auto observed = observations_of(status);
   EXPECT_THAT(condition(observed, "devices"), UnorderedElementsAre(Key("tracker"), Key("encoder")));
   const auto system = condition(observed, "system");
   EXPECT_EQ(system.at("recorder").level, Level::Fault);
   EXPECT_EQ(system.at("dds_security").level, Level::Warning);
+  EXPECT_TRUE(system.contains("identity"));
 }
 
 TEST(Observations, RaiseAConditionForEachVerdict) {

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "abbe/config/config.hpp"
+#include "abbe/model/machine_identity.hpp"
 #include "abbe/model/stored_model.hpp"
 
 namespace abbe::daemon {
@@ -95,7 +96,8 @@ Result<FoundModel> found_model(const std::string& name, const StoreOption& where
   if (!id) return tl::make_unexpected(id.error());
   auto stored = stored_model(*store, *id);
   if (!stored) return tl::make_unexpected(stored.error());
-  return FoundModel{std::move(stored->document), std::move(stored->events), *std::move(machine)};
+  return FoundModel{std::move(stored->document), std::move(stored->events), *std::move(machine),
+                    identity_doubt(*store, *id, marks_of_this_computer())};
 }
 
 Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {

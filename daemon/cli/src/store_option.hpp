@@ -39,9 +39,10 @@ struct FoundModel {
   ModelDocument document;
   std::vector<StoreEvent> events;           ///< empty for a file
   std::optional<std::string> machine_hash;  ///< of the abbed.toml of -c
+  std::string identity_doubt{};             ///< ModelInUse::identity_doubt; empty for a file
 
   [[nodiscard]] ModelInUse in_use(ModelPurpose purpose) const {
-    return {document, events, machine_hash, purpose};
+    return {document, events, machine_hash, purpose, identity_doubt};
   }
 };
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cctype>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -66,20 +67,32 @@ bool is_uuid(const std::string& text) {
   return true;
 }
 
+json identity_event_json(const IdentityEvent& e) {
+  json event{{"action", kIdentityActions[static_cast<std::size_t>(e.action)]},
+             {"machine_id", e.machine_id},
+             {"who", e.who},
+             {"why", e.why},
+             {"when", to_text(e.when)}};
+  if (e.store) event["store"] = {{"events", e.store->events}, {"last", e.store->last}};
+  return event;
+}
+
 json identity_json(const MachineIdentity& identity) {
   json events = json::array();
-  for (const auto& e : identity.events)
-    events.push_back({{"action", kIdentityActions[static_cast<std::size_t>(e.action)]},
-                      {"machine_id", e.machine_id},
-                      {"who", e.who},
-                      {"why", e.why},
-                      {"when", to_text(e.when)}});
+  for (const auto& e : identity.events) events.push_back(identity_event_json(e));
   return {{"schema", kIdentitySchema},
           {"machine_id", identity.machine_id},
           {"computer",
            {{"machine_id", identity.computer.machine_id},
             {"interfaces", identity.computer.interfaces}}},
           {"events", std::move(events)}};
+}
+
+/// nullopt: there is none. Throws json::exception as below.
+std::optional<StorePlace> store_place_from(const json& event) {
+  if (!event.contains("store")) return std::nullopt;
+  const json& place = event.at("store");
+  return StorePlace{place.at("events").get<std::size_t>(), place.at("last").get<std::string>()};
 }
 
 /// Throws json::exception if a member is missing or has the wrong type.
@@ -91,7 +104,8 @@ std::optional<IdentityEvent> identity_event_from(const json& object) {
                        .machine_id = object.at("machine_id").get<std::string>(),
                        .who = object.at("who").get<std::string>(),
                        .why = object.at("why").get<std::string>(),
-                       .when = *when};
+                       .when = *when,
+                       .store = store_place_from(object)};
 }
 
 /// nullopt: a value cannot be used. Throws json::exception as above.
@@ -115,6 +129,29 @@ std::optional<MachineIdentity> identity_from(const json& document) {
 Result<void> write_identity(const fs::path& data_dir, const MachineIdentity& identity) {
   if (auto made = create_folder(data_dir); !made) return made;
   return replace_file(identity_file(data_dir), identity_json(identity).dump(1) + "\n");
+}
+
+std::string store_event_text(const StoreEvent& event) {
+  return fmt::format("{} {}", event.id, to_text(event.actor.when));
+}
+
+/// Whether the events before `place` are those of `history`.
+bool is_place_of(const StorePlace& place, std::span<const StoreEvent> history) {
+  if (place.events > history.size()) return false;
+  return place.events == 0 || store_event_text(history[place.events - 1]) == place.last;
+}
+
+/// Whether event `i` of the store is later than `decision`.
+bool is_later(std::span<const StoreEvent> history, std::size_t i, const IdentityEvent& decision) {
+  if (decision.store && is_place_of(*decision.store, history)) return i >= decision.store->events;
+  return history[i].actor.when >= decision.when;
+}
+
+/// The store may not exist yet: then it has no events.
+std::optional<StorePlace> end_of_store(const fs::path& data_dir) {
+  const auto history = ModelStore{data_dir / "models"}.history();
+  if (!history) return std::nullopt;
+  return end_of(*history);
 }
 
 Result<MachineIdentity> new_identity(const ComputerMarks& here, std::vector<IdentityEvent> events,
@@ -153,10 +190,14 @@ bool same_computer(const ComputerMarks& a, const ComputerMarks& b) noexcept {
   return std::ranges::find_first_of(a.interfaces, b.interfaces) != a.interfaces.end();
 }
 
-std::optional<protocol::UtcTime> MachineIdentity::renewed() const {
-  std::optional<protocol::UtcTime> last;
+StorePlace end_of(std::span<const StoreEvent> history) {
+  return {history.size(), history.empty() ? std::string{} : store_event_text(history.back())};
+}
+
+const IdentityEvent* MachineIdentity::renewal() const noexcept {
+  const IdentityEvent* last = nullptr;
   for (const auto& event : events)
-    if (event.action == IdentityAction::Renewed) last = event.when;
+    if (event.action == IdentityAction::Renewed) last = &event;
   return last;
 }
 
@@ -165,6 +206,41 @@ std::string MachineIdentity::machine_id_at(protocol::UtcTime time) const {
   std::string then = events.front().machine_id;
   for (const auto& event : events)
     if (event.when <= time) then = event.machine_id;
+  return then;
+}
+
+std::vector<std::string> models_of_other_machine(const MachineIdentity& identity,
+                                                 std::span<const StoreEvent> history) {
+  const IdentityEvent* renewal = identity.renewal();
+  if (renewal == nullptr) return {};
+  std::map<std::string, bool> own;
+  for (std::size_t i = 0; i < history.size(); ++i) {
+    const auto& id = history[i].id;
+    const auto action = history[i].action;
+    if (action == StoreAction::Activated || action == StoreAction::Forced)
+      own[id] = is_later(history, i, *renewal);
+    else if (action == StoreAction::Added)
+      own.try_emplace(id, is_later(history, i, *renewal));
+  }
+
+  std::vector<std::string> others;
+  for (const auto& [id, is_own] : own)
+    if (!is_own) others.push_back(id);
+  return others;
+}
+
+std::optional<std::string> machine_id_of_model(const MachineIdentity& identity,
+                                               std::span<const StoreEvent> history,
+                                               const std::string& id) {
+  const auto added = std::ranges::find_if(history, [&id](const StoreEvent& event) {
+    return event.id == id && event.action == StoreAction::Added;
+  });
+  if (added == history.end() || identity.events.empty()) return std::nullopt;
+  const auto i = static_cast<std::size_t>(added - history.begin());
+  std::string then = identity.events.front().machine_id;
+  for (const auto& event : identity.events)
+    if (event.action == IdentityAction::Renewed && is_later(history, i, event))
+      then = event.machine_id;
   return then;
 }
 
@@ -220,6 +296,25 @@ std::string why_not_confirmed(const MachineIdentity& identity, const ComputerMar
       identity.machine_id);
 }
 
+Result<std::optional<MachineIdentity>> identity_of(const ModelStore& store) {
+  std::error_code none;
+  const auto models = fs::absolute(store.model_path({}), none).lexically_normal().parent_path();
+  return read_identity(models.parent_path().parent_path());
+}
+
+std::string identity_doubt(const ModelStore& store, const std::string& id,
+                           const ComputerMarks& here) {
+  const auto identity = identity_of(store);
+  // A damaged file may hide that a person has not decided yet.
+  if (!identity) return identity.error().code == ErrorCode::BadInput ? identity.error().text : "";
+  if (!*identity) return {};
+  if (auto why = why_not_confirmed(**identity, here); !why.empty()) return why;
+  const auto history = store.history();
+  if (!history) return {};
+  const auto others = models_of_other_machine(**identity, *history);
+  return std::ranges::binary_search(others, id) ? kOfOtherMachine : "";
+}
+
 Result<MachineIdentity> decide_identity(const fs::path& data_dir, const ComputerMarks& here,
                                         const IdentityDecision& decision) {
   auto known = read_identity(data_dir);
@@ -228,7 +323,8 @@ Result<MachineIdentity> decide_identity(const fs::path& data_dir, const Computer
                       .machine_id = exists ? (*known)->machine_id : std::string{},
                       .who = decision.who,
                       .why = decision.why,
-                      .when = decision.when};
+                      .when = decision.when,
+                      .store = end_of_store(data_dir)};
   if (decision.action == IdentityAction::Kept && !exists) {
     if (!known) return tl::unexpected(known.error());
     return fail(ErrorCode::Refused, fmt::format("{}: there is no identity to keep; abbed makes it "

@@ -57,6 +57,7 @@ void add_later_changes(const ModelInUse& use, Obstacles& out) {
   if (use.machine_hash && *use.machine_hash != use.document.machine_hash &&
       !accepted_for(use.events, *use.machine_hash))
     list.emplace_back("STALE: the model was made for another machine configuration");
+  if (!use.identity_doubt.empty()) list.push_back("STALE: " + use.identity_doubt);
 }
 
 }  // namespace

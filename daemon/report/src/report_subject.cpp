@@ -9,7 +9,8 @@ ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose) {
   return {.document = subject.document,
           .events = subject.events,
           .machine_hash = subject.machine_hash,
-          .purpose = purpose};
+          .purpose = purpose,
+          .identity_doubt = subject.identity_doubt};
 }
 
 Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id) {
@@ -18,10 +19,13 @@ Result<ReportSubject> report_subject(const ModelStore& store, const std::string&
   ReportSubject subject{.document = std::move(stored->document),
                         .entry = std::move(stored->entry),
                         .events = std::move(stored->events)};
-  // The store of abbed is DATA_DIR/models. A report is made also where the identity cannot be read.
-  const auto data_dir = store.model_path(id).parent_path().parent_path().parent_path();
-  if (const auto identity = read_identity(data_dir); identity && *identity)
-    subject.machine_id = (*identity)->machine_id_at(subject.document.created);
+  // A report is made also where the identity cannot be read.
+  subject.identity_doubt = identity_doubt(store, id, marks_of_this_computer());
+  const auto identity = identity_of(store);
+  if (!identity || !*identity) return subject;
+  const auto history = store.history();
+  auto known = history ? machine_id_of_model(**identity, *history, id) : std::nullopt;
+  subject.machine_id = known ? *known : (*identity)->machine_id_at(subject.document.created);
   return subject;
 }
 

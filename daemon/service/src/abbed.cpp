@@ -225,6 +225,7 @@ struct Abbed::State {
     machine_identity.emplace(
         IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(),
                             std::chrono::time_point_cast<std::chrono::nanoseconds>(now)));
+    authority->set_identity(&*machine_identity);
     const auto& known = machine_identity->known();
     if (!known.machine_id.empty())
       fmt::print(stderr, "abbed: machine {}, machine_id {}\n", config.machine.name,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "abbe/service/background_tasks.hpp"
@@ -11,11 +12,20 @@ namespace {
 
 using Known = IdentityWatch::Known;
 
-Known known_from(const MachineIdentity& identity, const ComputerMarks& here) {
-  return {.machine_id = identity.machine_id,
-          .doubt = why_not_confirmed(identity, here),
-          .fault = {},
-          .renewed = identity.renewed()};
+/// Where the store cannot be read, the models of the other machine are those that were known
+/// `before`. At the start none are: then no model can be used.
+Known known_from(const MachineIdentity& identity, const ComputerMarks& here,
+                 const std::filesystem::path& data_dir, const Known& before) {
+  Known known{
+      .machine_id = identity.machine_id, .doubt = why_not_confirmed(identity, here), .fault = {}};
+  if (identity.renewal() == nullptr) return known;
+  if (const auto history = ModelStore{data_dir / "models"}.history())
+    known.others = models_of_other_machine(identity, *history);
+  else if (before.machine_id == known.machine_id)
+    known.others = before.others;
+  else if (known.doubt.empty())
+    known.doubt = "which models are of the other machine is not known: " + history.error().text;
+  return known;
 }
 
 /// A damaged file may hide that a person has not decided yet. A file that could not be written at
@@ -23,15 +33,14 @@ Known known_from(const MachineIdentity& identity, const ComputerMarks& here) {
 Known unknown(const Error& error) {
   return {.machine_id = {},
           .doubt = error.code == ErrorCode::BadInput ? error.text : std::string{},
-          .fault = error.text,
-          .renewed = {}};
+          .fault = error.text};
 }
 
 Known read_known(const std::filesystem::path& data_dir, const ComputerMarks& here,
                  const Known& before) {
   const auto identity = read_identity(data_dir);
   if (!identity) return unknown(identity.error());
-  return *identity ? known_from(**identity, here) : before;
+  return *identity ? known_from(**identity, here, data_dir, before) : before;
 }
 
 }  // namespace
@@ -40,7 +49,7 @@ IdentityWatch IdentityWatch::open(const std::filesystem::path& data_dir, const C
                                   protocol::UtcTime now) {
   IdentityWatch watch(data_dir, here);
   const auto identity = open_identity(data_dir, here, now);
-  watch.known_ = identity ? known_from(*identity, here) : unknown(identity.error());
+  watch.known_ = identity ? known_from(*identity, here, data_dir, {}) : unknown(identity.error());
   return watch;
 }
 
@@ -50,7 +59,10 @@ void IdentityWatch::follow(WallTime now) {
     try {
       auto read = reading_.get();
       // The identity that is published stays while the disk does not answer.
-      if (read.machine_id.empty() && read.doubt.empty()) read.machine_id = known_.machine_id;
+      if (read.machine_id.empty() && read.doubt.empty()) {
+        read.machine_id = known_.machine_id;
+        read.others = known_.others;
+      }
       known_ = std::move(read);
     } catch (const std::exception& error) {
       known_.fault = error.what();
@@ -62,18 +74,18 @@ void IdentityWatch::follow(WallTime now) {
       [dir = data_dir_, here = here_, before = known_] { return read_known(dir, here, before); });
 }
 
+std::string IdentityWatch::objection_to(const std::string& id) const {
+  if (!known_.doubt.empty()) return known_.doubt;
+  return std::ranges::binary_search(known_.others, id) ? kOfOtherMachine : "";
+}
+
 void IdentityWatch::restrict(ActiveModelState& state) const {
   if (state.status != v1::ModelStatus::MODEL_ACTIVE && state.status != v1::ModelStatus::MODEL_DRIFT)
     return;
-  if (!known_.doubt.empty()) {
-    state.status = v1::ModelStatus::MODEL_STALE;
-    state.reason = known_.doubt;
-  } else if (known_.renewed && state.activated < *known_.renewed) {
-    state.status = v1::ModelStatus::MODEL_STALE;
-    state.reason =
-        "the model is of the machine from which the data folder was copied: calibrate, or check it "
-        "and run `abbe model activate` with a reason";
-  }
+  auto objection = objection_to(state.model != nullptr ? state.model->id : std::string{});
+  if (objection.empty()) return;
+  state.status = v1::ModelStatus::MODEL_STALE;
+  state.reason = std::move(objection);
 }
 
 StreamHealth IdentityWatch::health(const std::string& twin) const {

@@ -92,6 +92,12 @@ void ModelAuthority::raise_drift(const std::string& id, std::string drift) {
   if (active_.model != nullptr && active_.model->id == id) active_.drift = std::move(drift);
 }
 
+std::shared_ptr<const PublishedModel> ModelAuthority::comparison_model() const {
+  if (active_.model == nullptr || !active_.unfit.empty()) return nullptr;
+  const bool objected = identity_ != nullptr && !identity_->objection_to(active_.model->id).empty();
+  return objected ? nullptr : active_.model;
+}
+
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
   if (!looking_.valid()) begin_to_look(now);
   if (looking_.wait_for(std::chrono::seconds{0}) == std::future_status::ready)
@@ -167,8 +173,7 @@ ActiveModelState ModelAuthority::model_state(HostTime now, std::optional<HostTim
 
 ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<HostTime> axes_known_at,
                                                 std::chrono::nanoseconds patience) const {
-  ActiveModelState s{
-      .model = active_model(), .revision = revision_, .activated = active_.activation.actor.when};
+  ActiveModelState s{.model = active_model(), .revision = revision_};
   if (s.model != nullptr) s.publication = &active_.publication;
   if (s.model != nullptr) s.refused = refusal_of(active_.activation);
   if (!active_.model) {

@@ -316,20 +316,26 @@ bool corrects_a_scale(const drivers::MeasuredRegister& measured, const Config& c
          });
 }
 
-/// The sensors whose values correct a reading. The others are only recorded: adding or changing one
-/// must not end a model.
 void state_environment(ClassifiedSection& root, const Config& config) {
+  const auto [readings, measurements] = environment_meaning(config);
+  for (const auto& [key, value] : readings) root.state(Role::Reading, key, value);
+  for (const auto& [key, value] : measurements) root.state(Role::Measurement, key, value);
+}
+
+}  // namespace
+
+Meaning environment_meaning(const Config& config) {
+  Meaning meaning;
   for (const auto& device : config.of<EnvironmentConfig>())
     for (const auto& measured : device.map.measured) {
       const auto entry = fmt::format("environment.{}.register", measured.name);
       if (corrects_a_scale(measured, config))
-        root.state(Role::Reading, entry, register_text(device.map, measured));
+        set_entry(meaning.readings, entry, register_text(device.map, measured));
       else if (config.air.assumed_index && measured.quantity != Quantity::Temperature)
-        root.state(Role::Measurement, entry, register_text(device.map, measured));
+        set_entry(meaning.measurements, entry, register_text(device.map, measured));
     }
+  return meaning;
 }
-
-}  // namespace
 
 const ConfigKind EnvironmentConfig::kKind{.key = "environment",
                                           .several = true,

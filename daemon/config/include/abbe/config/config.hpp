@@ -326,6 +326,10 @@ void use_dds_unit(Config& config, bool unit);
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 
+/// What [[environment]] contributes to Config::meaning: the sensors whose values correct a reading.
+/// The others are only recorded: adding or changing one must not end a model.
+[[nodiscard]] Meaning environment_meaning(const Config& config);
+
 /// SHA-256 in hex over Meaning::readings: the machine and all that gives an axis reading its
 /// meaning. A stored model is ACTIVE only if its hash equals that of the present configuration.
 /// Noise values and transport settings are not included.

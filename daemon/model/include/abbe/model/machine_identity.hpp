@@ -14,10 +14,12 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "abbe/base/error.hpp"
+#include "abbe/model/model_store.hpp"
 #include "abbe/protocol/time.hpp"
 
 namespace abbe::daemon {
@@ -38,12 +40,23 @@ struct ComputerMarks {
 
 enum class IdentityAction { Made, Kept, Renewed };
 
+/// A place in the events of the model store. A date does not order events: the clock of the computer
+/// may be wrong, or set.
+struct StorePlace {
+  std::size_t events = 0;  ///< number of events before the place
+  std::string last;        ///< the last of them, id and date; empty: there is none
+  bool operator==(const StorePlace&) const = default;
+};
+[[nodiscard]] StorePlace end_of(std::span<const StoreEvent> history);
+
 /// A decision on the identity. Kept permanently.
 struct IdentityEvent {
   IdentityAction action = IdentityAction::Made;
   std::string machine_id;  ///< since then
   std::string who, why;
   protocol::UtcTime when{};
+  /// Kept, Renewed: the end of the store at that time; nullopt: it could not be read.
+  std::optional<StorePlace> store{};
   bool operator==(const IdentityEvent&) const = default;
 };
 
@@ -52,12 +65,22 @@ struct MachineIdentity {
   ComputerMarks computer;
   std::vector<IdentityEvent> events;  ///< in order; the first is Made
 
-  /// When a person decided that this is another machine than the one of the data folder: models
-  /// that were activated before are those of the other machine. nullopt: never.
-  [[nodiscard]] std::optional<protocol::UtcTime> renewed() const;
+  /// The last decision of a person that this is another machine than the one of the data folder.
+  /// Null: there is none.
+  [[nodiscard]] const IdentityEvent* renewal() const noexcept;
   /// The machine_id at `time`; before the first start that made one, the first.
   [[nodiscard]] std::string machine_id_at(protocol::UtcTime time) const;
 };
+
+/// The models that neither a person nor the gate activated after the renewal, sorted: they are of the
+/// machine from which the data folder was copied. A roll-back accepts no model. `history`: all events
+/// of the store. Where these are not those of the renewal (the store was made anew), dates decide.
+[[nodiscard]] std::vector<std::string> models_of_other_machine(const MachineIdentity& identity,
+                                                               std::span<const StoreEvent> history);
+/// The machine_id when model `id` was added to the store; nullopt: the store has no such event.
+[[nodiscard]] std::optional<std::string> machine_id_of_model(const MachineIdentity& identity,
+                                                             std::span<const StoreEvent> history,
+                                                             const std::string& id);
 
 [[nodiscard]] std::filesystem::path identity_file(const std::filesystem::path& data_dir);
 
@@ -74,6 +97,17 @@ struct MachineIdentity {
 /// Why the identity may not be used without a decision; empty: it may. Pure.
 [[nodiscard]] std::string why_not_confirmed(const MachineIdentity& identity,
                                             const ComputerMarks& here);
+
+/// Why a model that was not activated after the renewal may not be used.
+inline constexpr const char* kOfOtherMachine =
+    "the model is of the machine from which the data folder was copied: calibrate, or check it and "
+    "run `abbe model activate` with a reason";
+
+/// The identity of the machine of `store`, which is DATA_DIR/models. As read_identity().
+[[nodiscard]] Result<std::optional<MachineIdentity>> identity_of(const ModelStore& store);
+/// What the identity has against the use of model `id`; empty: nothing, or there is no identity.
+[[nodiscard]] std::string identity_doubt(const ModelStore& store, const std::string& id,
+                                         const ComputerMarks& here);
 
 struct IdentityDecision {
   IdentityAction action = IdentityAction::Kept;  ///< Kept or Renewed

@@ -25,6 +25,8 @@ struct ModelInUse {
   /// machine_hash() of the configuration of the machine that will use the model; nullopt: not known.
   std::optional<std::string> machine_hash{};
   ModelPurpose purpose = ModelPurpose::Control;
+  /// identity_doubt() of the store of the model; empty: there is none, or no identity is known.
+  std::string identity_doubt{};
 };
 
 /// Sentences without full stop; none has a line break.

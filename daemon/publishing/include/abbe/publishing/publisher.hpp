@@ -45,7 +45,6 @@ struct ActiveModelState {
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
   /// Why the gate refused the model that a person activated nevertheless; empty: it accepted it.
   std::string refused{};
-  protocol::UtcTime activated = {};  ///< date of the activation in the store
 };
 
 class Publisher {

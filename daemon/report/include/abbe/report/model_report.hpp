@@ -25,6 +25,7 @@ struct ReportSubject {
   std::optional<StoreActor> forced{};
   /// Of the machine, when the model was identified; empty: the store is not in a data folder of abbed.
   std::string machine_id{};
+  std::string identity_doubt{};  ///< ModelInUse::identity_doubt
 };
 [[nodiscard]] ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose);
 

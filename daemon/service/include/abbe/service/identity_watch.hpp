@@ -7,8 +7,8 @@
 #include <chrono>
 #include <filesystem>
 #include <future>
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "abbe/model/machine_identity.hpp"
 #include "abbe/pipeline/stream_health.hpp"
@@ -22,10 +22,10 @@ class IdentityWatch {
   static constexpr std::chrono::seconds kPeriod{1};
 
   struct Known {
-    std::string machine_id;  ///< empty: it could neither be read nor made
-    std::string doubt;       ///< why no model may be ACTIVE; empty: it is confirmed
-    std::string fault;       ///< why it could not be read or made
-    std::optional<protocol::UtcTime> renewed;
+    std::string machine_id;             ///< empty: it could neither be read nor made
+    std::string doubt;                  ///< why no model may be ACTIVE; empty: it is confirmed
+    std::string fault;                  ///< why it could not be read or made
+    std::vector<std::string> others{};  ///< models_of_other_machine()
   };
 
   /// Reads or makes the identity. Waits for the disk.
@@ -36,6 +36,8 @@ class IdentityWatch {
   void follow(WallTime now);
 
   [[nodiscard]] const Known& known() const noexcept { return known_; }
+  /// Why model `id` may not be used, neither to correct nor to judge a run; empty: it may.
+  [[nodiscard]] std::string objection_to(const std::string& id) const;
   /// Changes ACTIVE and DRIFT to STALE where the identity does not allow them.
   void restrict(ActiveModelState& state) const;
   /// Health of stream "identity". `twin`: what abbe-dds reports; empty: none.

@@ -53,7 +53,7 @@ std::string footer() {
        {ExitCode::StopNotSent,
         "abbed has ended without a connection to the measuring machine: it may be moving"},
        {ExitCode::Internal,
-        "the hub hangs, or abbed does not end within 25 s after a signal (the hub: 5 s), or an "
+        "the hub hangs, or abbed does not end within 27 s after a signal (the hub: 5 s), or an "
         "internal error: systemd restarts abbed"}});
 }
 
@@ -139,14 +139,16 @@ int run(Abbed& abbed, const sigset_t& stop) {
   }
 }
 
-/// Reports the end. Returns the exit code: `code`, or another one if the measuring machine may be
-/// moving on.
-int report_end(const std::optional<abbe::drivers::IppStop>& machine, int code) {
+/// True if no measuring machine may be moving on.
+bool stands(const std::optional<abbe::drivers::IppStop>& machine) {
+  return !machine || machine->outcome == abbe::drivers::IppStopOutcome::Stopped;
+}
+
+/// Reports a measuring machine that may be moving on, before anything that can wait for a disk.
+/// Returns the exit code: `code`, or another one for such a machine.
+int report_machine(const std::optional<abbe::drivers::IppStop>& machine, int code) {
   using Outcome = abbe::drivers::IppStopOutcome;
-  if (!machine || machine->outcome == Outcome::Stopped) {
-    print_message("abbed", "stopped");
-    return code;
-  }
+  if (stands(machine)) return code;
   print_message("abbed",
                 fmt::format("ended, but the stop of the measuring machine is {}: {}; check "
                             "the machine, use its emergency stop",
@@ -167,8 +169,10 @@ int end_in_order(std::unique_ptr<Abbed> abbed, int code) {
           "code {}\n",
           kLongestEnd.count(), kInternal),
       &stop_machines_at_once};
-  const int reported = report_end(abbed->end(), code);
+  const auto machine = abbed->end();
+  const int reported = report_machine(machine, code);
   abbed.reset();
+  if (stands(machine)) print_message("abbed", "stopped");
   return reported;
 }
 

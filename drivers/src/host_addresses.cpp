@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include <array>
 #include <condition_variable>
@@ -73,6 +75,24 @@ struct HostAddresses::Shared {
       addresses = std::move(*found);
     answered.notify_all();
   }
+  /// As keep() after an internal error, usually no memory: the known addresses and the last fault
+  /// stay.
+  void give_up() noexcept {
+    const std::lock_guard lock(mutex);
+    running = false;
+    answered.notify_all();
+  }
+  /// On a thread of its own. It inherits the real-time priority of the device thread, which a name
+  /// service must not have; if the change is refused, it keeps it.
+  void run(const HostLookUp& look_up) noexcept {
+    const sched_param none{};
+    (void)::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &none);
+    try {
+      keep(look_up(host, port));
+    } catch (...) {
+      give_up();
+    }
+  }
 };
 
 HostAddresses::HostAddresses(std::string host, std::uint16_t port, HostAddressesOptions options)
@@ -103,12 +123,13 @@ void HostAddresses::begin_look_up() {
 
   try {
     // Detached: no thread that ends waits for a name service.
-    std::thread([shared = shared_, look_up = options_.look_up] {
-      shared->keep(look_up(shared->host, shared->port));
-    }).detach();
+    std::thread([shared = shared_, look_up = options_.look_up] { shared->run(look_up); }).detach();
   } catch (const std::system_error& refused) {
     shared_->keep(tl::unexpected{
         Error{ErrorCode::SystemRefused, fmt::format("no address: no thread: {}", refused.what())}});
+  } catch (...) {
+    shared_->give_up();
+    throw;
   }
 }
 

@@ -330,6 +330,17 @@ TEST_F(DdsLinkTest, SocketFileIsAccessibleToItsOwnerOnly) {
   EXPECT_EQ(file.st_mode & 0777, 0660u);
 }
 
+TEST_F(DdsLinkTest, AGroupThatCannotBeSetIsAFaultThatARestartMayRepair) {
+  const Account mine{::geteuid(), ::getegid()};
+  EXPECT_TRUE(DdsLink::listen(directory_ / "mine.sock", {.user = mine}).has_value());
+  if (::geteuid() == 0) GTEST_SKIP() << "root may give a file to any group";
+  const Account foreign{::geteuid(), gid_t{54'321}};
+  const auto refused = DdsLink::listen(directory_ / "foreign.sock", {.user = foreign});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::Io);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("set [dds] socket to"));
+}
+
 TEST_F(DdsLinkTest, RefusesAPathThatARunningProcessServes) {
   const auto second = DdsLink::listen(path_);
   ASSERT_FALSE(second.has_value());

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <future>
 #include <memory>
+#include <new>
 #include <thread>
 
 #include "abbe/drivers/tcp_client.hpp"
@@ -92,6 +93,18 @@ TEST(HostAddresses, KeepsAnAddressWhileLaterLookUpsFail) {
   };
   HostAddresses host{"cmm.example", kPort, {60s, 0ms, once}};
   while (*asked < 4) ASSERT_EQ(text_of(host.next().value()), "127.0.0.3");
+}
+
+TEST(HostAddresses, ALookUpThatThrowsIsFollowedByAnother) {
+  const auto asked = std::make_shared<std::atomic<int>>(0);
+  const auto no_memory_first = [asked](const std::string&, std::uint16_t port) {
+    if (++*asked == 1) throw std::bad_alloc{};
+    return look_up_host("127.0.0.3", port);
+  };
+  HostAddresses host{"cmm.example", kPort, {60s, 0ms, no_memory_first}};
+  auto found = host.next();
+  for (; !found; found = host.next()) std::this_thread::yield();
+  EXPECT_EQ(text_of(*found), "127.0.0.3");
 }
 
 TEST(HostAddresses, ReportsWhyANameHasNoAddress) {

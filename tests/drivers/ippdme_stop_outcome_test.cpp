@@ -118,6 +118,26 @@ TEST(IppStopOutcomes, ASecondRequestSendsAnAbortAgainThatWasRefused) {
   EXPECT_EQ(stage.times_heard("AbortE()"), aborts + 1);
 }
 
+TEST(IppStopOutcomes, RequestsThatArriveOutOfOrderHaveTheHighestNumber) {
+  drivers::IppSession session{drivers::IppSessionOptions{}};
+  (void)session.on(drivers::IppAbortRequested{.number = 2}, {});
+  (void)session.on(drivers::IppAbortRequested{.number = 1}, {});
+  EXPECT_EQ(session.stop().number, 2u);
+  EXPECT_EQ(session.stop().outcome, IppStopOutcome::NotSent);
+}
+
+TEST(IppStopOutcomes, AnInternalErrorKeepsTheNumberOfARequest) {
+  MovingStage stage;
+  stage.peer.hold_answers(true);
+  const auto number = stage.device->abort();
+  stage.cycle();
+  EXPECT_TRUE(stage.device->stop_after_failure());
+  stage.peer.hold_answers(false);
+  ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_EQ(stage.device->last_stop().number, number);
+  EXPECT_EQ(stage.device->last_stop().outcome, IppStopOutcome::Stopped);
+}
+
 /// The end of the device in real time, with the server in another thread.
 IppStop end_of(sim::IppDmeOptions machine, bool lose_the_connection, bool& moves_on) {
   drivers::MonotonicTime time;

@@ -141,6 +141,34 @@ TEST(IppStop, AnEndByRequestStopsTheMotionAndHoldsNothing) {
   EXPECT_EQ(stage.device->points_left(), 0u);
 }
 
+TEST(IppStop, AMachineStoppedAfterAnExceptionIsHeldForIt) {
+  MovingStage stage;
+  EXPECT_TRUE(stage.device->stop_after_failure());
+  ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_THAT(stage.last_fault(), HasSubstr("stopped after an internal error"));
+}
+
+TEST(IppStop, AHoldByRequestOutlivesTheEndBeforeTheAnswer) {
+  for (const bool lost : {false, true}) {
+    drivers::IppMachine kept;
+    IppDeviceOptions options;
+    options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
+    MovingStage stage{options};
+    if (lost) {
+      stage.peer.hang_up();
+      ASSERT_TRUE(stage.cycles_until(1s, [&] { return !stage.device->status().connected; }));
+    }
+    stage.device->abort();
+    stage.device->end();
+
+    ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "disconnected"; }))
+        << stage.state();
+    ASSERT_TRUE(stage.cycles_until(10s, [&] { return !kept.moving; }));
+    EXPECT_FALSE(stage.peer.machine().moving());
+    EXPECT_EQ(kept.held, "stopped by request");
+  }
+}
+
 TEST(IppRelease, AMotionThatIsBeingStoppedCannotBeReleased) {
   MovingStage stage;
   stage.peer.hold_answers(true);

@@ -17,6 +17,7 @@
 #include <exception>
 #include <list>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -156,7 +157,8 @@ class Server final : public ControlServer {
                                 {long_done_.get(), POLLIN, 0}};
       for (const Client& c : clients_) waits.push_back({c.fd.get(), events_of(c), 0});
 
-      if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR) return;
+      if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR)
+        throw std::system_error(errno, std::generic_category(), "poll");  // ENOMEM
       if (waits[0].revents != 0) return;
 
       if (waits[2].revents != 0) take_long_answers();

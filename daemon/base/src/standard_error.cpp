@@ -13,8 +13,10 @@
 #include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
+#include <exception>
 #include <iostream>
 #include <mutex>
+#include <new>
 #include <streambuf>
 #include <thread>
 #include <utility>
@@ -46,13 +48,18 @@ class StderrThread {
     ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   }
 
-  void take(std::string_view text) {
+  /// A message without memory for it is dropped.
+  void take(std::string_view text) noexcept {
     {
       const std::lock_guard lock(mutex_);
-      if (waiting_.size() + text.size() > kMostWaitingStderr)
+      try {
+        if (waiting_.size() + text.size() > kMostWaitingStderr)
+          ++dropped_;
+        else
+          waiting_ += text;
+      } catch (const std::bad_alloc&) {
         ++dropped_;
-      else
-        waiting_ += text;
+      }
     }
     changed_.notify_all();
   }
@@ -68,14 +75,24 @@ class StderrThread {
     for (;;) {
       changed_.wait(lock, [this] { return !waiting_.empty(); });
       std::string text = std::exchange(waiting_, {});
-      if (const auto lost = std::exchange(dropped_, 0); lost > 0)
-        text += fmt::format("{}: {} messages were lost: stderr was not read\n", program_, lost);
+      add_lost(text);
       writing_ = true;
       lock.unlock();
       write_whole(text);
       lock.lock();
       writing_ = false;
       changed_.notify_all();
+    }
+  }
+
+  /// Without memory for it, the number of lost messages is reported later.
+  void add_lost(std::string& text) noexcept {
+    if (dropped_ == 0) return;
+    try {
+      text += fmt::format("{}: {} messages were lost: stderr was not read, or no memory\n",
+                          program_, dropped_);
+      dropped_ = 0;
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch)
     }
   }
 

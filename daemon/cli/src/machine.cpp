@@ -50,7 +50,12 @@ int stop_machine(const DaemonSocket& where) {
     return report(error);
   }
 
-  const auto stopped = await_stop(*socket, (*asked)["stop"].get<std::uint64_t>());
+  const auto number = asked->find("stop");
+  if (number == asked->end())
+    return report({ErrorCode::StopNotConfirmed,
+                   "abbed does not report whether the machine has stopped: check the machine, use "
+                   "its emergency stop"});
+  const auto stopped = await_stop(*socket, number->get<std::uint64_t>());
   if (!stopped) return report(stopped.error());
   fmt::print("{}\nthe machine does not move again before `abbe machine release`\n", *stopped);
   return 0;

@@ -18,10 +18,23 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kStopPollPeriod{50};
 constexpr std::string_view kWhatToDo = "check the machine, use its emergency stop";
 
-bool is_settled(const json& answer, std::uint64_t number) {
-  const auto stop = answer.find("stop");
-  return stop != answer.end() && (*stop)["number"].get<std::uint64_t>() >= number &&
-         (*stop)["outcome"] != "pending";
+/// abbed connects again, which takes 3 s at most, and waits for the answer to AbortE, 5 s at most.
+constexpr std::chrono::seconds kLongestStop{10};
+/// A request reaches the thread of the machine within some ms. Later a missing or smaller number is
+/// that of an abbed that restarted.
+constexpr std::chrono::seconds kReceivedSoon{2};
+
+bool is_received(const json& stop, std::uint64_t number) {
+  return stop.is_object() && stop.value("number", std::uint64_t{0}) >= number;
+}
+
+bool is_settled(const json& stop) {
+  return stop.value("outcome", "pending") != "pending";
+}
+
+tl::unexpected<Error> not_confirmed(const std::string& why) {
+  return fail(ErrorCode::StopNotConfirmed,
+              fmt::format("the stop of the machine is not confirmed: {}; {}", why, kWhatToDo));
 }
 
 }  // namespace
@@ -35,16 +48,25 @@ Result<std::string> stop_outcome(const json& stop) {
 }
 
 Result<std::string> await_stop(const std::filesystem::path& socket, std::uint64_t number) {
-  for (auto answered = steady_clock::now();; std::this_thread::sleep_for(kStopPollPeriod)) {
+  const auto asked = steady_clock::now();
+  for (auto answered = asked;; std::this_thread::sleep_for(kStopPollPeriod)) {
     const auto answer = ask_daemon(socket, {{"do", "machine"}});
-    if (answer) {
-      answered = steady_clock::now();
-      if (is_settled(*answer, number)) return stop_outcome((*answer)["stop"]);
-    } else if (steady_clock::now() - answered >= kDaemonTimeout) {
-      return fail(ErrorCode::StopNotConfirmed,
-                  fmt::format("the stop of the machine is not confirmed: {}; {}",
-                              answer.error().text, kWhatToDo));
+    const auto now = steady_clock::now();
+    if (!answer) {
+      if (now - answered >= kDaemonTimeout) return not_confirmed(answer.error().text);
+      continue;
     }
+
+    answered = now;
+    const json stop = answer->value("stop", json());
+    if (!is_received(stop, number)) {
+      if (now - asked >= kReceivedSoon)
+        return not_confirmed("abbed does not know the request: it may have restarted");
+    } else if (is_settled(stop)) {
+      return stop_outcome(stop);
+    }
+    if (now - asked >= kLongestStop)
+      return not_confirmed(fmt::format("no outcome in {} s", kLongestStop.count()));
   }
 }
 

@@ -15,7 +15,7 @@ namespace abbe::daemon {
 [[nodiscard]] Result<std::string> stop_outcome(const nlohmann::json& stop);
 
 /// Waits for the outcome of the request with this number. StopNotConfirmed if the daemon does not
-/// answer any more.
+/// answer any more, does not know the request (it has restarted), or has no outcome after 10 s.
 [[nodiscard]] Result<std::string> await_stop(const std::filesystem::path& socket,
                                              std::uint64_t number);
 

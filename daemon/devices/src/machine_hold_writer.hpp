@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/drivers/ippdme/device.hpp"
 
 namespace abbe::daemon {
@@ -16,7 +17,7 @@ namespace abbe::daemon {
 class MachineHoldWriter {
  public:
   static constexpr std::chrono::seconds kRetryPeriod{1};
-  static constexpr std::chrono::seconds kEndTimeout{3};
+  static constexpr std::chrono::seconds kEndTimeout = kLongestHoldEnd;
 
   /// `in_file`: the state in the file; nullopt: not known, so that the first state is written.
   MachineHoldWriter(std::filesystem::path file, std::optional<drivers::IppMachine> in_file);

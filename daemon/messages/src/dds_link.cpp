@@ -36,17 +36,21 @@ bool may_connect(int fd, const DdsLinkPeer& peer) {
   return credentials.pid != 0 && credentials.pid == process->pid();
 }
 
-/// Lets the group of `user` open the socket. A folder with the setgid bit has done so already.
+/// Lets the group of `user` open the socket. A folder with the setgid bit has done so already, and
+/// abbed.service does not permit chown(). Io: after a person has corrected the folder, a restart
+/// succeeds.
 Result<void> open_to_group(const std::filesystem::path& socket,
                            const std::optional<Account>& user) {
-  if (!user || ::chown(socket.c_str(), static_cast<uid_t>(-1), user->gid) == 0) return {};
-  const int error = errno;
+  if (!user) return {};
   struct stat status {};
   if (::stat(socket.c_str(), &status) == 0 && status.st_gid == user->gid) return {};
-  return fail(ErrorCode::Refused,
-              fmt::format("{}: its group cannot be set to that of abbe-dds: {}: the folder must "
-                          "belong to this group, with the mode 2750: systemd-tmpfiles --create",
-                          socket.string(), std::strerror(error)));
+  if (::chown(socket.c_str(), static_cast<uid_t>(-1), user->gid) == 0) return {};
+  return fail(
+      ErrorCode::Io,
+      fmt::format("{}: its group cannot be set to that of abbe-dds: {}: set [dds] socket to "
+                  "a file in /run/abbe-dds, or give its folder to this group with the mode "
+                  "2750 (systemd-tmpfiles --create)",
+                  socket.string(), std::strerror(errno)));
 }
 
 /// Tracks the unanswered beats of one connection.

@@ -210,12 +210,12 @@ void Hub::on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime t
 }
 
 /// Passes the batch to the running touch job, together with the last fault of the machine. The
-/// fault is looked up only if the job may have ended, because collecting health takes too long for
-/// every cycle.
+/// fault is looked up only if the job may have ended, and not while it waits for the outcome of a
+/// stop, because collecting health takes too long for every cycle.
 void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
   std::string seen;
-  if (points_left == 0 && batch_.touches.empty()) {
+  if (points_left == 0 && batch_.touches.empty() && !parts_.touching->awaits_stop()) {
     collect_health(parts_.time.now());
     for (const auto& h : health_)
       if (h.status.name == touches_by_) seen = h.status.last_fault;

@@ -160,13 +160,14 @@ Result<json> stop_outcome(PageContext& context) {
   const auto& socket = context.options.settings.config.control.socket;
   const auto asked = daemon::ask_daemon(socket, {{"do", "machine"}, {"stop", true}});
   if (!asked) return asked;
-  const auto number = (*asked)["stop"].get<std::uint64_t>();
+  const auto number = asked->value("stop", std::uint64_t{1});
   for (const auto until = Clock::now() + kStopPatience; Clock::now() < until && !context.stopping;
        std::this_thread::sleep_for(kStopPeriod)) {
     const auto answer = daemon::ask_daemon(socket, {{"do", "machine"}});
     if (!answer) return answer;
     const json stop = answer->value("stop", json::object());
-    if (stop.value("number", std::uint64_t{0}) >= number && stop["outcome"] != "pending")
+    if (stop.value("number", std::uint64_t{0}) >= number &&
+        stop.value("outcome", "pending") != "pending")
       return stop;
   }
   return daemon::fail(ErrorCode::StopNotConfirmed,

@@ -45,11 +45,15 @@ IppDevice::~IppDevice() {
 }
 
 IppStop IppDevice::finish() {
+  if (ended_) return session().stop();
+  read_stops(requests_.take());  // of a person, since the last cycle: they hold the machine
   handle(IppStopRequested{});
   await_standstill();
+  session().give_up_stop();
   leave(IppStopRequested{});
   report_machine();
   show_session();
+  ended_ = true;
   return session().stop();
 }
 
@@ -181,32 +185,41 @@ bool IppDevice::stop_after_failure() {
   emergency_stop_.set_moving(true);
   (void)send_emergency_stops({});
   discard_posted_messages();
-  handle(IppAbortRequested{});
+  // The number is that of the latest request: the exception may have lost the request itself.
+  handle(IppAbortRequested{.number = stops_asked_.load(std::memory_order_relaxed),
+                           .reason = "stopped after an internal error of abbed"});
   show_session();
   return session().may_move();
 }
 
+/// Stops first: an exception from a later request must not lose one. Paths and releases before the
+/// last stop are discarded.
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
-  const auto is_abort = [](const Request& r) {
-    return std::holds_alternative<IppAbortRequested>(r);
-  };
+  const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), is_stop).base();
+  for (const Request& request : requests)
+    if (const auto* path = std::get_if<IppPath>(&request)) taken_ += path->size();
 
-  const auto is_end = [](const Request& r) { return std::holds_alternative<IppStopRequested>(r); };
-  const auto stops = [&](const Request& r) { return is_abort(r) || is_end(r); };
-  const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), stops).base();
-
-  for (auto request = requests.begin(); request != requests.end(); ++request) {
-    if (const auto* path = std::get_if<IppPath>(&*request)) {
-      taken_ += path->size();
-      if (request >= after_last_stop) handle(*path);  // earlier points are not begun
-    } else if (const auto* abort = std::get_if<IppAbortRequested>(&*request)) {
-      handle(*abort);
-    } else if (is_end(*request)) {
-      handle(IppStopRequested{});
-    } else {
+  read_stops(requests);
+  for (auto request = after_last_stop; request != requests.end(); ++request) {
+    if (const auto* path = std::get_if<IppPath>(&*request))
+      handle(*path);
+    else
       handle(IppReleaseRequested{});
-    }
+  }
+}
+
+bool IppDevice::is_stop(const Request& request) {
+  return std::holds_alternative<IppAbortRequested>(request) ||
+         std::holds_alternative<IppStopRequested>(request);
+}
+
+void IppDevice::read_stops(const std::vector<Request>& requests) {
+  for (const Request& request : requests) {
+    if (const auto* abort = std::get_if<IppAbortRequested>(&request))
+      handle(*abort);
+    else if (std::holds_alternative<IppStopRequested>(request))
+      handle(IppStopRequested{});
   }
 }
 

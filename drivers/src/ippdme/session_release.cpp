@@ -1,6 +1,7 @@
 // Stopping a motion after a fault or on request, and waiting for the release by an operator.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "abbe/drivers/ippdme/session.hpp"
@@ -22,7 +23,10 @@ IppAction IppSession::stop_motion(bool close_then) {
 IppAction IppSession::stopped_moving() {
   moving_ = false;
   settle(IppStopOutcome::Stopped, "AbortE was answered: the motion is stopped");
-  if (stopped_) return in_session_ ? end_session() : close(IppState::Disconnected);
+  if (stopped_) {
+    if (!asked_reason_.empty()) hold_for(asked_reason_);
+    return in_session_ ? end_session() : close(IppState::Disconnected);
+  }
   hold_for(stop_reason_);
   return close_then_ ? close(IppState::AwaitingRelease) : await_release();
 }
@@ -91,19 +95,23 @@ void IppSession::settle(IppStopOutcome outcome, std::string text) {
 }
 
 IppAction IppSession::take(const IppAbortRequested& request) {
-  stop_ = {request.number, IppStopOutcome::Pending, {}};
+  stop_ = {std::max(stop_.number, request.number), IppStopOutcome::Pending, {}};
   points_.clear();
   if (state_ == IppState::Aborting) return IppNothing{};  // its answer is the outcome
-  if (moving_) return open_ ? stop_motion_by_request() : connect_to_abort();
-  if (!open_) return stop_without_connection();
+  if (moving_ && open_) return stop_motion_by_request(request.reason);
+  if (moving_) {
+    asked_reason_ = request.reason;
+    return connect_to_abort();
+  }
+  if (!open_) return stop_without_connection(request.reason);
 
   settle(IppStopOutcome::Stopped, "no motion of abbed was under way");
   const bool ended = state_ == IppState::Stopping || held_ || stopped_;
-  return ended ? IppAction{IppNothing{}} : hold("stopped by request");
+  return ended ? IppAction{IppNothing{}} : hold(std::string{request.reason});
 }
 
-IppAction IppSession::stop_motion_by_request() {
-  if (!held_) note("stopped by request");
+IppAction IppSession::stop_motion_by_request(std::string_view reason) {
+  if (!held_) note(std::string{reason});
   return stop_motion(false);
 }
 
@@ -113,12 +121,12 @@ IppAction IppSession::connect_to_abort() {
   return state_ == IppState::Connecting ? IppAction{IppNothing{}} : connect();
 }
 
-IppAction IppSession::stop_without_connection() {
+IppAction IppSession::stop_without_connection(std::string_view reason) {
   settle(IppStopOutcome::NotSent,
          "there is no connection to the machine; no motion of abbed was under way");
   if (held_ || stopped_) return IppNothing{};
-  note("stopped by request");
-  hold_for("stopped by request");
+  note(std::string{reason});
+  hold_for(std::string{reason});
   return close(IppState::AwaitingRelease);
 }
 
@@ -143,6 +151,7 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   settle(IppStopOutcome::NotSent, "a person has released the machine before AbortE was sent");
   held_ = moving_ = session_first_ = false;  // an operator has inspected the machine
   hold_reason_.clear();
+  asked_reason_.clear();
   may_home_ = options_.home;
   pause_ = options_.first_pause;
   if (open_ && in_session_)
@@ -156,14 +165,28 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   return IppNothing{};
 }
 
+/// A hold that follows the answer to AbortE follows it also when the session ends before: the next
+/// start of abbed awaits a release.
 IppAction IppSession::take(const IppStopRequested&) {
   if (std::exchange(stopped_, true)) return IppNothing{};
   points_.clear();
   if (stop_.outcome != IppStopOutcome::Pending) stop_ = {stop_.number, IppStopOutcome::Pending, {}};
-  if (state_ == IppState::Aborting) return IppNothing{};
+  if (state_ == IppState::Aborting) {
+    hold_for(stop_reason_);
+    return IppNothing{};
+  }
   if (moving_) return open_ ? stop_motion(false) : connect_to_abort();
   settle(IppStopOutcome::Stopped, "no motion of abbed was under way");
   return end_session();
+}
+
+void IppSession::give_up_stop() {
+  if (open_)
+    settle(IppStopOutcome::NotConfirmed,
+           "AbortE was not answered before the connection was closed: the machine may be moving");
+  else
+    settle(IppStopOutcome::NotSent,
+           "there was no connection before the end of abbed: the machine may be moving");
 }
 
 IppAction IppSession::end_session() {

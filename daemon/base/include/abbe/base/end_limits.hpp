@@ -16,13 +16,15 @@ inline constexpr std::chrono::seconds kLongestCountingEnd{3};
 inline constexpr std::chrono::seconds kLongestMachineConnect{3};
 /// ... and the answer to AbortE: the largest [cmm] command_timeout_s.
 inline constexpr std::chrono::seconds kLongestMachineAnswer{5};
+/// The state of the measuring machine in its file.
+inline constexpr std::chrono::seconds kLongestHoldEnd{3};
 /// abbe-dds as a child of abbed: from SIGTERM to SIGKILL.
 inline constexpr std::chrono::seconds kLongestDdsEnd{3};
 
 /// All of them one after the other, and the disk. Then abbed exits at once.
-inline constexpr std::chrono::seconds kLongestEnd{25};
+inline constexpr std::chrono::seconds kLongestEnd{27};
 static_assert(kLongestHubEnd + kLongestWorkEnd + kLongestCountingEnd + kLongestMachineConnect +
-                  kLongestMachineAnswer + kLongestDdsEnd <
+                  kLongestMachineAnswer + kLongestHoldEnd + kLongestDdsEnd <
               kLongestEnd);
 
 }  // namespace abbe::daemon

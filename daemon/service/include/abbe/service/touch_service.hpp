@@ -73,6 +73,8 @@ class TouchService {
   /// The status, for the client that started the job. Resets the time of kLongestUnwatched.
   [[nodiscard]] const Status& look();
   [[nodiscard]] const Status& status() const noexcept { return status_; }
+  /// True once the motion is being stopped: cycle() then ignores `seen`.
+  [[nodiscard]] bool awaits_stop() const noexcept { return stopping_; }
 
  private:
   void ask_next();

@@ -142,10 +142,14 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSource& time);
 
+  using Request = std::variant<IppPath, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
+
   [[nodiscard]] std::span<const std::byte> encode(const IppSend& command);
   void connected();
   void disconnected() { emergency_stop_.set_socket(-1); }
   void read_requests();
+  [[nodiscard]] static bool is_stop(const Request& request);
+  void read_stops(const std::vector<Request>& requests);
   void await_standstill();
   void count_points();
   void report_machine();
@@ -168,7 +172,6 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  using Request = std::variant<IppPath, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
   Mailbox<Request> requests_;  ///< written by the hub without a lock
   std::size_t taken_ = 0;      ///< points that the device thread took from requests_
   std::atomic<std::size_t> asked_{0};
@@ -181,7 +184,8 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   std::string condition_;                            ///< last value shown
   std::optional<protocol::HostTime> unsaved_since_;  ///< machine_ is not stored since then
   std::atomic<std::uint64_t> stops_asked_{0};
-  IppStop stop_;  ///< last value shown
+  bool ended_ = false;  ///< finish() has returned
+  IppStop stop_;        ///< last value shown
   FaultText stop_text_;
   /// number * kOutcomes + outcome: one value, because both change together
   std::atomic<std::uint64_t> stop_shown_{0};

@@ -130,7 +130,10 @@ struct IppConnectionLost {
 struct IppStopRequested {};  ///< ends the session
 /// Input: stop a motion, discard all points, and await a release whether or not the machine moved.
 struct IppAbortRequested {
-  std::uint64_t number = 0;  ///< of the request; returned with the outcome
+  /// Of the request; returned with the outcome. Requests of several threads may arrive out of order:
+  /// the outcome has the highest number.
+  std::uint64_t number = 0;
+  std::string_view reason = "stopped by request";  ///< of the hold; a literal
 };
 struct IppReleaseRequested {};  ///< an operator has inspected the machine
 struct IppMotionStored {};      ///< in Storing: the motion may be sent
@@ -172,10 +175,13 @@ class IppSession {
   [[nodiscard]] bool moving() const noexcept { return moving_; }
   /// True if moving(), or if a motion is sent as soon as this is stored.
   [[nodiscard]] bool may_move() const noexcept { return moving_ || state_ == IppState::Storing; }
-  /// True while AbortE is awaited, or a connection on which the ending session sends it.
+  /// True while AbortE is awaited, or a connection or session in which the ending session sends it.
   [[nodiscard]] bool stopping_motion() const noexcept {
-    return state_ == IppState::Aborting || (stopped_ && moving_ && state_ == IppState::Connecting);
+    const bool before_abort = state_ == IppState::Connecting || state_ == IppState::Opening;
+    return state_ == IppState::Aborting || (stopped_ && moving_ && before_abort);
   }
+  /// The owner ends without waiting any longer: an outstanding request to stop has failed.
+  void give_up_stop();
   /// The latest request to stop and its outcome.
   [[nodiscard]] const IppStop& stop() const noexcept { return stop_; }
   /// Why the machine may be moving although nothing can be done about it now; empty if it cannot.
@@ -259,9 +265,9 @@ class IppSession {
   [[nodiscard]] IppAction hold(const std::string& what);
   [[nodiscard]] IppAction await_release();
   [[nodiscard]] IppAction stop_motion(bool close_then);
-  [[nodiscard]] IppAction stop_motion_by_request();
+  [[nodiscard]] IppAction stop_motion_by_request(std::string_view reason);
   [[nodiscard]] IppAction connect_to_abort();
-  [[nodiscard]] IppAction stop_without_connection();
+  [[nodiscard]] IppAction stop_without_connection(std::string_view reason);
   [[nodiscard]] IppAction stopped_moving();
   [[nodiscard]] IppAction abort_unanswered();
   [[nodiscard]] IppAction abort_refused(const IppError& error);
@@ -294,6 +300,7 @@ class IppSession {
   std::string hold_reason_;
   std::string last_note_;       ///< latest fault without the peer and the reason of a hold
   std::string stop_reason_;     ///< last_note_ when AbortE was sent
+  std::string asked_reason_;    ///< of a request to stop that found no connection; empty: none
   bool session_first_ = false;  ///< start a session before AbortE: the server requires one
   bool may_home_;
   IppStop stop_;

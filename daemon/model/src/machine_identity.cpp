@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
@@ -114,7 +115,7 @@ std::optional<MachineIdentity> identity_from(const json& document) {
 
 Result<void> write_identity(const fs::path& data_dir, const MachineIdentity& identity) {
   if (auto made = create_folder(data_dir); !made) return made;
-  return replace_file(identity_file(data_dir), identity_json(identity).dump(1) + "\n");
+  return replace_file(identity_file(data_dir), indented_json_text(identity_json(identity)) + "\n");
 }
 
 Result<MachineIdentity> new_identity(const ComputerMarks& here, std::vector<IdentityEvent> events,

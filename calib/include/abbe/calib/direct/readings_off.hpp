@@ -9,8 +9,8 @@
 /// of the error. A value is off if
 ///     |d| > 20 s + 1e-7   (0.1 um or urad: the resolution of files)
 /// and if without it (or without it and one other) no value of its pass is: its neighbours, whose
-/// curvature it changes, are not named. With one or two passes a real step of the machine at one position is named, too. Not
-/// tested: passes with fewer than five positions. Pure; allocates.
+/// curvature it changes, are not named. With one or two passes a real step of the machine at one
+/// position is named, too. Not tested: passes with fewer than five positions. Pure; allocates.
 
 #include <cstddef>
 #include <vector>

@@ -35,9 +35,9 @@ struct ComparisonModel {
   void add_note(calib::Verdict& verdict) const;  ///< adds `left_out` to the notes of `verdict`
 };
 
-/// The active model, if it was made, or accepted, for the machine of `config`. A model of another machine
-/// configuration is never applied to this machine; so the gate must not compare a new model with
-/// it.
+/// The active model, if it was made, or accepted, for the machine of `config`. A model of another
+/// machine configuration is never applied to this machine; so the gate must not compare a new model
+/// with it.
 [[nodiscard]] ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
                                                const Config& config);
 

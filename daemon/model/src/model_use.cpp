@@ -35,7 +35,7 @@ void add_verdict(const ModelInUse& use, Obstacles& out) {
   (verdict && !verdict->accepted ? out.refusals : out.statements).push_back(text);
 }
 
-/// A person accepted the model of an earlier version for this configuration, and for no other since.
+/// A person accepted the model of an earlier version for this configuration and no later one.
 bool accepted_for(std::span<const StoreEvent> events, const std::string& machine_hash) {
   const auto last = std::find_if(events.rbegin(), events.rend(), [](const StoreEvent& event) {
     return !event.accepted_configuration.empty();

@@ -48,6 +48,24 @@ TEST(ReadingsOff, AreNotTheInnocentOnes) {
       EXPECT_EQ(readings_found(measured_in_runs(runs, seed)), ReadingNumbers{}) << seed;
 }
 
+TEST(ReadingsOff, AreNotTheStepsOfACoarseInstrument) {
+  constexpr double kStep = 1e-6;
+  MeasuredError error = measured_in_runs(3);
+  for (Reading& r : error.readings) r.value = 0.0;
+  error.readings[5].value = kStep;  // most deviations are exactly 0
+  error.readings[31].value = -kStep;
+  EXPECT_EQ(readings_found(error), ReadingNumbers{});
+  error.readings[31].value = -9999e-6;
+  EXPECT_EQ(readings_found(error), ReadingNumbers{31});
+}
+
+TEST(ReadingsOff, AreASentinelAmongEqualValues) {
+  MeasuredError error = measured_in_runs(3);
+  for (Reading& r : error.readings) r.value = 0.0;
+  error.readings[31].value = -9999e-6;
+  EXPECT_EQ(readings_found(error), ReadingNumbers{31});
+}
+
 TEST(ReadingsOff, AreNotAStepThatAllRunsShow) {
   MeasuredError error = measured_in_runs(3);
   for (Reading& r : error.readings)

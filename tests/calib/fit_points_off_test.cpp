@@ -52,6 +52,13 @@ TEST(PointsOff, AreSentinelsAndWrongDigits) {
   EXPECT_NEAR(off.rms_others_m, std::sqrt(3.0) * 5e-6, 2e-6);
 }
 
+TEST(PointsOff, AreNotThoseOfOrdinarySize) {
+  MeasuredPlaces m(60);
+  m.measured_m[7].x() += 0.5e-3;
+  EXPECT_EQ(points_off(m.measured_m, m.readings_m, 0.4e-3).points.size(), 1u);
+  EXPECT_TRUE(points_off(m.measured_m, m.readings_m, 0.6e-3).points.empty());
+}
+
 TEST(PointsOff, AreNotTheInnocentOnes) {
   for (unsigned seed = 1; seed <= 200; ++seed)
     for (const std::size_t n : {4u, 6u, 7u, 10u, 60u})

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <string>
+#include <utility>
+
 #include "abbe/calib/otf/alignment.hpp"
 #include "abbe/calib/otf/standstill.hpp"
 #include "otf_run.hpp"
@@ -20,12 +23,23 @@ std::string refusal_with_ranges(const MadeRun& run, double longer_m) {
   return a ? "accepted" : a.error().text;
 }
 
+/// The number after `words`; 0 if the text does not have them.
+double mm_after(const std::string& text, const std::string& words) {
+  const auto at = text.find(words);
+  EXPECT_NE(at, std::string::npos) << text;
+  return at == std::string::npos ? 0.0 : std::stod(text.substr(at + words.size()));
+}
+
+/// Errors of 30 um act as a scale error, which 0.3 mm of range at 2 to 3 m make, too.
 TEST(RangeChange, IsNamedWithItsSizeAndDirection) {
-  const MadeRun run = make_run({});
-  EXPECT_THAT(refusal_with_ranges(run, 19.05e-3),
-              HasSubstr("they fit with ranges shorter by 19.05 mm (radius of the reflector"));
-  EXPECT_THAT(refusal_with_ranges(run, -12.7e-3),
-              HasSubstr("they fit with ranges longer by 12.7 mm"));
+  for (const auto& [error_scale_m, tolerance_mm] : {std::pair{0.0, 0.05}, {30e-6, 0.3}}) {
+    const MadeRun run = make_run({.error_scale_m = error_scale_m});
+    const auto longer = refusal_with_ranges(run, 19.05e-3);
+    EXPECT_NEAR(mm_after(longer, "they fit with ranges shorter by "), 19.05, tolerance_mm);
+    EXPECT_THAT(longer, HasSubstr(" mm (radius of the reflector"));
+    EXPECT_NEAR(mm_after(refusal_with_ranges(run, -12.7e-3), "they fit with ranges longer by "),
+                12.7, tolerance_mm);
+  }
 }
 
 TEST(RangeChange, IsNotNamedForAnotherShape) {

@@ -54,6 +54,14 @@ ConfigurationFit fit_with(const ModelDocument& document, const std::string& text
   return fit_of(document, present_configuration(fit_config(text)));
 }
 
+TEST(ConfigurationFit, OfAnEarlierVersionIsFitWhereItWasAccepted) {
+  const auto config = fit_config(kEncoders);
+  const auto present = present_configuration(config);
+  const auto document = former_document(config);
+  EXPECT_EQ(unfit_for(document, present, present.hash), "");
+  EXPECT_NE(unfit_for(document, present, "of another"), "");
+}
+
 TEST(ConfigurationFit, OfAnUnchangedConfigurationIsTheSame) {
   const auto fit = fit_with(document_for(fit_config(kEncoders)), kEncoders);
   EXPECT_EQ(fit.kind, Kind::Same);

@@ -76,6 +76,11 @@ max_rate_hPa_per_min = 6
   EXPECT_DOUBLE_EQ(*sensors.limits[1].most_per_s, 10.0);
 }
 
+TEST(SensorConfiguration, RefusesACorrectionThatFollowsNoSensor) {
+  EXPECT_THAT(fault_text_of("[sensors]\ncorrection_K_per_min = 0.01\n"),
+              ::testing::HasSubstr("sensors.correction_K_per_min: must be at least 0.1"));
+}
+
 TEST(SensorConfiguration, NamesEveryFault) {
   EXPECT_THAT(
       fault_text_of(kScales + R"([[sensors.limit]]

@@ -133,5 +133,15 @@ TEST(MachineHash, DoesNotDependOnTheTransport) {
   EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
 }
 
+TEST(MachineHash, OfAnAbsentTargetIsThatOfATargetInTheMiddle) {
+  auto none = kMachine, zero = kMachine;
+  const auto table = kMachine.find("[target]");
+  const auto line = kMachine.find("offset_mm = [20"), end = kMachine.find('\n', line) + 1;
+  zero.replace(line, end - line, "offset_mm = [0, 0, 0]\n");
+  none.erase(table, end - table);
+  EXPECT_EQ(machine_hash(parse_config(none, "a.toml").value()),
+            machine_hash(parse_config(zero, "b.toml").value()));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

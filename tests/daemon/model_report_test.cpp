@@ -120,6 +120,31 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("No verdict"));
 }
 
+TEST(ModelReport, OfAModelThatWasNotJudgedIsNotRed) {
+  ReportSubject subject = reported(3);
+  subject.document.verdict.reset();
+  subject.entry->judged = subject.entry->accepted = false;
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("No verdict"), Not(HasSubstr("Red: the gate"))));
+}
+
+TEST(ModelReport, OfAnEarlierVersionIsGreenWhereItWasAccepted) {
+  ReportSubject subject = reported(3);
+  subject.machine_hash = "present";
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("for another machine configuration"));
+  subject.events.push_back({.action = StoreAction::Activated,
+                            .id = subject.entry->id,
+                            .actor = {"foreman", "checked", {}}});
+  subject.events.back().accepted_configuration = "present";
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("Green: the gate accepted"));
+}
+
+TEST(ModelReport, StatesTimesThatContradictEachOther) {
+  ReportSubject subject = reported(3);
+  subject.details.now = subject.document.created - std::chrono::hours{48};
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("which is in the future"));
+}
+
 TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
   ReportSubject subject = reported(3);
   EXPECT_THAT(model_report(subject).value(), HasSubstr("<p>Not recorded.</p>"));

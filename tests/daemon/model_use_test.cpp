@@ -108,6 +108,12 @@ TEST(ModelUse, AForcedUseStatesTheRefusalWhoForcedItAndWhy) {
                                    "1971-01-01T12:00:00.000000000Z (UTC): for a test"));
 }
 
+TEST(ModelUse, NoStatementHasAControlCharacter) {
+  const auto found =
+      obstacles_to_use({.document = judged_document(ModelVerdict{.reasons = {"a\x1b[2Jb\n"}})});
+  EXPECT_THAT(found.refusals, ElementsAre(HasSubstr("a\\u{1B}[2Jb ")));
+}
+
 TEST(ModelUse, AModelOfAnEarlierVersionStatesThatItWasNotJudged) {
   const auto found = obstacles_to_use({.document = judged_document({})});
   EXPECT_THAT(found.refusals, IsEmpty());

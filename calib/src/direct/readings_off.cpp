@@ -11,7 +11,8 @@ namespace abbe::calib::direct {
 namespace {
 
 constexpr std::size_t kFewestPositions = 5;
-constexpr double kMostScales = 20.0, kFileResolution = 1e-7;
+constexpr double kMostScales = 20.0, kMostSteps = 5.0, kFileResolution = 1e-7;
+constexpr double kSameValue = 1e-12, kCoarsest = 1e-5;  // rounding; a dial gauge
 
 /// The readings of one direction of one run, by position.
 using Pass = std::vector<std::size_t>;
@@ -79,12 +80,30 @@ Curvatures deviations_of(const MeasuredError& error, const std::vector<Pass>& pa
   return d;
 }
 
-double curvature_limit_of(const Curvatures& d) {
+/// Smallest difference of two values, beyond rounding; 0 if it is that of no instrument.
+double resolution_of(const MeasuredError& error) {
+  std::vector<double> values;
+  for (const Reading& reading : error.readings) {
+    values.push_back(reading.value);
+  }
+  std::sort(values.begin(), values.end());
+  double least = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double step = values[i] - values[i - 1];
+    if (step > kSameValue && (least == 0.0 || step < least)) {
+      least = step;
+    }
+  }
+  return least <= kCoarsest ? least : 0.0;
+}
+
+double curvature_limit_of(const MeasuredError& error, const Curvatures& d) {
   std::vector<double> sizes;
   for (const auto& [reading, deviation] : d) {
     sizes.push_back(std::abs(deviation));
   }
-  return kMostScales * kMadToSigma * median(sizes) + kFileResolution;
+  const double by_scatter = kMostScales * kMadToSigma * median(sizes);
+  return std::max(by_scatter, kMostSteps * resolution_of(error)) + kFileResolution;
 }
 
 /// The largest |d| of the pass.
@@ -160,7 +179,7 @@ std::vector<ReadingOff> readings_off(const MeasuredError& error) {
     return {};
   }
   const Curvatures d = deviations_of(error, passes);
-  const double limit = curvature_limit_of(d);
+  const double limit = curvature_limit_of(error, d);
   std::vector<ReadingOff> found;
   for (std::size_t number = 0; number < passes.size(); ++number) {
     if (!(largest_in(d, passes[number]) > limit)) {

@@ -112,10 +112,12 @@ double rms_of(std::span<const Vector3> measured_m, std::span<const Vector3> want
 
 /// Moves the points of `suspects` that fit the motion back to `rest`.
 void keep_what_fits(const MotionOfRest& motion, std::span<const Vector3> measured_m,
-                    std::span<const Vector3> wanted_m, Indices& rest, Indices& suspects) {
+                    std::span<const Vector3> wanted_m, double least_m, Indices& rest,
+                    Indices& suspects) {
   const auto fits = [&](std::size_t i) {
     // A limit that is not a number: the points do not determine the motion.
-    return !((motion.T * measured_m[i] - wanted_m[i]).norm() > motion.limit_m(wanted_m[i]));
+    const double limit_m = std::max(motion.limit_m(wanted_m[i]), least_m);
+    return !((motion.T * measured_m[i] - wanted_m[i]).norm() > limit_m);
   };
   std::copy_if(suspects.begin(), suspects.end(), std::back_inserter(rest), fits);
   std::erase_if(suspects, fits);
@@ -125,7 +127,8 @@ void keep_what_fits(const MotionOfRest& motion, std::span<const Vector3> measure
 
 }  // namespace
 
-PointsOff points_off(std::span<const Vector3> measured_m, std::span<const Vector3> wanted_m) {
+PointsOff points_off(std::span<const Vector3> measured_m, std::span<const Vector3> wanted_m,
+                     double least_m) {
   const std::size_t n = measured_m.size();
   if (n <= kFewestThatFit) {
     return {};
@@ -148,7 +151,7 @@ PointsOff points_off(std::span<const Vector3> measured_m, std::span<const Vector
     if (!motion) {
       return {};
     }
-    keep_what_fits(*motion, measured_m, wanted_m, rest, suspects);
+    keep_what_fits(*motion, measured_m, wanted_m, least_m, rest, suspects);
   }
   const auto T = fit_rigid(selected(measured_m, rest), selected(wanted_m, rest));
   if (!T || suspects.empty()) {

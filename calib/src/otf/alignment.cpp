@@ -298,9 +298,15 @@ std::string range_change_that_fits(const BlockSeries& series, const Machine& mac
     const auto a = align_as_given(with_longer_ranges(series, change_m), machine, path, loose);
     return a ? std::optional(a->last_rms_m) : std::nullopt;
   };
+  // A change of this size is a mistake; a smaller one only absorbs another error of the run.
+  constexpr double kLeastChange_m = 2e-3, kMostOfRms = 1.0 / 3.0;
   const auto change_m = best_range_change_m(rms_m);
+  if (!change_m || std::abs(*change_m) < kLeastChange_m) {
+    return "";
+  }
+  const auto before_m = rms_m(0.0), after_m = rms_m(*change_m);
   const bool fits =
-      change_m &&
+      before_m && after_m && *after_m <= kMostOfRms * *before_m &&
       align_as_given(with_longer_ranges(series, *change_m), machine, path, options).has_value();
   return fits ? "; they fit with " + range_change_text(*change_m) : "";
 }

@@ -16,7 +16,8 @@ namespace abbe::calib::otf {
 
 /// The change of all ranges with the least rms, at most 60 mm. `rms_m(change)`: rms distance to the
 /// path with ranges changed by this; nullopt if the points cannot be aligned then. Its square is a
-/// parabola of the change, except for the assignment to the path. nullopt: not found.
+/// parabola of the change, except for the assignment to the path. Errors of the machine that act as
+/// a scale error e at the range r shift it by e r: 100 um/m at 2 m by 0.2 mm. nullopt: not found.
 [[nodiscard]] std::optional<double> best_range_change_m(
     const std::function<std::optional<double>(double change_m)>& rms_m);
 

@@ -72,11 +72,25 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
   }
 }
 
-/// Replaces control characters, which a device may have sent to the daemon and which a terminal
-/// would execute. The depth of `value` is bounded by parse_json().
+/// `text` without the control characters that a terminal executes. Tabs and line ends remain: the
+/// text of a configuration file is an answer, too.
+std::string harmless(std::string_view text) {
+  const auto is_kept = [](char c) { return c == '\t' || c == '\r'; };
+  std::string out;
+  while (!text.empty()) {
+    const auto end = std::ranges::find_if(text, is_kept);
+    const auto length = static_cast<std::size_t>(end - text.begin());
+    out += protocol::without_control_characters(text.substr(0, length));
+    if (end != text.end()) out += *end;
+    text.remove_prefix(std::min(text.size(), length + 1));
+  }
+  return out;
+}
+
+/// Replaces what a device may have sent to the daemon and a terminal would execute. The depth of
+/// `value` is bounded by parse_json().
 void replace_control_characters(json& value) {
-  if (value.is_string())
-    value = protocol::without_control_characters(value.get_ref<const std::string&>());
+  if (value.is_string()) value = harmless(value.get_ref<const std::string&>());
   if (value.is_structured())
     for (json& element : value) replace_control_characters(element);
 }

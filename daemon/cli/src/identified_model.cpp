@@ -31,29 +31,29 @@ void add_result_options(CLI::App& command, std::string& keep, bool& json, std::s
   command.add_option("-o,--out", out, "folder for the results; created if needed")->required();
 }
 
-Result<std::optional<ModelDocument>> active_model(const std::string& store) {
-  std::optional<ModelDocument> active;
-  if (store.empty()) return active;
+Result<std::optional<ActiveDocument>> active_model(const std::string& store) {
+  if (store.empty()) return std::nullopt;
   const auto opened = ModelStore::open(store);
   if (!opened) return tl::make_unexpected(opened.error());
-  const auto id = opened->active_id();
-  if (!id) return tl::make_unexpected(id.error());
-  if (!*id) return active;
-  auto document = opened->load(**id);
+  const auto activation = opened->activation();
+  if (!activation) return tl::make_unexpected(activation.error());
+  if (!*activation) return std::nullopt;
+  auto document = opened->load((*activation)->id);
   if (!document) return tl::make_unexpected(document.error());
-  active = std::move(*document);
-  return active;
+  return ActiveDocument{*std::move(document), (*activation)->accepted_configuration};
 }
 
 void ComparisonModel::add_note(calib::Verdict& verdict) const {
   if (!left_out.empty()) verdict.notes.push_back(left_out);
 }
 
-ComparisonModel comparison_model(const std::optional<ModelDocument>& active, const Config& config) {
+ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
+                                 const Config& config) {
   if (!active) return {};
-  if (fit_of(*active, present_configuration(config)).kind != ConfigurationFit::Kind::Same)
-    return {nullptr, std::string{kOfAnotherMachine}};
-  return {&active->model, {}};
+  const auto unfit =
+      unfit_for(active->document, present_configuration(config), active->accepted_configuration);
+  if (!unfit.empty()) return {nullptr, std::string{kOfAnotherMachine}};
+  return {&active->document.model, {}};
 }
 
 namespace {

@@ -119,7 +119,7 @@ Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, con
 }  // namespace
 
 Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
-                                    const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                                    const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   apply(arguments, files->config);
@@ -176,7 +176,7 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
 namespace {
 
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
-                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                              const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto run = identify_files(arguments, active, bar);
   if (!run) return tl::make_unexpected(run.error());
   return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode,

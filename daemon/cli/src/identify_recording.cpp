@@ -81,7 +81,7 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, Pr
 }
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
-                                  const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                                  const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
   apply(arguments, recording->config);

@@ -15,6 +15,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/config/config.hpp"
 #include "commands.hpp"
@@ -46,7 +48,8 @@ void print_identity(const MachineIdentity& identity, const std::string& doubt) {
   fmt::print("state       {}\n", doubt.empty() ? "confirmed" : "not confirmed: " + doubt);
   for (const auto& e : identity.events)
     fmt::print("{:<10}  {}  {}  by {}{}\n", text_of(e.action), to_text(e.when).substr(0, 19),
-               e.machine_id, e.who, e.why.empty() ? "" : ": " + e.why);
+               printable_line(e.machine_id), printable_line(e.who),
+               e.why.empty() ? "" : ": " + printable_line(e.why));
 }
 
 int show_identity(const IdentityArguments& arguments) {
@@ -60,10 +63,9 @@ int show_identity(const IdentityArguments& arguments) {
                                          identity_file(*folder).string())});
   const auto doubt = why_not_confirmed(**identity, marks_of_this_computer());
   if (arguments.json) {
-    fmt::print("{}\n", nlohmann::json{{"machine_id", (*identity)->machine_id},
-                                      {"confirmed", doubt.empty()},
-                                      {"reason", doubt}}
-                           .dump(1));
+    fmt::print("{}\n", indented_json_text(nlohmann::json{{"machine_id", (*identity)->machine_id},
+                                                         {"confirmed", doubt.empty()},
+                                                         {"reason", doubt}}));
   } else {
     print_identity(**identity, doubt);
   }

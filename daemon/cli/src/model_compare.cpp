@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
@@ -96,8 +97,8 @@ int run(const ModelCompareArguments& arguments) {
     return 0;
   }
 
-  for (const auto& caution : found->cautions_a) fmt::print("A: {}\n", caution);
-  for (const auto& caution : found->cautions_b) fmt::print("B: {}\n", caution);
+  for (const auto& caution : found->cautions_a) fmt::print("A: {}\n", printable_line(caution));
+  for (const auto& caution : found->cautions_b) fmt::print("B: {}\n", printable_line(caution));
   fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found->points);
   fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
   print("as stated", d.as_stated);

@@ -105,7 +105,7 @@ void print_model(const ModelDocument& document) {
   for (const auto& input : document.inputs)
     fmt::print("input       {}  sha256 {}\n", printable_line(input.name), input.sha256);
   if (!document.recording_gap.empty())
-    fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
+    fmt::print("            {}\n", printable_line(cannot_be_checked(document.recording_gap)));
   fmt::print("devices     {}\n", devices_in_words(made_on_simulated_devices(document)));
   if (document.model.travel() != nullptr)
     fmt::print(
@@ -124,7 +124,7 @@ int show_file(const ModelStoreArguments& arguments) {
     fmt::print("{}", to_json(*document));
   } else {
     fmt::print("id          {}\nfile        {}\nverdict     {}\n", model_id(*document),
-               arguments.id, in_one_line(document->verdict));
+               printable_line(arguments.id), printable_line(in_one_line(document->verdict)));
     print_model(*document);
   }
   return 0;
@@ -147,7 +147,7 @@ int show(const ModelStoreArguments& arguments) {
 
   print_entry(stored->entry);
   if (const auto& verdict = stored->document.verdict; verdict && verdict->forced)
-    fmt::print("forced by   {}\n", who_and_when(*verdict->forced));
+    fmt::print("forced by   {}\n", printable_line(who_and_when(*verdict->forced)));
   print_model(stored->document);
 
   return 0;

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -147,6 +148,16 @@ std::string file_name(const ReportSubject& subject, const ReportArguments& argum
   return fmt::format("{}-{}.html", arguments.trend ? "trend" : "report", id);
 }
 
+/// Without what the model itself has: nobody can correct it, and the report states it.
+std::vector<std::string> contradictory_details(const ReportSubject& subject) {
+  auto wrong = contradictory_dates(subject, nullptr);
+  const auto of_model = contradictory_times(subject);
+  std::erase_if(wrong, [&of_model](const std::string& text) {
+    return std::ranges::find(of_model, text) != of_model.end();
+  });
+  return wrong;
+}
+
 Result<void> write_report(const ReportArguments& arguments) {
   CertificateDetails details;
   if (!arguments.details.empty()) {
@@ -163,7 +174,7 @@ Result<void> write_report(const ReportArguments& arguments) {
   for (const auto& file : written)
     if (auto place = file.empty() ? Result<void>{} : require_place_of(file); !place) return place;
 
-  if (auto wrong = contradictory_dates(*subject, nullptr); arguments.dcc.empty() && !wrong.empty())
+  if (auto wrong = contradictory_details(*subject); arguments.dcc.empty() && !wrong.empty())
     return tl::make_unexpected(
         Error{ErrorCode::BadInput, "report: dates are impossible", std::move(wrong)});
 

@@ -6,6 +6,7 @@
 #include <CLI/Formatter.hpp>
 #include <system_error>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/model/machine_identity.hpp"
 #include "abbe/model/stored_model.hpp"
@@ -114,7 +115,7 @@ std::vector<std::string> cautions_of(const FoundModel& model) {
 
 void print_cautions(const std::string& name, const FoundModel& model) {
   for (const std::string& caution : cautions_of(model))
-    fmt::print(stderr, "abbe: caution: {}: {}\n", name, caution);
+    fmt::print(stderr, "abbe: caution: {}: {}\n", printable_line(name), printable_line(caution));
 }
 
 }  // namespace abbe::daemon

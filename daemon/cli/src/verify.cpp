@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 #include <system_error>
 
 #include "abbe/base/json_text.hpp"
@@ -111,13 +112,13 @@ std::string place_of(const VerificationFile& file, std::size_t point) {
 
 /// One line for each point that alone does not fit the others.
 std::vector<std::string> lines_of_points_off(const VerificationFile& file,
-                                             const calib::fit::PointsOff& off) {
+                                             const calib::fit::PointsOff& off,
+                                             std::string_view advice) {
   std::vector<std::string> lines;
   for (const auto& [point, distance_m] : off.points)
     lines.push_back(fmt::format(
-        "{}: alone does not fit: {:.4g} mm off, the others fit within {:.4g} mm rms: correct or "
-        "delete it",
-        place_of(file, point), kMmPerM * distance_m, kMmPerM * off.rms_others_m));
+        "{}: alone does not fit: {:.4g} mm off, the others fit within {:.4g} mm rms: {}",
+        place_of(file, point), kMmPerM * distance_m, kMmPerM * off.rms_others_m, advice));
   return lines;
 }
 
@@ -133,7 +134,7 @@ Error with_points_off(Error error, const VerificationFile& file) {
   return {error.code,
           fmt::format("verification: {} of {} points alone do not fit the others",
                       off.points.size(), file.points.size()),
-          lines_of_points_off(file, off)};
+          lines_of_points_off(file, off, "correct or delete it")};
 }
 
 Result<verify::Observations> observed_in(const VerifyArguments& arguments,
@@ -155,9 +156,11 @@ std::vector<std::string> off_with_model(const VerificationFile& file,
     measured_m.push_back(at_m);
     corrected_m.emplace_back(reading_m + model.V_at(reading_m, tool_m));
   }
-  auto off = calib::fit::points_off(measured_m, corrected_m);
+  // An error of the size of those of the machine is one that the model does not know.
+  auto off = calib::fit::points_off(measured_m, corrected_m, compared.before.rms_m);
   for (auto& found : off.points) found.point = compared.inside[found.point];
-  return lines_of_points_off(file, off);
+  return lines_of_points_off(
+      file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
 
 /// Sets `cut_short` if points are missing, even if the comparison fails: the missing points may be

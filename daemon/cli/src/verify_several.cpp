@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/verify/compare.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -69,7 +70,7 @@ void print_predictions_json(const std::vector<Predicted>& all, std::size_t point
 
 void print_prediction(const std::string& name, const char* effect,
                       const calib::VectorStatistics& s) {
-  fmt::print("{:<32}  {:>9.3f}  {:>9.3f}  {:>9.3f}  {}\n", name, kUmPerM * s.mean_m,
+  fmt::print("{:<32}  {:>9.3f}  {:>9.3f}  {:>9.3f}  {}\n", printable_line(name), kUmPerM * s.mean_m,
              kUmPerM * s.rms_m, kUmPerM * s.max_m, effect);
 }
 
@@ -83,7 +84,8 @@ void print_predictions(const std::vector<Predicted>& all, std::size_t points,
     print_prediction(model->name, effect_name(verify::effect_at_points(at_points)),
                      at_points.after);
   for (const auto& [model, at_points] : all)
-    for (const std::string& caution : model->cautions) fmt::print("{}: {}\n", model->name, caution);
+    for (const std::string& caution : model->cautions)
+      fmt::print("{}: {}\n", printable_line(model->name), printable_line(caution));
 }
 
 }  // namespace

@@ -171,8 +171,8 @@ void read_machine(ClassifiedSection& root, MachineConfig& out) {
   read_axes(root.child("axes", Need::Required), out);
 
   ClassifiedSection target = root.child("target");
-  std::vector<double> offset_m;
-  if (target.get(if_given(reading("offset_mm")), offset_m, kMilli)) {
+  std::vector<double> offset_m(3, 0.0);  // written or not: the same machine
+  if (target.get(reading("offset_mm"), offset_m, kMilli)) {
     out.target_given = offset_m.size() == 3;
     if (out.target_given)
       std::copy(offset_m.begin(), offset_m.end(), out.target_offset_m.begin());

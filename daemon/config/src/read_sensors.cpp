@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <string>
 #include <string_view>
@@ -87,7 +88,9 @@ void read_sensors(ClassifiedSection& root, Config& out) {
   sensors.get("hold_s", config.hold, kPlain, {0.0, 3600.0});
   sensors.get("forget_s", config.forget, kPlain, {1.0, 86'400.0});
   sensors.get("start_spread_K", config.start_spread_K, kPlain, kPositive);
-  sensors.get("correction_K_per_min", config.correction_K_per_s, {kSecondsPerMinute}, kPositive);
+  // The air of a hall changes by some K per hour: a slower correction would never follow it.
+  sensors.get("correction_K_per_min", config.correction_K_per_s, {kSecondsPerMinute},
+              {0.1, std::numeric_limits<double>::infinity()});
 
   std::set<std::string> named;
   for (auto& section : sensors.children("limit")) {

@@ -162,7 +162,9 @@ bool Section::get(std::string_view key, std::string& out, Need need) {
 }
 
 void Section::check_characters(std::string_view key, std::string_view value) {
-  const auto is_control = [](char c) { return (c >= 0 && c < ' ' && c != '\n') || c == '\x7f'; };
+  const auto is_control = [](char c) {
+    return (c >= 0 && c < ' ' && c != '\n' && c != '\t') || c == '\x7f';
+  };
   const auto found = std::ranges::find_if(value, is_control);
   if (found != value.end())
     implausible(key, fmt::format("contains {}", protocol::strange_character({&*found, 1})));

@@ -42,6 +42,13 @@ ConfigurationFit fit_of(const ModelDocument& document, const PresentConfiguratio
                                  : older_hash(document, differing.added);
 }
 
+std::string unfit_for(const ModelDocument& document, const PresentConfiguration& present,
+                      const std::string& accepted_configuration) {
+  const auto fit = fit_of(document, present);
+  const bool accepted = fit.kind == Kind::OlderHash && accepted_configuration == present.hash;
+  return accepted ? std::string{} : fit.sentence;
+}
+
 std::string changed_measurements(const ModelDocument& document,
                                  const PresentConfiguration& present) {
   if (!document.configuration) return {};

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/utc_text.hpp"
@@ -128,7 +129,7 @@ std::optional<MachineIdentity> identity_from(const json& document) {
 
 Result<void> write_identity(const fs::path& data_dir, const MachineIdentity& identity) {
   if (auto made = create_folder(data_dir); !made) return made;
-  return replace_file(identity_file(data_dir), identity_json(identity).dump(1) + "\n");
+  return replace_file(identity_file(data_dir), indented_json_text(identity_json(identity)) + "\n");
 }
 
 std::string store_event_text(const StoreEvent& event) {

@@ -47,13 +47,17 @@ class ModelIndex {
   ModelIndex& operator=(const ModelIndex&) = delete;
   ~ModelIndex();
 
-  /// All rows with a correct checksum, by id.
-  [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows() const;
-  /// Adds rows, or replaces those of the same id.
+  /// All rows with a correct checksum, by id; none, and an empty index, if SQLite finds damage.
+  [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows();
+  /// Adds rows, or replaces those of the same id. A damaged index is then empty.
   void put(std::span<const IndexedModel> models);
   void remove(std::span<const std::string> ids);
 
  private:
+  /// An empty index in place of the present one; none if the folder is not writable.
+  void make_again();
+
+  std::filesystem::path file_;
   std::unique_ptr<SQLite::Database> database_;  ///< null: there is no usable index
 };
 

@@ -151,15 +151,22 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   // but with the same model, because the id is a hash of the model. A file of this id that is
   // damaged, or has another verdict, is replaced.
   const ModelVerdict verdict{accepted, reasons};
-  if (const auto known = load(id); !known || !same_decision(known->verdict, verdict)) {
+  const auto write_model_file = [&]() -> Result<void> {
     const ModelDocument judged = with_verdict(document, verdict);
-    if (const auto written = replace_file(model_path(id), to_json(judged)); !written)
-      return tl::make_unexpected(written.error());
+    if (auto written = replace_file(model_path(id), to_json(judged)); !written) return written;
     const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(judged)};
     ModelIndex{folder_}.put({&indexed, 1});
-  }
+    return {};
+  };
+  if (const auto known = load(id); !known || !same_decision(known->verdict, verdict))
+    if (const auto written = write_model_file(); !written)
+      return tl::make_unexpected(written.error());
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
+  // remove_old() of another process may have deleted the file meanwhile.
+  if (std::error_code seen; !fs::exists(model_path(id), seen) && !seen)
+    if (const auto written = write_model_file(); !written)
+      return tl::make_unexpected(written.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
 

@@ -4,13 +4,16 @@
 
 #include <algorithm>
 
+#include "abbe/base/printable.hpp"
+
 namespace abbe::daemon {
 namespace {
 
+/// Spaces for line ends and tabs; a terminal must not take the rest for a command.
 std::string one_line(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return text;
+  return printable_line(text);
 }
 
 /// The last event of the model that found drift, unless a person activated the model after it.
@@ -32,11 +35,12 @@ void add_verdict(const ModelInUse& use, Obstacles& out) {
   (verdict && !verdict->accepted ? out.refusals : out.statements).push_back(text);
 }
 
-/// A person accepted the model of an earlier version for this configuration.
+/// A person accepted the model of an earlier version for this configuration and no later one.
 bool accepted_for(std::span<const StoreEvent> events, const std::string& machine_hash) {
-  return std::ranges::any_of(events, [&machine_hash](const StoreEvent& event) {
-    return event.accepted_configuration == machine_hash;
+  const auto last = std::find_if(events.rbegin(), events.rend(), [](const StoreEvent& event) {
+    return !event.accepted_configuration.empty();
   });
+  return last != events.rend() && last->accepted_configuration == machine_hash;
 }
 
 /// Nobody signs a certificate of a machine that does not exist. A control file of such a model may be
@@ -54,13 +58,17 @@ void add_later_changes(const ModelInUse& use, Obstacles& out) {
   auto& list = use.purpose == ModelPurpose::Control ? out.refusals : out.statements;
   if (const StoreEvent* drift = drift_of(use.events); drift != nullptr)
     list.push_back("a later run found drift: " + who_and_when(drift->actor));
-  if (use.machine_hash && *use.machine_hash != use.document.machine_hash &&
-      !accepted_for(use.events, *use.machine_hash))
+  if (is_of_another_machine(use))
     list.emplace_back("STALE: the model was made for another machine configuration");
   if (!use.identity_doubt.empty()) list.push_back("STALE: " + use.identity_doubt);
 }
 
 }  // namespace
+
+bool is_of_another_machine(const ModelInUse& use) {
+  return use.machine_hash && *use.machine_hash != use.document.machine_hash &&
+         !accepted_for(use.events, *use.machine_hash);
+}
 
 Obstacles obstacles_to_use(const ModelInUse& use) {
   Obstacles found;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/messages/attachment_content.hpp"
 #include "abbe/pipeline/sensor_checks.hpp"
 
@@ -68,7 +69,7 @@ RecordingAttachment SensorChecks::to_attachment() const {
                    {"doubt", static_cast<int>(s.doubt)}});
   return {.name = std::string{kSensorStateName},
           .media_type = "application/json",
-          .content = all.dump()};
+          .content = json_text(all)};
 }
 
 Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {

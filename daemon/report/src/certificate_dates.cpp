@@ -47,7 +47,7 @@ void compare_with_model(const CertificateDetails& d, const ReportSubject& subjec
                                 state, day_of(last)));
 }
 
-/// A measurement cannot end after the model was identified, whatever clock was wrong.
+/// A measurement cannot end after the model was identified.
 void compare_with_identification(const CertificateDetails& d, const ReportSubject& subject,
                                  bool is_last, std::vector<std::string>& wrong) {
   const protocol::UtcTime created = subject.document.created;
@@ -59,12 +59,23 @@ void compare_with_identification(const CertificateDetails& d, const ReportSubjec
   };
   require(d.begin_date, "begin_date");
   if (is_last) require(d.end_date, "end_date");
-  const auto measured = measured_of(subject.document);
+}
+
+/// Times of the model alone that contradict each other, or the present time `now`.
+void compare_clocks(const ModelDocument& document, const std::optional<protocol::UtcTime>& now,
+                    std::vector<std::string>& wrong) {
+  const protocol::UtcTime created = document.created;
+  const auto measured = measured_of(document);
   if (measured && (*measured)[1] > created + kMostAheadOfUtc)
     wrong.push_back(fmt::format(
         "model {}: measured until {}, but identified {} (UTC): one of the clocks was wrong; "
         "identify it again",
-        model_id(subject.document), to_seconds((*measured)[1]), to_seconds(created)));
+        model_id(document), to_seconds((*measured)[1]), to_seconds(created)));
+  if (now && created > *now + kMostAheadOfUtc)
+    wrong.push_back(
+        fmt::format("model {}: identified {}, which is in the future (now {} UTC): the "
+                    "clock of this or that computer is wrong",
+                    model_id(document), to_seconds(created), to_seconds(*now)));
 }
 
 /// Dates after the present day.
@@ -72,15 +83,6 @@ void compare_with_today(const CertificateDetails& d, std::vector<std::string>& w
   if (d.now && d.issue_date > day_of(*d.now + kMostAheadOfUtc))
     wrong.push_back(fmt::format("certificate.issue_date: {} is in the future, today is {} (UTC)",
                                 d.issue_date, day_of(*d.now)));
-}
-
-void compare_with_today(const CertificateDetails& d, const ModelDocument& document,
-                        std::vector<std::string>& wrong) {
-  if (d.now && document.created > *d.now + kMostAheadOfUtc)
-    wrong.push_back(
-        fmt::format("model {}: identified {}, which is in the future (now {} UTC): the "
-                    "clock of this or that computer is wrong",
-                    model_id(document), to_seconds(document.created), to_seconds(*d.now)));
 }
 
 void compare_measurements(const ReportSubject& as_found, const ReportSubject& as_left,
@@ -138,12 +140,18 @@ std::vector<std::string> contradictory_dates(const ReportSubject& as_found,
   compare_with_model(d, as_found, as_left != nullptr ? "as found" : "the measurement", wrong);
   compare_with_identification(d, as_found, as_left == nullptr, wrong);
   compare_with_today(d, wrong);
-  compare_with_today(d, as_found.document, wrong);
+  compare_clocks(as_found.document, d.now, wrong);
   if (as_left == nullptr) return wrong;
   compare_with_model(d, *as_left, "as left", wrong);
   compare_with_identification(d, *as_left, true, wrong);
-  compare_with_today(d, as_left->document, wrong);
+  compare_clocks(as_left->document, d.now, wrong);
   compare_measurements(as_found, *as_left, wrong);
+  return wrong;
+}
+
+std::vector<std::string> contradictory_times(const ReportSubject& subject) {
+  std::vector<std::string> wrong;
+  compare_clocks(subject.document, subject.details.now, wrong);
   return wrong;
 }
 

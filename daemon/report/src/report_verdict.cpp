@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "abbe/base/utc_text.hpp"
+#include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_words.hpp"
 #include "certificate_dates.hpp"
 #include "report_sections.hpp"
@@ -23,13 +25,6 @@ void add_expired_equipment(const ReportSubject& subject, std::vector<std::string
                       e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
-/// That of the document; of a model of an earlier version that of the store.
-std::optional<ModelVerdict> verdict_on(const ReportSubject& subject) {
-  const auto& entry = subject.entry;
-  if (subject.document.verdict || !entry) return subject.document.verdict;
-  return ModelVerdict{entry->accepted, entry->reasons};
-}
-
 /// What its user must know apart from the verdict, which is the first statement. Some of it is among
 /// the notes already.
 void add_obstacles(const ReportSubject& subject, std::vector<std::string>& notes) {
@@ -41,7 +36,7 @@ void add_obstacles(const ReportSubject& subject, std::vector<std::string>& notes
 /// What happened to the model in the store, apart from its verdict.
 std::vector<std::string> notes_of(const ReportSubject& subject) {
   std::vector<std::string> notes;
-  if (const auto verdict = verdict_on(subject)) notes = verdict->notes;
+  if (const auto& verdict = subject.document.verdict) notes = verdict->notes;
   if (notes.empty() && subject.document.run) notes = subject.document.run->notes;
   for (const StoreEvent& event : subject.events) {
     switch (event.action) {
@@ -68,6 +63,7 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
   if (subject.forced && !certified.refusals.empty())
     notes.push_back("a certificate of it was made nevertheless, forced by " +
                     who_and_when(*subject.forced));
+  for (auto& wrong : contradictory_times(subject)) notes.push_back(std::move(wrong));
   add_obstacles(subject, notes);
   add_expired_equipment(subject, notes);
   return notes;
@@ -75,10 +71,6 @@ std::vector<std::string> notes_of(const ReportSubject& subject) {
 
 bool has_drifted(const ReportSubject& subject) {
   return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
-}
-
-bool is_of_another_machine(const ReportSubject& subject) {
-  return subject.machine_hash && *subject.machine_hash != subject.document.machine_hash;
 }
 
 std::string_view place_in_words(const ReportSubject& subject) {
@@ -90,7 +82,7 @@ std::string_view place_in_words(const ReportSubject& subject) {
 
 VerdictInWords verdict_in_words(const ReportSubject& subject) {
   VerdictInWords words{.text = {}, .reasons = {}, .notes = notes_of(subject)};
-  const auto verdict = verdict_on(subject);
+  const auto& verdict = subject.document.verdict;
   const auto set = [&](Signal signal, std::string_view text) {
     words.signal = signal;
     words.text = fmt::format("{} {}", text, place_in_words(subject));
@@ -102,7 +94,7 @@ VerdictInWords verdict_in_words(const ReportSubject& subject) {
     set(Signal::Red, verdict->forced ? "Red: the gate refused the model; it was activated by force."
                                      : "Red: the gate refused the model.");
     words.reasons = verdict->reasons;
-  } else if (is_of_another_machine(subject)) {
+  } else if (is_of_another_machine(in_use(subject, ModelPurpose::Look))) {
     set(Signal::Yellow, "Yellow: accepted, but made for another machine configuration.");
   } else if (has_drifted(subject)) {
     set(Signal::Yellow, "Yellow: accepted, but the machine has changed since.");

@@ -21,15 +21,6 @@ std::optional<double> largest_U_m(const calib::VolumetricModel& model) {
   return volume ? std::optional(volume->max_U_m) : std::nullopt;
 }
 
-/// Empty if the model is for this configuration, or was accepted for it.
-std::string unfit_for(const PresentConfiguration& configuration, const ModelDocument& document,
-                      const StoreEvent& activation) {
-  const auto fit = fit_of(document, configuration);
-  const bool accepted = fit.kind == ConfigurationFit::Kind::OlderHash &&
-                        activation.accepted_configuration == configuration.hash;
-  return accepted ? std::string{} : fit.sentence;
-}
-
 std::string not_known_since(const std::string& damaged_state) {
   return fmt::format(
       "which model was active is not known: the store's state was damaged and is kept as {}; "
@@ -137,7 +128,7 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
 ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument document,
                                    protocol::HostTime now) const {
   ActiveModel active{.activation = activation};
-  active.unfit = unfit_for(*configuration_, document, activation);
+  active.unfit = unfit_for(document, *configuration_, activation.accepted_configuration);
   active.measured_otherwise = changed_measurements(document, *configuration_);
   active.recording_gap = document.recording_gap;
   auto model = std::make_shared<const PublishedModel>(PublishedModel{

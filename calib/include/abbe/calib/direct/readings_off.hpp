@@ -7,10 +7,12 @@
 /// slope of a pass changes. With at least three passes, d = curvature minus its median over the
 /// passes at this position; else d = curvature. Robust scale: s = 1.4826 median |d| over all values
 /// of the error. A value is off if
-///     |d| > 20 s + 1e-7   (0.1 um or urad: the resolution of files)
+///     |d| > max(20 s, 5 r) + 1e-7   (0.1 um or urad: the resolution of files)
+/// with the resolution r of the instrument, the smallest difference of two values of the error:
+/// where it is coarse, most d are 0 and so is s,
 /// and if without it (or without it and one other) no value of its pass is: its neighbours, whose
-/// curvature it changes, are not named. With one or two passes a real step of the machine at one position is named, too. Not
-/// tested: passes with fewer than five positions. Pure; allocates.
+/// curvature it changes, are not named. With one or two passes a real step of the machine at one
+/// position is named, too. Not tested: passes with fewer than five positions. Pure; allocates.
 
 #include <cstddef>
 #include <vector>

@@ -32,8 +32,9 @@ struct PointsOff {
   double rms_others_m = 0.0;     ///< rms distance of all other points; 0 if no point is off
 };
 
-/// `measured_m[i]` is the measurement of the point `wanted_m[i]`, in a frame of its own.
+/// `measured_m[i]` is the measurement of the point `wanted_m[i]`, in a frame of its own. A point with
+/// d <= `least_m` is not off.
 [[nodiscard]] PointsOff points_off(std::span<const Vector3> measured_m,
-                                   std::span<const Vector3> wanted_m);
+                                   std::span<const Vector3> wanted_m, double least_m = 0.0);
 
 }  // namespace abbe::calib::fit

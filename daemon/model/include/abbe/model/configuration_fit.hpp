@@ -31,6 +31,12 @@ struct ConfigurationFit {
 [[nodiscard]] ConfigurationFit fit_of(const ModelDocument& document,
                                       const PresentConfiguration& present);
 
+/// Why the model must not be applied to this configuration; empty: it is for it, or it is of an
+/// earlier version and was accepted for it. `accepted_configuration`: that of its activation.
+[[nodiscard]] std::string unfit_for(const ModelDocument& document,
+                                    const PresentConfiguration& present,
+                                    const std::string& accepted_configuration);
+
 /// What was measured otherwise when the model was made: "[tracker] reflector was A, is B". Empty:
 /// nothing, or not known. A device that is not configured any more is not named.
 [[nodiscard]] std::string changed_measurements(const ModelDocument& document,

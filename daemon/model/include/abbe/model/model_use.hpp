@@ -29,7 +29,11 @@ struct ModelInUse {
   std::string identity_doubt{};
 };
 
-/// Sentences without full stop; none has a line break.
+/// True if the model was made for another configuration than that of `machine_hash`, and nobody
+/// accepted it for this one. False if the configuration is not known.
+[[nodiscard]] bool is_of_another_machine(const ModelInUse& use);
+
+/// Sentences without full stop; none has a line break or a control character.
 struct Obstacles {
   std::vector<std::string> refusals;    ///< the model must not be used, unless a person forces it
   std::vector<std::string> statements;  ///< belong into each file that is made of the model

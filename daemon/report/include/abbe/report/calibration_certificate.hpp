@@ -21,9 +21,13 @@ namespace abbe::daemon {
     const ReportSubject& as_found, const std::optional<ReportSubject>& as_left = {});
 
 /// Dates of the details that no calendar has, that contradict each other, the measurements or the
-/// identification of the models, or that are in the future. A report with them is wrong, too.
+/// identification of the models, or that are in the future; and contradictory_times() of both.
 /// `as_left` may be null.
 [[nodiscard]] std::vector<std::string> contradictory_dates(const ReportSubject& as_found,
                                                            const ReportSubject* as_left);
+
+/// Times of the model alone that contradict each other or the present. No details can correct them:
+/// a certificate is refused, a report has them among its notes.
+[[nodiscard]] std::vector<std::string> contradictory_times(const ReportSubject& subject);
 
 }  // namespace abbe::daemon

@@ -45,10 +45,15 @@ ModelSummary summary_from(const std::string& text) {
           object.at("fault").get<std::string>()};
 }
 
-/// SQLite has no checksums, and a changed bit must not rename a machine.
+/// SQLite has no checksums, and a changed bit must not rename a machine. Another version of abbe may
+/// read a file that this one cannot.
 std::string checksum(const std::string& id, const StoreStamp& file, const std::string& summary) {
-  return sha256_hex(
-      fmt::format("{} {} {} {} {}", id, file.inode, file.modified_ns, file.bytes, summary));
+  return sha256_hex(fmt::format("{} {} {} {} {} {}", ABBE_VERSION, id, file.inode, file.modified_ns,
+                                file.bytes, summary));
+}
+
+bool is_damage(const SQLite::Exception& error) {
+  return error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
 }
 
 bool is_regular_or_missing(const fs::path& file) {
@@ -81,18 +86,22 @@ std::unique_ptr<SQLite::Database> create_index(const fs::path& file) {
 
 }  // namespace
 
-ModelIndex::ModelIndex(const fs::path& folder) {
-  const fs::path file = folder / "index.sqlite";
-  if (!is_regular_or_missing(file)) return;
+ModelIndex::ModelIndex(const fs::path& folder) : file_(folder / "index.sqlite") {
+  if (!is_regular_or_missing(file_)) return;
 
   try {
-    database_ = open_index(file);
+    database_ = open_index(file_);
   } catch (const SQLite::Exception& error) {
     if (error.getErrorCode() == SQLITE_BUSY) return;
   }
-  if (database_ != nullptr || ::access(folder.c_str(), W_OK) != 0) return;
+  if (database_ == nullptr) make_again();
+}
+
+void ModelIndex::make_again() {
+  database_.reset();
+  if (::access(file_.parent_path().c_str(), W_OK) != 0) return;
   try {
-    database_ = create_index(file);
+    database_ = create_index(file_);
   } catch (const SQLite::Exception&) {  // a full disk, or another process creates it now
     database_ = nullptr;
   }
@@ -100,7 +109,7 @@ ModelIndex::ModelIndex(const fs::path& folder) {
 
 ModelIndex::~ModelIndex() = default;
 
-std::unordered_map<std::string, IndexedModel> ModelIndex::rows() const {
+std::unordered_map<std::string, IndexedModel> ModelIndex::rows() {
   std::unordered_map<std::string, IndexedModel> found;
   if (database_ == nullptr) return found;
 
@@ -118,8 +127,9 @@ std::unordered_map<std::string, IndexedModel> ModelIndex::rows() const {
       std::string id = model.id;
       found.insert_or_assign(std::move(id), std::move(model));
     }
-  } catch (const SQLite::Exception&) {  // the rows so far have their checksums
-  } catch (const json::exception&) {    // a version of abbe with other members and the same number
+  } catch (const SQLite::Exception& error) {  // the rows so far have their checksums
+    if (is_damage(error)) make_again();
+  } catch (const json::exception&) {  // a version of abbe with other members and the same number
     found.clear();
   }
   return found;
@@ -139,7 +149,8 @@ void ModelIndex::put(std::span<const IndexedModel> models) {
       row.reset();
     }
     change.commit();
-  } catch (const SQLite::Exception&) {  // read-only, busy or full: these models are read again
+  } catch (const SQLite::Exception& error) {  // else read-only, busy or full: they are read again
+    if (is_damage(error)) make_again();
   }
 }
 

@@ -45,12 +45,16 @@ class ModelIndex {
   ~ModelIndex();
 
   /// All rows with a correct checksum, by id.
-  [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows() const;
+  [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows();
   /// Adds rows, or replaces those of the same id.
   void put(std::span<const IndexedModel> models);
   void remove(std::span<const std::string> ids);
 
  private:
+  /// Replaces the file by an empty index, if the folder is writable.
+  void make_again();
+
+  std::filesystem::path file_;
   std::unique_ptr<SQLite::Database> database_;  ///< null: there is no usable index
 };
 

@@ -70,6 +70,15 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
+/// Writes the file of a model, and adds it to the index.
+Result<void> write_model(const fs::path& folder, const fs::path& file, const std::string& id,
+                         const ModelDocument& document) {
+  if (auto written = replace_file(file, to_json(document)); !written) return written;
+  const IndexedModel indexed{id, stamp_of_file(file), summary_of(document)};
+  ModelIndex{folder}.put({&indexed, 1});
+  return {};
+}
+
 constexpr std::size_t kShortestPrefix = 4;
 
 /// Why `prefix` does not name one of `candidates`, the ids that begin with it.
@@ -124,14 +133,14 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   // The model file is written first and without the lock. Another process may write the same file,
   // but with the same model, because the id is a hash of the model. A damaged file of this id is
   // replaced.
-  if (!load(id)) {
-    if (const auto written = replace_file(model_path(id), to_json(document)); !written)
+  if (!load(id))
+    if (const auto written = write_model(folder_, model_path(id), id, document); !written)
       return tl::make_unexpected(written.error());
-    const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(document)};
-    ModelIndex{folder_}.put({&indexed, 1});
-  }
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
+  if (stamp_of_file(model_path(id)) == StoreStamp{})  // remove_old() removed it meanwhile
+    if (const auto written = write_model(folder_, model_path(id), id, document); !written)
+      return tl::make_unexpected(written.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
 

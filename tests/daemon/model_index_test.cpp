@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -94,6 +95,19 @@ TEST_F(ModelIndexTest, ADamagedIndexIsMadeAgain) {
   std::ofstream(index()) << "this is no database, but longer than the header of one";
   EXPECT_THAT(listed(), ElementsAre(id));
   EXPECT_THAT(text_of(index()), HasSubstr("SQLite format 3"));
+}
+
+// The page behind the header, which holds the rows.
+TEST_F(ModelIndexTest, ADamagedPageOfTheIndexIsMadeAgain) {
+  const auto id = add(1);
+  std::string bytes = text_of(index());
+  constexpr std::size_t kPage = 4096;
+  ASSERT_GE(bytes.size(), 2 * kPage);
+  std::fill(bytes.begin() + kPage, bytes.begin() + 2 * kPage, 'x');
+  std::ofstream(index(), std::ios::binary) << bytes;
+  EXPECT_THAT(listed(), ElementsAre(id));
+  damage_unnoticed(id);
+  EXPECT_EQ(store().list().value()[0].fault, "");  // it was added to the new index
 }
 
 // Any flipped bit: a list may read models again, but never shows what they do not contain.

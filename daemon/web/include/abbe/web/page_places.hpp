@@ -13,8 +13,8 @@ namespace abbe::web {
 /// that a computer that opens page after page leaves places for others.
 ///
 /// A page reports that it reads its events. One that has not done so for some time loses its place
-/// as soon as another page needs it: the buffers of a connection hide for long that a page does not read.
-/// Thread-safe.
+/// as soon as another page needs it, because the buffers of a connection take events that the page
+/// does not read. Thread-safe.
 class PagePlaces {
  public:
   using Clock = std::chrono::steady_clock;

@@ -314,6 +314,7 @@ TEST(CalibrationCertificate, NamesEverythingThatIsMissing) {
 TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
   ReportSubject subject = certified_subject(3);
   subject.document.run.reset();
+  subject.document.created += std::chrono::hours{24 * 365 * 3};  // after these days
   subject.details.begin_date = "2026-11-25";
   subject.details.end_date = "2026-11-24";
   subject.details.issue_date = "2026-11-23";

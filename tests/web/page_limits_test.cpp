@@ -334,7 +334,7 @@ TEST_F(PageLimitsTest, StreamsThatNobodyReadsGiveWayToAPage) {
   }
 }
 
-TEST_F(PageLimitsTest, APageThatReportsKeepsItsPlace) {
+TEST_F(PageLimitsTest, APageReportsThatItReadsByTheNumberOfItsPlace) {
   ASSERT_NO_FATAL_FAILURE(start("most_pages = 1\n"));
   const auto page = connection(page_->port(), get_request("/events"));
   std::string text;

@@ -35,6 +35,46 @@ bool all_inside(std::span<const Vector3> points_m, const Matrix3& M, const Machi
   });
 }
 
+double travel_m(const AxisNodes& axis) {
+  return axis.nodes_m.back() - axis.nodes_m.front();
+}
+
+/// A wrong sign, order or unit moves coordinates by a large part of the travel. A coordinate a
+/// little beyond an end is a coordinate a little beyond an end.
+bool is_far_outside(std::span<const Vector3> points_m, const MachineNodes& travel) {
+  constexpr double kFar = 0.05;
+  double shortest_m = travel_m(travel[0]);
+  for (const AxisNodes& axis : travel) {
+    shortest_m = std::min(shortest_m, travel_m(axis));
+  }
+  return !outside_travel(points_m, travel, kFar * shortest_m).empty();
+}
+
+/// True if the scaled points extend over at least half of the travel of an axis. A factor below 1
+/// makes all coordinates small, and small coordinates are inside the travel of most machines.
+bool fills(std::span<const Vector3> points_m, double factor, const MachineNodes& travel) {
+  constexpr double kPart = 0.5;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto [low, high] = std::minmax_element(
+        points_m.begin(), points_m.end(), [a](const Vector3& p, const Vector3& q) {
+          return p(static_cast<Eigen::Index>(a)) < q(static_cast<Eigen::Index>(a));
+        });
+    const auto k = static_cast<Eigen::Index>(a);
+    if (factor * ((*high)(k) - (*low)(k)) >= kPart * travel_m(travel[a])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Units of the points that may be wrong, and those of the travel.
+std::vector<UnitMistake> units_of_points_or_travel() {
+  std::vector<UnitMistake> all = unit_mistakes();
+  all.push_back({"the travel of the axes in inches instead of mm", 1.0 / 25.4});
+  all.push_back({"the travel of the axes in m instead of mm", 1e-3});
+  return all;
+}
+
 }  // namespace
 
 const std::vector<AxisMistake>& axis_mistakes() {
@@ -76,6 +116,9 @@ std::vector<OutsideTravel> outside_travel(std::span<const Vector3> points_m,
 
 std::string corrections_inside_travel(std::span<const Vector3> points_m,
                                       const MachineNodes& travel) {
+  if (!is_far_outside(points_m, travel)) {
+    return "";
+  }
   std::vector<std::string> texts;
   for (const AxisMistake& mistake : axis_mistakes()) {
     if (all_inside(points_m, mistake.M, travel)) {
@@ -83,11 +126,10 @@ std::string corrections_inside_travel(std::span<const Vector3> points_m,
     }
   }
 
-  // A factor below 1 makes all coordinates small, and small coordinates are inside the travel of
-  // most machines. Therefore a wrong unit is reported only if no axis mistake explains the data.
   const bool explained = !texts.empty();
-  for (const UnitMistake& mistake : unit_mistakes()) {
-    if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel)) {
+  for (const UnitMistake& mistake : units_of_points_or_travel()) {
+    if (!explained && all_inside(points_m, mistake.factor * Matrix3::Identity(), travel) &&
+        fills(points_m, mistake.factor, travel)) {
       texts.push_back(mistake.text);
     }
   }

@@ -1,11 +1,14 @@
 /* Shows how to apply abbe's correction, with Cyclone DDS in C and the types that idlc generates
    from abbe_v1.idl:
 
-     cyclone_subscriber DOMAIN [KEYS]
+     cyclone_subscriber DOMAIN [KEYS] [--machine NAME MACHINE_ID]
 
-   It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
-   of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. The program has one
-   thread; Cyclone DDS calls the listener from another one. */
+   It prints for every Compensation of every machine whether it may be applied, and when one that may
+   be applied may no longer be, because nothing newer has arrived. KEYS is the folder
+   of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. With --machine only
+   the machine NAME is used, and only if its identity is MACHINE_ID (`abbe machine identity`);
+   without it the first machine of each name, and no other one while the program runs. The program
+   has one thread; Cyclone DDS calls the listener from another one. */
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -25,12 +28,18 @@ static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1
    second, even if nothing in it changes. */
 static const int64_t longest_silence_ns = INT64_C(1500000000);
 
+/* --machine NAME MACHINE_ID; NULL: not given. */
+static const char *given_name, *given_machine_id;
+
 /* State of one publisher (a DDS participant) of one machine, independent of other publishers. */
 struct publisher {
   dds_guid_t participant;
   int64_t first_ns, last_ns; /* times of its samples; last_ns 0: entry is free */
   int64_t alone_ns;          /* time of sending since the last sample of the pinned publisher */
   bool foreign;
+  abbe_v1_Identity identity;   /* which machine the publisher is */
+  bool identified;             /* `identity` is valid */
+  const char* ignored_because; /* NULL: it is not, or not yet known */
   abbe_v1_ModelState state;
   dds_instance_handle_t state_from; /* writer of `state`; 0: there is no valid state */
   int64_t state_received_ns;
@@ -41,10 +50,15 @@ struct publisher {
 /* One of the machines whose data are published in the domain. Only samples of its pinned publisher
    are used. */
 struct machine {
+  char machine_id[sizeof(((abbe_v1_Identity*)0)->machine_id)];
+  bool has_machine_id; /* `machine_id` was given, or that of the first pinned publisher */
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
-  int64_t foreign_reported_ns;
+  int64_t ignored_reported_ns;
+  abbe_v1_Compensation applied; /* the last vector, while it may be applied */
+  int64_t applied_age_ns;       /* when it arrived */
+  int64_t applied_ns;           /* its arrival; 0: none may be applied */
 };
 static struct machine machines[MOST_MACHINES];
 
@@ -84,11 +98,18 @@ static int64_t now_in_ns(void) {
   return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already. */
+/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already, or another
+   machine was given. */
 static struct machine* find_machine(const char* name) {
+  if (given_name != NULL && strcmp(given_name, name) != 0) return NULL;
   for (int i = 0; i < MOST_MACHINES; ++i) {
-    if (machines[i].name[0] == '\0') strcpy(machines[i].name, name);
-    if (strcmp(machines[i].name, name) == 0) return &machines[i];
+    struct machine* m = &machines[i];
+    if (m->name[0] == '\0') {
+      strcpy(m->name, name);
+      m->has_machine_id = given_machine_id != NULL;
+      if (m->has_machine_id) snprintf(m->machine_id, sizeof m->machine_id, "%s", given_machine_id);
+    }
+    if (strcmp(m->name, name) == 0) return m;
   }
   return NULL;
 }
@@ -127,25 +148,43 @@ static struct publisher* find_publisher(struct machine* m, const dds_guid_t* par
   return entry;
 }
 
-/* True if `p`, which sent a sample now, is the pinned publisher of the machine. The first publisher
-   is pinned. Another publisher replaces the pinned one if the pinned one has been silent for 300 ms
-   (10 s if the other is foreign) and the other has sent for 30 ms since then. A publisher is
-   foreign if the pinned one still sends 100 ms after the first sample of the other. Reasons and
-   limits: publisher_pin.hpp and dds.md. */
+static void print_state(const abbe_v1_ModelState* state) {
+  printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
+}
+
+/* True if `p`, which is not pinned, may be pinned now. It must be the same machine as before, not
+   only have the same name: a publisher of another machine_id is never pinned. Of two machines that
+   know of each other (`twin`) none is the first. A publisher that sent beside the pinned one is
+   foreign, and never pinned. Another one replaces the pinned one if that has been silent for 300 ms
+   and the other has sent for 30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
+static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns) {
+  p->ignored_because = NULL;
+  if (!p->identified) return false;
+  if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
+    p->ignored_because = "%s: another machine of this name, publisher %s is ignored\n";
+  else if (!m->has_machine_id && p->identity.twin)
+    p->ignored_because = "%s: one of several machines of this name, publisher %s is ignored\n";
+  else if (p->foreign)
+    p->ignored_because = "%s: another publisher %s is ignored\n";
+  if (p->ignored_because != NULL) return false;
+  return m->pinned == NULL || (now_ns - m->pinned->last_ns >= 300 * millisecond_ns &&
+                               p->alone_ns >= 30 * millisecond_ns);
+}
+
+/* True if `p`, which sent a sample now, is the pinned publisher of the machine. */
 static bool is_pinned(struct machine* m, struct publisher* p) {
   const int64_t now_ns = now_in_ns(), pause_ns = now_ns - p->last_ns;
   p->last_ns = now_ns;
 
   if (m->pinned != p) {
-    const int64_t silence_ns = m->pinned == NULL ? INT64_MAX : now_ns - m->pinned->last_ns;
     p->alone_ns += pause_ns < 10 * millisecond_ns ? pause_ns : 10 * millisecond_ns;
-    const bool next = silence_ns >= (p->foreign ? 10 * second_ns : 300 * millisecond_ns) &&
-                      p->alone_ns >= 30 * millisecond_ns;
-    if (!next && m->pinned != NULL) return false;
+    if (!may_be_pinned(m, p, now_ns)) return false;
     if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
     m->pinned = p;
-    p->foreign = false;
+    m->has_machine_id = true;
+    strcpy(m->machine_id, p->identity.machine_id);
     print_participant("%s: publisher is %s\n", m->name, &p->participant);
+    if (p->state_from != 0) print_state(&p->state);
   }
 
   for (struct publisher* other = m->publishers; other < m->publishers + MOST_PUBLISHERS; ++other) {
@@ -156,13 +195,13 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
   return true;
 }
 
-static void report_foreign_publisher(struct machine* m, const struct publisher* p) {
+static void report_ignored_publisher(struct machine* m, const struct publisher* p) {
   const int64_t now_ns = now_in_ns();
-  if (!p->foreign ||
-      (m->foreign_reported_ns != 0 && now_ns - m->foreign_reported_ns < 10 * second_ns))
+  if (p->ignored_because == NULL ||
+      (m->ignored_reported_ns != 0 && now_ns - m->ignored_reported_ns < 10 * second_ns))
     return;
-  m->foreign_reported_ns = now_ns;
-  print_participant("%s: another publisher %s is ignored\n", m->name, &p->participant);
+  m->ignored_reported_ns = now_ns;
+  print_participant(p->ignored_because, m->name, &p->participant);
 }
 
 /* The publisher of a sample; NULL if the writer of the sample does not exist any more. */
@@ -238,10 +277,23 @@ static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
   p->state_from = writer;
   p->state_received_ns = now_in_ns();
   if (!is_pinned(m, p)) {
-    report_foreign_publisher(m, p);
+    report_ignored_publisher(m, p);
     return;
   }
-  printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
+  print_state(state);
+}
+
+/* Which machine a publisher is. The pinned publisher is released if abbed behind it has become
+   another machine. */
+static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
+                     dds_instance_handle_t writer) {
+  struct machine* m = find_machine(identity->machine);
+  struct publisher* p = publisher_of(m, reader, writer);
+  if (p == NULL) return;
+  p->identity = *identity;
+  p->identified = true;
+  if (m->pinned == p && strcmp(m->machine_id, identity->machine_id) != 0) m->pinned = NULL;
+  if (!is_pinned(m, p)) report_ignored_publisher(m, p);
 }
 
 static void decide(const abbe_v1_Compensation* c, dds_entity_t reader,
@@ -251,15 +303,34 @@ static void decide(const abbe_v1_Compensation* c, dds_entity_t reader,
   if (p == NULL) return;
   const int64_t age_ns = c->age_ns + delay_of(c, p);
   if (!is_pinned(m, p)) {
-    report_foreign_publisher(m, p);
+    report_ignored_publisher(m, p);
     return;
   }
   const char* reason = why_not(c, age_ns, p);
+  m->applied_ns = 0;
   if (reason != NULL) {
     printf("%s: do not apply: %s\n", c->machine, reason);
   } else {
+    m->applied = *c;
+    m->applied_age_ns = age_ns;
+    m->applied_ns = now_in_ns();
     printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c->machine, c->vector_m[0] * 1e6,
            c->vector_m[1] * 1e6, c->vector_m[2] * 1e6, (double)age_ns * 1e-6);
+  }
+}
+
+/* Call it every few milliseconds: a publisher that has ended sends nothing more, so that no sample
+   shows that its last vector may not be applied any more. */
+static void withdraw(void) {
+  for (struct machine* m = machines; m < machines + MOST_MACHINES; ++m) {
+    if (m->applied_ns == 0) continue;
+    const int64_t since_ns = now_in_ns() - m->applied_ns;
+    const char* reason = m->pinned == NULL
+                             ? "the publisher states another machine"
+                             : why_not(&m->applied, m->applied_age_ns + since_ns, m->pinned);
+    if (reason == NULL) continue;
+    printf("%s: do not apply: %s\n", m->name, reason);
+    m->applied_ns = 0;
   }
 }
 
@@ -332,6 +403,19 @@ static dds_entity_t read_state(dds_entity_t participant) {
   return reader;
 }
 
+/* Identity is reliable and retained for late joiners. */
+static dds_entity_t read_identity(dds_entity_t participant) {
+  dds_entity_t topic =
+      dds_create_topic(participant, &abbe_v1_Identity_desc, "abbe/v1/Identity", NULL, NULL);
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+  dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
+  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
+  dds_entity_t reader = dds_create_reader(participant, topic, qos, NULL);
+  dds_delete_qos(qos);
+  return reader;
+}
+
 static dds_entity_t read_compensation(dds_entity_t participant) {
   dds_entity_t topic =
       dds_create_topic(participant, &abbe_v1_Compensation_desc, "abbe/v1/Compensation", NULL, NULL);
@@ -340,30 +424,42 @@ static dds_entity_t read_compensation(dds_entity_t participant) {
 
 int main(int argc, char** argv) {
   setvbuf(stdout, NULL, _IOLBF, 0);
+  if (argc > 3 && strcmp(argv[argc - 3], "--machine") == 0) {
+    given_name = argv[argc - 2];
+    given_machine_id = argv[argc - 1];
+    argc -= 3;
+  }
   const dds_domainid_t domain = argc > 1 ? (dds_domainid_t)atoi(argv[1]) : 0;
   if (argc > 2) configure_for_keys(domain);
   dds_qos_t* participant_qos = argc > 2 ? qos_with_keys(argv[2]) : NULL;
   dds_entity_t participant = dds_create_participant(domain, participant_qos, NULL);
   dds_delete_qos(participant_qos);
   if (participant < 0) return 4;
-  dds_entity_t states = read_state(participant), vectors = read_compensation(participant);
-  if (states < 0 || vectors < 0) return 4;
+  dds_entity_t identities = read_identity(participant), states = read_state(participant),
+               vectors = read_compensation(participant);
+  if (identities < 0 || states < 0 || vectors < 0) return 4;
 
+  abbe_v1_Identity* identity = abbe_v1_Identity__alloc();
   abbe_v1_ModelState* state = abbe_v1_ModelState__alloc();
   abbe_v1_Compensation* vector = abbe_v1_Compensation__alloc();
   dds_sample_info_t info;
   dds_entity_t waitset = dds_create_waitset(participant);
+  dds_waitset_attach(waitset, dds_create_readcondition(identities, DDS_ANY_STATE), 0);
   dds_waitset_attach(waitset, dds_create_readcondition(states, DDS_ANY_STATE), 0);
   dds_waitset_attach(waitset, dds_create_readcondition(vectors, DDS_ANY_STATE), 0);
   puts("waiting");
   for (;;) {
-    dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(50));
+    dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(5));
     discard_dead_states();
+    while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
+      if (info.valid_data) identify(identity, identities, info.publication_handle);
+    }
     while (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
       if (info.valid_data) keep(state, states, info.publication_handle);
     }
     while (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
       if (info.valid_data) decide(vector, vectors, info.publication_handle);
     }
+    withdraw();
   }
 }

@@ -1,20 +1,22 @@
 // Shows how to apply abbe's correction, with Fast DDS and the types that fastddsgen generates from
 // abbe_v1.idl:
 //
-//   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]]
+//   fastdds_subscriber DOMAIN [PROFILES.xml [KEYS]] [--machine NAME MACHINE_ID]
 //
-// It prints for every Compensation of every machine whether it may be applied. KEYS is the folder
-// of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. Fast DDS calls the
+// It prints for every Compensation of every machine whether it may be applied, and when one that may
+// be applied may no longer be, because nothing newer has arrived. KEYS is the folder
+// of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
+// identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
+// name is used, and no other one while the program runs. Fast DDS calls the
 // listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp and
 // message_filter (daemon/dds).
-#include <unistd.h>
-
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -27,6 +29,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 
 #include "abbe/dds/message_filter.hpp"
 #include "abbe/dds/publisher_pin.hpp"
@@ -37,6 +40,7 @@ using abbe::dds::ParticipantId;
 using abbe::dds::PublisherPin;
 using abbe::dds::text_of;
 using abbe::v1::Compensation;
+using abbe::v1::Identity;
 using abbe::v1::ModelState;
 using Writer = InstanceHandle_t;  // a DDS writer, by its GUID
 
@@ -92,12 +96,20 @@ struct Publisher {
   Delay delay;
 };
 
+/// The last vector of a machine, while it may be applied.
+struct Applied {
+  Compensation vector;
+  std::int64_t age_ns;  ///< when it arrived
+  SteadyClock::time_point arrived;
+};
+
 /// One of the machines whose data are published in the domain. Only samples of its pinned publisher
 /// are used (publisher_pin.hpp).
 struct Machine {
   PublisherPin pin;
   std::map<ParticipantId, Publisher> publishers;
-  std::optional<SteadyClock::time_point> foreign_publisher_reported;
+  std::optional<SteadyClock::time_point> ignored_publisher_reported;
+  std::optional<Applied> applied;
 };
 
 /// The rule of abbe_v1.idl: nullptr if the vector may be applied, else the reason. `alive`: the
@@ -118,6 +130,35 @@ const char* why_not(const Compensation& c, std::int64_t age_ns, const Publisher&
 }
 
 class Listener : public DataReaderListener {
+ public:
+  /// `machine_ids`: identities by machine name, for machines whose identity is given.
+  explicit Listener(std::map<std::string, std::string> machine_ids)
+      : machine_ids_(std::move(machine_ids)) {}
+
+  /// Call it every few milliseconds: a publisher that has ended sends nothing more, so that no
+  /// sample shows that its last vector may not be applied any more.
+  void withdraw() {
+    const std::lock_guard lock(mutex_);
+    for (auto& [name, machine] : machines_) {
+      if (!machine.applied) continue;
+      const char* reason = why_not_any_more(machine);
+      if (reason == nullptr) continue;
+      std::printf("%s: do not apply: %s\n", name.c_str(), reason);
+      machine.applied.reset();
+    }
+  }
+
+ private:
+  /// nullptr: the last vector may still be applied.
+  const char* why_not_any_more(Machine& machine) const {
+    const auto pinned = machine.pin.pinned();
+    if (!pinned) return "the publisher states another machine";
+    const Publisher& publisher = machine.publishers[*pinned];
+    const Applied& applied = *machine.applied;
+    const std::chrono::nanoseconds since = SteadyClock::now() - applied.arrived;
+    return why_not(applied.vector, applied.age_ns + since.count(), publisher, is_alive(publisher));
+  }
+
   /// Called by Fast DDS when a writer of ModelState loses or regains its liveliness. The state from
   /// a writer that lost it is discarded; a writer that regains it repeats its state within a
   /// second.
@@ -138,83 +179,128 @@ class Listener : public DataReaderListener {
 
   void on_data_available(DataReader* reader) override {
     const std::lock_guard lock(mutex_);
-    const bool is_state = reader->get_topicdescription()->get_name() == "abbe/v1/ModelState";
+    const std::string topic = reader->get_topicdescription()->get_name();
+    if (topic == "abbe/v1/Identity")
+      take<Identity>(reader, [this](const auto& m, auto& writer) { identify(m, writer); });
+    if (topic == "abbe/v1/ModelState")
+      take<ModelState>(reader, [this](const auto& m, auto& writer) { keep(m, writer); });
+    if (topic == "abbe/v1/Compensation")
+      take<Compensation>(reader, [this](const auto& m, auto& writer) { decide(m, writer); });
+  }
+
+  template <class Sample, class Use>
+  static void take(DataReader* reader, Use use) {
     SampleInfo info;
-    ModelState state;
-    Compensation vector;
-    const auto ok = ReturnCode_t::RETCODE_OK;
-    while (is_state && reader->take_next_sample(&state, &info) == ok) {
-      if (info.valid_data) keep(state, info.publication_handle);
-    }
-    while (!is_state && reader->take_next_sample(&vector, &info) == ok) {
-      if (info.valid_data) decide(vector, info.publication_handle);
-    }
+    Sample sample;
+    while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK)
+      if (info.valid_data && !sample.machine().empty()) use(sample, info.publication_handle);
   }
 
   struct Source {
     Publisher& publisher;
     bool pinned;  ///< if false, its samples are kept but not used
   };
-  Source heard(const std::string& name, const Writer& writer) {
+  /// `identity`: the sample, if it is an Identity.
+  Source heard(const std::string& name, const Writer& writer, const Identity* identity = nullptr) {
     using Verdict = PublisherPin::Verdict;
     ParticipantId id{};
     for (std::size_t i = 0; i < id.size(); ++i) id[i] = writer.value[i];
-    Machine& machine = machines_[name];
+    Machine& machine =
+        machines_.try_emplace(name, Machine{.pin = PublisherPin(machine_id_of(name))})
+            .first->second;
     const auto former = machine.pin.pinned();
-    const Verdict verdict = machine.pin.heard(id, SteadyClock::now());
+    const auto now = SteadyClock::now();
+    const Verdict verdict = identity == nullptr ? machine.pin.heard(id, now)
+                                                : machine.pin.identified(id, identity->machine_id(),
+                                                                         identity->twin(), now);
     const auto [found, is_new] = machine.publishers.try_emplace(id);
     if (is_new && former)
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();
-    if (verdict == Verdict::NewlyPinned)
+    if (verdict == Verdict::NewlyPinned) {
       std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
-    if (verdict == Verdict::Foreign) report_foreign_publisher(name, machine, id);
+      if (found->second.state_from != Writer()) print_state(found->second.state);
+    }
+    if (verdict == Verdict::Foreign)
+      report_ignored_publisher(name, machine, id, "another publisher");
+    if (verdict == Verdict::OtherMachine)
+      report_ignored_publisher(name, machine, id, "another machine of this name, publisher");
+    if (verdict == Verdict::Ambiguous)
+      report_ignored_publisher(name, machine, id,
+                               "one of several machines of this name, publisher");
     std::erase_if(machine.publishers,
                   [&](const auto& p) { return !machine.pin.remembers(p.first); });
 
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// Prints at most every 10 s that another publisher of this machine is ignored. (`abbe watch`
-  /// also prints the network address of that publisher.)
-  static void report_foreign_publisher(const std::string& name, Machine& machine,
-                                       const ParticipantId& id) {
+  /// No more than 256 machines: any participant may make up names.
+  [[nodiscard]] bool has_place(const std::string& name) const {
+    return machines_.size() < 256 || machines_.contains(name);
+  }
+
+  [[nodiscard]] std::string machine_id_of(const std::string& name) const {
+    const auto given = machine_ids_.find(name);
+    return given == machine_ids_.end() ? std::string() : given->second;
+  }
+
+  /// Prints at most every 10 s that the samples of a publisher of this machine are not used.
+  /// (`abbe watch` also prints the network address of that publisher.)
+  static void report_ignored_publisher(const std::string& name, Machine& machine,
+                                       const ParticipantId& id, const char* what) {
     constexpr std::chrono::seconds kReportPeriod{10};
     const auto now = SteadyClock::now();
-    if (machine.foreign_publisher_reported &&
-        now - *machine.foreign_publisher_reported < kReportPeriod)
+    if (machine.ignored_publisher_reported &&
+        now - *machine.ignored_publisher_reported < kReportPeriod)
       return;
-    machine.foreign_publisher_reported = now;
-    std::printf("%s: another publisher %s is ignored\n", name.c_str(), text_of(id).c_str());
+    machine.ignored_publisher_reported = now;
+    std::printf("%s: %s %s is ignored\n", name.c_str(), what, text_of(id).c_str());
+  }
+
+  /// A sample that tells which machine a publisher is.
+  void identify(const Identity& identity, const Writer& writer) {
+    if (has_place(identity.machine())) heard(identity.machine(), writer, &identity);
   }
 
   /// Keeps a ModelState, also one from a publisher that is not pinned, because it may be pinned
   /// later.
   void keep(const ModelState& state, const Writer& writer) {
+    if (!has_place(state.machine())) return;
     const auto [publisher, pinned] = heard(state.machine(), writer);
     publisher.state = state;
     publisher.state_from = writer;
     publisher.heard = SteadyClock::now();
     alive_.insert(writer);  // Fast DDS may report simultaneous changes in the wrong order
-    if (!pinned) return;
+    if (pinned) print_state(state);
+  }
+
+  static void print_state(const ModelState& state) {
     std::printf("%s: state %u %s\n", state.machine().c_str(), static_cast<unsigned>(state.state()),
                 state.reason().c_str());
   }
 
   void decide(const Compensation& c, const Writer& writer) {
+    if (!has_place(c.machine())) return;
     const auto [publisher, pinned] = heard(c.machine(), writer);
     const std::int64_t age_ns = c.age_ns() + publisher.delay.of_ns(c);
     if (!pinned) return;
-    const bool alive = alive_.contains(publisher.state_from) &&
-                       SteadyClock::now() - publisher.heard < kLongestSilence;
-    if (const char* reason = why_not(c, age_ns, publisher, alive)) {
+    auto& applied = machines_[c.machine()].applied;
+    applied.reset();
+    if (const char* reason = why_not(c, age_ns, publisher, is_alive(publisher))) {
       std::printf("%s: do not apply: %s\n", c.machine().c_str(), reason);
     } else {
+      applied = {c, age_ns, SteadyClock::now()};
       const double age_ms = static_cast<double>(age_ns) * 1e-6;
       std::printf("%s: apply V = %.3f %.3f %.3f um, %.3f ms old\n", c.machine().c_str(),
                   c.vector_m()[0] * 1e6, c.vector_m()[1] * 1e6, c.vector_m()[2] * 1e6, age_ms);
     }
   }
 
+  [[nodiscard]] bool is_alive(const Publisher& publisher) const {
+    return alive_.contains(publisher.state_from) &&
+           SteadyClock::now() - publisher.heard < kLongestSilence;
+  }
+
+  std::map<std::string, std::string> machine_ids_;
   std::mutex mutex_;
   std::map<std::string, Machine> machines_;
   std::set<Writer> alive_;  ///< writers of ModelState that are alive
@@ -240,7 +326,7 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
 
 /// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
 /// them (abbe/dds/message_filter.hpp).
-void filter_messages(DomainParticipantQos& qos) {
+void filter_messages(DomainParticipantQos& qos, bool secured) {
   auto& transports = qos.transport();
   if (transports.user_transports.empty()) {
     transports.use_builtin_transports = false;
@@ -248,8 +334,24 @@ void filter_messages(DomainParticipantQos& qos) {
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
   for (auto& transport : transports.user_transports)
-    transport = abbe::dds::with_message_filter(transport);
+    transport = abbe::dds::with_message_filter(transport, secured);
 }
+
+/// A generated type whose deserialize() does not throw: any participant of the domain may send bytes
+/// that are no valid message, and an exception in a thread of Fast DDS ends the process. Such a
+/// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
+/// the next sample.)
+template <class GeneratedType>
+class Checked final : public GeneratedType {
+  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
+    try {
+      if (GeneratedType::deserialize(payload, data)) return true;
+    } catch (const std::exception&) {
+    }
+    *static_cast<typename GeneratedType::type*>(data) = {};
+    return true;
+  }
+};
 
 /// Prevents that Fast DDS announces a TypeObject, which Cyclone DDS does not accept and which may
 /// crash older versions of Fast DDS.
@@ -270,6 +372,11 @@ bool read_topic(DomainParticipant* participant, Subscriber* subscriber, TypeSupp
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::map<std::string, std::string> machine_ids;
+  if (argc > 3 && std::string(argv[argc - 3]) == "--machine") {
+    machine_ids[argv[argc - 2]] = argv[argc - 1];
+    argc -= 3;
+  }
   auto* factory = DomainParticipantFactory::get_instance();
   DomainParticipantQos participant_qos;
   // The default lease of 20 s may be shorter than a suspension of this process. abbe-dds would then
@@ -281,28 +388,43 @@ int main(int argc, char** argv) {
                        ReturnCode_t::RETCODE_OK)) {
     return 3;
   }
+  // Fast DDS tries so many ports. With its default of 100 the participants beyond the first hundred
+  // of a computer receive nothing, and no error is reported.
+  participant_qos.wire_protocol().builtin.mutation_tries = 400;
   if (argc > 3) use_keys(argv[3], participant_qos);
-  filter_messages(participant_qos);
+  filter_messages(participant_qos, argc > 3);
   auto* participant = factory->create_participant(
       argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 0, participant_qos);
   if (participant == nullptr) return 4;
-  static Listener listener;
+  static Listener listener(machine_ids);
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
   DataReaderQos live;  // best effort, volatile, keep last 1
-  DataReaderQos durable;
+  // One instance per machine, and those that strangers make up: where the table is full (10 by
+  // default), Fast DDS 2.9 may abort.
+  live.resource_limits().max_samples = live.resource_limits().max_instances = 1024;
+  live.resource_limits().max_samples_per_instance = 1;
+  DataReaderQos durable = live;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
+  const DataReaderQos retained = durable;
   // abbe-dds asserts liveliness only while abbed is alive
   durable.liveliness().kind = MANUAL_BY_TOPIC_LIVELINESS_QOS;
   durable.liveliness().lease_duration = eprosima::fastrtps::Duration_t(1, 0);
 
-  const bool ok =
-      read_topic(participant, subscriber, without_type_object(new abbe::v1::ModelStatePubSubType),
-                 "abbe/v1/ModelState", durable, &listener) &&
-      read_topic(participant, subscriber, without_type_object(new abbe::v1::CompensationPubSubType),
-                 "abbe/v1/Compensation", live, &listener);
+  const bool ok = read_topic(participant, subscriber,
+                             without_type_object(new Checked<abbe::v1::ModelStatePubSubType>),
+                             "abbe/v1/ModelState", durable, &listener) &&
+                  read_topic(participant, subscriber,
+                             without_type_object(new Checked<abbe::v1::IdentityPubSubType>),
+                             "abbe/v1/Identity", retained, &listener) &&
+                  read_topic(participant, subscriber,
+                             without_type_object(new Checked<abbe::v1::CompensationPubSubType>),
+                             "abbe/v1/Compensation", live, &listener);
   if (!ok) return 4;
   std::puts("waiting; end with Ctrl-C");
-  for (;;) ::pause();
+  for (;;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+    listener.withdraw();
+  }
 }

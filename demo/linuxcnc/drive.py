@@ -5,13 +5,17 @@ machine that has changed. The number of the phase is in the signal `phase`, whic
 
 Prints one line for each phase. Exit code 1: LinuxCNC did not do what it was told."""
 import json
+import math
 import os
+import signal
 import subprocess
 import sys
 import time
 
 import hal
 import linuxcnc
+
+import hand_over
 
 FEED = 6000  # mm/min, 100 mm/s
 HALF_STEP_NM = 5.1  # of the encoders in positions.toml.in, with rounding
@@ -26,9 +30,23 @@ STANDSTILL_S = 2.0       # before the calibration, at its first vertex
 DWELL_S = 0.2            # at each vertex
 PHASES = {"without": 10, "with": 20}  # line, arc and helix: + 1, 2, 3
 FAULTS = {"abbe-dds killed": 31, "NaN": 32, "machine off": 33, "model not ACTIVE": 34,
-          "not homed": 37, "model DRIFT": 36, "feeder killed": 35}
+          "tool change": 38, "clamp": 39, "clamp, paused": 40, "feeder killed": 35, "not homed": 37,
+          "model DRIFT": 36}
+FEEDER_BACK_S = 5.0  # asked
+INHIBIT, PAUSE = 1, 2  # abbe-correction.on-loss
+# What the operator reads on the screen.
+MESSAGES = {"abbe-dds killed": "the feed is inhibited: the ModelState publisher is not alive",
+            "NaN": "the feed is inhibited: a component of the correction is not a number",
+            "model not ACTIVE": "the feed is inhibited: ModelState is ",
+            "tool change": "the feed is inhibited: the model is for the tool offset "
+                           "(20.000, -15.000, -120.000) mm, T2 has (20.000, -15.000, -150.000) mm",
+            "clamp": "the feed is inhibited: a component of the correction is beyond abbe-correction.clamp",
+            "clamp, paused": "the program is paused: a component of the correction is beyond "
+                             "abbe-correction.clamp",
+            "feeder killed": "the feed is inhibited: the feeder did not answer",
+            "model DRIFT": "the feed is inhibited: ModelState is DRIFT"}
 
-command = status = None  # of a running LinuxCNC; evaluate.py reads the names of the phases only
+command = status = errors = None  # of a running LinuxCNC; evaluate.py reads the names of the phases only
 
 
 def fail(text):
@@ -66,9 +84,17 @@ def applied_um():
     return max(abs(hal.get_value("abbe-correction.%d.applied" % j)) for j in range(3)) * 1e3
 
 
+def valid():
+    return hal.get_value("abbe-correction.valid")
+
+
+def lost():
+    return hal.get_value("abbe-correction.lost")
+
+
 def switch_on():
     """The correction is applied again, which needs a living feeder with a valid model."""
-    wait_until("the feeder has a valid correction", lambda: hal.get_value("abbe-feeder.valid"), 60)
+    wait_until("the feeder has a valid correction", valid, 60)
     enable(False)
     time.sleep(0.2)
     enable(True)
@@ -196,7 +222,7 @@ def feeder_said(text):
 
 def model_drifts():
     """The calibration shows that the machine has changed."""
-    wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"), 100)
+    wait_until("the correction is off", lambda: not valid(), 100)
     time.sleep(0.5)
     if not feeder_said("ModelState is DRIFT"):
         fail("the correction is off, but not because the model drifted: see feeder.log")
@@ -206,10 +232,19 @@ def model_drifts():
 
 
 def not_a_number():
-    halcmd("unlinkp", "abbe-correction.0.wanted")
-    halcmd("setp", "abbe-correction.0.wanted", "nan")
-    time.sleep(1.0)
-    halcmd("net", "x-correction", "abbe-correction.0.wanted")
+    """A feeder that sends NaN in X: the real one is stopped meanwhile."""
+    with hand_over.attached() as memory:
+        feeder = memory.feeder
+        os.kill(feeder, signal.SIGSTOP)
+        time.sleep(0.01)  # of its loop at most a copy is left, which takes 1 us
+        end = time.time() + 1.0
+        while time.time() < end:
+            memory.write((math.nan, 0.0, 0.0))
+            time.sleep(0.001)
+        os.kill(feeder, signal.SIGCONT)
+    wait_until("the correction is active again", lambda: active() or hal.get_value("abbe-correction.stale"))
+    if hal.get_value("abbe-correction.stale"):
+        switch_on()  # the stopped feeder needed longer than the timeout to go on
 
 
 def machine_off():
@@ -223,8 +258,8 @@ def machine_off():
 
 def model_not_active():
     write_request("stop-encoder")
-    wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"))
-    time.sleep(0.5)
+    wait_until("the correction is off", lambda: not valid())
+    time.sleep(1.0)
     write_request("continue-encoder")
 
 
@@ -232,7 +267,7 @@ def not_homed():
     """At standstill: LinuxCNC unhomes in joint mode only. It is homed again at the same place, so the
     machine has the same coordinates."""
     command.unhome(-1)
-    wait_until("the correction is off", lambda: not hal.get_value("abbe-feeder.valid"))
+    wait_until("the correction is off", lambda: not valid())
     time.sleep(1.0)  # abbed calls an axis missing after 150 ms
     condition = next(s for s in abbe_status()["streams"] if s["name"] == "encoder")["condition"]
     if "LinuxCNC is not homed" not in condition or not feeder_said("not all joints are homed"):
@@ -243,11 +278,81 @@ def not_homed():
 
 
 def feeder_killed():
-    write_request("kill-feeder")
-    wait_until("the correction is stale", lambda: hal.get_value("abbe-correction.stale"))
+    """It comes back by itself; the user switches the correction on again."""
+    with hand_over.attached() as memory:
+        before = memory.feeder
+        killed_at = time.time()
+        os.kill(before, signal.SIGKILL)
+        wait_until("the correction is stale", lambda: hal.get_value("abbe-correction.stale"))
+        wait_until("the feeder is back", lambda: memory.feeder not in (0, before) and valid())
+        back_s = time.time() - killed_at
+    if back_s > FEEDER_BACK_S:
+        fail("the feeder came back after %.1f s" % back_s)
     time.sleep(0.5)
     if applied_um() > 1e-3:
         fail("the correction did not fade: %g um" % applied_um())
+    report("feeder killed: it writes a valid correction again after %.1f s (asked: %g)"
+           % (back_s, FEEDER_BACK_S))
+    switch_on()
+
+
+def use_tool(number):
+    command.mode(linuxcnc.MODE_MDI)
+    command.wait_complete()
+    for line in ("T%d M6" % number, "G43 H%d" % number):
+        command.mdi(line)
+        command.wait_complete()
+
+
+def run_program(*lines):
+    with open("fault.ngc", "w") as out:
+        out.write("\n".join(("G21 G90 G64 F%g" % FEED,) + lines + ("M2", "")))
+    command.mode(linuxcnc.MODE_AUTO)
+    command.wait_complete()
+    command.program_open(os.path.abspath("fault.ngc"))
+    command.auto(linuxcnc.AUTO_RUN, 0)
+    time.sleep(0.5)
+
+
+def drive_to_tool_change():
+    """A circle with T1, then T2 in the spindle, whose offset is 30 mm longer, and circles with it."""
+    run_program("G3 X75 Y0 I-75 J0", "T2 M6", "G43 H2", "G3 X75 Y0 I-75 J0 P60")
+
+
+def tool_change():
+    wait_until("T2 is in the spindle", lambda: hal.get_value("iocontrol.0.tool-number") == 2)
+    wait_until("the correction is lost", lost)
+    time.sleep(1.0)
+    if applied_um() > 1e-3:
+        fail("the correction of T1 is applied to T2: %g um" % applied_um())
+    command.abort()
+    command.wait_complete()
+    use_tool(1)
+    wait_until("the correction is active with T1", active)
+
+
+def clamp_reached():
+    """The clamp is less than c of X, more than c of the other axes."""
+    halcmd("setp", "abbe-correction.clamp", 0.02)
+    wait_until("the correction is lost", lost)
+    time.sleep(2.0)
+    halcmd("setp", "abbe-correction.clamp", 0.2)
+    wait_until("the correction is active", active)
+
+
+def clamp_reached_paused():
+    clamp_reached()
+    status.poll()
+    if not status.paused:
+        fail("the program is not paused")
+    halcmd("setp", "abbe-correction.on-loss", INHIBIT)
+    command.auto(linuxcnc.AUTO_RESUME)
+    wait_until("the program continues", lambda: status.poll() or not status.paused)
+
+
+def drive_paused():
+    halcmd("setp", "abbe-correction.on-loss", PAUSE)
+    run_program("G3 X75 Y0 I-75 J0 P60")
 
 
 def kill_dds():
@@ -280,7 +385,10 @@ def drive_circles():
 
 
 # Of each fault: what is done before it, what the machine does at it, the fault.
-ACTIONS = {"abbe-dds killed": (go_to_circles, drive_circles, kill_dds),
+ACTIONS = {"tool change": (go_to_circles, drive_to_tool_change, tool_change),
+           "clamp": (go_to_circles, drive_circles, clamp_reached),
+           "clamp, paused": (go_to_circles, drive_paused, clamp_reached_paused),
+           "abbe-dds killed": (go_to_circles, drive_circles, kill_dds),
            "NaN": (go_to_circles, drive_circles, not_a_number),
            "machine off": (go_to_circles, drive_circles, machine_off),
            "model not ACTIVE": (go_to_circles, drive_circles, model_not_active),
@@ -289,22 +397,58 @@ ACTIONS = {"abbe-dds killed": (go_to_circles, drive_circles, kill_dds),
            "feeder killed": (go_to_circles, drive_circles, feeder_killed)}
 
 
+def report(line):
+    with open("faults.txt", "a") as out:
+        out.write(line + "\n")
+
+
+def shown():
+    """The messages since the last call, as the user interface of an operator takes them."""
+    lines = []
+    while True:
+        message = errors.poll()
+        if message is None:
+            return lines
+        lines.append(message[1].strip())
+
+
+def check_messages(name):
+    lines = [line for line in shown() if line.startswith("abbe: ")]
+    expected = MESSAGES.get(name)
+    if expected is None:  # the control itself stops the machine
+        return
+    if not any(expected in line for line in lines):
+        fail("%s: the screen shows %s, not \"%s\"" % (name, lines, expected))
+    report("%s: the screen shows \"%s\"" % (name, next(line for line in lines if expected in line)))
+
+
 def fault(name):
     prepare, drive, act = ACTIONS[name]
     prepare()
     drive()
+    shown()
     phase(FAULTS[name])
     act()
     time.sleep(0.5)
     phase(0)
+    check_messages(name)
     command.abort()
     command.wait_complete()
     print("drive: %s" % name, flush=True)
 
 
+def use_tool_of_model():
+    """T1 is the reflector of the calibration. The work offset makes the coordinates of its centre those
+    of the machine, so that the path of the calibration can be driven with it."""
+    use_tool(1)
+    offset = [hal.get_value("motion.tooloffset." + axis) for axis in "xyz"]
+    command.mdi("G10 L2 P1 X%g Y%g Z%g" % tuple(-o for o in offset))
+    command.wait_complete()
+
+
 def main():
-    global command, status
-    command, status = linuxcnc.command(), linuxcnc.stat()
+    global command, status, errors
+    command, status, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
     reader = hal.component("drive")
     reader.ready()
     machine_on()
@@ -313,11 +457,12 @@ def main():
     with open("offsets.txt", "w") as out:
         out.write(" ".join("%.9f" % o for o in offsets) + "\n")
 
+    use_tool_of_model()
     drive_calibration("first")
     wait_for_end_of_path()
     if wait_for_calibration("first") != 0:
         fail("the calibration was refused")
-    wait_until("the feeder has a valid correction", lambda: hal.get_value("abbe-feeder.valid"), 60)
+    wait_until("the feeder has a valid correction", valid, 60)
     enable(False)
     drive_path(PHASES["without"])
     print("drive: path without correction", flush=True)

@@ -18,6 +18,9 @@
 namespace abbe::drivers {
 namespace {
 
+/// Pause of the thread after an exception while a machine may be moving.
+constexpr std::chrono::milliseconds kStopRetry{10};
+
 using Refusals = std::vector<std::string>;
 
 std::string reason(int error_number) {
@@ -98,6 +101,16 @@ struct DeviceThread::State {
     failures.fetch_add(1, std::memory_order_release);
   }
 
+  /// Stops what the device moves. True: the motion may go on.
+  [[nodiscard]] bool motion_goes_on() noexcept {
+    try {
+      return device.stop_after_failure();
+    } catch (...) {
+      fail(std::current_exception());
+      return true;
+    }
+  }
+
   /// Sleeps in steps of wait_at_most, so that the thread reacts to stop().
   void pause(std::chrono::nanoseconds time) const {
     const auto until = std::chrono::steady_clock::now() + time;
@@ -122,6 +135,10 @@ struct DeviceThread::State {
         loop();
       } catch (...) {
         fail(std::current_exception());
+        if (motion_goes_on()) {
+          pause(kStopRetry);
+          continue;
+        }
         if (std::chrono::steady_clock::now() - begun > options.longest_back_off)
           back_off = options.first_back_off;  // the loop ran long enough
         pause(back_off);

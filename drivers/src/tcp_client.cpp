@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -13,7 +12,6 @@
 #include <array>
 #include <cerrno>
 #include <ctime>
-#include <memory>
 #include <system_error>
 #include <utility>
 
@@ -31,45 +29,29 @@ auto failed(ErrorCode code, std::string text) {
   return tl::unexpected{Error{code, std::move(text)}};
 }
 
-using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
-
-Result<Addresses> resolve(const std::string& host, std::uint16_t port) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int error = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
-  if (error != 0)
-    return failed(ErrorCode::Unreachable, fmt::format("no address: {}", ::gai_strerror(error)));
-  return Addresses{found, &::freeaddrinfo};
-}
-
-const addrinfo& nth(const Addresses& addresses, unsigned n) {
-  unsigned count = 0;
-  for (const addrinfo* a = addresses.get(); a != nullptr; a = a->ai_next) ++count;
-  const addrinfo* chosen = addresses.get();
-  for (unsigned i = 0; i < n % count; ++i) chosen = chosen->ai_next;
-  return *chosen;
-}
-
 bool try_again(int error) {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
 }
 
 }  // namespace
 
-Result<void> TcpClient::open(const std::string& host, std::uint16_t port) {
+void TcpClient::look_up(const std::string& host, std::uint16_t port) {
+  host_ = std::make_unique<HostAddresses>(host, port);
+}
+
+Result<void> TcpClient::open() {
   close();
-  const auto addresses = resolve(host, port);
-  if (!addresses) return tl::unexpected{addresses.error()};
-  const addrinfo& address = nth(*addresses, tries_++);
-  fd_ = ::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (!host_) return failed(ErrorCode::BadConfiguration, "no address: no host is given");
+  const auto address = host_->next();
+  if (!address) return tl::unexpected{address.error()};
+  const auto* at = reinterpret_cast<const sockaddr*>(&address->at);  // NOLINT: sockets interface
+  fd_ = ::socket(at->sa_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0)
     return failed(ErrorCode::SystemRefused, fmt::format("no socket: {}", error_text(errno)));
   const int yes = 1;
   ::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
 
-  if (::connect(fd_, address.ai_addr, address.ai_addrlen) != 0 && errno != EINPROGRESS) {
+  if (::connect(fd_, at, address->length) != 0 && errno != EINPROGRESS) {
     const int error = errno;
     close();
     return failed(ErrorCode::Unreachable, fmt::format("no connection: {}", error_text(error)));

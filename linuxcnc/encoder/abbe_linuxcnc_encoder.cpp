@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "abbe/protocol/exit_codes.hpp"
+#include "abbe/protocol/option_values.hpp"
 #include "encoder_frames.hpp"
 
 namespace {
@@ -49,7 +50,9 @@ struct Options {
 /// The component in HAL, attached to the stream of a sampler.
 class SamplerStream {
  public:
-  explicit SamplerStream(int channel) : id_(hal_init("abbe-encoder")) {
+  /// The name is that of this process: after a program that was killed its name stays in HAL.
+  explicit SamplerStream(int channel)
+      : id_(hal_init(("abbe-encoder-" + std::to_string(::getpid())).c_str())) {
     if (id_ < 0) return;
     hal_ready(id_);
     attached_ = hal_stream_attach(&stream_, id_, kSamplerKey + channel, kColumns) >= 0;
@@ -217,6 +220,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   try {
+    abbe::protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

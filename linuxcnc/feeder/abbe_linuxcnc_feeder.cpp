@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // abbe-linuxcnc-feeder: receives the model of a machine over DDS, computes the correction at the
-// joint positions of LinuxCNC every millisecond, and writes it into HAL for the realtime component
-// abbe_correction.
-#include <fmt/format.h>
+// joint positions of LinuxCNC every millisecond, and writes it into the shared memory of the
+// realtime component abbe_correction.
+#include <sched.h>
 #include <signal.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <exception>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -19,143 +21,198 @@
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/dds/participant.hpp"
 #include "abbe/dds/readers.hpp"
+#include "abbe/protocol/option_values.hpp"
+#include "abbe/protocol/printable.hpp"
+#include "control_link.hpp"
 #include "correction_field.hpp"
-#include "hal_pins.hpp"
+#include "latest_usable.hpp"
+#include "restarted.hpp"
 #include "subscription.hpp"
 
 namespace {
 
 using namespace abbe;
-using linuxcnc::HalPins;
-using linuxcnc::Usable;
+using linuxcnc::ControlLink;
+using linuxcnc::LatestUsable;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kMillimetre = 1e-3;
 constexpr std::chrono::milliseconds kDecisionPeriod{20};  // of the DDS rule
-constexpr std::chrono::milliseconds kReportPeriod{100};   // between two reported changes
+constexpr std::chrono::milliseconds kReportPeriod{100};   // at which changes are reported
+
+constexpr unsigned kExitDeadline_s = 3;
 
 volatile sig_atomic_t stop_requested = 0;
 
 struct Options {
   dds::ParticipantOptions participant;
   std::string machine;
-  std::vector<double> tool_offset_mm;
+  std::string machine_id;
+  std::vector<double> tool_offset_mm{0.0, 0.0, 0.0};
   double clamp_mm = 0.2;
   long period_us = 1000;
+  int priority = 0;
+  int key = ABBE_HAND_OVER_KEY;
+  bool restart = false;
 };
 
-/// Latest decision of the subscription's thread, and its time.
-class Latest {
- public:
-  void set(std::shared_ptr<const Usable> usable) {
-    const std::lock_guard lock(mutex_);
-    usable_ = std::move(usable);
-    at_ = Clock::now();
-  }
-  [[nodiscard]] std::pair<std::shared_ptr<const Usable>, Clock::time_point> get() const {
-    const std::lock_guard lock(mutex_);
-    return {usable_, at_};
-  }
+int fail(const std::string& text, daemon::ExitCode code) {
+  std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", protocol::printable_line(text).c_str());
+  return number(code);
+}
 
- private:
-  mutable std::mutex mutex_;
-  std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
-  Clock::time_point at_{};
-};
-
-/// Prints whether the correction is applied, and why not, when this changes.
+/// Prints whether the correction is applied, and why not, when this changes. In a thread of its own:
+/// a terminal that is halted, or a full pipe, delays neither the decisions nor the loop.
 class Reporter {
  public:
-  void report(const linuxcnc::Wanted& wanted, const std::string& model_id, Clock::time_point now) {
-    const std::string line =
-        wanted.valid ? "correction of model " + model_id : "no correction: " + wanted.reason;
-    if (line == reported_ || now - reported_at_ < kReportPeriod) return;
-    reported_ = line;
-    reported_at_ = now;
-    std::printf("abbe-linuxcnc-feeder: %s\n", line.c_str());
+  explicit Reporter(const ControlLink& link) : link_(link) {}
+
+  /// Any thread.
+  void decided(const std::string& model_id) {
+    const std::lock_guard lock(mutex_);
+    model_id_ = model_id;
+  }
+  void report_until(const std::stop_token& stop) {
+    std::string reported;
+    while (!stop.stop_requested()) {
+      std::string line = current();
+      if (!line.empty() && line != reported) {
+        std::printf("abbe-linuxcnc-feeder: %s\n", protocol::printable_line(line).c_str());
+        reported = std::move(line);
+      }
+      std::this_thread::sleep_for(kReportPeriod);
+    }
   }
 
  private:
-  std::string reported_;
-  Clock::time_point reported_at_{};
+  [[nodiscard]] std::string current() {
+    const auto sent = link_.sent();
+    if (!sent) return {};
+    const std::lock_guard lock(mutex_);
+    if (sent->valid != 0 && model_id_.empty()) return {};  // withdrawn since then
+    return sent->valid != 0 ? "correction of model " + model_id_
+                            : std::string("no correction: ") + sent->reason;
+  }
+
+  const ControlLink& link_;
+  std::mutex mutex_;
+  std::string model_id_;
 };
 
+/// Thread of the subscription.
+void decide(const std::stop_token& stop, linuxcnc::Subscription& subscription, LatestUsable& latest,
+            Reporter& reporter) {
+  while (!stop.stop_requested()) {
+    const auto usable = subscription.poll(kDecisionPeriod);
+    latest.set(usable, Clock::now());
+    reporter.decided(usable->model_id);
+  }
+}
+
+/// SCHED_FIFO for the calling thread, the loop.
+void take_priority(int priority) {
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  if (priority == 0 || ::sched_setscheduler(0, SCHED_FIFO, &parameters) == 0) return;
+  std::fprintf(stderr,
+               "abbe-linuxcnc-feeder: no realtime priority %d (%s): other programs may delay the "
+               "correction; allow it with \"rtprio\" in /etc/security/limits.d\n",
+               priority, std::strerror(errno));
+}
+
+/// After a delay of a second, as of a process that was stopped, the cycles in between are omitted.
 void wait_for_next(timespec& next, long period_us) {
   constexpr long kSecond_ns = 1'000'000'000;
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  if (now.tv_sec > next.tv_sec + 1) next = now;
   next.tv_nsec += period_us * 1000;
   while (next.tv_nsec >= kSecond_ns) next.tv_nsec -= kSecond_ns, ++next.tv_sec;
   ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, nullptr);
 }
 
-void feed(const Options& options, HalPins& pins, const Latest& latest) {
-  linuxcnc::FeedLimits limits;
-  limits.clamp_m = options.clamp_mm * kMillimetre;
-  Reporter reporter;
+/// Until a signal, or LinuxCNC ends: returns the reason of the latter.
+std::string feed(const Options& options, ControlLink& link, LatestUsable& latest) {
+  linuxcnc::FeedOptions feed_options;
+  feed_options.clamp_m = options.clamp_mm * kMillimetre;
+  const auto& t = options.tool_offset_mm;
+  feed_options.tool_offset_at_zero_m = calib::Vector3(t[0], t[1], t[2]) * kMillimetre;
   timespec next{};
   ::clock_gettime(CLOCK_MONOTONIC, &next);
 
   while (stop_requested == 0) {
-    const auto [usable, decided_at] = latest.get();
     const auto now = Clock::now();
-    const auto p = pins.positions_mm();
-    const auto wanted =
-        linuxcnc::wanted(*usable, std::chrono::duration<double>(now - decided_at).count(),
-                         pins.homed(), calib::Vector3(p[0], p[1], p[2]) * kMillimetre, limits);
-    const calib::Vector3 c_mm = wanted.correction_m / kMillimetre;
-
-    pins.write({c_mm[0], c_mm[1], c_mm[2]}, wanted.valid);
-    reporter.report(wanted, usable->model_id, now);
+    const abbe_control& control = link.read();
+    if (auto reason = link.ended(now); !reason.empty()) return reason;
+    link.write(linuxcnc::wanted(latest.get(), latest.silence_s(now), control, feed_options));
     wait_for_next(next, options.period_us);
   }
-  pins.write({}, false);
+
+  abbe_wanted nothing{};
+  std::snprintf(nothing.reason, sizeof nothing.reason, "the feeder has ended");
+  link.write(nothing);
+  return {};
 }
 
 int run(const Options& options) {
   using daemon::ExitCode;
-  const auto failed = [](const std::string& text, ExitCode code) {
-    std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", text.c_str());
-    return number(code);
-  };
-
-  auto participant = dds::Participant::create(options.participant);
-  if (!participant) return failed(participant.error().text, ExitCode::BadInput);
-  auto readers = dds::Readers::create(*participant, linuxcnc::Subscription::kTopics);
-  if (!readers) return failed(readers.error().text, ExitCode::Io);
   std::string error;
-  auto pins = HalPins::create(error);
-  if (!pins) return failed(error, ExitCode::Io);
+  auto link = ControlLink::attach(options.key, error);
+  if (!link) return fail(error, ExitCode::Refused);
+  auto participant = dds::Participant::create(options.participant);
+  if (!participant) {
+    const bool is_input = participant.error().code == daemon::ErrorCode::BadInput;
+    return fail(participant.error().text, is_input ? ExitCode::BadInput : ExitCode::Io);
+  }
+  auto readers = dds::Readers::create(*participant, linuxcnc::Subscription::kTopics);
+  if (!readers) return fail(readers.error().text, ExitCode::Io);
 
-  const auto& t = options.tool_offset_mm;
-  linuxcnc::Subscription subscription(
-      {options.machine, calib::Vector3(t[0], t[1], t[2]) * kMillimetre}, *readers);
-  Latest latest;
-  std::jthread deciding([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) latest.set(subscription.poll(kDecisionPeriod));
-  });
+  linuxcnc::Subscription subscription({options.machine, options.machine_id}, *readers);
+  LatestUsable latest;
+  Reporter reporter(*link);
+  std::jthread reporting([&](const std::stop_token& stop) { reporter.report_until(stop); });
+  std::jthread deciding(
+      [&](const std::stop_token& stop) { decide(stop, subscription, latest, reporter); });
 
-  feed(options, *pins, latest);
-  return number(ExitCode::Done);
+  take_priority(options.priority);
+  const std::string ended = feed(options, *link, latest);
+  ::alarm(kExitDeadline_s);  // a thread that cannot write to a halted terminal does not end
+  if (ended.empty() || link->closed()) return number(ExitCode::Done);
+  return fail(ended, ExitCode::Refused);
+}
+
+/// Child processes of --restart: these codes do not change by themselves.
+bool is_final(int code) {
+  using daemon::ExitCode;
+  for (const auto last : {ExitCode::Done, ExitCode::BadInput, ExitCode::Refused})
+    if (code == number(last)) return true;
+  return false;
 }
 
 void stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   for (const int signal : {SIGTERM, SIGINT}) ::sigaction(signal, &action, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);  // the reader of the output has ended
 }
 
-}  // namespace
+int run_caught(const Options& options) {
+  try {
+    stop_on_signals();
+    return run(options);
+  } catch (const std::exception& e) {
+    return fail(std::string("internal error: ") + e.what(), daemon::ExitCode::Internal);
+  }
+}
 
-int main(int argc, char** argv) {
-  std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  CLI::App app{
-      "Receives the error model of a machine from abbe over DDS and feeds its correction to the "
-      "realtime component abbe_correction of LinuxCNC. Load it from HAL: loadusr -Wn abbe-feeder."};
-  app.set_version_flag("--version", "abbe-linuxcnc-feeder " ABBE_VERSION);
-  Options options;
+void add_options(CLI::App& app, Options& options) {
   app.add_option("--machine", options.machine, "name of the machine in abbed.toml")->required();
+  app.add_option("--machine-id", options.machine_id,
+                 "identity of the machine, from `abbe machine identity` (default: the first one "
+                 "that publishes under the name, while the feeder runs)");
   app.add_option("--tool-offset-mm", options.tool_offset_mm,
-                 "tool offset x y z for which the model must be valid")
-      ->required()
+                 "abbe's tool offset x y z while motion.tooloffset is 0; that of a tool is this "
+                 "minus motion.tooloffset (default: 0 0 0)")
       ->expected(3);
   app.add_option("--domain", options.participant.domain, "DDS domain, 0 to 232")
       ->check(CLI::Range(0U, dds::kHighestDomain))
@@ -171,18 +228,45 @@ int main(int argc, char** argv) {
   app.add_option("--period-us", options.period_us, "period of the loop")
       ->check(CLI::Range(100L, 20'000L))
       ->capture_default_str();
+  app.add_option("--priority", options.priority,
+                 "SCHED_FIFO priority of the loop, below that of the servo thread; 0: none")
+      ->check(CLI::Range(0, 98))
+      ->capture_default_str();
+  app.add_flag("--restart", options.restart,
+               "start again within a second when it is killed or fails, until LinuxCNC ends");
+  app.add_option("--key", options.key, "key of the shared memory: key= of abbe_correction")
+      ->capture_default_str();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using daemon::ExitCode;
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  CLI::App app{
+      "Receives the error model of a machine from abbe over DDS and feeds its correction to the "
+      "realtime component abbe_correction of LinuxCNC, which must be loaded first."};
+  app.set_version_flag("--version", "abbe-linuxcnc-feeder " ABBE_VERSION);
+  app.footer(daemon::exit_codes_text(
+      {{ExitCode::Done, "a signal, or LinuxCNC has ended"},
+       {ExitCode::Usage},
+       {ExitCode::BadInput, "profile or keys cannot be used"},
+       {ExitCode::Io},
+       {ExitCode::Refused, "LinuxCNC does not run with abbe_correction, or another feeder runs"},
+       {ExitCode::Internal}}));
+  Options options;
+  add_options(app, options);
 
   try {
+    abbe::protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : number(daemon::ExitCode::Usage);
+    return app.exit(e) == 0 ? 0 : number(ExitCode::Usage);
   }
 
-  try {
-    stop_on_signals();
-    return run(options);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "abbe-linuxcnc-feeder: internal error: %s\n", e.what());
-    return number(daemon::ExitCode::Internal);
-  }
+  if (!options.restart) return run_caught(options);
+  return linuxcnc::run_restarted([&options] { return run_caught(options); }, is_final,
+                                 [](const std::string& text) {
+                                   std::fprintf(stderr, "abbe-linuxcnc-feeder: %s\n", text.c_str());
+                                 });
 }

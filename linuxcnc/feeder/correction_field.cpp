@@ -1,7 +1,49 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "correction_field.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "abbe/calib/volumetric_model.hpp"
+
 namespace abbe::linuxcnc {
+namespace {
+
+constexpr double kMillimetre = 1e-3;
+
+using Vector = calib::Vector3;
+
+Vector from_mm(const double (&v_mm)[3]) {
+  return Vector(v_mm[0], v_mm[1], v_mm[2]) * kMillimetre;
+}
+
+/// Not valid, with a formatted reason that is cut to the size of the memory.
+template <class... Values>
+abbe_wanted refuse(fmt::format_string<Values...> reason, Values&&... values) {
+  abbe_wanted refused{};
+  fmt::format_to_n(&refused.reason[0], ABBE_REASON_SIZE - 1, reason,
+                   std::forward<Values>(values)...);
+  return refused;
+}
+
+/// As VolumetricModel::holds_for_tool() of a model for one tool: what is published does not show
+/// whether a model holds for more tools. An offset that is NaN refuses, too.
+bool holds_for(const Vector& tool_m, const Usable& usable) {
+  return (tool_m - usable.tool_offset_m).norm() <= calib::VolumetricModel::kToolTolerance_m;
+}
+
+abbe_wanted refuse_tool(const Vector& tool_m, int number, const Usable& usable) {
+  const Vector t = tool_m / kMillimetre, of_model = usable.tool_offset_m / kMillimetre;
+  return refuse(
+      "the model is for the tool offset ({:.3f}, {:.3f}, {:.3f}) mm, T{} has "
+      "({:.3f}, {:.3f}, {:.3f}) mm",
+      of_model.x(), of_model.y(), of_model.z(), number, t.x(), t.y(), t.z());
+}
+
+}  // namespace
 
 std::optional<calib::Vector3> command_correction(const calib::ErrorLattice& field,
                                                  const calib::Vector3& position_m) {
@@ -18,21 +60,30 @@ std::optional<calib::Vector3> command_correction(const calib::ErrorLattice& fiel
   return correction_m;
 }
 
-Wanted wanted(const Usable& usable, double silence_s, bool homed, const calib::Vector3& position_m,
-              const FeedLimits& limits) {
-  const auto refuse = [](std::string reason) {
-    return Wanted{calib::Vector3::Zero(), false, std::move(reason)};
-  };
-  if (!homed) return refuse("not all joints are homed");
-  if (silence_s > limits.longest_silence_s) return refuse("the DDS subscription does not answer");
-  if (!usable.field) return refuse(usable.reason);
+abbe_wanted wanted(const Usable& usable, double silence_s, const abbe_control& control,
+                   const FeedOptions& options) {
+  if (control.homed == 0) return refuse("not all joints are homed");
+  if (silence_s > options.longest_silence_s) return refuse("the DDS subscription does not answer");
+  if (!usable.field) return refuse("{}", usable.reason);
 
-  const auto correction_m = command_correction(*usable.field, position_m);
+  if (control.tool == ABBE_TOOL_NOT_LINKED)
+    return refuse("abbe-correction.tool-offset.x, y, z and tool-number are not all linked in HAL");
+  if (control.tool != ABBE_TOOL_KNOWN)
+    return refuse("the offset of T{} is not applied yet: G43 (after G49, if it equals that before)",
+                  control.tool_number);
+  const Vector tool_m = options.tool_offset_at_zero_m - from_mm(control.tool_offset);
+  if (!holds_for(tool_m, usable)) return refuse_tool(tool_m, control.tool_number, usable);
+
+  const auto correction_m = command_correction(*usable.field, from_mm(control.position));
   if (!correction_m) return refuse("outside the volume of the model");
   // A clamp that is NaN refuses, too.
-  if (!(correction_m->cwiseAbs().maxCoeff() <= limits.clamp_m))
+  if (!(correction_m->cwiseAbs().maxCoeff() <= options.clamp_m))
     return refuse("the correction is larger than the clamp");
-  return {*correction_m, true, {}};
+
+  abbe_wanted w{};
+  w.valid = 1;
+  for (int i = 0; i < 3; ++i) w.correction[i] = (*correction_m)[i] / kMillimetre;
+  return w;
 }
 
 }  // namespace abbe::linuxcnc

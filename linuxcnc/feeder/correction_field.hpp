@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
-/// The command correction of a received error model. Pure; a value may be read by several threads.
+/// The command correction of a received error model. Pure, without allocation; a value may be read
+/// by several threads.
 
 #include <optional>
 #include <string>
 
 #include "abbe/calib/error_lattice.hpp"
+#include "hand_over.h"
 
 namespace abbe::linuxcnc {
 
@@ -16,27 +18,26 @@ namespace abbe::linuxcnc {
 [[nodiscard]] std::optional<calib::Vector3> command_correction(const calib::ErrorLattice& field,
                                                                const calib::Vector3& position_m);
 
-/// What the subscription passes to the loop that writes the pins.
+/// What the subscription passes to the loop of the feeder.
 struct Usable {
   std::optional<calib::ErrorLattice> field;  ///< nullopt: nothing may be applied, see reason
   std::string reason;
   std::string model_id;
+  calib::Vector3 tool_offset_m = calib::Vector3::Zero();  ///< for which V of the field holds
 };
 
-/// Decision for one cycle.
-struct Wanted {
-  calib::Vector3 correction_m = calib::Vector3::Zero();
-  bool valid = false;
-  std::string reason;  ///< why not valid
-};
-
-struct FeedLimits {
+struct FeedOptions {
   double clamp_m = 0.2e-3;  ///< that of the realtime component: a larger c is not applied in part
   double longest_silence_s = 0.25;  ///< of the subscription's thread
+  /// abbe's tool offset (tool reference point to functional point) while motion.tooloffset is 0.
+  /// That of any tool is this minus motion.tooloffset: LinuxCNC subtracts its offset from the
+  /// position of the tool reference point to show that of the functional point.
+  calib::Vector3 tool_offset_at_zero_m = calib::Vector3::Zero();
 };
 
+/// Decision for one cycle: the values for the realtime component, with a reason if not valid.
 /// `silence_s`: since the subscription's thread last decided.
-[[nodiscard]] Wanted wanted(const Usable& usable, double silence_s, bool homed,
-                            const calib::Vector3& position_m, const FeedLimits& limits);
+[[nodiscard]] abbe_wanted wanted(const Usable& usable, double silence_s,
+                                 const abbe_control& control, const FeedOptions& options);
 
 }  // namespace abbe::linuxcnc

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #include "subscription.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "abbe/dds/grid_nodes.hpp"
@@ -15,13 +13,6 @@ using daemon::Topic;
 
 /// abbe-dds repeats ModelState every second; an older one is not valid (daemon/docs/dds.md).
 constexpr std::chrono::milliseconds kLongestSilence{1500};
-
-/// Tool offsets that differ by less count as equal.
-constexpr double kSameTool_m = 1e-6;
-
-std::string millimetres(const calib::Vector3& v_m) {
-  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", v_m[0] * 1e3, v_m[1] * 1e3, v_m[2] * 1e3);
-}
 
 /// Malformed payloads are skipped: any participant of the domain may send them.
 template <class T, class Use>
@@ -39,7 +30,7 @@ std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_mo
   const bool was_usable = usable_->field.has_value();
   if (!reason.empty()) {
     if (was_usable || usable_->reason != reason)
-      usable_ = std::make_shared<const Usable>(Usable{std::nullopt, std::move(reason), {}});
+      usable_ = std::make_shared<const Usable>(Usable{std::nullopt, std::move(reason), {}, {}});
     return usable_;
   }
 
@@ -50,20 +41,37 @@ std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_mo
   grid_changed_ = false;
   const auto nodes = model.grid();
   auto lattice = dds::lattice_of(*nodes);
-  usable_ =
-      std::make_shared<const Usable>(lattice ? Usable{std::move(*lattice), {}, id}
-                                             : Usable{std::nullopt, lattice.error().text, {}});
+  const auto& t = model.model()->tool_offset_m();
+  usable_ = std::make_shared<const Usable>(
+      lattice ? Usable{std::move(*lattice), {}, id, calib::Vector3(t[0], t[1], t[2])}
+              : Usable{std::nullopt, lattice.error().text, {}, {}});
   return usable_;
 }
 
 void Subscription::take(const dds::Arrival& arrival) {
   const auto key = daemon::payload_key(arrival.topic, arrival.payload);
-  if (!key || key->machine != options_.machine) return;
+  if (!key || key->machine != machine_) return;
 
   const auto from = dds::participant_of(arrival.writer);
-  pin_.heard(from, Clock::now());
+  judge(arrival, from);
   keep(arrival, publishers_[from]);
   std::erase_if(publishers_, [this](const auto& p) { return !pin_.remembers(p.first); });
+}
+
+void Subscription::judge(const dds::Arrival& arrival, const dds::ParticipantId& from) {
+  using Verdict = dds::PublisherPin::Verdict;
+  auto verdict = Verdict::Waiting;
+  if (arrival.topic == Topic::Identity) {
+    with<v1::Identity>(arrival, [&](v1::Identity&& identity) {
+      verdict = pin_.identified(from, identity.machine_id(), identity.twin(), Clock::now());
+    });
+  } else {
+    verdict = pin_.heard(from, Clock::now());
+  }
+  if (verdict == Verdict::OtherMachine)
+    why_none_ = "machine_id " + pin_.stated_by(from).value_or("") + " is another machine";
+  if (verdict == Verdict::Ambiguous)
+    why_none_ = "several machines have this name: give --machine-id";
 }
 
 void Subscription::keep(const dds::Arrival& arrival, Publisher& publisher) {
@@ -96,7 +104,8 @@ std::string Subscription::why_not() const {
   const auto pinned = pin_.pinned();
   const auto found = pinned ? publishers_.find(*pinned) : publishers_.end();
   if (found == publishers_.end())
-    return "nothing received about machine \"" + options_.machine + "\"";
+    return "nothing received about machine \"" + machine_ + "\"" +
+           (why_none_.empty() ? "" : ": " + why_none_);
 
   const Publisher& publisher = found->second;
   const auto decision = publisher.model.decide(alive(publisher));
@@ -107,11 +116,6 @@ std::string Subscription::why_not_model(const Publisher& publisher) const {
   const auto& model = publisher.model.model();
   if (!model || model->model_id() != publisher.model.state()->model_id())
     return "no ErrorModel received of the active model";
-  const auto& t = model->tool_offset_m();
-  const calib::Vector3 of_model_m(t[0], t[1], t[2]);
-  if (!((of_model_m - options_.tool_offset_m).norm() < kSameTool_m))
-    return "the model is for the tool offset " + millimetres(of_model_m) + ", not for " +
-           millimetres(options_.tool_offset_m);
   return {};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 #pragma once
 /// Subscribes to the model of one machine and decides by the rule of abbe_v1.idl whether its grid
-/// may be applied. Used by one thread.
+/// may be applied: the tool is compared by the loop of the feeder. Used by one thread.
 
 #include <chrono>
 #include <map>
@@ -19,18 +19,20 @@ namespace abbe::linuxcnc {
 
 struct SubscriptionOptions {
   std::string machine;
-  calib::Vector3 tool_offset_m;  ///< of the tool in the spindle
+  std::string machine_id = {};  ///< of the machine; empty: the first one of this name is pinned
 };
 
 class Subscription {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::array kTopics{daemon::Topic::ModelState, daemon::Topic::ErrorModel,
-                                      daemon::Topic::ErrorGrid};
+  static constexpr std::array kTopics{daemon::Topic::Identity, daemon::Topic::ModelState,
+                                      daemon::Topic::ErrorModel, daemon::Topic::ErrorGrid};
 
   /// `readers` must outlive the subscription and read kTopics.
   Subscription(SubscriptionOptions options, dds::Readers& readers)
-      : options_(std::move(options)), readers_(readers) {}
+      : machine_(std::move(options.machine)),
+        readers_(readers),
+        pin_(std::move(options.machine_id)) {}
 
   /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
   /// replaced only when the decision changes. Never null.
@@ -44,15 +46,18 @@ class Subscription {
   };
 
   void take(const dds::Arrival& arrival);
+  /// Passes the sample to the pin; notes why a publisher is not used.
+  void judge(const dds::Arrival& arrival, const dds::ParticipantId& from);
   void keep(const dds::Arrival& arrival, Publisher& publisher);
   [[nodiscard]] bool alive(const Publisher& publisher) const;
   [[nodiscard]] std::string why_not() const;
   [[nodiscard]] std::string why_not_model(const Publisher& publisher) const;
 
-  SubscriptionOptions options_;
+  std::string machine_;
   dds::Readers& readers_;
   dds::PublisherPin pin_;
   std::map<dds::ParticipantId, Publisher> publishers_;
+  std::string why_none_;  ///< why the last publisher that was heard is not used
   bool grid_changed_ = false;
   std::shared_ptr<const Usable> usable_ = std::make_shared<const Usable>();
 };

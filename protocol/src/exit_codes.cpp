@@ -37,6 +37,10 @@ std::string_view meaning_of(ExitCode code) noexcept {
       return "input or output failed";
     case ExitCode::Refused:
       return "refused by the gate, or because of a state";
+    case ExitCode::StopNotConfirmed:
+      return "the stop of the measuring machine is not confirmed: it may be moving";
+    case ExitCode::StopNotSent:
+      return "no stop could be sent to the measuring machine: it may be moving";
     case ExitCode::Internal:
       return "internal error";
     case ExitCode::Interrupted:

@@ -21,6 +21,9 @@ class Model:
     @property
     def method(self) -> str: ...
     @property
+    def simulated(self) -> bool | None:
+        """True: the devices were those of abbe-sim. None: not known, a file of an earlier version."""
+    @property
     def estimator(self) -> str: ...
     @property
     def created_utc_ns(self) -> int: ...
@@ -46,12 +49,23 @@ class Model:
         Where it is unknown, V is the mean of both directions, and the covariance contains half the
         difference.
         """
+    @property
+    def verdict(self) -> dict[str, Any] | None:
+        """Of the gate: state ("accepted", "refused", "forced"), reasons, notes, forced_by, forced_why.
+
+        None: not judged, as files of earlier versions of abbe.
+        """
+    @property
+    def statements(self) -> list[str]:
+        """What a user of the model must know, the verdict first: write them into files made of it."""
     def correction_at(self, points_m: ArrayLike, tool_m: ArrayLike | None = None,
-                      direction: Sequence[int] | None = None
+                      direction: Sequence[int] | None = None, force: bool = False, why: str = ""
                       ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """(c (N, 3) in m, inside (N)): to reach the nominal position p, command p + c.
 
-        direction: as for error_at(), in which the axes reach p.
+        direction: as for error_at(), in which the axes reach p. abbe.Error with the code "refused" for
+        a model that must not correct a machine, because the gate refused it; unless force, which needs
+        a reason.
         """
 
 class Recording:

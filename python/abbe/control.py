@@ -12,6 +12,11 @@ from abbe.errors import Error
 
 _LONGEST_ANSWER = 64 << 20
 _POLL_PERIOD_S = 0.2
+_STOP_PERIOD_S = 0.05
+# A request reaches the machine's thread within some ms. Later a smaller number is that of a restarted abbed.
+_STOP_RECEIVED_S = 2.0
+# abbed connects again (3 s at most) and waits for the answer to AbortE (5 s at most).
+_LONGEST_STOP_S = 10.0
 
 File = str | os.PathLike[str]
 
@@ -141,12 +146,36 @@ class Control:
         return self._order({"do": "tracker_reflectors"}).get("reflectors", [])
 
     def machine(self) -> dict[str, Any]:
-        """Of a measuring machine: release_awaited, reason, tip_m and tip_age_s once it reported the tip."""
+        """Of a measuring machine: release_awaited, reason; tip_m and tip_age_s once it reported the tip; stop."""
         return self.ask({"do": "machine"})
 
-    def stop_machine(self) -> None:
-        """Stops every motion that abbed has commanded; the machine does not move before a release."""
-        self.ask({"do": "machine", "stop": True})
+    def stop_machine(self) -> str:
+        """Stops every motion that abbed has commanded, waits for the outcome and returns its text.
+
+        The machine does not move before a release. Error "stop_not_confirmed" if AbortE was refused or
+        not answered, "stop_not_sent" if there is no connection: the machine may then be moving.
+        """
+        number = self.ask({"do": "machine", "stop": True}).get("stop")
+        if number is None:
+            raise Error("stop_not_confirmed", "machine: abbed does not report whether it has stopped")
+        stop = self._outcome_of_stop(number)
+        if stop["outcome"] == "stopped":
+            return stop["text"]
+        code = "stop_not_sent" if stop["outcome"] == "not sent" else "stop_not_confirmed"
+        raise Error(code, f"machine: stop {stop['outcome']}: {stop['text']}")
+
+    def _outcome_of_stop(self, number: int) -> dict[str, Any]:
+        asked = time.monotonic()
+        while True:
+            stop = self.machine().get("stop", {"number": 0, "outcome": "pending"})
+            if stop["number"] >= number and stop["outcome"] != "pending":
+                return stop
+            waited_s = time.monotonic() - asked
+            if stop["number"] < number and waited_s >= _STOP_RECEIVED_S:
+                raise Error("stop_not_confirmed", "machine: abbed does not know the stop: it may have restarted")
+            if waited_s >= _LONGEST_STOP_S:
+                raise Error("stop_not_confirmed", f"machine: no outcome of the stop in {_LONGEST_STOP_S:g} s")
+            time.sleep(_STOP_PERIOD_S)
 
     def release_machine(self) -> str:
         """States that a person has checked the machine, which may move from then on; returns what was released."""

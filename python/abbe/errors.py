@@ -4,7 +4,8 @@
 class Error(Exception):
     """A message of abbe.
 
-    code: "bad_input", "usage", "refused", "data_insufficient" or "io".
+    code: "bad_input", "usage", "refused", "data_insufficient", "io"; of Control.stop_machine() also
+    "stop_not_confirmed" and "stop_not_sent".
     details: further lines, for example one for each fault of a file with file, line and field.
     """
 

@@ -23,7 +23,11 @@ def main() -> None:
     applied = refused = 0
     with abbe.Subscription(domain=int(sys.argv[2]), profile=sys.argv[3],
                            timeout_s=float(sys.argv[4]) if len(sys.argv) > 4 else 10.0) as subscription:
+        shown = None
         for decision in subscription.decisions():
+            if decision.apply != shown:
+                print("apply" if decision.apply else f"do not apply: {decision.reason}")
+            shown = decision.apply
             applied += decision.apply
             refused += not decision.apply
     print(f"vectors: {applied} may be applied, {refused} may not")

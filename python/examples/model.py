@@ -17,6 +17,7 @@ def table_of(parameters: dict, name: str) -> np.ndarray:
 def main() -> None:
     model = abbe.Model.load(sys.argv[1])
     print(f"model {model.id} of {model.machine}, method {model.method}, chain {model.chain}")
+    print("\n".join(model.statements))
 
     p = model.parameters
     for name in dict.fromkeys(p["name"]):

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "abbe/config/calib_error.hpp"
-#include "abbe/model/model_document.hpp"
+#include "abbe/model/model_use.hpp"
 #include "bindings.hpp"
 #include "raise.hpp"
 
@@ -94,9 +94,40 @@ py::tuple error_at(const ModelDocument& document, const Points& points_m,
   return py::make_tuple(V, cov, inside);
 }
 
+/// abbe.Error "refused" for a model that must not correct a machine, unless forced with a reason.
+void require_use(const ModelDocument& document, bool force, const std::string& why) {
+  if (force && why.empty()) refuse("force: needs why, the reason");
+  const auto found = daemon::obstacles_to_use({.document = document});
+  if (found.refusals.empty() || force) return;
+  throw Raised({daemon::ErrorCode::Refused,
+                "correction_at: the model must not be used; to use it nevertheless, give "
+                "force=True and why",
+                found.refusals});
+}
+
+/// What a model file states of its verdict; None: not judged.
+py::object verdict_of(const ModelDocument& document) {
+  const auto& verdict = document.verdict;
+  if (!verdict) return py::none();
+  py::dict out;
+  out["state"] = std::string{daemon::name(daemon::state_of(verdict))};
+  out["reasons"] = verdict->reasons;
+  out["notes"] = verdict->notes;
+  out["forced_by"] = verdict->forced ? verdict->forced->who : std::string{};
+  out["forced_why"] = verdict->forced ? verdict->forced->why : std::string{};
+  return out;
+}
+
+std::vector<std::string> statements_of(const ModelDocument& document) {
+  return daemon::obstacles_to_use({.document = document, .purpose = daemon::ModelPurpose::Look})
+      .statements;
+}
+
 /// (c_m (N, 3), inside (N)).
 py::tuple correction_at(const ModelDocument& document, const Points& points_m,
-                        const std::optional<Vector3>& tool_m, const Direction& direction) {
+                        const std::optional<Vector3>& tool_m, const Direction& direction,
+                        bool force, const std::string& why) {
+  require_use(document, force, why);
   const py::ssize_t n = rows_of(points_m, "points_m");
   const Vector3 tool = tool_of(document, tool_m);
   const auto travel = travel_of(document, direction);
@@ -161,6 +192,8 @@ void bind_model(py::module_& module) {
       .def_property_readonly("hash", [](const ModelDocument& d) { return daemon::model_hash(d); })
       .def_property_readonly("machine", [](const ModelDocument& d) { return d.machine; })
       .def_property_readonly("method", [](const ModelDocument& d) { return d.method; })
+      .def_property_readonly(
+          "simulated", [](const ModelDocument& d) { return daemon::made_on_simulated_devices(d); })
       .def_property_readonly("estimator", [](const ModelDocument& d) { return d.estimator; })
       .def_property_readonly(
           "created_utc_ns",
@@ -181,8 +214,10 @@ void bind_model(py::module_& module) {
                              [](const ModelDocument& d) { return d.model.covariance(); })
       .def("error_at", error_at, py::arg("points_m"), py::arg("tool_m") = py::none(),
            py::arg("direction") = py::none())
+      .def_property_readonly("verdict", verdict_of)
+      .def_property_readonly("statements", statements_of)
       .def("correction_at", correction_at, py::arg("points_m"), py::arg("tool_m") = py::none(),
-           py::arg("direction") = py::none());
+           py::arg("direction") = py::none(), py::arg("force") = false, py::arg("why") = "");
 }
 
 }  // namespace abbe::python

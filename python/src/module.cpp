@@ -20,6 +20,10 @@ const char* name_of(daemon::ErrorCode code) {
       return "data_insufficient";
     case daemon::ErrorCode::Io:
       return "io";
+    case daemon::ErrorCode::StopNotConfirmed:
+      return "stop_not_confirmed";
+    case daemon::ErrorCode::StopNotSent:
+      return "stop_not_sent";
   }
   return "unknown";
 }

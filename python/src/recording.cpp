@@ -171,6 +171,7 @@ py::dict streams(const RecordingReader& reader) {
     const py::gil_scoped_release other_threads_may_run;
     (void)reader.read(sink);
   }
+  if (auto intact = reader.intact(); !intact) throw Raised(std::move(intact.error()));
   py::dict out;
   out["tracker"] = as_dict(tracker);
   out["axes"] = as_dict(axes);

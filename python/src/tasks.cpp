@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/evemu/task_of_files.hpp"
@@ -25,7 +26,8 @@ using daemon::CalibrationTask;
 
 std::string otf_task(const std::string& path) {
   auto read = value_or_raise(daemon::read_path_csv(path));
-  return to_json(CalibrationTask{daemon::OtfRequest{std::move(read.vertices_m), {}}}).dump();
+  return daemon::json_text(
+      to_json(CalibrationTask{daemon::OtfRequest{std::move(read.vertices_m), {}}}));
 }
 
 std::string evemu_task(const std::string& calibrator,
@@ -33,7 +35,8 @@ std::string evemu_task(const std::string& calibrator,
   const auto array = value_or_raise(daemon::read_calibrator_toml(calibrator));
   std::optional<daemon::BallErrorsFile> reference;
   if (rotation_reference) reference = value_or_raise(daemon::read_errors_csv(*rotation_reference));
-  return daemon::evemu_task(array, reference ? &*reference : nullptr, u_reference_m).dump();
+  return daemon::json_text(
+      daemon::evemu_task(array, reference ? &*reference : nullptr, u_reference_m));
 }
 
 daemon::MfbRequest::File with_text(const std::string& file) {
@@ -45,7 +48,7 @@ std::string mfb_task(const std::string& bar, const std::string& plan) {
   daemon::MfbRequest request{with_text(bar), with_text(plan), {}};
   const auto read = value_or_raise(daemon::parse_bar_toml(request.bar.text, bar));
   (void)value_or_raise(daemon::parse_bar_plan_toml(request.plan.text, plan, read.bar));
-  return to_json(CalibrationTask{std::move(request)}).dump();
+  return daemon::json_text(to_json(CalibrationTask{std::move(request)}));
 }
 
 }  // namespace

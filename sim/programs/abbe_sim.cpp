@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "abbe/protocol/option_values.hpp"
+#include "abbe/protocol/printable.hpp"
 #include "commands.hpp"
 
 namespace abbe::sim {
@@ -22,7 +24,7 @@ constexpr int kUsage = number(ExitCode::Usage), kBadInput = number(ExitCode::Bad
 }  // namespace
 
 int report(const Error& error) {
-  std::fprintf(stderr, "abbe-sim: %s\n", error.text.c_str());
+  std::fprintf(stderr, "abbe-sim: %s\n", protocol::printable(error.text).c_str());
   switch (error.code) {
     case ErrorCode::BadInput:
       return kBadInput;
@@ -84,6 +86,7 @@ int run(int argc, char** argv) {
   add_examples(app);
 
   try {
+    protocol::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

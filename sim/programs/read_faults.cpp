@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "abbe/protocol/can/canopen.hpp"
+#include "abbe/sim/environment_model.hpp"
 
 namespace abbe::sim {
 namespace {
@@ -45,6 +46,8 @@ ScheduledFault read_fault(TomlSection& section) {
   section.number("value", scheduled.fault.value);
   if (section.integer("node", node, 0, can::kMaxNodeId))
     scheduled.fault.node = static_cast<std::uint8_t>(node);
+  if (std::int64_t input = 0; section.integer("input", input, 0, kSimulatedInputs))
+    scheduled.fault.input = static_cast<std::uint8_t>(input);
   section.refuse_unknown_keys();
 
   return scheduled;

@@ -38,6 +38,14 @@ constexpr std::array kEnvironmentFaults{
     Name{"garbage", FaultKind::ModbusGarbage},
     Name{"wrong_map", FaultKind::WrongMap},
     Name{"sensors_gone", FaultKind::SensorsGone},
+    Name{"sensor_value", FaultKind::SensorValue},
+    Name{"sensor_stuck", FaultKind::SensorStuck},
+    Name{"sensor_swapped", FaultKind::SensorSwapped},
+    Name{"sensor_fahrenheit", FaultKind::SensorFahrenheit},
+    Name{"sensor_byte_order", FaultKind::SensorByteOrder},
+    Name{"sensor_spikes", FaultKind::SensorSpikes},
+    Name{"sensor_drift", FaultKind::SensorDrift},
+    Name{"sensor_other_slave", FaultKind::SensorOtherSlave},
 };
 
 constexpr std::array kCounterCardFaults{

@@ -42,8 +42,12 @@ Eigen::Vector3d place_m(const std::string& arguments, Eigen::Vector3d here_m) {
   return here_m;
 }
 
+/// True for a place that the machine can report: within 1e12 mm of its zero.
 bool finite_place(const std::string& arguments) {
-  return ippdme::parse_point(arguments).has_value();
+  constexpr double kFarthest_mm = 1e12;
+  const auto point = ippdme::parse_point(arguments);
+  return point &&
+         std::ranges::all_of(point->p_mm, [](double p) { return std::abs(p) <= kFarthest_mm; });
 }
 
 }  // namespace
@@ -93,7 +97,9 @@ std::string IppDmeDevice::place(const std::vector<std::string>& names,
     if (name == "IJK") {
       text += "IJK(0,0,1)";
     } else {
-      text += name + "(" + ippdme::number_text(kMillimetresPerMetre * p_m[name[0] - 'X']) + ")";
+      // has a value: see finite_place()
+      text +=
+          name + "(" + ippdme::number_text(kMillimetresPerMetre * p_m[name[0] - 'X']).value() + ")";
     }
   }
   return text;

@@ -1,5 +1,6 @@
 #include "abbe/sim/modbus_registers.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -66,11 +67,55 @@ Registers comet(const Air& air, std::uint32_t serial) {
   return r;
 }
 
+bool is_broken(const BrokenInput& broken, std::size_t input) {
+  return broken.input == 0 || broken.input == input + 1;
+}
+
+/// The reading `right_C` of an input as its fault changes it.
+double broken_reading_C(const BrokenInput& fault, const EnvironmentModel& environment,
+                        std::size_t input, nanoseconds t, double right_C) {
+  constexpr std::int64_t kSpikePeriod_s = 5;
+  const auto& sensors = environment.temperature_C;
+  switch (fault.kind) {
+    case FaultKind::SensorValue:
+      return fault.value;
+    case FaultKind::SensorStuck:
+      return sensors[input].at(fault.since);
+    case FaultKind::SensorSwapped:
+      return sensors[input ^ 1u].at(t);
+    case FaultKind::SensorFahrenheit:
+      return 1.8 * right_C + 32.0;
+    case FaultKind::SensorSpikes:
+      return std::chrono::duration_cast<std::chrono::seconds>(t).count() % kSpikePeriod_s == 0
+                 ? right_C + fault.value
+                 : right_C;
+    case FaultKind::SensorDrift:
+      return right_C + fault.value * ns_to_seconds(t - fault.since) / 3600.0;
+    case FaultKind::SensorOtherSlave:
+      return sensors[(input + kSimulatedInputs / 2) % kSimulatedInputs].at(t);
+    default:
+      return right_C;
+  }
+}
+
+std::uint16_t register_of_input(const EnvironmentModel& environment, std::size_t input,
+                                nanoseconds t, const std::vector<BrokenInput>& broken) {
+  // Saturated, as in the module.
+  const double reading_C =
+      std::clamp(reading_of_input(environment, input, t, broken), -3276.0, 3276.0);
+  std::uint16_t value = tenths(reading_C);
+  for (const BrokenInput& fault : broken)
+    if (fault.kind == FaultKind::SensorByteOrder && is_broken(fault, input))
+      value = static_cast<std::uint16_t>(value << 8 | value >> 8);
+  return value;
+}
+
 Registers zt2005(const EnvironmentModel& environment, nanoseconds t, std::uint8_t unit,
-                 bool sensors_gone) {
+                 bool sensors_gone, const std::vector<BrokenInput>& broken) {
   Registers r;
   for (std::uint16_t i = 0; i < kSimulatedInputs; ++i) {
-    const std::uint16_t value = sensors_gone ? 0x8000u : tenths(environment.temperature_C[i].at(t));
+    const std::uint16_t value =
+        sensors_gone ? std::uint16_t{0x8000u} : register_of_input(environment, i, t, broken);
     r.push_back({unit, RegisterSpace::Input, i, value});
     r.push_back({unit, RegisterSpace::Holding, i, value});
   }
@@ -78,6 +123,15 @@ Registers zt2005(const EnvironmentModel& environment, nanoseconds t, std::uint8_
 }
 
 }  // namespace
+
+double reading_of_input(const EnvironmentModel& environment, std::size_t input, nanoseconds t,
+                        const std::vector<BrokenInput>& broken) {
+  double reading_C = environment.temperature_C[input].at(t);
+  for (const BrokenInput& fault : broken)
+    if (is_broken(fault, input))
+      reading_C = broken_reading_C(fault, environment, input, t, reading_C);
+  return reading_C;
+}
 
 std::optional<ModbusModel> modbus_model(std::string_view name) {
   if (name == "indigo520_hmp") return ModbusModel::Indigo520Hmp;
@@ -88,7 +142,8 @@ std::optional<ModbusModel> modbus_model(std::string_view name) {
 
 std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
                                             const EnvironmentModel& environment,
-                                            nanoseconds since_start, bool sensors_gone) {
+                                            nanoseconds since_start, bool sensors_gone,
+                                            const std::vector<BrokenInput>& broken) {
   const Air air{environment.air_temperature_C.at(since_start),
                 environment.air_pressure_hPa.at(since_start),
                 environment.relative_humidity_percent.at(since_start)};
@@ -98,7 +153,7 @@ std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
     case ModbusModel::CometT7510:
       return comet(air, identity.serial_number);
     case ModbusModel::Zt2005C8:
-      return zt2005(environment, since_start, identity.unit, sensors_gone);
+      return zt2005(environment, since_start, identity.unit, sensors_gone, broken);
   }
   return {};
 }

@@ -80,6 +80,7 @@ struct ModbusServer::State {
   void answer_due(HostTime now);
   void answer(const Query& query, HostTime now);
   [[nodiscard]] Mapping mapping_for(std::uint8_t unit, HostTime now) const;
+  [[nodiscard]] std::vector<BrokenInput> broken_inputs() const;
 };
 
 Result<void> ModbusServer::State::plug_in() {
@@ -180,9 +181,19 @@ void ModbusServer::State::answer(const Query& query, HostTime now) {
                mapping.get());
 }
 
+std::vector<BrokenInput> ModbusServer::State::broken_inputs() const {
+  std::vector<BrokenInput> broken;
+  for (const auto& [fault, end] : faults)
+    broken.push_back({.kind = fault.kind,
+                      .input = fault.input,
+                      .value = fault.value,
+                      .since = end - seconds_to_ns(fault.duration_s) - start});
+  return broken;
+}
+
 Mapping ModbusServer::State::mapping_for(std::uint8_t unit, HostTime now) const {
   auto registers = registers_of(options.identity, options.environment, now - start,
-                                active(FaultKind::SensorsGone) != nullptr);
+                                active(FaultKind::SensorsGone) != nullptr, broken_inputs());
   std::erase_if(registers, [unit](const auto& r) { return r.unit != 0 && r.unit != unit; });
   if (registers.empty()) return nullptr;
   unsigned end = 0;

@@ -282,7 +282,7 @@ class Bench {
     recorder_ =
         daemon::RecorderThread::start(std::move(options), {"mill", {}, 1.0, "", {}}).value();
     authority_.emplace(open_models());
-    calibration_.emplace(config_, *authority_, recorder_.get(), protocol::UtcOffset{});
+    calibration_.emplace(config_, *authority_, recorder_.get());
     publisher_.emplace(
         daemon::DdsLink::listen(folder_ / "dds.sock").value(),
         daemon::PublisherOptions{.machine = "mill", .snapshot_hz = 0.0, .compensation_hz = 0.0},

@@ -102,6 +102,41 @@ TEST(DirectRuns, RefuseAMixtureOfDirections) {
   EXPECT_THAT(runs.error().text, HasSubstr("run 3 has other directions"));
 }
 
+TEST(DirectRuns, NameTheNumberingOfLaserPrograms) {
+  MeasuredError error = two_runs();
+  for (auto& r : error.readings) r.run = 2 * r.run - (r.forward ? 1 : 0);
+  const auto runs = runs_of(error);
+  ASSERT_FALSE(runs);
+  EXPECT_THAT(runs.error().text,
+              HasSubstr("forward and backward of one cycle have the same number"));
+  EXPECT_THAT(runs.error().text, HasSubstr("(1, 1, 2, 2, ...)"));
+}
+
+TEST(DirectRuns, DoNotNameTheNumberingIfARunIsIncomplete) {
+  MeasuredError error = two_runs();
+  std::erase_if(error.readings, [](const Reading& r) { return r.run == 2 && !r.forward; });
+  EXPECT_THAT(runs_of(error).error().text, HasSubstr("leave out the incomplete runs"));
+}
+
+TEST(DirectRuns, NameReadingsInsteadOfTargets) {
+  MeasuredError error = two_runs();
+  double shift_m = 0.0;
+  for (auto& r : error.readings) r.position_m += shift_m += 20e-6;
+  const auto runs = runs_of(error);
+  ASSERT_FALSE(runs);
+  EXPECT_THAT(runs.error().text, HasSubstr("differ by more than 0.01 mm are different targets"));
+  EXPECT_THAT(runs.error().text, HasSubstr("write the target position instead of the reading"));
+}
+
+TEST(DirectRuns, StateTheLimitAloneIfThePositionsAreOthers) {
+  const MeasuredError error{
+      .name = "EXX",
+      .readings = {
+          {0.0, 0.0, 1, true}, {0.1, 0.0, 1, true}, {0.05, 0.0, 2, true}, {0.15, 0.0, 2, true}}};
+  EXPECT_THAT(runs_of(error).error().text, HasSubstr("0.01 mm"));
+  EXPECT_THAT(runs_of(error).error().text, testing::Not(HasSubstr("reading")));
+}
+
 TEST(DirectRuns, RefuseNoCommonPositionAndNoNumber) {
   MeasuredError error{.name = "EXX", .readings = {{0.0, 0.0, 1, true}, {0.1, 0.0, 2, true}}};
   EXPECT_EQ(runs_of(error).error().code, ErrorCode::TooFewObservations);

@@ -65,6 +65,24 @@ TEST(Assembler, PutsTheAxesWhereTheTrackerPointIs) {
   }
 }
 
+TEST(Assembler, APointFromTheFutureDelaysAndInvalidatesNoOther) {
+  Assembler assembler{{}};
+  auto batch = axes_batch(kStart, kStart + 400ms);
+  batch.points = {point_at(kStart + 10ms), point_at(kStart + 1h), point_at(kStart + 12ms)};
+  batch.taken = kStart + 400ms;
+  assembler.take(batch);
+  std::vector<Snapshot> out;
+  assembler.emit(out);
+  auto later = axes_batch(kStart + 400ms, kStart + 900ms);
+  later.points = {point_at(kStart + 500ms)};
+  later.taken = kStart + 900ms;
+  assembler.take(later);
+  assembler.emit(out);
+  ASSERT_EQ(out.size(), 4u);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    EXPECT_EQ(has(out[i].head.flags, SampleFlag::AxisMissing), i == 1) << i;
+}
+
 TEST(Assembler, TheOrderOfArrivalChangesNothing) {
   std::vector<Snapshot> early_axes;
   std::vector<Snapshot> late_axes;

@@ -37,12 +37,13 @@ CertificateDetails certificate_details() {
   return d;
 }
 
-/// Measured on 2024-05-17, or this number of days later, from 8:00 to 8:30 UTC.
+/// Measured on 2024-05-17, or this number of days later, from 8:00 to 8:30 UTC, and identified then.
 ReportSubject certified_subject(unsigned seed, int days_later = 0) {
   using protocol::UtcTime;
   ReportSubject subject{.document = test::synthetic_document(seed),
                         .details = certificate_details()};
   const UtcTime last{std::chrono::seconds{1'715'934'600} + days_later * std::chrono::hours{24}};
+  subject.document.created = last + std::chrono::minutes{1};
   subject.document.run = RunFigures{.residuals = {}};
   subject.document.run->conditions =
       RunConditions{.measured = std::array{last - std::chrono::minutes{30}, last}};
@@ -114,6 +115,7 @@ TEST(CalibrationCertificate, ContainsTheDaysOfBothMeasurements) {
 
 TEST(CalibrationCertificate, DatesBeforeTheMeasurementAsLeftAreNamed) {
   ReportSubject as_found = certified_subject(3);
+  as_found.document.created += std::chrono::hours{24};
   as_found.details.end_date = "2024-05-18";
   as_found.details.issue_date = "2024-05-18";
   as_found.details.equipment.front().valid_until = "2024-05-18";
@@ -174,6 +176,78 @@ TEST(CalibrationCertificate, AcceptsLocalDaysBesideThoseOfUtc) {
   EXPECT_FALSE(calibration_certificate(subject));
   subject.details.begin_date = subject.details.end_date = "2024-05-18";
   EXPECT_FALSE(calibration_certificate(subject)) << "22:00 in the east is the 17th";
+}
+
+std::string refusal_of(const ReportSubject& subject) {
+  const auto refused = calibration_certificate(subject);
+  EXPECT_FALSE(refused);
+  if (refused) return {};
+  EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+  return testing::PrintToString(refused.error().details);
+}
+
+/// A mistyped year, of a model from files, which has no time of its measurement.
+TEST(CalibrationCertificate, RefusesAMeasurementAfterTheModelWasIdentified) {
+  ReportSubject subject = certified_subject(3);
+  subject.document.run.reset();
+  subject.details.begin_date = "2024-05-16";
+  subject.details.end_date = "2060-05-16";
+  EXPECT_THAT(refusal_of(subject), HasSubstr("certificate.end_date: 2060-05-16 is after the model "
+                                             "was identified, 2024-05-17 (UTC)"));
+  EXPECT_THAT(contradictory_dates(subject, nullptr), ::testing::SizeIs(1)) << "also in a report";
+  subject.details.begin_date = "2060-05-16";
+  EXPECT_THAT(refusal_of(subject), HasSubstr("certificate.begin_date: 2060-05-16 is after"));
+  subject.details.begin_date = subject.details.end_date = "2024-05-17";
+  EXPECT_TRUE(calibration_certificate(subject));
+  subject.document.created += std::chrono::hours{2};  // 10:31 UTC is the 18th in the far east
+  subject.details.end_date = "2024-05-18";
+  EXPECT_TRUE(calibration_certificate(subject)) << "14 h for time zones";
+}
+
+TEST(CalibrationCertificate, RefusesAModelThatWasIdentifiedBeforeItsMeasurementEnded) {
+  ReportSubject subject = certified_subject(3);
+  subject.document.created -= std::chrono::hours{24 * 200};  // the clock was set back
+  EXPECT_THAT(refusal_of(subject), HasSubstr("one of the clocks was wrong"));
+}
+
+TEST(CalibrationCertificate, OfTheFutureIsRefused) {
+  ReportSubject subject = certified_subject(3);
+  subject.details.now = subject.document.created + std::chrono::hours{24};
+  subject.details.issue_date = "2024-05-18";
+  EXPECT_TRUE(calibration_certificate(subject));
+  subject.details.issue_date = "2042-05-18";
+  EXPECT_THAT(
+      refusal_of(subject),
+      HasSubstr("certificate.issue_date: 2042-05-18 is in the future, today is 2024-05-18"));
+  subject.details.issue_date.clear();
+  subject.details.now = subject.document.created - std::chrono::hours{24 * 200};
+  EXPECT_THAT(refusal_of(subject), HasSubstr("which is in the future"));
+}
+
+TEST(CalibrationCertificate, HasNoYearZero) {
+  EXPECT_FALSE(is_date("0000-11-25"));
+  EXPECT_TRUE(is_date("0001-11-25"));
+  ReportSubject subject = certified_subject(3);
+  subject.details.begin_date = subject.details.end_date = "0000-11-25";
+  EXPECT_THAT(refusal_of(subject), HasSubstr("dates such as"));
+}
+
+TEST(CalibrationCertificate, OfARefusedModelIsRefusedUnlessForcedAndThenStatesIt) {
+  ReportSubject subject = certified_subject(3);
+  subject.document.verdict = ModelVerdict{.reasons = {"larger by 418 um/m"}};
+  const auto refused = calibration_certificate(subject);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Refused);
+  EXPECT_THAT(refused.error().details,
+              ::testing::ElementsAre(HasSubstr("refused by the gate: larger by 418 um/m")));
+  subject.forced = StoreActor{"anna", "customer insists", {}};
+  const std::string text = calibration_certificate(subject).value();
+  EXPECT_EQ(schema_faults(text), "");
+  const auto statements = text.find("<dcc:statements>");
+  ASSERT_NE(statements, std::string::npos);
+  EXPECT_LT(text.find("larger by 418 um/m", statements), text.find(">Gauge<"));
+  EXPECT_LT(text.find("forced by anna", statements), text.find(">Gauge<"));
+  EXPECT_THAT(text, HasSubstr("customer insists"));
 }
 
 /// dcc:norm states that the measurement followed the standard.
@@ -240,6 +314,7 @@ TEST(CalibrationCertificate, NamesEverythingThatIsMissing) {
 TEST(CalibrationCertificate, DatesThatContradictEachOtherAreNamed) {
   ReportSubject subject = certified_subject(3);
   subject.document.run.reset();
+  subject.document.created += std::chrono::hours{24 * 365 * 3};  // after these days
   subject.details.begin_date = "2026-11-25";
   subject.details.end_date = "2026-11-24";
   subject.details.issue_date = "2026-11-23";

@@ -22,7 +22,7 @@ class CalibrationServiceTest : public ::testing::Test {
   CalibrationServiceTest()
       : config_(parse_config(test::synthetic_machine_toml(), "machine.toml").value()) {
     authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, {}, HostTime{1s}));
-    service_.emplace(config_, *authority_, nullptr, protocol::UtcOffset{});
+    service_.emplace(config_, *authority_, nullptr);
   }
   /// The machine drives the path at 100 mm/s; a point every 5 ms.
   void drive() {

@@ -245,6 +245,7 @@ TEST(Cdr, BoundsCheckedAreThoseOfTheIdl) {
   expect_bounds_of_idl<v1::ErrorGrid>("ErrorGrid");
   expect_bounds_of_idl<v1::ModelState>("ModelState");
   expect_bounds_of_idl<v1::Health>("Health");
+  expect_bounds_of_idl<v1::Identity>("Identity");
 }
 
 TEST(Cdr, IdlTextCarriesNoPathOfTheBuildMachine) {

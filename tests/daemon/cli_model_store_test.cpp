@@ -127,5 +127,69 @@ TEST_F(CliModelStore, EvaluatesAModelOfTheStoreByItsNameThere) {
   EXPECT_EQ(eval("ffff").exit, 2);
 }
 
+/// A refused model as a file and in a store, and an accepted one.
+class CliRefusedModel : public CliModelStore {
+ protected:
+  CliRefusedModel() {
+    auto document = test::synthetic_document(1);
+    (void)write("accepted.json", to_json(document));
+    document.verdict = ModelVerdict{.reasons = {kReason}};
+    (void)write("refused.json", to_json(document));
+    document.verdict.reset();
+    (void)write("earlier.json", to_json(document));
+    (void)write("points.csv", "x_mm,y_mm,z_mm\n10,-20,-250\n");
+    id_ = store().add(test::synthetic_document(2), false, {kReason}, {"test", "", {}}).value();
+  }
+  [[nodiscard]] ModelStore store() const { return ModelStore::open(folder_ / "store").value(); }
+
+  static constexpr const char* kReason = "larger by 418 um/m";
+  std::string id_;
+};
+
+TEST_F(CliRefusedModel, EvaluatedStatesItInTheOutputAndOnTheTerminal) {
+  for (const std::string& model : {std::string{"refused.json"}, id_ + " --store store"}) {
+    const auto ran = abbe("model eval " + model + " --points points.csv --correction");
+    ASSERT_EQ(ran.exit, 0) << ran.err;
+    EXPECT_THAT(ran.out, testing::StartsWith("# verdict: refused by the gate: larger by 418"));
+    EXPECT_THAT(ran.err, HasSubstr("verdict: refused by the gate: larger by 418"));
+  }
+  EXPECT_THAT(abbe("model eval earlier.json --points points.csv").out,
+              testing::StartsWith("# verdict: not judged"));
+  EXPECT_THAT(abbe("model eval accepted.json --points points.csv").out,
+              testing::StartsWith("# quantity = error"));
+}
+
+TEST_F(CliRefusedModel, ComparedStatesIt) {
+  const auto ran = abbe("model compare accepted.json refused.json");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("B: verdict: refused by the gate: larger by 418"));
+  const auto json =
+      nlohmann::json::parse(abbe("model compare accepted.json refused.json --json").out);
+  EXPECT_TRUE(json["cautions_a"].empty());
+  EXPECT_THAT(json["cautions_b"].dump(), HasSubstr("larger by 418"));
+}
+
+TEST_F(CliRefusedModel, ShownFromAFileOrAStoreHasItsVerdict) {
+  EXPECT_THAT(abbe("model show ./refused.json").out,
+              HasSubstr("verdict     refused by the gate: larger by 418"));
+  EXPECT_THAT(abbe("model show ./earlier.json").out, HasSubstr("verdict     not judged"));
+  ASSERT_EQ(abbe("model activate " + id_ + " --store store --force --reason scrap").exit, 0);
+  EXPECT_THAT(abbe("model show active --store store").out,
+              AllOf(HasSubstr("active (forced)"), HasSubstr("forced by"), HasSubstr(": scrap")));
+  const auto file = abbe("model show active --store store --json").out;
+  const auto read = parse_model(file, "model.json");
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(state_of(read->verdict), VerdictState::Forced);
+  EXPECT_EQ(read->verdict->forced->why, "scrap");
+}
+
+TEST_F(CliRefusedModel, AStoreOfAnEarlierVersionListsItAsNotJudgedWithoutItsState) {
+  auto document = test::synthetic_document(2);
+  document.verdict.reset();
+  (void)write("store/models/" + id_ + ".json", to_json(document));
+  fs::remove(folder_ / "store" / "state.json");
+  EXPECT_THAT(abbe("model list --store store").out, HasSubstr("not judged"));
+}
+
 }  // namespace
 }  // namespace abbe::daemon

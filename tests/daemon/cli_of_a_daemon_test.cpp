@@ -223,6 +223,31 @@ TEST_F(CliOfADaemon, StatusShowsThePositionsOfTheAxes) {
   EXPECT_THAT(ran.out, HasSubstr("position   X 10.0000 mm  Y -  C 28.6479 deg\n"));
 }
 
+TEST_F(CliOfADaemon, StatusShowsWhyAnAxisHasNoPositionAndHowFarTheRecordingIsBehind) {
+  const auto socket = folder_.path() / "missing.sock";
+  auto status = status_with_positions();
+  status["axes"][1]["missing"] = "scale_y is not available (Y is missing): rtd sends no value";
+  status["recording"] = "run.mcap.part";
+  status["streams"] = {{{"name", "recorder"},
+                        {"state", "recording"},
+                        {"connected", true},
+                        {"rate_hz", 0.0},
+                        {"samples", 1},
+                        {"dropped", 0},
+                        {"gaps", 0},
+                        {"last_fault", ""},
+                        {"behind_s", 31.04}}};
+  const auto daemon = ControlServer::open(
+      socket, [&status](const nlohmann::json&, const ControlPeer&) { return status; });
+  ASSERT_TRUE(daemon);
+  const auto ran =
+      test::run_abbe(folder_.path(), fmt::format("status --socket '{}'", socket.string()));
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out,
+              HasSubstr("Y: scale_y is not available (Y is missing): rtd sends no value\n"));
+  EXPECT_THAT(ran.out, HasSubstr("recording  run.mcap.part, 31.0 s behind\n"));
+}
+
 TEST_F(CliOfADaemon, StatusShowsTheRemainingTimeInSecondsOrMinutes) {
   const std::vector<std::pair<nlohmann::json, std::string>> cases{{380.0, "about 6.3 min left\n"},
                                                                   {59.7, "about 1.0 min left\n"},

@@ -1,4 +1,4 @@
-/// [probe] and [cmm] of a configuration.
+/// [probe], [cmm] and [dds] of a configuration.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +55,37 @@ TEST(ConfigCmm, IsReadInSi) {
   EXPECT_EQ(config->of<CmmConfig>()->port, 1294);
   EXPECT_DOUBLE_EQ(config->of<CmmConfig>()->u_position_m, 0.9e-6);
   EXPECT_FALSE(config->of<CmmConfig>()->home);
+}
+
+// A longer time would outlast systemd's TimeoutStopSec: abbed waits for AbortE at its end.
+TEST(ConfigCmm, BoundsItsTimeOuts) {
+  const std::string cmm = kMachine + "[cmm]\nhost = \"10.0.0.9\"\n";
+  EXPECT_TRUE(parse_config(cmm + "command_timeout_s = 5\nmotion_timeout_s = 3600\n", "abbed.toml"));
+  EXPECT_THAT(faults_of(cmm + "command_timeout_s = 5.1\n"),
+              ElementsAre(HasSubstr("cmm.command_timeout_s")));
+  EXPECT_THAT(faults_of(cmm + "motion_timeout_s = 1e9\n"),
+              ElementsAre(HasSubstr("cmm.motion_timeout_s")));
+}
+
+TEST(ConfigDds, RunsAbbeDdsAsAUnitUnderSystemd) {
+  auto unit = parse_config(kMachine, "abbed.toml");
+  ASSERT_TRUE(unit);
+  auto child = *unit;
+  use_dds_unit(*unit, true);
+  use_dds_unit(child, false);
+  EXPECT_EQ(unit->dds.supervise, Supervise::Systemd);
+  EXPECT_EQ(unit->dds.socket, "/run/abbe-dds/dds.sock");
+  EXPECT_EQ(child.dds.supervise, Supervise::Child);
+  EXPECT_EQ(child.dds.socket, "/run/abbe/dds.sock");
+}
+
+TEST(ConfigDds, AnExplicitChoiceStays) {
+  auto config = parse_config(
+      kMachine + "[dds]\nsupervise = \"child\"\nsocket = \"/run/x/dds.sock\"\n", "abbed.toml");
+  ASSERT_TRUE(config);
+  use_dds_unit(*config, true);
+  EXPECT_EQ(config->dds.supervise, Supervise::Child);
+  EXPECT_EQ(config->dds.socket, "/run/x/dds.sock");
 }
 
 TEST(ConfigCmm, NeedsAHost) {

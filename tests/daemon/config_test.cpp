@@ -442,7 +442,7 @@ TEST(Config, DeviceNamesAreUniqueAndDifferFromThoseOfTheDaemonsParts) {
   EXPECT_THAT(with("laser"), SizeIs(0));
   EXPECT_THAT(with("encoder"),
               ElementsAre(HasSubstr("encoder.name: two devices are called \"encoder\"")));
-  for (const char* own : {"recorder", "models", "dds"})
+  for (const char* own : {"recorder", "models", "dds", "dds_security", "identity"})
     EXPECT_THAT(with(own), ElementsAre(AllOf(HasSubstr("tracker.name"),
                                              HasSubstr("reserved for a part of the daemon"))));
 }

@@ -108,6 +108,22 @@ TEST_F(Control, AFaultInTheDaemonIsNotReportedAsAWrongRequest) {
       << answer.error().text;
 }
 
+// std::bad_alloc outside the handler, or what a library throws: it ends the request, not the socket.
+TEST_F(Control, AnExceptionOfAnyKindEndsOnlyItsRequest) {
+  const auto server = ControlServer::open(socket(), [](const json& request, const ControlPeer&) {
+    if (request.contains("bad")) throw 1;  // NOLINT: not derived from std::exception
+    return json{{"ok", true}};
+  });
+  ASSERT_TRUE(server);
+  for (const std::string& filler : {std::string{}, std::string(100'000, 'x')}) {  // a long request
+    const auto answer = ask_daemon(socket(), {{"do", "status"}, {"bad", true}, {"x", filler}});
+    ASSERT_FALSE(answer);
+    EXPECT_EQ(answer.error().code, ErrorCode::Io);
+    EXPECT_NE(answer.error().text.find("internal error"), std::string::npos) << answer.error().text;
+    EXPECT_TRUE(ask_daemon(socket(), {{"do", "status"}, {"x", filler}}));
+  }
+}
+
 TEST_F(Control, ARequestLongerThanTheLimitIsRefusedWithTheLimit) {
   const auto server = ControlServer::open(socket(), echo);
   ASSERT_TRUE(server);

@@ -37,6 +37,13 @@ struct FarEnd {
   FarEnd(const FarEnd&) = delete;
   FarEnd& operator=(const FarEnd&) = delete;
 
+  /// What abbe-dds sends when it sees another publisher of this machine.
+  void report_twin(const std::string& text) const {
+    std::string report{'\1', static_cast<char>(text.size()), '\0'};
+    report += text;
+    EXPECT_EQ(::send(fd, report.data(), report.size(), 0), static_cast<ssize_t>(report.size()));
+  }
+
   /// Every whole frame that has arrived by now.
   std::vector<Seen> take() {
     std::byte chunk[4096];

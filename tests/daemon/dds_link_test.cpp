@@ -72,6 +72,21 @@ class DdsLinkTest : public testing::Test {
   std::optional<DdsLink> link_;
 };
 
+TEST_F(DdsLinkTest, ReportsATwinWhateverThePartsInWhichItArrives) {
+  const FarEnd far(path_);
+  link_->poll();
+  const std::string report{'\0', '\1', '\3', '\0', 'a', 'b', 'c'};  // after the answer to a beat
+  for (const char c : report) {
+    EXPECT_EQ(link_->twin(), "");
+    ASSERT_EQ(::send(far.fd, &c, 1, 0), 1);
+    link_->poll();
+  }
+  EXPECT_EQ(link_->twin(), "abc");
+  far.report_twin("");
+  link_->poll();
+  EXPECT_EQ(link_->twin(), "");
+}
+
 TEST_F(DdsLinkTest, AnAbbeDdsThatDoesNotAnswerIsNotReportedAsConnected) {
   EXPECT_STREQ(link_->state(), "waiting");
   const FarEnd hung(path_);
@@ -313,6 +328,17 @@ TEST_F(DdsLinkTest, SocketFileIsAccessibleToItsOwnerOnly) {
   struct stat file {};
   ASSERT_EQ(::stat(path_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 0777, 0660u);
+}
+
+TEST_F(DdsLinkTest, AGroupThatCannotBeSetIsAFaultThatARestartMayRepair) {
+  const Account mine{::geteuid(), ::getegid()};
+  EXPECT_TRUE(DdsLink::listen(directory_ / "mine.sock", {.user = mine}).has_value());
+  if (::geteuid() == 0) GTEST_SKIP() << "root may give a file to any group";
+  const Account foreign{::geteuid(), gid_t{54'321}};
+  const auto refused = DdsLink::listen(directory_ / "foreign.sock", {.user = foreign});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::Io);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("set [dds] socket to"));
 }
 
 TEST_F(DdsLinkTest, RefusesAPathThatARunningProcessServes) {

@@ -51,6 +51,53 @@ std::string fault_text_of(const std::string& text) {
   return all;
 }
 
+TEST(SensorConfiguration, IsReadInSiUnits) {
+  const auto sensors = config_of(kScales + kAir + R"([sensors]
+hold_s = 30
+correction_K_per_min = 0.6
+[[sensors.limit]]
+name = "scale_x"
+expected_C = [15, 30]
+max_rate_K_per_min = 3
+twin = "part"
+[[sensors.limit]]
+name = "air_pressure"
+expected_hPa = [900, 1050]
+max_rate_hPa_per_min = 6
+)")
+                           .sensors;
+  EXPECT_EQ(sensors.hold, std::chrono::seconds{30});
+  EXPECT_DOUBLE_EQ(sensors.correction_K_per_s, 0.01);
+  ASSERT_EQ(sensors.limits.size(), 2u);
+  EXPECT_DOUBLE_EQ(*sensors.limits[0].lowest, 288.15);
+  EXPECT_DOUBLE_EQ(*sensors.limits[0].most_per_s, 0.05);
+  EXPECT_EQ(sensors.limits[0].twin, "part");
+  EXPECT_DOUBLE_EQ(*sensors.limits[1].highest, 105'000.0);
+  EXPECT_DOUBLE_EQ(*sensors.limits[1].most_per_s, 10.0);
+}
+
+TEST(SensorConfiguration, RefusesACorrectionThatFollowsNoSensor) {
+  EXPECT_THAT(fault_text_of("[sensors]\ncorrection_K_per_min = 0.01\n"),
+              ::testing::HasSubstr("sensors.correction_K_per_min: must be at least 0.1"));
+}
+
+TEST(SensorConfiguration, NamesEveryFault) {
+  EXPECT_THAT(
+      fault_text_of(kScales + R"([[sensors.limit]]
+name = "scale_y"
+[[sensors.limit]]
+name = "scale_x"
+expected_C = [30, 15]
+twin = "scale_x"
+max_rate_hPa_per_min = 3
+[[sensors.limit]]
+name = "scale_x"
+)"),
+      AllOf(HasSubstr("no [[environment]] measures it: check the name"),
+            HasSubstr("the lowest and the highest"), HasSubstr("is the sensor itself"),
+            HasSubstr("max_rate_hPa_per_min"), HasSubstr("has two [[sensors.limit]] tables")));
+}
+
 TEST(EnvironmentConfiguration, FindsDevicesByTheNameOfTheirMap) {
   const auto config = config_of(kAir + kScales);
   ASSERT_EQ(config.of<EnvironmentConfig>().size(), 2u);
@@ -205,6 +252,15 @@ TEST(ThermalConfiguration, IsPartOfTheMachineHash) {
   EXPECT_NE(plain, hash("part", "8", "0.5"));
   EXPECT_NE(plain, hash("scale_x", "9", "0.5"));
   EXPECT_EQ(plain, hash("scale_x", "8", "1"));  // how well it is known changes no reading
+}
+
+TEST(ThermalConfiguration, DecidesWhichSensorsGiveAReadingItsMeaning) {
+  auto config = config_of(kScales);
+  EXPECT_THAT(environment_meaning(config).readings, IsEmpty());
+  config.thermal.push_back({.axis = "X", .temperature = 1});
+  const auto readings = environment_meaning(config).readings;
+  ASSERT_EQ(readings.size(), 1u);
+  EXPECT_EQ(readings[0].key, "environment." + config.temperatures[1] + ".register");
 }
 
 TEST(ThermalConfiguration, RefusesATemperatureThatIsNotMeasured) {

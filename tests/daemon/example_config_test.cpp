@@ -2,22 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
-#include <regex>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "abbe/config/config.hpp"
+#include "example_config.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-std::string example() {
-  std::ifstream in{ABBE_EXAMPLE_CONFIG};
-  return {std::istreambuf_iterator<char>{in}, {}};
-}
+using example_config::example;
+using example_config::uncommented;
+using example_config::with_counter_card_and_probe;
+using example_config::with_modbus_and_cmm;
 
 std::string faults(const std::string& text) {
   const auto config = parse_config(text, "/etc/abbe/abbed.toml");
@@ -26,38 +23,6 @@ std::string faults(const std::string& text) {
   for (std::size_t i = 0; !config && i < config.error().details.size(); ++i)
     out += "\n" + config.error().details[i];
   return out;
-}
-
-/// With every default written out.
-std::string uncommented() {
-  return std::regex_replace(example(), std::regex{"\n#([a-z_A-Z]+ = )"}, "\n$1");
-}
-
-/// With the tables of these names that are there by example only: blocks that begin with "#
-/// [NAME]".
-std::string with_tables(std::string text, const std::vector<std::string>& names) {
-  for (const auto& name : names) {
-    std::istringstream lines{text};
-    text.clear();
-    bool in_table = false;
-    for (std::string line; std::getline(lines, line);) {
-      in_table = line.rfind("# " + name, 0) == 0 || (in_table && line.rfind("# ", 0) == 0);
-      text += (in_table ? line.substr(2) : line) + "\n";
-    }
-  }
-  return text;
-}
-
-std::string with_modbus_and_cmm() {
-  return with_tables(example(), {"[[environment]]", "[[thermal]]", "[cmm]"});
-}
-
-/// The axes come from one device.
-std::string with_counter_card_and_probe() {
-  const std::string text = example();
-  const auto encoder = text.find("\n[encoder]");
-  return with_tables(text.substr(0, encoder) + text.substr(text.find("\n\n", encoder)),
-                     {"[counter_card]", "[reference]", "[probe]"});
 }
 
 TEST(ExampleConfig, IsValid) {
@@ -75,6 +40,7 @@ TEST(ExampleConfig, ItsExampleTablesAreValidToo) {
   const auto config = parse_config(with_modbus_and_cmm(), "/etc/abbe/abbed.toml").value();
   EXPECT_EQ(config.of<EnvironmentConfig>().size(), 3u);
   EXPECT_EQ(config.thermal.size(), 1u);
+  EXPECT_EQ(config.sensors.limits.size(), 1u);
   EXPECT_TRUE(config.of<CmmConfig>());
 }
 
@@ -124,7 +90,8 @@ TEST(ExampleConfig, ItsProbeShowsTheDefaults) {
 }
 
 TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
-  const auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
+  auto plain = parse_config(example(), "/etc/abbe/abbed.toml").value();
+  use_dds_unit(plain, true);  // the defaults of [dds] are those under abbed.service
   const auto full = parse_config(uncommented(), "/etc/abbe/abbed.toml").value();
 
   EXPECT_EQ(machine_hash(full), machine_hash(plain));
@@ -147,6 +114,8 @@ TEST(ExampleConfig, ItsCommentedKeysAreTheDefaults) {
   EXPECT_EQ(full.recording.chunk_bytes, plain.recording.chunk_bytes);
   EXPECT_EQ(full.recording.min_free_bytes, plain.recording.min_free_bytes);
   EXPECT_EQ(full.dds.socket, plain.dds.socket);
+  EXPECT_EQ(full.dds.supervise, plain.dds.supervise);
+  EXPECT_EQ(full.dds.user, plain.dds.user);
   EXPECT_EQ(full.dds.validity, plain.dds.validity);
   EXPECT_EQ(full.gate.max_error_m, plain.gate.max_error_m);
   EXPECT_EQ(full.gate.max_gradient, plain.gate.max_gradient);

@@ -5,6 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abbe/exports/export_format.hpp"
+#include "abbe/model/model_store.hpp"
 #include "abbe_command.hpp"
 #include "recording_fixture.hpp"
 #include "synthetic_model.hpp"
@@ -70,6 +72,87 @@ TEST_F(CliExport, WritesTheReportBesideFilesWithoutComments) {
   EXPECT_THAT(file("compensation/z.comp"), AllOf(Not(IsEmpty()), Not(HasSubstr("#"))));
 }
 
+constexpr const char* kLimit = "larger by 418 um/m";
+
+/// Models of every state, in files and in a store.
+class CliExportUse : public CliExport {
+ protected:
+  CliExportUse() {
+    auto document = test::synthetic_document(3);
+    document.verdict = ModelVerdict{.reasons = {kLimit}};
+    test::write_text(folder_.path() / "refused.json", to_json(document));
+    document.verdict.reset();
+    test::write_text(folder_.path() / "earlier.json", to_json(document));
+    id_ = store().add(document, false, {kLimit}, {"tester", "", {}}).value();
+  }
+  [[nodiscard]] ModelStore store() const {
+    return ModelStore::open(folder_.path() / "store").value();
+  }
+  std::string id_;
+};
+
+TEST_F(CliExportUse, RefusesAModelThatTheGateRefused) {
+  for (const std::string& model : {std::string{"refused.json"}, id_ + " --store store"}) {
+    const auto ran = abbe(model + " --to siemens-lec -o comp.mpf");
+    EXPECT_EQ(ran.exit, 5) << model;
+    EXPECT_THAT(ran.err, AllOf(HasSubstr("refused by the gate"), HasSubstr(kLimit),
+                               HasSubstr("--force"), HasSubstr("--why")));
+    EXPECT_THAT(file("comp.mpf"), IsEmpty());
+  }
+}
+
+TEST_F(CliExportUse, AForcedExportStatesItInEveryFileWithComments) {
+  for (const FormatFacts* facts :
+       {format_named("isg-csv"), format_named("etalon"), format_named("siemens-cec"),
+        format_named("siemens-lec"), format_named("csv-grid"), format_named("linuxcnc-comp"),
+        format_named("heidenhain-com")}) {
+    const std::string name{facts->name};
+    const auto ran = abbe("refused.json --to " + name + " -o out-" + name +
+                          (facts->positive_moves == 0 ? " --positive plus" : "") +
+                          " --force --reason 'trial on scrap parts'");
+    ASSERT_EQ(ran.exit, 0) << name << ran.err;
+    const auto stated = AllOf(HasSubstr("refused by the gate"), HasSubstr(kLimit),
+                              HasSubstr("forced by"), HasSubstr("trial on scrap parts"));
+    EXPECT_THAT(ran.out, stated) << name;
+    EXPECT_THAT(ran.err, HasSubstr("caution: refused.json: verdict: refused")) << name;
+    EXPECT_THAT(file("out-" + name + (facts->folder ? "/export.txt" : "")), stated) << name;
+    EXPECT_EQ(facts->comments, !facts->folder);
+  }
+}
+
+TEST_F(CliExportUse, ForceNeedsAReason) {
+  const auto ran = abbe("refused.json --to siemens-lec -o comp.mpf --force");
+  EXPECT_EQ(ran.exit, 2);
+  EXPECT_THAT(ran.err, HasSubstr("--force needs --why"));
+}
+
+TEST_F(CliExportUse, AModelOfAnEarlierVersionIsExportedAndStatedAsNotJudged) {
+  const auto ran = abbe("earlier.json --to csv-grid -o grid.csv");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("caution: earlier.json: verdict: not judged"));
+  EXPECT_THAT(file("grid.csv"), HasSubstr("# verdict: not judged"));
+  ASSERT_EQ(abbe("model.json --to csv-grid -o grid.csv").exit, 0);
+  EXPECT_THAT(file("grid.csv"), HasSubstr("# verdict: accepted by the gate"));
+}
+
+TEST_F(CliExportUse, AForcedActivationIsNoReasonToExport) {
+  ASSERT_TRUE(store().activate(id_, {"foreman", "parts are waiting", {}}, true));
+  const auto ran = abbe("active --store store --to siemens-lec -o comp.mpf");
+  EXPECT_EQ(ran.exit, 5);
+  EXPECT_THAT(ran.err,
+              AllOf(HasSubstr("activated by force by foreman"), HasSubstr("parts are waiting")));
+}
+
+TEST_F(CliExportUse, RefusesAModelThatHasDrifted) {
+  const auto good = store().add(test::synthetic_document(4), true, {}, {"tester", "", {}}).value();
+  ASSERT_TRUE(store().activate(good, {"tester", "", {}}));
+  ASSERT_EQ(abbe("active --store store --to siemens-lec -o comp.mpf").exit, 0);
+  ASSERT_TRUE(store().add_drift(good, {"abbed", "EXX changed by 20 um", {}}));
+  const auto ran = abbe("active --store store --to siemens-lec -o comp.mpf");
+  EXPECT_EQ(ran.exit, 5);
+  EXPECT_THAT(ran.err, HasSubstr("EXX changed by 20 um"));
+}
+
 TEST_F(CliExport, ReportsAsJson) {
   const auto ran = abbe("travel.json --to csv-grid --direction +,-,+ -o grid.csv --json");
   ASSERT_EQ(ran.exit, 0) << ran.err;
@@ -103,7 +186,7 @@ TEST_F(CliExport, RefusesWrongOptionsByName) {
   EXPECT_THAT(message("--to linuxcnc-comp --positive plus"), HasSubstr("is fixed"));
   EXPECT_THAT(message("--to linuxcnc-comp --step 1"), HasSubstr("601 nodes on axis X"));
   EXPECT_THAT(message("--to csv-grid --step 0"), HasSubstr("must be positive"));
-  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be positive"));
+  EXPECT_THAT(message("--to csv-grid --step nan"), HasSubstr("must be finite"));
   EXPECT_THAT(message("--to csv-grid --step 0.5"), HasSubstr("nodes of the grid"));
   EXPECT_THAT(message("--to csv-grid --volume=-300,300,-300,300,-400,0"),
               HasSubstr("Z -400 to 0 mm; the model is valid from -400 to -100 mm"));

@@ -6,11 +6,14 @@
 #include <gtest/gtest.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstddef>
 #include <thread>
@@ -52,5 +55,71 @@ inline int make_stall(unsigned call) {
   return static_cast<int>(
       ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_NEW_LISTENER, &program));
 }
+
+/// A disk that is slow when asked to be: while it stalls, system call number `call` of the thread
+/// in which start() runs, and of the threads that it begins, does not return.
+class SlowDisk {
+ public:
+  explicit SlowDisk(unsigned call) : call_(call) {}
+  SlowDisk(const SlowDisk&) = delete;
+  SlowDisk& operator=(const SlowDisk&) = delete;
+  ~SlowDisk() {
+    ending_ = true;
+    go_on();
+    if (answering_.joinable()) answering_.join();
+    if (listener_ >= 0) ::close(listener_);
+  }
+
+  /// Runs `work` in a thread whose calls are slow. False: not permitted here.
+  template <class Work>
+  bool start(Work work) {
+    std::atomic<int> listener{kNotYet};
+    std::thread working{[&] {
+      listener = make_stall(call_);
+      listener.notify_one();
+      if (listener >= 0) work();
+    }};
+    listener.wait(kNotYet);
+    listener_ = listener;
+    if (listener_ >= 0) answering_ = std::thread{[this] { answer(); }};
+    working.join();
+    return listener_ >= 0;
+  }
+
+  void stall() { stalled_ = true; }
+  void go_on() {
+    stalled_ = false;
+    stalled_.notify_all();
+  }
+  /// Returns when a call is held.
+  void wait_until_held() { held_.wait(false); }
+
+ private:
+  static constexpr int kNotYet = -2;
+
+  void answer() {
+    constexpr int kLook_ms = 20;
+    while (!ending_) {
+      pollfd ready{.fd = listener_, .events = POLLIN, .revents = 0};
+      if (::poll(&ready, 1, kLook_ms) <= 0) continue;
+      if ((ready.revents & POLLIN) == 0) return;  // no thread with the filter is left
+      seccomp_notif asked{};
+      if (::ioctl(listener_, SECCOMP_IOCTL_NOTIF_RECV, &asked) != 0) continue;
+      if (stalled_) {
+        held_ = true;
+        held_.notify_all();
+        stalled_.wait(true);
+      }
+      seccomp_notif_resp go{
+          .id = asked.id, .val = 0, .error = 0, .flags = SECCOMP_USER_NOTIF_FLAG_CONTINUE};
+      (void)::ioctl(listener_, SECCOMP_IOCTL_NOTIF_SEND, &go);
+    }
+  }
+
+  unsigned call_;
+  int listener_ = -1;
+  std::atomic<bool> stalled_{false}, held_{false}, ending_{false};
+  std::thread answering_;
+};
 
 }  // namespace abbe::daemon::test

@@ -55,7 +55,7 @@ class HubBench : public ::testing::Test {
   /// With the configuration, the recorder and the verification as they are now.
   void make_hub() {
     authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, {}, time_.now()));
-    calibration_.emplace(config_, *authority_, recorder_.get(), protocol::UtcOffset{});
+    calibration_.emplace(config_, *authority_, recorder_.get());
     publisher_.emplace(DdsLink::listen(folder_.path() / "dds.sock").value(),
                        PublisherOptions{.machine = "mill",
                                         .tool_offset_m = config_.machine.target_offset_m,

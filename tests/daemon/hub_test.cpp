@@ -259,6 +259,35 @@ TEST_F(HubTest, TrackerMotionOrdersAreRefusedToTheLookRole) {
       HasSubstr("not in this daemon"));
 }
 
+// The hub compares each name with the axes: 600,000 names kept it busy for seconds.
+TEST_F(HubTest, MoreAxisNamesThanACardCountsAreRefusedBeforeTheHub) {
+  const auto asked = [&](std::size_t names) {
+    return answer_on_hub(
+        *hub_,
+        {{"do", "reference"}, {"here", true}, {"axes", std::vector<std::string>(names, "X")}},
+        myself());
+  };
+  const json many = asked(600'000);
+  EXPECT_EQ(many["code"], "usage");
+  EXPECT_THAT(many["error"].get<std::string>(), HasSubstr("600000 axes are named: at most 8"));
+  EXPECT_THAT(asked(8)["error"].get<std::string>(), HasSubstr("not in this daemon"));
+}
+
+TEST_F(HubTest, TheUserOfAbbeDdsHasNoRole) {
+  Hub hub{HubParts{.config = config_,
+                   .time = time_,
+                   .devices = devices_,
+                   .authority = *authority_,
+                   .calibration = *calibration_,
+                   .network_user = ::geteuid() + 7}};
+  const auto answer_to = [&](uid_t uid) {
+    return answer_on_hub(hub, {{"do", "calibration"}}, {.user = "abbe-dds", .uid = uid});
+  };
+  EXPECT_THAT(answer_to(::geteuid() + 7)["error"].get<std::string>(),
+              HasSubstr("abbe-dds is the user of abbe-dds, which reads the network"));
+  EXPECT_EQ(answer_to(::geteuid())["ok"], true);
+}
+
 TEST_F(HubTest, CollectsStandstillsRequestedOverTheSocket) {
   config_.of<TrackerConfig>().emplace().host = "127.0.0.1";
   VerificationService verification{config_};

@@ -118,6 +118,8 @@ TEST_F(JointRecording, GivesTheNumbersOfTheFilesOfTheSameRun) {
             1e-6 * two->model.covariance().norm());
   EXPECT_EQ(one->statistics.samples, two->statistics.samples);
   EXPECT_EQ(one->inputs.size(), 4u);  // machine, parts, recording, errors
+  EXPECT_EQ(made_on_simulated_devices(*one), true) << "as recorded, not as in machine.toml";
+  EXPECT_EQ(made_on_simulated_devices(*two), false);
 }
 
 TEST_F(JointRecording, IsRefusedBesideFiles) {

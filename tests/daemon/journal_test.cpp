@@ -100,13 +100,15 @@ TEST(Journal, WithoutASocketIsAnError) {
 TEST(Journal, AsTextIsOneLineWithTheSameContent) {
   std::array<int, 2> ends{};
   ASSERT_EQ(::pipe(ends.data()), 0);
-  text_journal(ends[1])->write(kEntry);
-  ::close(ends[1]);
+  std::FILE* const stream = ::fdopen(ends[1], "w");
+  ASSERT_NE(stream, nullptr);
+  text_journal(stream)->write(kEntry);
+  ASSERT_EQ(std::fclose(stream), 0);
   std::array<char, 1024> buffer{};
   const ssize_t n = ::read(ends[0], buffer.data(), buffer.size());
   ::close(ends[0]);
   EXPECT_EQ((std::string{buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))}),
-            "abbed: device tracker: connecting; last fault: a?b [ABBE_DEVICE=tracker "
+            "abbed: device tracker: connecting; last fault: a\\u{A}b [ABBE_DEVICE=tracker "
             "ABBE_STATE=connecting]\n");
 }
 
@@ -164,6 +166,19 @@ TEST_F(StateObserverTest, ARefusedDeviceIsOneWarningWithARemedy) {
   EXPECT_EQ(field(entries[0], "ABBE_DEVICE"), "tracker");
   EXPECT_EQ(field(entries[0], "ABBE_FAULT"), "connect 10.0.0.7:700: Connection refused");
   EXPECT_THAT(look(), IsEmpty());
+}
+
+TEST_F(StateObserverTest, AConditionOfAConnectedDeviceIsAWarningAndItsEndALine) {
+  tracker("streaming", true, "");
+  (void)look();
+  now_.streams[0].status.condition = "scale_x is not available (X is missing)";
+  const auto entries = look();
+  ASSERT_THAT(entries, SizeIs(1));
+  EXPECT_EQ(entries[0].urgency, Urgency::Warning);
+  EXPECT_THAT(entries[0].message, HasSubstr("streaming; scale_x is not available (X is missing)"));
+  EXPECT_EQ(field(entries[0], "ABBE_CONDITION"), "scale_x is not available (X is missing)");
+  now_.streams[0].status.condition.clear();
+  EXPECT_THAT(lines(), SizeIs(1));
 }
 
 TEST_F(StateObserverTest, FaultsThatRepeatAreALineAMinuteWithTheirCount) {

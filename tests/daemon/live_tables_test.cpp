@@ -183,7 +183,7 @@ TEST(LiveTables, AreInTheStatusOfTheSessionWhileTheMachineMoves) {
   const Config config = live_config();
   ModelAuthority authority =
       ModelAuthority::open(folder.path() / "models", config, {}, HostTime{1s});
-  CalibrationService service{config, authority, nullptr, protocol::UtcOffset{}};
+  CalibrationService service{config, authority, nullptr};
   ASSERT_TRUE(service.start(OtfRequest{test::synthetic_request_path_m()}, "anna", HostTime{10s}));
   HostTime now{};
   for (const auto& snapshot : live_snapshots()) {

@@ -1,5 +1,5 @@
-// A stored model is only ACTIVE on a machine with its hash: a hash that changes with the program
-// would end every model. The values are those of earlier versions.
+// The hash of model files of earlier versions must not change, or no such model can be accepted any
+// more. The values are those of earlier versions. Of the present hash: meaning_keys_test.cpp.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,14 +33,14 @@ offset_mm = [20, -15, -120]
 node_spacing_mm = 50
 )";
 
-std::string hash_with(const std::string& devices) {
+std::string former_hash_with(const std::string& devices) {
   const auto config = parse_config(kMill + devices, "abbed.toml");
   EXPECT_TRUE(config) << ::testing::PrintToString(config.error().details);
-  return config ? machine_hash(*config) : "";
+  return config ? former_machine_hash(*config) : "";
 }
 
-TEST(MachineHash, WithEncodersStays) {
-  EXPECT_EQ(hash_with(R"([encoder]
+TEST(FormerMachineHash, WithEncodersStays) {
+  EXPECT_EQ(former_hash_with(R"([encoder]
 transport = "socketcan"
 interface = "can0"
 nodes = [
@@ -52,8 +52,8 @@ nodes = [
             "f43f8407c6be8a957ec6dd0c0857fec1ba461f6863b708fbe95e20ceb89b56fe");
 }
 
-TEST(MachineHash, WithACardAndReferenceMarksStays) {
-  EXPECT_EQ(hash_with(R"([counter_card]
+TEST(FormerMachineHash, WithACardAndReferenceMarksStays) {
+  EXPECT_EQ(former_hash_with(R"([counter_card]
 transport = "usb"
 serial_number = "01ABBE08"
 axes_compensated = true
@@ -70,8 +70,8 @@ axes = [{ axis = "X", channel = 0, signal_period_um = 20, increment = 1000, leng
             "f7aa146602ef8cd9d090f464b1defb85c845803c039bd69d35feb35a192ad323");
 }
 
-TEST(MachineHash, WithAMeasuringMachineAndAThermometerStays) {
-  EXPECT_EQ(hash_with(R"([cmm]
+TEST(FormerMachineHash, WithAMeasuringMachineAndAThermometerStays) {
+  EXPECT_EQ(former_hash_with(R"([cmm]
 host = "10.0.0.9"
 axes_compensated = false
 [[environment]]
@@ -131,6 +131,16 @@ TEST(MachineHash, DoesNotDependOnTheTransport) {
       "a.toml");
   ASSERT_TRUE(can && udp);
   EXPECT_EQ(machine_hash(*can), machine_hash(*udp));
+}
+
+TEST(MachineHash, OfAnAbsentTargetIsThatOfATargetInTheMiddle) {
+  auto none = kMachine, zero = kMachine;
+  const auto table = kMachine.find("[target]");
+  const auto line = kMachine.find("offset_mm = [20"), end = kMachine.find('\n', line) + 1;
+  zero.replace(line, end - line, "offset_mm = [0, 0, 0]\n");
+  none.erase(table, end - table);
+  EXPECT_EQ(machine_hash(parse_config(none, "a.toml").value()),
+            machine_hash(parse_config(zero, "b.toml").value()));
 }
 
 }  // namespace

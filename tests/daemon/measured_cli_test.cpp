@@ -112,6 +112,37 @@ TEST_F(MeasuredCli, PrintsTablesConventionsAndVolume) {
   EXPECT_THAT(compare("--straightness least-squares").out, HasSubstr("least-squares line"));
 }
 
+TEST_F(MeasuredCli, NamesTheLineOfAValueThatAloneDoesNotFit) {
+  auto all = rows();
+  all[7].value = -9999.0;
+  all[200].value = 1e30;
+  write_rows(all);
+  const auto ran = compare();
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("measured.csv:9: EXX alone does not fit"),
+                             HasSubstr("measured.csv:202: EYX alone does not fit")));
+  const auto object = nlohmann::json::parse(compare("--json").out);
+  EXPECT_EQ(object["rows_off"].size(), 2u);
+  write_rows(rows());
+  EXPECT_EQ(nlohmann::json::parse(compare("--json").out)["rows_off"].size(), 0u);
+}
+
+TEST_F(MeasuredCli, NamesTheNumberingOfBidirectionalRuns) {
+  const auto ran =
+      compare_changed([](MeasuredRow& r) { r.run = 2 * r.run - (r.direction == "+" ? 1 : 0); });
+  EXPECT_EQ(ran.exit, 3);
+  EXPECT_THAT(ran.err, HasSubstr("(1, 1, 2, 2, ...)"));
+}
+
+TEST_F(MeasuredCli, PrintsJsonAlsoForAFileNameInLatin1) {
+  write_rows(rows());
+  const std::string name = "m\xfc.csv";
+  std::filesystem::copy_file(folder_.path() / "measured.csv", folder_.path() / name);
+  const auto ran =
+      test::run_abbe(folder_.path(), "model compare model.json --measured '" + name + "' --json");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["measured"], "m\xef\xbf\xbd.csv");
+}
+
 TEST_F(MeasuredCli, NamesAReversedSign) {
   const auto ran = compare_changed([](MeasuredRow& r) { r.value = -r.value; });
   EXPECT_EQ(ran.exit, 5);

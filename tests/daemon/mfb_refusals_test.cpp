@@ -54,6 +54,27 @@ TEST_F(MfbRefusals, NamesATouchThatIsFarFromItsFeature) {
   EXPECT_THAT(test::text_of(out("report.html")), HasSubstr("hole 5"));
 }
 
+/// points.csv with the readings of line `from` in line `to`, too.
+std::string with_copied_readings(std::size_t from, std::size_t to) {
+  std::istringstream text(test::reference_points_csv());
+  std::vector<std::string> rows;
+  for (std::string row; std::getline(text, row);) rows.push_back(row);
+  auto cells = cells_of(rows.at(to - 1));
+  const auto other = cells_of(rows.at(from - 1));
+  for (const std::size_t column : {5u, 6u, 7u}) cells.at(column) = other.at(column);
+  rows.at(to - 1) = fmt::format("{}", fmt::join(cells, ","));
+  return fmt::format("{}\n", fmt::join(rows, "\n"));
+}
+
+TEST_F(MfbRefusals, NamesTheLineOfATouchThatAloneDoesNotFit) {
+  write("points.csv", with_copied_readings(150, 40));
+  const auto ran = abbe(kIdentifyMfb);
+  EXPECT_NE(ran.exit, 0);
+  EXPECT_THAT(ran.err, HasSubstr("points.csv:40: "));
+  EXPECT_THAT(ran.err, HasSubstr("alone does not fit"));
+  EXPECT_THAT(ran.err, ::testing::Not(HasSubstr("points.csv:41")));
+}
+
 TEST_F(MfbRefusals, NamesAMeasurementDuringWhichTheBarMoved) {
   std::istringstream rows(test::reference_points_csv());
   std::string all, row;

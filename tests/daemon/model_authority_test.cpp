@@ -38,7 +38,11 @@ class ModelAuthorityTest : public ::testing::Test {
   }
   ~ModelAuthorityTest() override { fs::remove_all(folder_); }
 
-  ModelAuthority open() { return ModelAuthority::open(folder_, config_, kUtc, kNow); }
+  /// The wall clock at kNow.
+  static WallClock clock() {
+    return WallClock{[] { return ClockReading{.utc = kUtc.to_utc(kNow).time_since_epoch()}; }};
+  }
+  ModelAuthority open() { return ModelAuthority::open(folder_, config_, clock(), kNow); }
   /// The store as a command in another process opens it.
   ModelStore store() { return ModelStore::open(folder_).value(); }
   std::string active_id() { return store().active_id().value().value(); }
@@ -169,8 +173,10 @@ TEST_F(ModelAuthorityTest, AForcedModelNamesUserAndReasonAlsoAfterARestart) {
       add(authority, document(1), {.reasons = {"3 mm"}}, actor("calibrate otf"), kNow).value();
   ASSERT_TRUE(store().activate(id, actor("crane test"), true));
   ASSERT_TRUE(follow(authority));
-  EXPECT_EQ(fresh_state(authority).reason, "forced by anna: crane test");
-  EXPECT_EQ(fresh_state(open()).reason, "forced by anna: crane test");
+  const std::string reason = "forced by anna: crane test; the gate had refused it: 3 mm";
+  EXPECT_EQ(fresh_state(authority).reason, reason);
+  EXPECT_EQ(fresh_state(open()).reason, reason);
+  EXPECT_EQ(fresh_state(open()).refused, "3 mm");
 }
 
 TEST_F(ModelAuthorityTest, ARollbackIsReportedWithTheVerdictOfTheGate) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
+#include <atomic>
 #include <optional>
 #include <thread>
 
@@ -162,8 +163,20 @@ class DriftingMachine : public ::testing::Test {
   }
   void restart() {
     service_.reset();
-    authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, {}, now_));
-    service_.emplace(config_, *authority_, nullptr, protocol::UtcOffset{});
+    const WallClock clock{[this] { return clocks(); }};
+    authority_.emplace(ModelAuthority::open(folder_.path() / "models", config_, clock, now_));
+    service_.emplace(config_, *authority_, nullptr, clock);
+  }
+  /// The clocks of the computer, of which the host clock does not see `set_` and `suspended_`.
+  [[nodiscard]] ClockReading clocks() const {
+    const auto running = seen_.load().time_since_epoch();
+    return {.utc = kFirstDay + running + suspended_.load() + set_.load(),
+            .since_boot = running + suspended_.load(),
+            .running = running};
+  }
+  [[nodiscard]] protocol::UtcTime utc_now() const { return protocol::UtcTime{clocks().utc}; }
+  [[nodiscard]] ModelDocument stored_model() const {
+    return store().load(model().model->id).value();
   }
   /// Drives the path and follows the session to its end. Returns the states of the active model
   /// that were seen, without repetition.
@@ -175,19 +188,23 @@ class DriftingMachine : public ::testing::Test {
       if (seen.empty() || seen.back() != status()) seen.push_back(status());
       if (s == SessionState::Active || s == SessionState::Refused) return seen;
       std::this_thread::yield();
-      (void)service_->cycle({}, now_ += 10ms);
+      seen_ = now_ += 10ms;
+      (void)service_->cycle({}, now_);
     }
   }
   [[nodiscard]] ActiveModelState model() const { return authority_->model_state(now_, now_, 1s); }
   [[nodiscard]] ModelStatus status() const { return model().status; }
   [[nodiscard]] ModelStore store() const { return ModelStore{folder_.path() / "models"}; }
 
+  static constexpr std::chrono::nanoseconds kFirstDay = std::chrono::hours{24 * 365 * 55};
+  HostTime now_ = kStart;
+  std::atomic<HostTime> seen_{kStart};  // by the identification, another thread
+  std::atomic<std::chrono::nanoseconds> set_{}, suspended_{};
   TemporaryFolder folder_;
   Config config_;
   sim::TruthMachine truth_ = test::synthetic_truth();
   std::optional<ModelAuthority> authority_;
   std::optional<CalibrationService> service_;
-  HostTime now_ = kStart;
 
  private:
   void drive() {
@@ -213,6 +230,7 @@ class DriftingMachine : public ::testing::Test {
     s.has_tracker_point = true;
     s.tracker_point.device_time = protocol::DeviceTime{now_.time_since_epoch()};
     s.tracker_point.p_tracker_m = p_tracker_m;
+    seen_ = now_;
     (void)service_->cycle({&s, 1}, now_);
   }
 };
@@ -229,22 +247,79 @@ TEST_F(DriftingMachine, RaisesDriftBeforeTheNewModelIsActive) {
   EXPECT_THAT(service_->status().reason,
               HasSubstr("drift since the active model: EC0Y changed by"));
   const auto kept = store().load(model().model->id).value();
-  EXPECT_THAT(kept.run->notes,
+  EXPECT_THAT(kept.verdict->notes,
               ::testing::Contains(HasSubstr("drift since the active model: EC0Y changed by")));
 }
 
 TEST_F(DriftingMachine, AModelKeepsWhenItWasMeasured) {
   configure("");
-  const protocol::UtcOffset utc{};
-  const auto before = utc.to_utc(now_);
+  const auto before = utc_now();
   (void)calibrate();
-  const auto document = store().load(model().model->id).value();
+  const auto document = stored_model();
   const auto [first, last] = document.run->conditions->measured.value();
   EXPECT_GT(first, before);
   EXPECT_LT(last, document.created);
   // The standstills before and after the path (0.4 s each) have no residuals.
   EXPECT_NEAR(std::chrono::duration<double>(last - first).count(),
               *document.run->conditions->duration_s, 2.0);
+}
+
+TEST_F(DriftingMachine, DatesAreThoseOfAWallClockThatWasSetAfterTheStart) {
+  configure("");
+  for (const auto set :
+       {std::chrono::nanoseconds{24h * 200}, std::chrono::nanoseconds{-24h * 200}}) {
+    restart();  // the change is counted from the start
+    const auto before = utc_now() + set;
+    set_ = set_.load() + set;
+    (void)calibrate();
+    const auto document = stored_model();
+    EXPECT_GE(document.created, before);
+    EXPECT_LE(document.created, utc_now());
+    const auto [first, last] = document.run->conditions->measured.value();
+    EXPECT_GT(first, before);
+    EXPECT_LT(last, document.created);
+    const auto events = store().history().value();
+    for (const StoreEvent& event : events) {
+      if (event.id == model().model->id) EXPECT_EQ(event.actor.when, document.created);
+    }
+    EXPECT_THAT(
+        document.verdict->notes,
+        ::testing::Contains(HasSubstr(set > 0ns ? "set forward by 200 d 0 h since abbed"
+                                                : "set backward by 200 d 0 h since abbed")));
+    EXPECT_THAT(service_->status().reason, HasSubstr("the wall clock was set"));
+    truth_.squareness.C0Y_rad += 60e-6;  // another model, so that the store keeps both
+  }
+}
+
+TEST_F(DriftingMachine, ASuspendedComputerIsInTheVerdict) {
+  configure("");
+  suspended_ = 3h;
+  const auto resumed = utc_now();
+  (void)calibrate();
+  const auto document = stored_model();
+  EXPECT_LE(document.created, utc_now());
+  EXPECT_GT(document.created, resumed);
+  EXPECT_THAT(document.verdict->notes,
+              ::testing::Contains(HasSubstr("suspended for 3 h 0 min since abbed started")));
+}
+
+TEST_F(DriftingMachine, AClockThatRunsOnLeavesNoNote) {
+  configure("");
+  set_ = 1s;  // a leap second
+  (void)calibrate();
+  EXPECT_THAT(stored_model().verdict->notes,
+              ::testing::Not(::testing::Contains(HasSubstr("since abbed started"))));
+}
+
+TEST_F(DriftingMachine, TheModelHashDoesNotDependOnTheWallClock) {
+  configure("");
+  (void)calibrate();
+  const auto before = model_hash(stored_model());
+  set_ = 24h * 200;
+  seen_ = now_ = kStart;  // the same samples on another day
+  restart();
+  (void)calibrate();
+  EXPECT_EQ(model_hash(stored_model()), before);
 }
 
 TEST_F(DriftingMachine, AnUnchangedMachineRaisesNone) {
@@ -292,7 +367,7 @@ TEST_F(DriftingMachine, ARunUpdatesTheActiveModelAndNamesBothParents) {
   EXPECT_EQ(store().load(of_run)->statistics, document.statistics);
   EXPECT_FALSE(store().load(of_run)->run->held_out_cells.empty());
   EXPECT_TRUE(document.run->held_out_cells.empty());
-  EXPECT_THAT(document.run->notes, ::testing::Contains(HasSubstr("was updated with the run")));
+  EXPECT_THAT(document.verdict->notes, ::testing::Contains(HasSubstr("was updated with the run")));
   EXPECT_LT(document.model.parameters().back().u, store().load(first)->model.parameters().back().u);
 }
 

@@ -29,6 +29,7 @@ ReportSubject reported(unsigned seed, bool accepted = true) {
   subject.entry = StoreEntry{
       .id = model_id(subject.document), .active = accepted, .accepted = accepted, .reasons = {}};
   if (!accepted) subject.entry->reasons = {"held out: no better than no compensation"};
+  subject.document.verdict = ModelVerdict{accepted, subject.entry->reasons};
   subject.events.push_back({.action = StoreAction::Added,
                             .id = subject.entry->id,
                             .actor = {"turner", "", subject.document.created},
@@ -115,7 +116,33 @@ TEST(ModelReport, StatesReasonsAndNotesApart) {
                             .actor = {"abbed", "EXX changed", {}}});
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("Yellow: accepted, but"));
   drifted.entry.reset();
+  drifted.document.verdict.reset();
   EXPECT_THAT(model_report(drifted).value(), HasSubstr("No verdict"));
+}
+
+TEST(ModelReport, OfAModelThatWasNotJudgedIsNotRed) {
+  ReportSubject subject = reported(3);
+  subject.document.verdict.reset();
+  subject.entry->judged = subject.entry->accepted = false;
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("No verdict"), Not(HasSubstr("Red: the gate"))));
+}
+
+TEST(ModelReport, OfAnEarlierVersionIsGreenWhereItWasAccepted) {
+  ReportSubject subject = reported(3);
+  subject.machine_hash = "present";
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("for another machine configuration"));
+  subject.events.push_back({.action = StoreAction::Activated,
+                            .id = subject.entry->id,
+                            .actor = {"foreman", "checked", {}}});
+  subject.events.back().accepted_configuration = "present";
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("Green: the gate accepted"));
+}
+
+TEST(ModelReport, StatesTimesThatContradictEachOther) {
+  ReportSubject subject = reported(3);
+  subject.details.now = subject.document.created - std::chrono::hours{48};
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("which is in the future"));
 }
 
 TEST(ModelReport, HasTheResidualsOfTheRunAndTheNotesOfItsVerdict) {
@@ -152,6 +179,16 @@ TEST(ModelReport, OfAModelOfAnEarlierVersionStatesWhatIsNotRecorded) {
   EXPECT_THAT(before_parts, HasSubstr("Residuals of the fit along the path, rms, after"));
   subject.document.run = with_run({});
   EXPECT_EQ(times(model_report(subject).value(), "Not recorded."), 2u);
+}
+
+TEST(ModelReport, StatesWhetherTheDevicesWereSimulatedAndWhatMeasured) {
+  ReportSubject subject = reported(3);
+  EXPECT_THAT(model_report(subject).value(), HasSubstr("not known whether they were simulated"));
+  auto& configuration = subject.document.configuration.emplace();
+  set_entry(configuration.readings, "daemon.simulated", "true");
+  set_entry(configuration.measurements, "tracker.reflector", "ball 1.5");
+  EXPECT_THAT(model_report(subject).value(),
+              AllOf(HasSubstr("SIMULATED"), HasSubstr("tracker.reflector = ball 1.5")));
 }
 
 /// Its statistics are those of the held-out test: rms only, no samples.

@@ -56,6 +56,17 @@ class ModelStoreTest : public ::testing::Test {
   protocol::UtcTime now_{std::chrono::hours{24 * 365}};
 };
 
+TEST_F(ModelStoreTest, ListsTheModelThatWasAddedLastFirstAlsoAfterTheClockWasSetBack) {
+  const auto first = add(1);
+  now_ -= std::chrono::hours{24 * 200};
+  const auto second = add(2), third = add(3);
+  const auto entries = open().list().value();
+  ASSERT_THAT(entries, SizeIs(3));
+  EXPECT_EQ(entries[0].id, third);
+  EXPECT_EQ(entries[1].id, second);
+  EXPECT_EQ(entries[2].id, first);
+}
+
 TEST_F(ModelStoreTest, IsEmptyWhenNew) {
   EXPECT_THAT(open().list().value(), IsEmpty());
   EXPECT_EQ(open().active_id().value(), std::nullopt);

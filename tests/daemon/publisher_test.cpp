@@ -182,6 +182,48 @@ TEST_F(PublisherTest, TheStateGoesOutEverySecondAndAtOnceWhenItChanges) {
   EXPECT_EQ(changed[0].reason(), "forced by anna: crane test");
 }
 
+TEST_F(PublisherTest, TheIdentityGoesOutBeforeEachStateAndAtOnceWhenItChanges) {
+  publisher_->set_identity({.machine_id = "7c1d5a52-8f0d-4c0e-8d0d-2f6b3f1f0c11"});
+  publisher_->model({}, kPublishTime, kWall);
+  publisher_->set_identity(
+      {.machine_id = "7c1d5a52-8f0d-4c0e-8d0d-2f6b3f1f0c11", .devices_simulated = true});
+  publisher_->model({}, kPublishTime, kWall + 1ms);
+
+  const auto seen = far_->take();
+  const auto identities = messages<v1::Identity>(seen, Topic::Identity);
+  const auto states = messages<v1::ModelState>(seen, Topic::ModelState);
+  ASSERT_THAT(identities, SizeIs(2));
+  ASSERT_THAT(states, SizeIs(2));
+  EXPECT_LT(identities[0].sequence_number(), states[0].sequence_number());
+  EXPECT_EQ(identities[0].machine_id(), "7c1d5a52-8f0d-4c0e-8d0d-2f6b3f1f0c11");
+  EXPECT_FALSE(identities[0].twin());
+  EXPECT_TRUE(identities[1].devices_simulated());
+}
+
+TEST_F(PublisherTest, ATwinThatAbbeDdsReportsIsPublishedUntilItIsGone) {
+  for (const std::string seen : {"machine_id 4711", ""}) {
+    far_->report_twin(seen);
+    publisher_->beat(kWall);
+    publisher_->model({}, kPublishTime, kWall);
+    const auto sent = taken<v1::Identity>(Topic::Identity);
+    ASSERT_THAT(sent, SizeIs(1));
+    EXPECT_EQ(sent[0].twin(), !seen.empty());
+    EXPECT_EQ(sent[0].twin_seen(), seen);
+  }
+}
+
+TEST_F(PublisherTest, TheIdentitySaysWhetherTheModelWasMadeOnSimulatedDevices) {
+  auto model = kPublishedModel;
+  model.simulated = true;
+  auto state = active();
+  state.model = &model;
+  publisher_->model(state, kPublishTime, kWall);
+  const auto sent = taken<v1::Identity>(Topic::Identity);
+  ASSERT_THAT(sent, SizeIs(1));
+  EXPECT_EQ(sent[0].model_id(), "m");
+  EXPECT_TRUE(sent[0].model_simulated());
+}
+
 TEST_F(PublisherTest, TheAgeOfAModelCountsFromItsActivation) {
   auto model = kPublishedModel;
   model.active_since = kPublishTime - 1h;
@@ -210,6 +252,10 @@ TEST_F(PublisherTest, EveryStreamHasItsHealth) {
   ASSERT_THAT(sent, SizeIs(2));
   EXPECT_EQ(sent[1].stream(), "encoder");
   EXPECT_EQ(sent[1].fault(), "no answer");
+  streams[1].status.condition = "X missing (node 1)";
+  publisher_->health(streams, kPublishTime);
+  EXPECT_EQ(taken<v1::Health>(Topic::Health).at(1).fault(),
+            "X missing (node 1); last fault: no answer");
 }
 
 }  // namespace

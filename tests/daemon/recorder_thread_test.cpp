@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "failing_disk.hpp"
 #include "recording_fixture.hpp"
 
 namespace abbe::daemon {
@@ -64,6 +65,29 @@ TEST_F(RecorderThreadTest, RecordsWhatItIsHanded) {
   start(1 << 20);
   thread_->hand_over(batch(0, 10));
   EXPECT_EQ(finish().message_count(), 50u);
+}
+
+TEST_F(RecorderThreadTest, ReportsHowFarTheFileIsBehindWhileTheDiskStalls) {
+  using namespace std::chrono_literals;
+  const auto in_31_s = [] { return Recorder::WallTime::clock::now() + 31s; };
+  test::SlowDisk disk{SYS_pwrite64};
+  if (!disk.start([this] { start(1 << 20); })) GTEST_SKIP() << "no seccomp filter here";
+  EXPECT_EQ(thread_->behind(in_31_s()), 0s);
+  thread_->hand_over(batch(0, 10));
+  EXPECT_GE(thread_->behind(in_31_s()), 31s) << "waits for the recorder, or in the open chunk";
+  for (int cycle = 0; cycle < 2; ++cycle) wait_until_written();
+  EXPECT_EQ(thread_->behind(in_31_s()), 0s);
+
+  disk.stall();
+  thread_->hand_over(batch(10, 10));
+  disk.wait_until_held();
+  thread_->hand_over(batch(20, 10));
+  EXPECT_GE(thread_->behind(in_31_s()), 31s);
+  EXPECT_EQ(thread_->status().state, RecorderStatus::State::Recording);
+  disk.go_on();
+  for (int cycle = 0; cycle < 2; ++cycle) wait_until_written();
+  EXPECT_EQ(thread_->behind(in_31_s()), 0s);
+  EXPECT_EQ(finish().message_count(), 150u);
 }
 
 TEST_F(RecorderThreadTest, EveryMessageCarriesTheCycleInWhichItWasTaken) {

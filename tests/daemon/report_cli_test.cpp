@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <regex>
 
 #include "abbe/model/model_store.hpp"
 #include "abbe_command.hpp"
@@ -34,6 +35,12 @@ class ReportCli : public ::testing::Test {
   }
   [[nodiscard]] std::string file(const std::string& name) const {
     return test::text_of(folder_ / name);
+  }
+  /// details.toml: the example with dates on days 15 and 16 of a month.
+  void write_details(const std::string& month) const {
+    std::string text = test::run_abbe(folder_, "example certificate.toml").out;
+    text = std::regex_replace(text, std::regex("2026-11-2([56])"), month + "-1$1");
+    test::write_text(folder_ / "details.toml", text);
   }
 
   TemporaryFolder temporary_;
@@ -72,15 +79,62 @@ TEST_F(ReportCli, TheTrendLeavesADamagedModelOutAndSaysSo) {
 }
 
 TEST_F(ReportCli, WritesACertificateWithTheDetailsOfTheExample) {
-  test::write_text(folder_ / "details.toml",
-                   test::run_abbe(folder_, "example certificate.toml").out);
+  write_details("2024-05");
+  const auto third = ModelStore::open(folder_ / "store")
+                         ->add(test::synthetic_document(3), true, {}, {"turner", "", {}})
+                         .value();
   const auto ran =
-      report(first_ + " --details details.toml --dcc c.xml --as-left " + second_ + " -o r.html");
+      report(first_ + " --details details.toml --dcc c.xml --as-left " + third + " -o r.html");
   EXPECT_EQ(ran.exit, 0) << ran.err;
   EXPECT_THAT(file("c.xml"), AllOf(HasSubstr("schemaVersion=\"3.2.1\""), HasSubstr(">As left<"),
                                    HasSubstr("600-0815")));
   EXPECT_THAT(file("r.html"), AllOf(HasSubstr("600-0815"), HasSubstr("2500 mm/min"),
                                     HasSubstr("20.40 \u00b1 0.60 C")));
+}
+
+TEST_F(ReportCli, RefusesACertificateOfARefusedModelAndStatesAForcedOne) {
+  write_details("2024-05");
+  const std::string options = " --details details.toml --dcc c.xml -o r.html";
+  const auto refused = report(second_ + options);
+  EXPECT_EQ(refused.exit, 5);
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("(as found)"), HasSubstr("refused by the gate: no better"),
+                    HasSubstr("--force")));
+  EXPECT_FALSE(fs::exists(folder_ / "c.xml"));
+  const auto left = report(first_ + options + " --as-left " + second_);
+  EXPECT_EQ(left.exit, 5);
+  EXPECT_THAT(left.err, HasSubstr("(as left)"));
+
+  EXPECT_EQ(report(second_ + options + " --force").exit, 2);
+  const auto forced = report(second_ + options + " --force --why 'customer insists'");
+  ASSERT_EQ(forced.exit, 0) << forced.err;
+  EXPECT_THAT(forced.out, HasSubstr("verdict     Red: the gate refused the model"));
+  const auto stated =
+      AllOf(HasSubstr("no better"), HasSubstr("forced by"), HasSubstr("customer insists"));
+  EXPECT_THAT(file("c.xml"), stated);
+  const std::string page = file("r.html");
+  EXPECT_THAT(page.substr(0, page.find("Volumetric error")), stated);
+}
+
+TEST_F(ReportCli, ACertificateOfAModelThatWasNotJudgedStatesThat) {
+  auto document = test::synthetic_document(3);
+  document.verdict.reset();
+  test::write_text(folder_ / "earlier.json", to_json(document));
+  write_details("2024-05");
+  const auto ran = report("earlier.json --details details.toml --dcc c.xml -o r.html");
+  ASSERT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("No verdict"));
+  EXPECT_THAT(file("c.xml"), HasSubstr("verdict: not judged"));
+  EXPECT_THAT(file("r.html"), HasSubstr("No verdict"));
+}
+
+TEST_F(ReportCli, OfAFileHasTheVerdictOfTheFile) {
+  auto document = test::synthetic_document(3);
+  document.verdict = ModelVerdict{.reasons = {"no better"}, .notes = {"dry air"}};
+  test::write_text(folder_ / "refused.json", to_json(document));
+  ASSERT_EQ(report("refused.json -o r.html").exit, 0);
+  EXPECT_THAT(file("r.html"), AllOf(HasSubstr("Red: the gate refused the model"),
+                                    HasSubstr("no better"), HasSubstr("dry air")));
 }
 
 TEST_F(ReportCli, WritesNothingIfAnythingIsWrong) {

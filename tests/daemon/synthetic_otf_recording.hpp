@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "abbe/methods/calibration_request.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "config_tables.hpp"
 #include "synthetic_otf_run.hpp"
@@ -21,7 +22,8 @@ inline std::string synthetic_recorded_toml() {
 }
 
 inline std::filesystem::path record_synthetic_run(
-    const std::filesystem::path& folder, std::optional<calib::otf::Mode> mode = std::nullopt) {
+    const std::filesystem::path& folder, std::optional<calib::otf::Mode> mode = std::nullopt,
+    std::optional<ClockChange> clock = std::nullopt) {
   using protocol::HostTime;
   constexpr HostTime kBegin{std::chrono::seconds{100}};
   RecorderOptions options;
@@ -55,6 +57,7 @@ inline std::filesystem::path record_synthetic_run(
     recorder->record(tracker, "tracker");
   }
 
+  if (clock) recorder->attach(to_attachment(*clock), kBegin);
   const auto closed = recorder->close();
   EXPECT_TRUE(closed) << closed.error().text;
   return closed->file;

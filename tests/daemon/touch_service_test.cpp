@@ -26,15 +26,20 @@ struct Machine final : SampleSource {
     if (!ready) return fail(ErrorCode::Refused, "measuring machine cmm is not ready: connecting");
     return std::array<double, 3>{0.0, 0.0, 1.0};
   }
-  void stop_machine() override { ++stopped; }
+  Result<std::uint64_t> stop_machine() override { return static_cast<std::uint64_t>(++stopped); }
+  drivers::IppStop machine_stop() const override { return stop; }
   std::optional<std::string> release_awaited() const override {
     return stopped > 0 ? std::optional<std::string>{"stopped by request"} : std::nullopt;
   }
   std::optional<TipPlace> tip_place() const override { return TipPlace{{0.1, 0.2, 0.0075}, 100ms}; }
   bool ready = true;
   int stopped = 0;
+  drivers::IppStop stop{1, drivers::IppStopOutcome::Stopped, "AbortE was answered"};
   std::vector<drivers::ProbePoint> asked;
 };
+
+const MotionVolume kVolume{
+    {-1, -1, -1}, {1, 1, 1}, {"[axes.X] travel", "[axes.Y] travel", "[axes.Z] travel"}};
 
 TouchJob two_touches(std::vector<drivers::ProbePoint> leave = {}) {
   TouchRequest one;
@@ -42,7 +47,7 @@ TouchJob two_touches(std::vector<drivers::ProbePoint> leave = {}) {
   one.point = {.position_m = {0, 0, 0.1}};
   TouchRequest two;
   two.point = {.position_m = {0, 0, 0.2}};
-  return touch_job({one, two}, std::move(leave)).value();
+  return touch_job(kVolume, {one, two}, std::move(leave)).value();
 }
 
 Batch touched(double z_m) {
@@ -83,12 +88,12 @@ TEST(TouchService, RequestsOneTouchAndItsApproachPathAtATime) {
 
 TEST(TouchService, AJobHasALimit) {
   const std::vector<TouchRequest> touches(TouchJob::kMostTouches);
-  EXPECT_TRUE(touch_job(touches));
-  EXPECT_THAT(touch_job(std::vector<TouchRequest>(touches.size() + 1)).error().text,
+  EXPECT_TRUE(touch_job(kVolume, touches));
+  EXPECT_THAT(touch_job(kVolume, std::vector<TouchRequest>(touches.size() + 1)).error().text,
               HasSubstr("exceed the limits of one request"));
   TouchRequest roundabout;
   roundabout.way.resize(TouchJob::kMostPlaces);
-  EXPECT_EQ(touch_job({roundabout}).error().code, ErrorCode::Usage);
+  EXPECT_EQ(touch_job(kVolume, {roundabout}).error().code, ErrorCode::Usage);
 }
 
 TEST(TouchService, EndsAtARefusedTouchWithTheMachinesMessage) {
@@ -127,7 +132,7 @@ TEST(TouchService, RefusesImpossibleJobs) {
   TouchService none{machine, false};
   EXPECT_THAT(none.start(two_touches()).error().text, HasSubstr("[cmm]"));
   TouchService service{machine, true};
-  EXPECT_FALSE(touch_job({}));
+  EXPECT_FALSE(touch_job(kVolume, {}));
   EXPECT_FALSE(service.cancel());
   ASSERT_TRUE(service.start(two_touches()));
   EXPECT_EQ(service.start(two_touches()).error().code, ErrorCode::Refused);
@@ -147,10 +152,38 @@ TEST(TouchService, StopsTheMotionWhenCancelledAndReportsThePositionOfTheTip) {
   service.cycle({}, 0, "", kFirstCycle);
   EXPECT_FALSE(service.status().running);
   EXPECT_EQ(service.status().reason,
-            "cancelled; the tip was reported at X 100.000, Y 200.000, Z 7.500 mm 0.1 s before; "
+            "cancelled; the machine is stopped: AbortE was answered; the tip was reported at X "
+            "100.000, Y 200.000, Z 7.500 mm 0.1 s before; "
             "look at the "
             "machine, then `abbe machine release`");
   EXPECT_EQ(machine.asked.size(), 2u);
+}
+
+TEST(TouchService, ReportsAStopThatTheMachineDoesNotConfirm) {
+  Machine machine;
+  machine.stop = {1, drivers::IppStopOutcome::Pending, ""};
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches()));
+  ASSERT_TRUE(service.cancel());
+  service.cycle({}, 0, "", kFirstCycle);
+  EXPECT_TRUE(service.status().running) << "the outcome of the stop is awaited";
+  machine.stop = {1, drivers::IppStopOutcome::NotConfirmed, "no answer to AbortE in 3 s"};
+  service.cycle({}, 0, "", kFirstCycle);
+  EXPECT_FALSE(service.status().running);
+  EXPECT_EQ(service.status().stop.outcome, drivers::IppStopOutcome::NotConfirmed);
+  EXPECT_THAT(service.status().reason,
+              HasSubstr("the stop of the machine is not confirmed: no answer to AbortE in 3 s"));
+}
+
+TEST(TouchService, AnOutcomeOfAnEarlierStopIsNotTheOutcomeOfThisOne) {
+  Machine machine;
+  machine.stopped = 4;  // the next stop is number 5
+  machine.stop = {4, drivers::IppStopOutcome::Stopped, "AbortE was answered"};
+  TouchService service{machine, true};
+  ASSERT_TRUE(service.start(two_touches()));
+  ASSERT_TRUE(service.cancel());
+  service.cycle({}, 0, "", kFirstCycle);
+  EXPECT_TRUE(service.status().running);
 }
 
 TEST(TouchService, KeepsTheTouchThatWasMadeBeforeTheMachineStopped) {

@@ -35,7 +35,7 @@ class UnstoredModel : public ::testing::Test {
 
   void start(RecorderThread* recorder = nullptr) {
     authority_.emplace(ModelAuthority::open(folder_ / "models", config_, {}, now_));
-    service_.emplace(config_, *authority_, recorder, protocol::UtcOffset{});
+    service_.emplace(config_, *authority_, recorder);
     ASSERT_TRUE(service_->start(OtfRequest{test::synthetic_request_path_m()}, "anna", now_));
   }
   void drive() {

@@ -102,23 +102,61 @@ TEST_F(VerifyCli, WritesAReportThatNeedsNoNetwork) {
   EXPECT_THAT(text_of(folder_ / "out/grid.csv"), StartsWith("x_mm,y_mm,z_mm,las_x_um,"));
 }
 
-TEST_F(VerifyCli, TakesAModelOfTables) {
-  const auto document = test::synthetic_document(3);
-  write("tables.json", to_json(document));
+/// A grid in the volume of the model, measured without noise.
+std::vector<calib::verify::MeasuredPoint> points_of(const ModelDocument& document) {
   std::vector<calib::verify::MeasuredPoint> points;
   const auto tool = document.model.tool_offsets_m().front();
-
   for (int i = 0; i < 343; ++i) {
     const calib::Vector3 q(-0.3 + 0.1 * (i % 7), -0.3 + 0.1 * (i / 7 % 7), -0.4 + 0.05 * (i / 49));
     points.push_back({q, q + tool + document.model.V_at(q, tool)});
   }
+  return points;
+}
 
-  write("points.csv", to_verification_csv(points));
+TEST_F(VerifyCli, TakesAModelOfTables) {
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  write("points.csv", to_verification_csv(points_of(document)));
   const auto ran = abbe("verify tables.json --points points.csv --json");
   ASSERT_EQ(ran.exit, 0) << ran.err;
   const auto summary = nlohmann::json::parse(ran.out);
   EXPECT_LT(summary["after"]["max_um"].get<double>(), 1e-3);
   EXPECT_GT(summary["before"]["max_um"].get<double>(), 1.0);
+}
+
+TEST_F(VerifyCli, NamesTheLineOfAPointThatAloneDoesNotFit) {
+  auto points = tracker_points(study::table3_machine());
+  for (const calib::Vector3& wrong_m :
+       {calib::Vector3(0, 0, 0), calib::Vector3(-9.999, -9.999, -9.999),
+        calib::Vector3(1e27, 1e27, 1e27)}) {
+    points[7].measured_m = wrong_m;
+    write("off.csv", to_verification_csv(points));
+    const auto ran = abbe("verify model.json --points off.csv");
+    EXPECT_THAT(ran.out + ran.err, HasSubstr("off.csv:9: alone does not fit"))
+        << wrong_m.transpose();
+    EXPECT_THAT(ran.out + ran.err, Not(HasSubstr("off.csv:10"))) << wrong_m.transpose();
+  }
+  const auto right = abbe("verify model.json --points verification.csv --json");
+  EXPECT_TRUE(nlohmann::json::parse(right.out)["points_off"].empty());
+}
+
+TEST_F(VerifyCli, NamesTheLineOfAPointThatIsOffByHalfAMillimetre) {
+  const auto document = test::synthetic_document(3);
+  write("tables.json", to_json(document));
+  auto points = points_of(document);
+  points[7].measured_m.x() += 0.5e-3;
+  write("off.csv", to_verification_csv(points));
+  const auto ran = abbe("verify tables.json --points off.csv");
+  EXPECT_THAT(ran.out + ran.err, HasSubstr("off.csv:9: alone does not fit"));
+  EXPECT_THAT(ran.out + ran.err, Not(HasSubstr("off.csv:10")));
+}
+
+TEST_F(VerifyCli, PrintsJsonAlsoForFileNamesInLatin1) {
+  const std::string name = "b\xfc.json";
+  fs::copy_file(folder_ / "model.json", folder_ / name);
+  const auto ran = abbe("verify model.json '" + name + "' --points verification.csv --json");
+  EXPECT_EQ(ran.exit, 0) << ran.err;
+  EXPECT_EQ(nlohmann::json::parse(ran.out)["models"][1]["name"], "b\xef\xbf\xbd.json");
 }
 
 TEST_F(VerifyCli, ComparesSeveralModelsAtTheSamePoints) {

@@ -117,6 +117,45 @@ TEST(DeviceThread, BeginsAgainAfterAnException) {
   EXPECT_EQ((*thread)->status().faults, (*thread)->failures());
 }
 
+/// Moves a machine, and throws in each wait() until it was told to stop `stops_needed` times.
+class MovingDevice final : public drivers::Device {
+ public:
+  explicit MovingDevice(int stops_needed) : stops_needed_(stops_needed) {}
+  void wait(std::chrono::nanoseconds) override {
+    if (stops < stops_needed_) throw std::runtime_error("no memory");
+    std::this_thread::yield();
+  }
+  void receive() ABBE_RT override { ++turns; }
+  [[nodiscard]] drivers::DeviceStatus status() const override { return {}; }
+  [[nodiscard]] bool stop_after_failure() override {
+    if (++stops < stops_needed_) throw std::runtime_error("no memory for the stop either");
+    return true;
+  }
+
+  std::atomic<int> stops{0};
+  std::atomic<int> turns{0};
+
+ private:
+  int stops_needed_;
+};
+
+TEST(DeviceThread, StopsAMotionAtOnceAndGoesOnWithoutItsPause) {
+  MovingDevice device(1);
+  const auto thread = DeviceThread::start(device, {.first_back_off = 1h, .longest_back_off = 1h});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return device.turns > 0; });
+  EXPECT_EQ(device.stops, 1);
+  EXPECT_EQ((*thread)->failures(), 1u);
+}
+
+TEST(DeviceThread, TriesAgainToStopAMotionThatItCannotStop) {
+  MovingDevice device(5);
+  const auto thread = DeviceThread::start(device, {.first_back_off = 1h, .longest_back_off = 1h});
+  ASSERT_TRUE(thread);
+  wait_for([&] { return device.turns > 0; });
+  EXPECT_EQ(device.stops, 5);
+}
+
 // No machine has processor 1023 in its set: a refusal that does not depend on who runs the test.
 constexpr int kNoSuchProcessor = 1023;
 

@@ -81,4 +81,40 @@ inline drivers::ProbePoint on_top() {
   return {.position_m = {0.1, 0.2, -0.1 + 12.5e-3 + 2e-3}, .normal = {0, 0, 1}};
 }
 
+inline constexpr std::string_view kHeld = "awaiting release";
+
+/// Ready, then on its way: 0.5 m at 0.2 m/s.
+struct MovingStage : IppStage {
+  explicit MovingStage(drivers::IppDeviceOptions options = {},
+                       const sim::IppDmeOptions& machine = machine_with_a_sphere())
+      : IppStage(machine, std::move(options)) {
+    EXPECT_TRUE(state_becomes("ready")) << last_fault();
+    device->measure({.position_m = {0.3, 0.4, 0.0}, .touch = false});
+    EXPECT_TRUE(cycles_until(std::chrono::seconds{1}, [this] { return peer.machine().moving(); }));
+  }
+  /// Stopped by one AbortE and held; nothing clears or moves for a minute.
+  void expect_stopped_and_held() {
+    EXPECT_TRUE(cycles_until(std::chrono::seconds{10}, [this] { return state() == kHeld; }))
+        << state() << ": " << last_fault();
+    EXPECT_FALSE(peer.machine().moving());
+    EXPECT_EQ(times_heard("AbortE()"), 1);
+    const auto commands = times_heard("ClearAllErrors()") + times_heard("StartSession()");
+    device->measure(on_top());
+    cycles_for(std::chrono::seconds{60});
+    EXPECT_EQ(state(), kHeld);
+    EXPECT_EQ(times_heard("ClearAllErrors()") + times_heard("StartSession()"), commands);
+    EXPECT_FALSE(peer.machine().moving());
+    EXPECT_EQ(peer.machine().touches(), 0u);
+    EXPECT_EQ(device->points_left(), 0u);
+  }
+  [[nodiscard]] std::size_t commands() { return peer.machine().heard().size(); }
+  [[nodiscard]] std::vector<std::string> commands_after(std::size_t n) {
+    const auto& heard = peer.machine().heard();
+    return {heard.begin() + static_cast<std::ptrdiff_t>(n), heard.end()};
+  }
+  void inject(sim::FaultKind kind, double value = 0.0) {
+    peer.machine().inject({.kind = kind, .value = value}, time.now());
+  }
+};
+
 }  // namespace abbe::tests

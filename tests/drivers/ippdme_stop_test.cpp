@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <cmath>
+#include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "ippdme_stage.hpp"
 
@@ -20,41 +22,55 @@ using drivers::ProbePoint;
 using protocol::TouchFlag;
 using testing::HasSubstr;
 
-constexpr std::string_view kHeld = "awaiting release";
-
-/// Ready, then on its way: 0.5 m at 0.2 m/s.
-struct MovingStage : IppStage {
-  explicit MovingStage(IppDeviceOptions options = {},
-                       const sim::IppDmeOptions& machine = machine_with_a_sphere())
-      : IppStage(machine, std::move(options)) {
-    EXPECT_TRUE(state_becomes("ready")) << last_fault();
-    device->measure({.position_m = {0.3, 0.4, 0.0}, .touch = false});
-    EXPECT_TRUE(cycles_until(1s, [this] { return peer.machine().moving(); }));
+/// A stage whose device throws once, when the machine begins to be held: after AbortE counts as sent,
+/// before it is sent.
+struct ThrowingStage : MovingStage {
+  ThrowingStage() : MovingStage(options()) {
+    inject(sim::FaultKind::EmergencyStop);
+    EXPECT_THROW(cycles_for(10s), std::runtime_error);
   }
-  /// Stopped by one AbortE and held; nothing clears or moves for a minute.
-  void expect_stopped_and_held() {
-    EXPECT_TRUE(cycles_until(10s, [this] { return state() == kHeld; }))
-        << state() << ": " << last_fault();
-    EXPECT_FALSE(peer.machine().moving());
-    EXPECT_EQ(times_heard("AbortE()"), 1);
-    const auto commands = times_heard("ClearAllErrors()") + times_heard("StartSession()");
-    device->measure(on_top());
-    cycles_for(60s);
-    EXPECT_EQ(state(), kHeld);
-    EXPECT_EQ(times_heard("ClearAllErrors()") + times_heard("StartSession()"), commands);
-    EXPECT_FALSE(peer.machine().moving());
-    EXPECT_EQ(peer.machine().touches(), 0u);
-    EXPECT_EQ(device->points_left(), 0u);
-  }
-  [[nodiscard]] std::size_t commands() { return peer.machine().heard().size(); }
-  [[nodiscard]] std::vector<std::string> commands_after(std::size_t n) {
-    const auto& heard = peer.machine().heard();
-    return {heard.begin() + static_cast<std::ptrdiff_t>(n), heard.end()};
-  }
-  void inject(sim::FaultKind kind, double value = 0.0) {
-    peer.machine().inject({.kind = kind, .value = value}, time.now());
+  static IppDeviceOptions options() {
+    IppDeviceOptions options;
+    options.machine_changed = [thrown = false](const drivers::IppMachine& machine) mutable {
+      if (!machine.held.empty() && !std::exchange(thrown, true))
+        throw std::runtime_error("no memory");
+    };
+    return options;
   }
 };
+
+TEST(IppStop, AnExceptionWhileMovingIsFollowedByAnAbortAtOnce) {
+  ThrowingStage stage;
+  const auto before = stage.times_heard("AbortE()");
+  EXPECT_TRUE(stage.device->stop_after_failure()) << "its end is not confirmed yet";
+  stage.peer.serve(stage.time.now());  // no cycle of the device in between
+  EXPECT_GT(stage.times_heard("AbortE()"), before);
+  EXPECT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_FALSE(stage.device->stop_after_failure());
+  EXPECT_FALSE(stage.peer.machine().moving());
+  EXPECT_TRUE(stage.device->held());
+}
+
+TEST(IppStop, AMachineThatStandsIsLeftAloneAfterAnException) {
+  IppStage stage;
+  ASSERT_TRUE(stage.state_becomes("ready"));
+  EXPECT_FALSE(stage.device->stop_after_failure());
+  stage.cycles_for(1s);
+  EXPECT_EQ(stage.times_heard("AbortE()"), 0);
+  EXPECT_EQ(stage.state(), "ready");
+}
+
+TEST(IppStop, AProcessThatEndsStopsTheMachineWithoutItsDevice) {
+  MovingStage stage;
+  stage.peer.serve(stage.time.now());
+  const auto done = drivers::send_emergency_stops({});
+  EXPECT_EQ(done.sent, 1);
+  stage.peer.serve(stage.time.now());
+  EXPECT_EQ(stage.times_heard("AbortE()"), 1);
+  stage.time.advance(1s);
+  stage.peer.serve(stage.time.now());
+  EXPECT_FALSE(stage.peer.machine().moving());
+}
 
 TEST(IppStop, AnUnknownTagWhileMovingIsAbortedFirst) {
   MovingStage stage;
@@ -123,6 +139,34 @@ TEST(IppStop, AnEndByRequestStopsTheMotionAndHoldsNothing) {
   stage.cycles_for(10s);
   EXPECT_EQ(stage.state(), "disconnected") << "nothing is begun any more";
   EXPECT_EQ(stage.device->points_left(), 0u);
+}
+
+TEST(IppStop, AMachineStoppedAfterAnExceptionIsHeldForIt) {
+  MovingStage stage;
+  EXPECT_TRUE(stage.device->stop_after_failure());
+  ASSERT_TRUE(stage.state_becomes(kHeld)) << stage.state();
+  EXPECT_THAT(stage.last_fault(), HasSubstr("stopped after an internal error"));
+}
+
+TEST(IppStop, AHoldByRequestOutlivesTheEndBeforeTheAnswer) {
+  for (const bool lost : {false, true}) {
+    drivers::IppMachine kept;
+    IppDeviceOptions options;
+    options.machine_changed = [&](const drivers::IppMachine& m) { kept = m; };
+    MovingStage stage{options};
+    if (lost) {
+      stage.peer.hang_up();
+      ASSERT_TRUE(stage.cycles_until(1s, [&] { return !stage.device->status().connected; }));
+    }
+    stage.device->abort();
+    stage.device->end();
+
+    ASSERT_TRUE(stage.cycles_until(10s, [&] { return stage.state() == "disconnected"; }))
+        << stage.state();
+    ASSERT_TRUE(stage.cycles_until(10s, [&] { return !kept.moving; }));
+    EXPECT_FALSE(stage.peer.machine().moving());
+    EXPECT_EQ(kept.held, "stopped by request");
+  }
 }
 
 TEST(IppRelease, AMotionThatIsBeingStoppedCannotBeReleased) {

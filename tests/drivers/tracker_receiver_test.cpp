@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "tracker_script.hpp"
@@ -209,6 +210,89 @@ TEST_F(TrackerReceiverTest, AClockThatJumpedBackRestartsItsMapping) {
   EXPECT_TRUE(has_flag(points_[before], SampleFlag::ClockUnsettled));
   EXPECT_LE(std::chrono::abs(points_.back().head.time - now_), 50ms);
   EXPECT_EQ(receiver_->clock().restarts, 1u);
+}
+
+// --- times that do not fit ---
+
+/// A packet of ten points that arrives at now_, with the time of point `k` moved by `by`.
+class TrackerTimes : public TrackerReceiverTest {
+ protected:
+  std::size_t packet_with(std::size_t k, std::chrono::nanoseconds by) {
+    auto points = points_until(device(now_ - kDelay), 10, 2ms);
+    points.at(k).time = emscon::TrackerClockReading::from(points[k].time.to_device_time() + by);
+    const auto before = points_.size();
+    push(burst(points), now_);
+    now_ += 332ms;
+    return before;
+  }
+  void expect_only_invalid(std::size_t from, std::size_t bad) {
+    for (std::size_t k = from; k < points_.size(); ++k) {
+      EXPECT_EQ(has_flag(points_[k], SampleFlag::PointInvalid), k == bad) << k - from;
+      EXPECT_LE(std::chrono::abs(points_[k].head.time - now_), 2s) << k - from;
+    }
+  }
+};
+
+TEST_F(TrackerTimes, APointFarAheadIsRefusedAndTheNextOnesAreUsed) {
+  for (const auto by : {std::chrono::nanoseconds{1h}, std::chrono::nanoseconds{5s}}) {
+    for (const std::size_t k : {0, 4, 9}) {
+      receiver_ = std::make_unique<TrackerReceiver>();
+      stream_until(now_ + 20s);
+      const auto from = packet_with(k, by);
+      packet_at(now_, 10);
+      packet_at(now_ += 332ms, 10);
+      expect_only_invalid(from, from + k);
+      EXPECT_EQ(receiver_->counters().time_disorder, 1u);
+      EXPECT_EQ(receiver_->clock().restarts, 0u);
+    }
+  }
+}
+
+TEST_F(TrackerTimes, APointFarBehindIsRefusedAndTheClockModelStays) {
+  for (const std::size_t k : {0, 4, 9}) {
+    receiver_ = std::make_unique<TrackerReceiver>();
+    stream_until(now_ + 20s);
+    const auto from = packet_with(k, -30min);
+    packet_at(now_, 10);
+    expect_only_invalid(from, from + k);
+    EXPECT_EQ(receiver_->clock().restarts, 0u);
+  }
+}
+
+TEST_F(TrackerTimes, ACorruptTimeInTheFirstPacketIsRefusedToo) {
+  const auto from = packet_with(4, 1h);
+  packet_at(now_, 10);
+  expect_only_invalid(from, from + 4);
+}
+
+TEST_F(TrackerTimes, AJumpThatSeveralPointsAgreeOnBeginsANewClockModel) {
+  stream_until(now_ + 20s);
+  for (const auto by : {std::chrono::nanoseconds{1h}, std::chrono::nanoseconds{-30min}}) {
+    const auto restarts = receiver_->clock().restarts;
+    auto points = points_until(device(now_ - kDelay), 10, 2ms);
+    for (std::size_t k = 4; k < points.size(); ++k)
+      points[k].time = emscon::TrackerClockReading::from(points[k].time.to_device_time() + by);
+    const auto from = points_.size();
+    push(burst(points), now_);
+    expect_only_invalid(from, points_.size());
+    EXPECT_TRUE(has_flag(points_[from + 4], SampleFlag::Restarted));
+    EXPECT_TRUE(has_flag(points_[from + 4], SampleFlag::GapBefore));
+    EXPECT_EQ(receiver_->clock().restarts, restarts + 1);
+    receiver_ = std::make_unique<TrackerReceiver>();
+    stream_until(now_ + 20s);
+  }
+}
+
+TEST_F(TrackerTimes, AJumpIsCertainAfterThreePacketsOfOnePoint) {
+  stream_until(now_ + 20s);
+  const auto from = points_.size();
+  for (int k = 0; k < 4; ++k, now_ += 332ms)
+    push(burst(std::array{point(device(now_) + 1h)}), now_);
+  EXPECT_TRUE(has_flag(points_[from], SampleFlag::PointInvalid));
+  EXPECT_TRUE(has_flag(points_[from + 1], SampleFlag::PointInvalid));
+  EXPECT_FALSE(has_flag(points_[from + 2], SampleFlag::PointInvalid));
+  EXPECT_TRUE(has_flag(points_[from + 2], SampleFlag::Restarted));
+  EXPECT_FALSE(has_flag(points_[from + 3], SampleFlag::PointInvalid));
 }
 
 // --- connections ---------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ void published(daemon::Topic topic, std::span<const std::byte> payload) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const auto payload = std::as_bytes(std::span(data, size)).subspan(1);
-  switch (data[0] % 13) {
+  switch (data[0] % 14) {
     case 0:
       published<v1::Snapshot>(daemon::Topic::Snapshot, payload);
       break;
@@ -84,6 +84,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       break;
     case 12:
       round_trip<v1::TouchScan>(payload);
+      break;
+    case 13:
+      published<v1::Identity>(daemon::Topic::Identity, payload);
       break;
     default:
       round_trip<v1::RawBytes>(payload);

@@ -95,7 +95,7 @@ struct Daemon {
   drivers::MonotonicTime time;
   NoDevices devices;
   ModelAuthority authority = ModelAuthority::open(empty_store(), config, {}, time.now());
-  CalibrationService calibration{config, authority, nullptr, protocol::UtcOffset{}};
+  CalibrationService calibration{config, authority, nullptr};
   ReferenceService reference{config, nullptr};
   VerificationService verification{config};
   TouchService touching{devices, true};

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -13,7 +15,7 @@ using abbe::calib::ErrorLattice;
 using abbe::calib::LatticeNode;
 using abbe::calib::Vector3;
 using abbe::linuxcnc::command_correction;
-using abbe::linuxcnc::FeedLimits;
+using abbe::linuxcnc::FeedOptions;
 using abbe::linuxcnc::Usable;
 
 constexpr double kNode_m = 0.1;
@@ -33,11 +35,35 @@ ErrorLattice grid() {
   return ErrorLattice::create(nodes).value();
 }
 
+const Vector3 kPlace_m(0.03, 0.12, 0.07);
+const Vector3 kModelTool_m(0.02, -0.015, -0.12);
+
 Usable usable() {
-  return {grid(), {}, "m"};
+  return {grid(), {}, "m", kModelTool_m};
 }
 
-const Vector3 kPlace_m(0.03, 0.12, 0.07);
+/// LinuxCNC at a place, with the tool of the model: its offset has the opposite sign.
+abbe_control control(const Vector3& place_m = kPlace_m) {
+  abbe_control c{};
+  for (int i = 0; i < 3; ++i) {
+    c.position[i] = 1e3 * place_m[i];
+    c.tool_offset[i] = -1e3 * kModelTool_m[i];
+  }
+  c.tool_number = 1;
+  c.homed = 1;
+  return c;
+}
+
+abbe_control with_tool(int number, double z_mm) {
+  abbe_control c = control();
+  c.tool_number = number;
+  c.tool_offset[2] = z_mm;
+  return c;
+}
+
+abbe_wanted wanted_of(const abbe_control& c, const FeedOptions& options = {}) {
+  return abbe::linuxcnc::wanted(usable(), 0.02, c, options);
+}
 
 TEST(CommandCorrection, TheToolIsAtTheCommandedPosition) {
   const auto c_m = command_correction(grid(), kPlace_m);
@@ -55,34 +81,62 @@ TEST(CommandCorrection, NothingOutsideTheVolume) {
 }
 
 TEST(Wanted, IsTheCorrectionIfEverythingIsRight) {
-  const auto w = abbe::linuxcnc::wanted(usable(), 0.02, true, kPlace_m, {});
+  const auto w = wanted_of(control());
   EXPECT_TRUE(w.valid) << w.reason;
-  EXPECT_EQ(w.correction_m, *command_correction(grid(), kPlace_m));
+  const Vector3 c_m = *command_correction(grid(), kPlace_m);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(w.correction[i], 1e3 * c_m[i], 1e-12);
+}
+
+TEST(Wanted, FollowsTheToolInTheSpindle) {
+  EXPECT_TRUE(wanted_of(with_tool(2, 120.4)).valid) << "the tolerance of tool_ok, 0.5 mm";
+  const auto longer = wanted_of(with_tool(2, 150.0));
+  EXPECT_FALSE(longer.valid);
+  EXPECT_STREQ(longer.reason,
+               "the model is for the tool offset (20.000, -15.000, -120.000) mm, T2 has "
+               "(20.000, -15.000, -150.000) mm");
+
+  FeedOptions master;  // the control measures tools against one that is 30 mm long
+  master.tool_offset_at_zero_m = {0.0, 0.0, -0.03};
+  EXPECT_FALSE(wanted_of(with_tool(1, 120.0), master).valid);
+  EXPECT_TRUE(wanted_of(with_tool(1, 90.0), master).valid);
 }
 
 TEST(Wanted, EveryRefusalHasAReasonAndIsZero) {
-  FeedLimits narrow;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  FeedOptions narrow, unusable;
   narrow.clamp_m = 1e-6;
-  FeedLimits unusable;
-  unusable.clamp_m = std::numeric_limits<double>::quiet_NaN();
-  const Usable drift{std::nullopt, "ModelState is DRIFT", {}};
-  const Vector3 outside_m(0.5, 0.0, 0.0);
-  const std::vector<std::pair<abbe::linuxcnc::Wanted, std::string>> refusals{
-      {abbe::linuxcnc::wanted(usable(), 0.02, false, kPlace_m, {}), "not all joints are homed"},
-      {abbe::linuxcnc::wanted(usable(), 0.3, true, kPlace_m, {}),
+  unusable.clamp_m = nan;
+  abbe_control not_homed = control(), not_linked = control(), missing = control();
+  not_homed.homed = 0;
+  not_linked.tool = ABBE_TOOL_NOT_LINKED;
+  missing.tool = ABBE_TOOL_OFFSET_MISSING;
+  const Usable drift{std::nullopt, "ModelState is DRIFT", {}, {}};
+  const std::vector<std::pair<abbe_wanted, std::string>> refusals{
+      {wanted_of(not_homed), "not all joints are homed"},
+      {abbe::linuxcnc::wanted(usable(), 0.3, control(), {}),
        "the DDS subscription does not answer"},
-      {abbe::linuxcnc::wanted(drift, 0.02, true, kPlace_m, {}), drift.reason},
-      {abbe::linuxcnc::wanted(usable(), 0.02, true, outside_m, {}),
-       "outside the volume of the model"},
-      {abbe::linuxcnc::wanted(usable(), 0.02, true, kPlace_m, narrow),
-       "the correction is larger than the clamp"},
-      {abbe::linuxcnc::wanted(usable(), 0.02, true, kPlace_m, unusable),
-       "the correction is larger than the clamp"}};
+      {abbe::linuxcnc::wanted(drift, 0.02, control(), {}), drift.reason},
+      {wanted_of(not_linked),
+       "abbe-correction.tool-offset.x, y, z and tool-number are not all linked in HAL"},
+      {wanted_of(missing),
+       "the offset of T1 is not applied yet: G43 (after G49, if it equals that before)"},
+      {wanted_of(with_tool(3, nan)),
+       "the model is for the tool offset (20.000, -15.000, -120.000) mm, T3 has "
+       "(20.000, -15.000, nan) mm"},
+      {wanted_of(control(Vector3(0.5, 0.0, 0.0))), "outside the volume of the model"},
+      {wanted_of(control(), narrow), "the correction is larger than the clamp"},
+      {wanted_of(control(), unusable), "the correction is larger than the clamp"}};
   for (const auto& [refusal, reason] : refusals) {
     EXPECT_FALSE(refusal.valid);
     EXPECT_EQ(refusal.reason, reason);
-    EXPECT_EQ(refusal.correction_m, Vector3::Zero());
+    for (const double c : refusal.correction) EXPECT_EQ(c, 0.0);
   }
+}
+
+TEST(Wanted, ALongReasonIsCut) {
+  const Usable refused{std::nullopt, std::string(5000, 'r'), {}, {}};
+  const auto w = abbe::linuxcnc::wanted(refused, 0.02, control(), {});
+  EXPECT_EQ(std::string(w.reason), std::string(ABBE_REASON_SIZE - 1, 'r'));
 }
 
 }  // namespace

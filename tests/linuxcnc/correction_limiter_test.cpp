@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 namespace {
 
@@ -20,11 +21,33 @@ constexpr double kMostPerCycle = ABBE_DEFAULT_RATE * kPeriod_s;
 constexpr double kMostChange = ABBE_DEFAULT_ACCELERATION * kPeriod_s * kPeriod_s;
 constexpr double kRounding = 1e-12;
 
-/// Largest value, step and change of step of one axis over all moves.
+/// Largest value, step and change of step of one axis.
+class Largest {
+ public:
+  void record(double value) {
+    const double step = value - value_before_;
+    value_ = std::max(value_, std::abs(value));
+    step_ = std::max(step_, std::abs(step));
+    change_ = std::max(change_, std::abs(step - step_before_));
+    value_before_ = value;
+    step_before_ = step;
+  }
+  void expect_within_limits() const {
+    EXPECT_LE(value_, ABBE_DEFAULT_CLAMP + kRounding);
+    EXPECT_LE(step_, kMostPerCycle + kRounding);
+    EXPECT_LE(change_, kMostChange + kRounding);
+  }
+
+ private:
+  double value_before_ = 0.0, step_before_ = 0.0;
+  double value_ = 0.0, step_ = 0.0, change_ = 0.0;
+};
+
+/// One axis that moves alone.
 class Watched {
  public:
   void move(double target) {
-    abbe_limiter_move(&axis_, target, &kLimits, kPeriod_s);
+    abbe_limiter_move(&axis_, &target, 1, &kLimits, kPeriod_s);
     record();
   }
   void hold() {
@@ -32,24 +55,12 @@ class Watched {
     record();
   }
   [[nodiscard]] double value() const { return axis_.value; }
-  void expect_within_limits() const {
-    EXPECT_LE(largest_value_, ABBE_DEFAULT_CLAMP + kRounding);
-    EXPECT_LE(largest_step_, kMostPerCycle + kRounding);
-    EXPECT_LE(largest_change_, kMostChange + kRounding);
-  }
+  void expect_within_limits() const { largest_.expect_within_limits(); }
 
  private:
-  void record() {
-    const double step = axis_.value - value_before_;
-    largest_value_ = std::max(largest_value_, std::abs(axis_.value));
-    largest_step_ = std::max(largest_step_, std::abs(step));
-    largest_change_ = std::max(largest_change_, std::abs(step - step_before_));
-    value_before_ = axis_.value;
-    step_before_ = step;
-  }
+  void record() { largest_.record(axis_.value); }
   abbe_limiter axis_{};
-  double value_before_ = 0.0, step_before_ = 0.0;
-  double largest_value_ = 0.0, largest_step_ = 0.0, largest_change_ = 0.0;
+  Largest largest_;
 };
 
 TEST(CorrectionLimiter, ReachesEveryTargetWithoutOvershoot) {
@@ -91,33 +102,6 @@ TEST(CorrectionLimiter, FollowsASlowCorrectionWithoutLag) {
   axis.expect_within_limits();
 }
 
-TEST(CorrectionLimiter, NeverLeavesTheLimitsWhateverTheTargets) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> wide(-1.0, 1.0);
-  const std::array<double, 5> odd{kNaN, kInfinity, -kInfinity, 1e300, 0.0};
-  Watched axis;
-  for (int i = 0; i < 200'000; ++i) {
-    const auto kind = random() % 100;
-    if (kind < 5)
-      axis.move(odd.at(random() % odd.size()));
-    else if (kind < 10)
-      axis.hold();
-    else
-      axis.move(kind < 50 ? std::copysign(1.0, wide(random)) : wide(random));
-  }
-  axis.expect_within_limits();
-}
-
-TEST(CorrectionLimiter, ATargetThatIsNotFiniteIsZero) {
-  for (const double target : {kNaN, kInfinity, -kInfinity}) {
-    Watched axis;
-    for (int i = 0; i < 200; ++i) axis.move(0.05);
-    for (int i = 0; i < 200; ++i) axis.move(target);
-    EXPECT_NEAR(axis.value(), 0.0, kRounding);
-    axis.expect_within_limits();
-  }
-}
-
 TEST(CorrectionLimiter, HoldStopsWithinTheAccelerationAndKeepsTheValue) {
   Watched axis;
   for (int i = 0; i < 30; ++i) axis.move(0.2);
@@ -134,10 +118,25 @@ TEST(CorrectionLimiter, UnusableLimitsAreReplacedByTheDefaults) {
     const abbe_limits unusable{limit, limit, limit};
     abbe_limiter axis{}, reference{};
     for (int i = 0; i < 300; ++i) {
-      abbe_limiter_move(&axis, 5.0, &unusable, kPeriod_s);
-      abbe_limiter_move(&reference, 5.0, &kLimits, kPeriod_s);
+      const double target = 0.15;
+      abbe_limiter_move(&axis, &target, 1, &unusable, kPeriod_s);
+      abbe_limiter_move(&reference, &target, 1, &kLimits, kPeriod_s);
     }
     EXPECT_EQ(axis.value, reference.value);
+  }
+}
+
+TEST(CorrectionLimiter, AllAxesHaveTheSameFractionOfTheirWay) {
+  std::array<abbe_limiter, 3> axes{};
+  const std::array<double, 3> target{0.04, -0.005, 0.017}, nothing{};
+  for (const auto& to : {target, nothing}) {
+    for (int i = 0; i < 100; ++i) {
+      abbe_limiter_move(axes.data(), to.data(), 3, &kLimits, kPeriod_s);
+      const double fraction = axes[0].value / target[0];
+      for (std::size_t k = 1; k < 3; ++k)
+        EXPECT_NEAR(axes.at(k).value, fraction * target.at(k), kRounding) << i;
+    }
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(axes.at(k).value, to.at(k), kRounding);
   }
 }
 
@@ -222,6 +221,135 @@ TEST(CorrectionSupervisor, TheSequenceNumberMayWrapAround) {
   s.in.sequence = std::numeric_limits<std::uint32_t>::max() - 5;
   s.switch_on();
   EXPECT_EQ(s.cycles(20, true), ABBE_FOLLOW);
+}
+
+/// Three axes with a feeder that counts, switched on.
+class Corrected {
+ public:
+  Corrected() {
+    in_.enable = false;
+    cycle({0.0, 0.0, 0.0});
+    cycle({0.0, 0.0, 0.0});
+    in_.enable = true;
+  }
+  using Vector = std::array<double, 3>;
+  void cycle(const Vector& wanted) {
+    ++in_.sequence;
+    abbe_correct(&state_, &in_, wanted.data(), 3, &kLimits, kPeriod_s);
+    for (std::size_t i = 0; i < 3; ++i) largest_.at(i).record(value(i));
+  }
+  void cycles(int n, const Vector& wanted) {
+    for (int i = 0; i < n; ++i) cycle(wanted);
+  }
+  [[nodiscard]] double value(std::size_t axis) const { return state_.axes[axis].value; }
+  [[nodiscard]] bool active() const { return state_.active; }
+  [[nodiscard]] abbe_loss loss() const { return state_.loss; }
+  void expect_within_limits() const {
+    for (const Largest& axis : largest_) axis.expect_within_limits();
+  }
+  abbe_inputs in_{true, true, true, true, 0, ABBE_DEFAULT_TIMEOUT};
+
+ private:
+  abbe_corrector state_{};
+  std::array<Largest, 3> largest_;
+};
+
+constexpr Corrected::Vector kWanted{0.04, -0.02, 0.01};
+
+TEST(Correction, IsActiveOnceTheWholeVectorIsApplied) {
+  Corrected c;
+  for (int i = 0; i < 1000 && !c.active(); ++i) {
+    EXPECT_EQ(c.loss(), i == 0 ? ABBE_NOT_LOST : ABBE_LOST_LIMITED);
+    c.cycle(kWanted);
+  }
+  EXPECT_TRUE(c.active());
+  EXPECT_EQ(c.loss(), ABBE_NOT_LOST);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(c.value(i), kWanted.at(i), ABBE_REACHED);
+}
+
+/// One component that may not be applied takes the whole vector away, along its direction.
+TEST(Correction, NothingIsAppliedInPart) {
+  const std::array<std::pair<double, abbe_loss>, 5> spoilt{
+      {{ABBE_DEFAULT_CLAMP * 1.001, ABBE_LOST_CLAMP},
+       {-1e300, ABBE_LOST_CLAMP},
+       {kNaN, ABBE_LOST_NOT_A_NUMBER},
+       {kInfinity, ABBE_LOST_NOT_A_NUMBER},
+       {-kInfinity, ABBE_LOST_NOT_A_NUMBER}}};
+  for (const auto& [component, loss] : spoilt) {
+    Corrected c;
+    c.cycles(200, kWanted);
+    ASSERT_TRUE(c.active());
+    for (int i = 0; i < 200; ++i) {
+      c.cycle({kWanted[0], component, kWanted[2]});
+      EXPECT_FALSE(c.active());
+      EXPECT_EQ(c.loss(), loss);
+      EXPECT_NEAR(c.value(0) / kWanted[0], c.value(2) / kWanted[2], 1e-9) << component;
+      EXPECT_NEAR(c.value(0) / kWanted[0], c.value(1) / kWanted[1], 1e-9) << component;
+    }
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(c.value(i), 0.0, kRounding);
+    c.cycles(200, kWanted);
+    EXPECT_TRUE(c.active());
+    c.expect_within_limits();
+  }
+}
+
+TEST(Correction, AVectorThatChangesFasterThanTheRateIsNotActive) {
+  Corrected c;
+  c.cycles(200, {-0.15, 0.01, 0.0});
+  ASSERT_TRUE(c.active());
+  const double twice_the_rate = 2.0 * kMostPerCycle;
+  for (int i = 1; i <= 60; ++i) c.cycle({-0.15 + twice_the_rate * i, 0.01, 0.0});
+  EXPECT_FALSE(c.active());
+  EXPECT_EQ(c.loss(), ABBE_LOST_LIMITED);
+  c.cycles(100, {-0.15 + twice_the_rate * 60, 0.01, 0.0});
+  EXPECT_TRUE(c.active());
+  c.expect_within_limits();
+}
+
+TEST(Correction, AVectorThatChangesAsAPathDoesStaysActive) {
+  Corrected c;
+  c.cycles(200, {0.04, 0.0, 0.0});
+  for (int i = 0; i < 3000; ++i) {
+    const double angle = 2.0 * M_PI * i * kPeriod_s;  // at most 0.25 mm/s
+    c.cycle({0.04 * std::cos(angle), 0.04 * std::sin(angle), 0.0});
+    EXPECT_TRUE(c.active()) << i;
+  }
+  c.expect_within_limits();
+}
+
+TEST(Correction, ALossIsKnownForWhatTheUserSwitchedOn) {
+  Corrected c;
+  c.cycles(200, kWanted);
+  for (bool abbe_inputs::*input : {&abbe_inputs::homed, &abbe_inputs::machine_on}) {
+    c.in_.*input = false;
+    c.cycle(kWanted);
+    EXPECT_EQ(c.loss(), ABBE_NOT_LOST);
+    c.in_.*input = true;
+    c.cycles(200, kWanted);
+  }
+  c.in_.valid = false;
+  c.cycle(kWanted);
+  EXPECT_EQ(c.loss(), ABBE_LOST_REFUSED);
+  c.in_.enable = false;
+  c.cycle(kWanted);
+  EXPECT_EQ(c.loss(), ABBE_NOT_LOST);
+}
+
+TEST(Correction, NeverLeavesTheLimitsWhateverIsWanted) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> wide(-1.5 * ABBE_DEFAULT_CLAMP, 1.5 * ABBE_DEFAULT_CLAMP);
+  const std::array<double, 5> odd{kNaN, kInfinity, -kInfinity, 1e300, 0.0};
+  Corrected c;
+  Corrected::Vector wanted{};
+  for (int i = 0; i < 200'000; ++i) {
+    if (random() % 20 == 0)
+      for (double& component : wanted) component = wide(random);
+    if (random() % 200 == 0) wanted.at(random() % 3) = odd.at(random() % odd.size());
+    c.in_.machine_on = random() % 50 != 0;
+    c.in_.valid = random() % 30 != 0;
+    c.cycle(wanted);
+  }
+  c.expect_within_limits();
 }
 
 }  // namespace

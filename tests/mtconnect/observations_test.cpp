@@ -39,6 +39,19 @@ TEST(Observations, StateTheModel) {
   EXPECT_EQ(event(observed, "model_date"), status["model"]["created"]);
 }
 
+TEST(Observations, StateWhetherDevicesOrModelAreSimulated) {
+  auto status = test::status();
+  status.erase("simulated");
+  EXPECT_EQ(event(observations_of(status), "simulated"), "UNAVAILABLE") << "an older abbed";
+  status["simulated"] = false;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "NO");
+  status["model"]["simulated"] = true;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "YES");
+  status["model"]["simulated"] = false;
+  status["simulated"] = true;
+  EXPECT_EQ(event(observations_of(status), "simulated"), "YES");
+}
+
 /// U with k = 2 in um; the data item is the standard uncertainty in mm.
 TEST(Observations, StateTheStandardUncertaintyInMillimetres) {
   const auto observed = observations_of(test::status());
@@ -69,12 +82,14 @@ TEST(Observations, RaiseAConditionForEachDevice) {
 
 TEST(Observations, SeparateDevicesFromPartsOfTheDaemon) {
   auto status = test::status();
+  status["streams"].push_back(test::stream("identity", "not confirmed", true));
   for (auto& stream : status["streams"]) stream["connected"] = false;
   const auto observed = observations_of(status);
   EXPECT_THAT(condition(observed, "devices"), UnorderedElementsAre(Key("tracker"), Key("encoder")));
   const auto system = condition(observed, "system");
   EXPECT_EQ(system.at("recorder").level, Level::Fault);
   EXPECT_EQ(system.at("dds_security").level, Level::Warning);
+  EXPECT_TRUE(system.contains("identity"));
 }
 
 TEST(Observations, RaiseAConditionForEachVerdict) {
@@ -98,6 +113,32 @@ TEST(Observations, RaiseAFaultForAModelThatMustNotBeUsed) {
     const auto raised = condition(observations_of(status), "calibration").at("MODEL_" + state);
     EXPECT_EQ(raised.level, state == "INVALID" ? Level::Fault : Level::Warning) << state;
   }
+}
+
+TEST(Observations, WarnOfARecordingThatIsBehindTheMachine) {
+  auto status = test::status();
+  status["streams"][2]["condition"] = "the file is more than 5 s behind the machine";
+  const auto raised = condition(observations_of(status), "system").at("recorder");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_EQ(raised.text, "the file is more than 5 s behind the machine");
+}
+
+TEST(Observations, WarnOfAModelThatAPersonActivatedAgainstTheGate) {
+  auto status = test::status();
+  EXPECT_FALSE(condition(observations_of(status), "calibration").contains("MODEL_REFUSED"));
+  status["model"]["reason"] = "forced by anna: crane test; the gate had refused it: 3 mm";
+  status["model"]["refused"] = "3 mm";
+  const auto raised = condition(observations_of(status), "calibration").at("MODEL_REFUSED");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_EQ(raised.text, status["model"]["reason"]);
+}
+
+TEST(Observations, WarnOfAClockThatWasSet) {
+  auto status = test::status();
+  status["clock"] = {"the wall clock was set forward by 200 d 0 h"};
+  const auto raised = condition(observations_of(status), "system").at("CLOCK");
+  EXPECT_EQ(raised.level, Level::Warning);
+  EXPECT_THAT(raised.text, HasSubstr("200 d"));
 }
 
 TEST(Observations, AskForTheReleaseOfAMachine) {

@@ -18,6 +18,7 @@ inline nlohmann::json stream(const char* name, const char* state, bool connected
 inline nlohmann::json status() {
   return {
       {"ok", true},
+      {"simulated", false},
       {"model",
        {{"state", "ACTIVE"},
         {"reason", "accepted by the gate"},

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -97,7 +98,7 @@ TEST(IppDmeCommand, RefusesTextOutsideTheGrammar) {
 
 TEST(IppDmeText, WritesNumbersThatReadBackTheSame) {
   for (const double value : {0.0, -0.001, 199.998, 1e-9, 123456.789012345, -987654.5}) {
-    const std::string line = "00001 A(X(" + number_text(value) + "))";
+    const std::string line = "00001 A(X(" + number_text(value).value() + "))";
     const auto c = parse_command(line);
     ASSERT_TRUE(c) << line;
     EXPECT_NEAR(parse_point(c->arguments)->p_mm[0], value, 0.5e-9);
@@ -105,6 +106,13 @@ TEST(IppDmeText, WritesNumbersThatReadBackTheSame) {
   EXPECT_EQ(number_text(1.5), "1.5");
   EXPECT_EQ(to_string(Tag{false, 15}), "00015");
   EXPECT_EQ(to_string(Tag{true, 7}), "E0007");
+}
+
+TEST(IppDmeText, WritesNoOtherNumberForOneThatCannotBeWritten) {
+  for (const double value : {std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity(), 1e15, -1e16})
+    EXPECT_FALSE(number_text(value)) << value;
+  EXPECT_TRUE(number_text(0.999e15));
 }
 
 TEST(IppDmeLineFramer, GivesLinesHoweverTheyAreCut) {

@@ -63,6 +63,7 @@ inline calib::VolumetricModel synthetic_travel_model(unsigned seed, double D = 7
   return calib::VolumetricModel::from_description(std::move(d)).value();
 }
 
+/// Accepted by the gate.
 inline ModelDocument synthetic_document(unsigned seed) {
   ModelStatistics statistics{.samples = 1000,
                              .lost_samples = 3,
@@ -78,14 +79,16 @@ inline ModelDocument synthetic_document(unsigned seed) {
                              .iterations = 1,
                              .stop_reason = "direct"};
 
-  return {synthetic_model(seed),
-          "otf",
-          "two-step",
-          "mill \"7\" \xC3\xBC",
-          "ab12",
-          protocol::UtcTime{std::chrono::nanoseconds{1'715'934'600'123'456'789}},
-          statistics,
-          {{"path.csv", "00ff"}, {"tracker.csv", "11ee"}}};
+  ModelDocument document{synthetic_model(seed),
+                         "otf",
+                         "two-step",
+                         "mill \"7\" \xC3\xBC",
+                         "ab12",
+                         protocol::UtcTime{std::chrono::nanoseconds{1'715'934'600'123'456'789}},
+                         statistics,
+                         {{"path.csv", "00ff"}, {"tracker.csv", "11ee"}}};
+  document.verdict = ModelVerdict{.accepted = true};
+  return document;
 }
 
 }  // namespace abbe::daemon::test

@@ -22,8 +22,7 @@ struct ModelViewsTest : test::WebFolder {
   std::string add(unsigned seed) { return add(daemon::test::synthetic_document(seed)); }
   std::string add(const daemon::ModelDocument& document) {
     auto store = daemon::ModelStore::open(folder_ / "models");
-    const auto id = store->add(document, true, {},
-                               {.who = "test", .why = "", .when = {}});
+    const auto id = store->add(document, true, {}, {.who = "test", .why = "", .when = {}});
     EXPECT_TRUE(id);
     return id.value_or("");
   }
@@ -76,6 +75,33 @@ TEST_F(ModelViewsTest, TheLampIsYellowAfterALaterRunFoundDrift) {
   EXPECT_EQ(before["lamp"], "green");
   EXPECT_EQ(after["lamp"], "yellow");
   EXPECT_THAT(after["notes"].dump(), HasSubstr("a later run found drift: abbed"));
+}
+
+TEST_F(ModelViewsTest, ADownloadedModelHasTheVerdictAndWhoForcedIt) {
+  auto store = daemon::ModelStore::open(folder_ / "models");
+  const daemon::StoreActor anna{.who = "anna", .why = "step gauge passed", .when = {}};
+  const auto id =
+      store->add(daemon::test::synthetic_document(1), false, {"held-out rms 9 um"}, anna);
+  ASSERT_TRUE(id);
+  const auto before = daemon::parse_model(views_.model_file(*id).value(), "model.json");
+  ASSERT_TRUE(before) << before.error().text;
+  EXPECT_EQ(before->verdict->reasons, std::vector<std::string>{"held-out rms 9 um"});
+  ASSERT_TRUE(store->activate(*id, anna, true));
+  const auto after = daemon::parse_model(views_.model_file(*id).value(), "model.json");
+  ASSERT_TRUE(after) << after.error().text;
+  EXPECT_EQ(after->verdict->forced, anna);
+  EXPECT_EQ(daemon::model_id(*after), *id);
+}
+
+TEST_F(ModelViewsTest, AModelOfAnotherMachineConfigurationIsYellow) {
+  const std::string id = add(1);
+  const auto hash = daemon::test::synthetic_document(1).machine_hash;
+  ModelViews own{folder_ / "models", hash}, other{folder_ / "models", "another"};
+  EXPECT_EQ(nlohmann::json::parse(own.model(id).value())["verdict"]["lamp"], "green");
+  const auto seen = nlohmann::json::parse(other.model(id).value())["verdict"];
+  EXPECT_EQ(seen["lamp"], "yellow");
+  EXPECT_THAT(seen["notes"].dump(), HasSubstr("STALE"));
+  EXPECT_THAT(other.report(id).value(), HasSubstr("made for another machine configuration"));
 }
 
 TEST_F(ModelViewsTest, TheTrendHasEachTableOfTheNewestModels) {

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <map>
+#include <string>
 
 #include "message.hpp"
 #include "units.hpp"
@@ -60,6 +63,33 @@ Result<std::map<int, RunValues>> by_run(const MeasuredError& error,
   return runs;
 }
 
+/// True if the runs are numbered as laser programs do, forward 1, backward 2, forward 3, ...: each
+/// has one direction, and they alternate.
+bool alternate(const std::map<int, RunValues>& runs) {
+  std::size_t previous = 2;
+  for (const auto& [number, run] : runs) {
+    const std::size_t travel = run.has(kForward) ? kForward : kBackward;
+    if ((run.has(kForward) && run.has(kBackward)) || travel == previous) {
+      return false;
+    }
+    previous = travel;
+  }
+  return runs.size() % 2 == 0;
+}
+
+std::string advice_on_directions(const std::map<int, RunValues>& runs) {
+  const auto first = runs.begin(), second = std::next(first);
+  if (!alternate(runs)) {
+    return ": the mean of one direction contains half of the backlash; leave out the incomplete "
+           "runs";
+  }
+  return message(
+      ": forward and backward of one cycle have the same number; the runs of this file "
+      "alternate, so number run ",
+      first->first, " and run ", second->first,
+      " both 1, the next two both 2, and so on (1, 1, 2, 2, ...)");
+}
+
 /// BadInput unless all runs have the same directions; else whether they have both.
 Result<std::array<bool, 2>> directions_of(const std::string& name,
                                           const std::map<int, RunValues>& runs) {
@@ -67,11 +97,9 @@ Result<std::array<bool, 2>> directions_of(const std::string& name,
   const std::array<bool, 2> wanted{first.has(kForward), first.has(kBackward)};
   for (const auto& [number, run] : runs) {
     if (run.has(kForward) != wanted[kForward] || run.has(kBackward) != wanted[kBackward]) {
-      return failure(
-          ErrorCode::BadInput,
-          message(name, ": run ", number, " has other directions than run ", runs.begin()->first,
-                  ": the mean of one direction contains half of the backlash; leave "
-                  "out the incomplete runs"));
+      return failure(ErrorCode::BadInput,
+                     message(name, ": run ", number, " has other directions than run ",
+                             runs.begin()->first, advice_on_directions(runs)));
     }
   }
   return wanted;
@@ -92,6 +120,63 @@ std::vector<std::size_t> complete_targets(const std::map<int, RunValues>& runs, 
     }
   }
   return complete;
+}
+
+/// The largest distance of a position of the first run and direction from the nearest one of
+/// another, and the smallest distance of its positions: readings instead of targets scatter by much
+/// less than the targets are apart.
+struct PositionScatter {
+  double largest_m = 0.0, spacing_m = std::numeric_limits<double>::infinity();
+};
+
+std::vector<std::vector<double>> positions_by_pass(const std::map<int, RunValues>& runs,
+                                                   const std::vector<double>& targets) {
+  std::vector<std::vector<double>> passes;
+  for (const auto& [number, run] : runs) {
+    for (const std::size_t travel : {kForward, kBackward}) {
+      std::vector<double> positions;
+      for (const auto& [target, values] : run.at) {
+        if (values[travel]) {
+          positions.push_back(targets[target]);
+        }
+      }
+      if (!positions.empty()) {
+        passes.push_back(std::move(positions));
+      }
+    }
+  }
+  return passes;
+}
+
+PositionScatter position_scatter_of(const std::vector<std::vector<double>>& passes) {
+  PositionScatter scatter;
+  const std::vector<double>& first = passes.front();
+  for (std::size_t i = 1; i < first.size(); ++i) {
+    scatter.spacing_m = std::min(scatter.spacing_m, first[i] - first[i - 1]);
+  }
+  for (const double p : first) {
+    for (const auto& other : passes) {
+      double nearest_m = std::numeric_limits<double>::infinity();
+      for (const double q : other) {
+        nearest_m = std::min(nearest_m, std::abs(q - p));
+      }
+      scatter.largest_m = std::max(scatter.largest_m, nearest_m);
+    }
+  }
+  return scatter;
+}
+
+/// Why no position occurs in all runs, if the positions are readings instead of targets.
+std::string scatter_text(const std::map<int, RunValues>& runs, const std::vector<double>& targets) {
+  constexpr double kReadings = 0.25;  // of the spacing: the assignment to a target is clear
+  const PositionScatter scatter = position_scatter_of(positions_by_pass(runs, targets));
+  const std::string limit = message("; positions that differ by more than ",
+                                    kMmPerM * kSameTarget_m, " mm are different targets");
+  if (!(scatter.largest_m < kReadings * scatter.spacing_m)) {
+    return limit;
+  }
+  return message(limit, ", and those of the runs differ by up to ", kMmPerM * scatter.largest_m,
+                 " mm: write the target position instead of the reading");
 }
 
 void append_run(Runs& out, const RunValues& run, const std::vector<std::size_t>& targets,
@@ -184,7 +269,7 @@ Result<Runs> runs_of(const MeasuredError& error) {
   if (complete.empty()) {
     return failure(ErrorCode::TooFewObservations,
                    message(error.name, ": no position occurs in all of its ", runs->size(),
-                           " runs and directions"));
+                           " runs and directions", scatter_text(*runs, targets)));
   }
 
   Runs out;

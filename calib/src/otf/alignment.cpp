@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "abbe/calib/axis_mistakes.hpp"
 #include "check_stopped.hpp"
 #include "message.hpp"
 #include "otf/path_corrections.hpp"
+#include "otf/range_offset.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -274,6 +276,43 @@ std::string reflections(const Path& path, const MachineNodes& travel) {
 
 }  // namespace
 
+namespace {
+
+BlockSeries with_longer_ranges(BlockSeries series, double longer_m) {
+  for (Block& b : series.blocks) {
+    b.mean_tracker_m = with_longer_range(b.mean_tracker_m, longer_m);
+  }
+  series.start_tracker_m = with_longer_range(series.start_tracker_m, longer_m);
+  series.end_tracker_m = with_longer_range(series.end_tracker_m, longer_m);
+  return series;
+}
+
+/// "; they fit with ranges shorter by 19.05 mm (...)"; empty if no change of the ranges makes the
+/// points fit.
+std::string range_change_that_fits(const BlockSeries& series, const Machine& machine,
+                                   const Path& path, const Options& options) {
+  Options loose = options;
+  loose.max_alignment_rms_m = loose.max_alignment_distance_m =
+      std::numeric_limits<double>::infinity();
+  const auto rms_m = [&](double change_m) -> std::optional<double> {
+    const auto a = align_as_given(with_longer_ranges(series, change_m), machine, path, loose);
+    return a ? std::optional(a->last_rms_m) : std::nullopt;
+  };
+  // A change of this size is a mistake; a smaller one only absorbs another error of the run.
+  constexpr double kLeastChange_m = 2e-3, kMostOfRms = 1.0 / 3.0;
+  const auto change_m = best_range_change_m(rms_m);
+  if (!change_m || std::abs(*change_m) < kLeastChange_m) {
+    return "";
+  }
+  const auto before_m = rms_m(0.0), after_m = rms_m(*change_m);
+  const bool fits =
+      before_m && after_m && *after_m <= kMostOfRms * *before_m &&
+      align_as_given(with_longer_ranges(series, *change_m), machine, path, options).has_value();
+  return fits ? "; they fit with " + range_change_text(*change_m) : "";
+}
+
+}  // namespace
+
 std::string corrections_that_fit(const Path& path, const MachineNodes& travel,
                                  const std::function<bool(const Path&)>& fits) {
   std::vector<std::string> texts;
@@ -305,10 +344,13 @@ Result<Alignment> align(const BlockSeries& series, const Machine& machine, const
       (a.error().code == ErrorCode::AlignmentFailed || a.error().code == ErrorCode::NotConverged)) {
     Options quiet = options;
     quiet.progress = {};
-    a.error().text += corrections_that_fit(path, machine.nodes, [&](const Path& other) {
-      return !(options.stopped && options.stopped()) &&
-             align_as_given(series, machine, other, quiet).has_value();
-    });
+    const std::string corrections =
+        corrections_that_fit(path, machine.nodes, [&](const Path& other) {
+          return !(options.stopped && options.stopped()) &&
+                 align_as_given(series, machine, other, quiet).has_value();
+        });
+    a.error().text +=
+        corrections.empty() ? range_change_that_fits(series, machine, path, quiet) : corrections;
   }
   return a;
 }

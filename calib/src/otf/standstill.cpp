@@ -189,6 +189,17 @@ bool has_valid_samples(std::span<const TrackerObservation> samples) {
                        [](const TrackerObservation& s) { return s.valid; }) >= kFewestInMean;
 }
 
+/// What a file with one mean for each standstill lacks; empty if the samples are dense enough.
+std::string means_text(double period_s, double least_duration_s) {
+  if (!(period_s > least_duration_s)) {
+    return "";
+  }
+  return message(": one row each ", period_s,
+                 " s. If each row is the mean of a standstill: means are not read, because they do "
+                 "not show their scatter; export every measurement, at least 3 in ",
+                 least_duration_s, " s of each stop");
+}
+
 }  // namespace
 
 Result<Standstills> find_standstills(std::span<const TrackerObservation> samples,
@@ -224,11 +235,12 @@ Result<Standstills> find_standstills(std::span<const TrackerObservation> samples
   }
 
   if (all.found.empty()) {
-    return failure(ErrorCode::TooFewObservations,
-                   message("standstills: none in ", samples.size(), " samples, from ",
-                           time_s.front(), " to ", time_s.back(), " s: the target stands below ",
-                           1e3 * all.speed_limit_m_per_s, " mm/s for ", options.least_duration_s,
-                           " s; ", all.too_short, " stops were shorter"));
+    return failure(
+        ErrorCode::TooFewObservations,
+        message("standstills: none in ", samples.size(), " samples, from ", time_s.front(), " to ",
+                time_s.back(), " s: the target stands below ", 1e3 * all.speed_limit_m_per_s,
+                " mm/s for ", options.least_duration_s, " s; ", all.too_short,
+                " stops were shorter", means_text(all.period_s, options.least_duration_s)));
   }
 
   all.correlation = variances.correlation();

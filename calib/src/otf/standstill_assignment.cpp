@@ -9,6 +9,7 @@
 #include "message.hpp"
 #include "otf/match_in_order.hpp"
 #include "otf/path_corrections.hpp"
+#include "otf/range_offset.hpp"
 
 namespace abbe::calib::otf {
 namespace {
@@ -335,6 +336,27 @@ Result<void> check_size(std::size_t standstills, std::size_t positions) {
   return {};
 }
 
+/// "; they fit with ranges shorter by 19.05 mm (...)" if the radius of a usual reflector, added to
+/// or subtracted from all ranges, makes the standstills match the positions; else empty.
+std::string reflector_that_fits(std::span<const Standstill> standstills, const Machine& machine,
+                                const Path& path, const Options& options) {
+  for (const double radius_m : reflector_radii_m()) {
+    for (const double change_m : {-radius_m, radius_m}) {
+      if (options.stopped && options.stopped()) {
+        return "";
+      }
+      std::vector<Standstill> changed(standstills.begin(), standstills.end());
+      for (Standstill& s : changed) {
+        s.mean_tracker_m = with_longer_range(s.mean_tracker_m, change_m);
+      }
+      if (assign_as_given(changed, machine, path, options)) {
+        return "; they fit with " + range_change_text(change_m);
+      }
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 Result<StandstillAssignment> assign_standstills(std::span<const Standstill> standstills,
@@ -350,10 +372,13 @@ Result<StandstillAssignment> assign_standstills(std::span<const Standstill> stan
 
   Result<StandstillAssignment> a = assign_as_given(standstills, machine, path, options);
   if (!a && a.error().code == ErrorCode::AlignmentFailed) {
-    a.error().text += corrections_that_fit(path, machine.nodes, [&](const Path& other) {
-      return !(options.stopped && options.stopped()) &&
-             assign_as_given(standstills, machine, other, options).has_value();
-    });
+    const std::string corrections =
+        corrections_that_fit(path, machine.nodes, [&](const Path& other) {
+          return !(options.stopped && options.stopped()) &&
+                 assign_as_given(standstills, machine, other, options).has_value();
+        });
+    a.error().text += corrections.empty() ? reflector_that_fits(standstills, machine, path, options)
+                                          : corrections;
   }
   return a;
 }

@@ -16,6 +16,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/protocol/printable.hpp"
 #include "json_line.hpp"
 
 namespace abbe::daemon {
@@ -71,6 +72,29 @@ Result<std::string> receive_line(int fd, std::chrono::milliseconds time_out,
   }
 }
 
+/// `text` without the control characters that a terminal executes. Tabs and line ends remain: the
+/// text of a configuration file is an answer, too.
+std::string harmless(std::string_view text) {
+  const auto is_kept = [](char c) { return c == '\t' || c == '\r'; };
+  std::string out;
+  while (!text.empty()) {
+    const auto end = std::ranges::find_if(text, is_kept);
+    const auto length = static_cast<std::size_t>(end - text.begin());
+    out += protocol::without_control_characters(text.substr(0, length));
+    if (end != text.end()) out += *end;
+    text.remove_prefix(std::min(text.size(), length + 1));
+  }
+  return out;
+}
+
+/// Replaces what a device may have sent to the daemon and a terminal would execute. The depth of
+/// `value` is bounded by parse_json().
+void replace_control_characters(json& value) {
+  if (value.is_string()) value = harmless(value.get_ref<const std::string&>());
+  if (value.is_structured())
+    for (json& element : value) replace_control_characters(element);
+}
+
 }  // namespace
 
 Result<json> ask_daemon(const std::filesystem::path& socket_path, const json& request,
@@ -108,6 +132,7 @@ Result<json> ControlConnection::exchange(const json& request, std::chrono::milli
   if (!parsed) return tl::unexpected(no_answer(path_, parsed.error().text));
   if (!parsed->is_object())
     return tl::unexpected(no_answer(path_, "the answer is not a JSON object"));
+  replace_control_characters(*parsed);
   return std::move(*parsed);
 }
 

@@ -1,7 +1,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <pwd.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -18,10 +17,12 @@
 #include <exception>
 #include <list>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
@@ -39,6 +40,9 @@ using nlohmann::json;
 constexpr std::size_t kMostUnread = 1u << 20;
 // Pause before the next accept() when no file descriptors are left.
 constexpr auto kAcceptPause = std::chrono::milliseconds{200};
+// Pause after a cycle that failed, for example for lack of memory.
+constexpr auto kPauseAfterFault = std::chrono::milliseconds{20};
+constexpr auto kFaultPeriod = std::chrono::minutes{1};
 constexpr int kAcceptsPerCycle = 16;
 constexpr std::size_t kLongRequest = 1u << 16;  ///< bytes; answered by LongRequests
 
@@ -58,14 +62,6 @@ struct Client {
     return outbox.size() < kMostUnread && !long_request;
   }
 };
-
-std::string name_of(uid_t uid) {
-  passwd entry{};
-  passwd* found = nullptr;
-  std::array<char, 16384> strings;  // NOLINT: getpwuid_r() fills what is used
-  ::getpwuid_r(uid, &entry, strings.data(), strings.size(), &found);
-  return found != nullptr ? found->pw_name : fmt::format("uid {}", uid);
-}
 
 /// Groups of the process at the other end (SO_PEERGROUPS, socket(7)). The call fails with ERANGE
 /// and reports the required size if the buffer is too small. An empty list if the kernel does not
@@ -87,7 +83,7 @@ ControlPeer peer_at(int fd) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {};
-  ControlPeer peer{.user = name_of(credentials.uid),
+  ControlPeer peer{.user = account_names().user(credentials.uid),
                    .uid = credentials.uid,
                    .groups = supplementary_groups_at(fd)};
   peer.groups.push_back(credentials.gid);
@@ -103,17 +99,7 @@ class Server final : public ControlServer {
         wake_(std::move(wake)),
         path_(std::move(path)),
         handler_(std::move(handler)) {
-    thread_ = std::thread([this] {
-      try {
-        serve();
-      } catch (const std::exception& error) {
-        // After such an exception only the control socket stops; measuring and recording continue.
-        fmt::print(stderr,
-                   "abbed: the control socket stopped with an internal error: {}; commands get no "
-                   "answer until abbed is restarted\n",
-                   error.what());
-      }
-    });
+    thread_ = std::thread([this] { serve_always(); });
   }
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -126,6 +112,39 @@ class Server final : public ControlServer {
   }
 
  private:
+  /// An exception (no memory) ends what caused it: one request, one connection, one cycle. Never
+  /// the socket: without it nobody could stop the machine.
+  void serve_always() noexcept {
+    for (;;) {
+      try {
+        return serve();
+      } catch (...) {
+        report_exception();
+      }
+      std::this_thread::sleep_for(kPauseAfterFault);
+    }
+  }
+
+  /// Reports the exception that is being handled.
+  void report_exception() noexcept {
+    try {
+      throw;
+    } catch (const std::exception& error) {
+      report(error.what());
+    } catch (...) {
+      report("an exception not derived from std::exception");
+    }
+  }
+
+  /// At most one line in kFaultPeriod. Needs no memory.
+  void report(const char* what) noexcept {
+    const auto now = Clock::now();
+    if (now < next_report_.load()) return;
+    next_report_ = now + kFaultPeriod;
+    std::fprintf(stderr, "abbed: control socket: internal error: %s; the other requests go on\n",
+                 what);
+  }
+
   void serve() {
     for (;;) {
       const auto now = Clock::now();
@@ -138,13 +157,14 @@ class Server final : public ControlServer {
                                 {long_done_.get(), POLLIN, 0}};
       for (const Client& c : clients_) waits.push_back({c.fd.get(), events_of(c), 0});
 
-      if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR) return;
+      if (::poll(waits.data(), waits.size(), time_out_ms(now)) < 0 && errno != EINTR)
+        throw std::system_error(errno, std::generic_category(), "poll");  // ENOMEM
       if (waits[0].revents != 0) return;
 
       if (waits[2].revents != 0) take_long_answers();
       std::size_t i = 3;
       for (auto c = clients_.begin(); c != clients_.end(); ++i)
-        c = cycle(*c, waits[i].revents) ? std::next(c) : erase(c);
+        c = cycle_alone(*c, waits[i].revents) ? std::next(c) : erase(c);
       close_idle(Clock::now());
       if ((waits[1].revents & POLLIN) != 0) accept_some();
     }
@@ -173,7 +193,7 @@ class Server final : public ControlServer {
   void take_long_answers() {
     std::uint64_t count = 0;
     (void)!::read(long_done_.get(), &count, sizeof count);
-    for (LongRequests::Answered& done : long_.answered()) {
+    for (LongRequests::Job& done : long_.answered()) {
       const auto c = std::ranges::find(clients_, done.client, &Client::number);
       if (c == clients_.end()) continue;  // it has left
       c->outbox += done.line;
@@ -246,6 +266,22 @@ class Server final : public ControlServer {
     if (!c.outbox.empty()) return;
     const std::string line =
         line_of(refusal({ErrorCode::Refused, "control socket: " + std::move(why)}));
+    send_now(c, line);
+  }
+
+  /// As cycle(); a client whose cycle fails is disconnected.
+  bool cycle_alone(Client& c, short revents) noexcept {
+    try {
+      return cycle(c, revents);
+    } catch (...) {
+      report_exception();
+      if (c.outbox.empty()) send_now(c, failed_line_);
+      return false;
+    }
+  }
+
+  /// Sends all of it or nothing; needs no memory.
+  static void send_now(const Client& c, const std::string& line) noexcept {
     (void)!::send(c.fd.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
 
@@ -257,7 +293,7 @@ class Server final : public ControlServer {
     if (c.has_request() && c.may_be_answered()) {
       const std::size_t end = c.inbox.find('\n');
       if (end < kLongRequest) {
-        c.outbox += line_of(answer(c.inbox.substr(0, end), c.peer));
+        c.outbox += answer_line(c.inbox.substr(0, end), c.peer);
       } else {
         c.long_request = long_.take(c.number, c.inbox.substr(0, end), c.peer);
         if (!c.long_request)
@@ -295,6 +331,16 @@ class Server final : public ControlServer {
     return true;
   }
 
+  /// Without memory for the request, or for the answer.
+  std::string answer_line(const std::string& line, const ControlPeer& peer) {
+    try {
+      return line_of(answer(line, peer));
+    } catch (...) {
+      report_exception();
+      return failed_line_;
+    }
+  }
+
   json answer(const std::string& line, const ControlPeer& peer) {
     auto parsed = parse_json(line, "request", kRequestBounds);
     if (!parsed) return refusal({ErrorCode::Usage, parsed.error().text});
@@ -324,11 +370,15 @@ class Server final : public ControlServer {
   std::list<Client> clients_;
   std::uint64_t last_number_ = 0;
   Clock::time_point accept_paused_until_{};
+  // any thread; two threads may both report
+  std::atomic<Clock::time_point> next_report_{Clock::time_point{}};
+  const std::string failed_line_ = line_of(refusal(
+      {ErrorCode::Io,
+       "control socket: the request failed in the daemon: internal error, or not enough memory"}));
   FileDescriptor long_done_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
-  LongRequests long_{[this](const std::string& line, const ControlPeer& peer) {
-                       return line_of(answer(line, peer));
-                     },
-                     long_done_.get()};
+  LongRequests long_{
+      [this](const std::string& line, const ControlPeer& peer) { return answer_line(line, peer); },
+      long_done_.get()};
   std::thread thread_;
 };
 

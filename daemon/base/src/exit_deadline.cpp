@@ -4,14 +4,23 @@
 
 #include <utility>
 
-namespace abbe::daemon {
+#include "abbe/base/standard_error.hpp"
 
-ExitDeadline::ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, std::string message)
-    : thread_([this, time_limit, exit_code, text = std::move(message)] {
+namespace abbe::daemon {
+namespace {
+
+constexpr std::chrono::milliseconds kMessageTime{200};
+
+}  // namespace
+
+ExitDeadline::ExitDeadline(std::chrono::nanoseconds time_limit, int exit_code, std::string message,
+                           std::function<std::string()> last_act)
+    : thread_([this, time_limit, exit_code, text = std::move(message),
+               act = std::move(last_act)]() mutable {
         if (met_.wait_for(time_limit)) return;
-        // write() is used because the hanging thread may hold the lock of stderr, for which stdio
-        // would wait.
-        (void)!::write(STDERR_FILENO, text.data(), text.size());
+        if (act) text += act();
+        // Not stdio: the hanging thread may hold the lock of stderr.
+        write_within(STDERR_FILENO, text, kMessageTime);
         ::_exit(exit_code);
       }) {}
 

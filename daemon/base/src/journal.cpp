@@ -4,15 +4,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <utility>
 
 #include "abbe/base/file_descriptor.hpp"
 #include "abbe/base/unix_socket.hpp"
+#include "abbe/protocol/printable.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -60,7 +61,7 @@ class NativeJournal final : public JournalSink {
 
 class TextJournal final : public JournalSink {
  public:
-  explicit TextJournal(int fd) : fd_(fd) {}
+  explicit TextJournal(std::FILE* stream) : stream_(stream) {}
 
   void write(const JournalEntry& entry) override {
     std::string line = fmt::format("abbed: {} [", entry.message);
@@ -68,14 +69,13 @@ class TextJournal final : public JournalSink {
       if (name != "ABBE_FAULT")  // the message contains it
         line += fmt::format("{}={} ", name, value);
     line.back() = ']';
-    std::ranges::replace_if(
-        line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-    line += '\n';
-    (void)!::write(fd_, line.data(), line.size());
+    line = protocol::printable_line(line) + '\n';
+    (void)!std::fwrite(line.data(), 1, line.size(), stream_);
+    (void)std::fflush(stream_);
   }
 
  private:
-  int fd_;
+  std::FILE* stream_;
 };
 
 /// JOURNAL_STREAM is "DEVICE:INODE" of the stream that is connected to the journal.
@@ -95,14 +95,14 @@ Result<std::unique_ptr<JournalSink>> native_journal(const std::filesystem::path&
   return std::make_unique<NativeJournal>(std::move(*connected));
 }
 
-std::unique_ptr<JournalSink> text_journal(int fd) {
-  return std::make_unique<TextJournal>(fd);
+std::unique_ptr<JournalSink> text_journal(std::FILE* stream) {
+  return std::make_unique<TextJournal>(stream);
 }
 
 std::unique_ptr<JournalSink> open_journal() {
   if (stderr_leads_to_journal())
     if (auto journal = native_journal()) return std::move(*journal);
-  return text_journal(STDERR_FILENO);
+  return text_journal(stderr);
 }
 
 }  // namespace abbe::daemon

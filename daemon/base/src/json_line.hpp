@@ -1,14 +1,14 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
+
+#include "abbe/base/json_text.hpp"
 
 namespace abbe::daemon {
 
-/// One line of the control API. Invalid UTF-8, which device messages and file names may contain, is
-/// replaced; nothing is thrown.
+/// One line of the control API.
 inline std::string line_of(const nlohmann::json& message) {
-  return message.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
+  return json_text(message) + '\n';
 }
 
 }  // namespace abbe::daemon

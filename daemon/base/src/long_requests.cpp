@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <new>
 #include <utility>
 
 namespace abbe::daemon {
@@ -31,10 +30,10 @@ bool LongRequests::take(std::uint64_t client, std::string line, ControlPeer peer
 
 void LongRequests::forget(std::uint64_t client) {
   const std::lock_guard lock(mutex_);
-  std::erase_if(waiting_, [client](const Waiting& w) { return w.client == client; });
+  std::erase_if(waiting_, [client](const Job& w) { return w.client == client; });
 }
 
-std::vector<LongRequests::Answered> LongRequests::answered() {
+std::list<LongRequests::Job> LongRequests::answered() {
   const std::lock_guard lock(mutex_);
   return std::exchange(answered_, {});
 }
@@ -44,17 +43,12 @@ void LongRequests::run() {
   for (;;) {
     changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
     if (stopping_) return;
-    const Waiting next = std::move(waiting_.front());
-    waiting_.pop_front();
+    std::list<Job> next;
+    next.splice(next.end(), waiting_, waiting_.begin());
     lock.unlock();
-    std::string line;
-    try {
-      line = answer_(next.line, next.peer);
-    } catch (const std::bad_alloc&) {
-      line = "\n";  // measuring continues
-    }
+    next.front().line = answer_(next.front().line, next.front().peer);
     lock.lock();
-    answered_.push_back({next.client, std::move(line)});
+    answered_.splice(answered_.end(), next);
     const std::uint64_t one = 1;
     (void)!::write(done_fd_, &one, sizeof one);
   }

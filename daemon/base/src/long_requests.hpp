@@ -2,12 +2,11 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <mutex>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "abbe/base/control_protocol.hpp"
 
@@ -20,15 +19,16 @@ namespace abbe::daemon {
 class LongRequests {
  public:
   using Answer = std::function<std::string(const std::string& line, const ControlPeer& peer)>;
-  struct Answered {
+  struct Job {
     std::uint64_t client = 0;
-    std::string line;
+    std::string line;  ///< the request, then its answer
+    ControlPeer peer;
   };
 
   static constexpr std::size_t kMostWaiting = 4;  ///< of up to 4 MB each
 
-  /// `answer` runs on the thread of the object; afterwards `done_fd`, an eventfd, is signalled. The
-  /// answer to a request for which memory is missing is an empty line.
+  /// `answer` runs on the thread of the object; afterwards `done_fd`, an eventfd, is signalled. It
+  /// must not throw.
   LongRequests(Answer answer, int done_fd);
   LongRequests(const LongRequests&) = delete;
   LongRequests& operator=(const LongRequests&) = delete;
@@ -38,22 +38,18 @@ class LongRequests {
   [[nodiscard]] bool take(std::uint64_t client, std::string line, ControlPeer peer);
   /// The client has left: its request is not carried out, unless it is being answered.
   void forget(std::uint64_t client);
-  [[nodiscard]] std::vector<Answered> answered();
+  [[nodiscard]] std::list<Job> answered();
 
  private:
-  struct Waiting {
-    std::uint64_t client = 0;
-    std::string line;
-    ControlPeer peer;
-  };
   void run();
 
   Answer answer_;
   int done_fd_;
   std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
-  std::deque<Waiting> waiting_;
-  std::vector<Answered> answered_;
+  // Lists: a request moves from one to the other without memory, so no answer can be lost.
+  std::list<Job> waiting_;
+  std::list<Job> answered_;
   bool stopping_ = false;
   std::thread thread_;
 };

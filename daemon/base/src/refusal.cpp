@@ -7,8 +7,9 @@
 namespace abbe::daemon {
 namespace {
 
-constexpr std::array<std::string_view, 5> kCodes{"data_insufficient", "usage", "bad_input", "io",
-                                                 "refused"};
+constexpr std::array<std::string_view, 7> kCodes{
+    "data_insufficient",  "usage",        "bad_input", "io", "refused",
+    "stop_not_confirmed", "stop_not_sent"};
 
 std::string text_of(const nlohmann::json& answer, const char* member) {
   const auto found = answer.find(member);

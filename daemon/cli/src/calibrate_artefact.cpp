@@ -13,6 +13,7 @@
 #include <numbers>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/calib/evemu/artefact_touches.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -74,6 +75,7 @@ struct Touched {
   std::vector<evemu::Touch> touches;
   double u_position_m = 0.0;
   std::string reason;
+  ErrorCode code = ErrorCode::DataInsufficient;  ///< of `reason`
 };
 
 Result<Touched> touch_artefact(const std::filesystem::path& socket,
@@ -81,7 +83,7 @@ Result<Touched> touch_artefact(const std::filesystem::path& socket,
   const auto made =
       make_touches(socket, {{plan.touches.begin(), plan.touches.end()}, plan.leave_m});
   if (!made) return tl::unexpected(made.error());
-  Touched out{{}, made->u_position_m, made->reason};
+  Touched out{{}, made->u_position_m, made->reason, made->code};
   for (std::size_t i = 0; i < made->places_m.size(); ++i)
     out.touches.push_back({.position = 1,
                            .feature = plan.touches[i].feature,
@@ -134,7 +136,7 @@ int print(const evemu::Calibrator& found, const evemu::Calibrator& nominal,
   }
 
   if (arguments.json)
-    fmt::print("{}\n", json{{"calibrator", arguments.out}, {"balls", balls}}.dump(1));
+    fmt::print("{}\n", indented_json_text(json{{"calibrator", arguments.out}, {"balls", balls}}));
   return 0;
 }
 
@@ -159,7 +161,7 @@ int calibrate(CalibrateArtefactArguments arguments) {
   if (!made) return report(made.error());
   if (!made->reason.empty())
     return report(with_partial_touches(
-        {ErrorCode::DataInsufficient,
+        {made->code,
          made->reason,
          {"the tip may be low: raise it above artefact and fixture before the next run"}},
         *made, arguments.touches));
@@ -189,24 +191,27 @@ int calibrate(CalibrateArtefactArguments arguments) {
 
 void add_calibrate_artefact(CLI::App& parent, int& exit) {
   auto arguments = std::make_shared<CalibrateArtefactArguments>();
-  auto* command =
-      parent.add_subcommand("artefact",
-                            "Calibrate a ball array on the measuring machine of the "
-                            "running daemon (" +
-                                tables_with(Capability::Motion) +
-                                "): touch the upper half\n"
-                                "of its balls and the block faces that the file names, and "
-                                "write the measured array with uncertainties.\n"
-                                "THE MACHINE MOVES: first straight up from its position, "
-                                "at the end up again. Its paths lead around\n"
-                                "the balls and above the whole array; they avoid no other "
-                                "obstacle. Ctrl-C, a closed terminal, or 2 s\n"
-                                "without contact between this command and the daemon end "
-                                "the run after the current touch; the tip may\n"
-                                "then be low. Exit code 1 in these cases, and if a touch "
-                                "is refused or machine or daemon do not answer\n"
-                                "any more: the touches made before are kept "
-                                "(.partial.csv), files of an earlier run stay unchanged.");
+  auto* command = parent.add_subcommand(
+      "artefact",
+      "Calibrate a ball array on the measuring machine of the "
+      "running daemon (" +
+          tables_with(Capability::Motion) +
+          "): touch the upper half\n"
+          "of its balls and the block faces that the file names, and "
+          "write the measured array with uncertainties.\n"
+          "THE MACHINE MOVES: first straight up from its position, "
+          "at the end up again. Its paths lead around\n"
+          "the balls and above the whole array; they avoid no other "
+          "obstacle. Ctrl-C, a closed terminal, or 2 s\n"
+          "without contact between this command and the daemon stop "
+          "the machine at once (AbortE); the tip may\n"
+          "then be low. Exit code 1 in these cases and if a touch is refused, 6 "
+          "or 7 if the machine is not confirmed\n"
+          "to be stopped (see abbe machine stop --help): the touches made "
+          "before are kept\n"
+          "(.partial.csv), files of an earlier run stay unchanged. A run with a "
+          "place outside the travel of\n"
+          "the machine is refused before it moves (exit code 5).");
   command
       ->add_option(
           "--calibrator", arguments->calibrator,

@@ -204,7 +204,7 @@ class BarCalibration {
       touches.push_back({pass->targets[i], made->places_m[i] - m.tool_offset_m});
     if (!made->reason.empty())
       return tl::unexpected(
-          with_kept({ErrorCode::DataInsufficient,
+          with_kept({made->code,
                      fmt::format("{}: {}", m.name, made->reason),
                      {"the tip may be low: raise it above the bar before --continue"}},
                     rows_of(m, touches)));
@@ -246,7 +246,7 @@ class BarCalibration {
     const auto made = make_touches(socket_, *touches);
     if (!made) return tl::unexpected(made.error());
     if (!made->reason.empty())
-      return fail(ErrorCode::DataInsufficient,
+      return fail(made->code,
                   fmt::format("step gauge: {}; --continue touches it again", made->reason));
 
     for (std::size_t i = 0; i < made->places_m.size(); ++i) {
@@ -337,7 +337,10 @@ void add_calibrate_bar(CLI::App& parent, int& exit) {
           "feature; it avoids no other obstacle. Every pass is checked and kept; a bar that lies\n"
           "turned, another bar or a missed touch ends the command, and --continue makes the pass\n"
           "again. Ctrl-C, a closed terminal, or 2 s without contact between this command and the\n"
-          "daemon end the run after the current touch; the tip may then be low.");
+          "daemon stop the machine at once (AbortE); the tip may then be low. Exit code 6 or 7 if\n"
+          "the machine is not confirmed to be stopped (see abbe machine stop --help). A pass with "
+          "a\n"
+          "place outside the travel of the machine is refused before it moves (exit code 5).");
   add_files(*command, *arguments);
   command->add_option("--gauge-runs", arguments->gauge_runs, "times that each face is touched")
       ->check(CLI::Range(1, 50))

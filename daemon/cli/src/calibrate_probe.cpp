@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/calib/probe/observe.hpp"
 #include "abbe/config/linear_axes.hpp"
 #include "abbe/recording/recording_reader.hpp"
@@ -58,6 +59,7 @@ Result<Touches> touches_of(const CalibrateProbeArguments& arguments) {
                               {t.velocity[0], t.velocity[1], t.velocity[2]}});
   };
   (void)recording->read(sink);
+  if (auto intact = recording->intact(); !intact) return tl::unexpected(intact.error());
   return touches;
 }
 
@@ -85,15 +87,14 @@ Error insufficient(const calib::Error& error) {
 
 int print_delay(const calib::probe::ProbeDelayFit& fit, bool as_json) {
   if (as_json) {
-    fmt::print("{}\n", json{{"delay_us", 1e6 * fit.delay_s},
-                            {"u_delay_us", 1e6 * fit.u_delay_s},
-                            {"jitter_us", 1e6 * fit.u_jitter_s},
-                            {"scatter_um", 1e6 * fit.u_scatter_m},
-                            {"misfit", fit.lack_of_fit},
-                            {"dof", fit.dof},
-                            {"feeds", fit.feeds},
-                            {"touches", fit.touches}}
-                           .dump(1));
+    fmt::print("{}\n", indented_json_text(json{{"delay_us", 1e6 * fit.delay_s},
+                                               {"u_delay_us", 1e6 * fit.u_delay_s},
+                                               {"jitter_us", 1e6 * fit.u_jitter_s},
+                                               {"scatter_um", 1e6 * fit.u_scatter_m},
+                                               {"misfit", fit.lack_of_fit},
+                                               {"dof", fit.dof},
+                                               {"feeds", fit.feeds},
+                                               {"touches", fit.touches}}));
     return 0;
   }
 
@@ -116,14 +117,14 @@ int print_qualification(const calib::probe::Qualification& q, bool as_json) {
 
   if (as_json) {
     fmt::print("{}\n",
-               json{{"tip_radius_mm", 1e3 * terms[0]},
-                    {"u_tip_radius_um", 1e6 * std::sqrt(q.map.covariance_m2()(0, 0))},
-                    {"lobing_um", 1e6 * q.lobing_m},
-                    {"terms_um", terms_um},
-                    {"centre_mm", {1e3 * q.centre_m[0], 1e3 * q.centre_m[1], 1e3 * q.centre_m[2]}},
-                    {"sigma_um", 1e6 * q.sigma_m},
-                    {"condition", q.condition}}
-                   .dump(1));
+               indented_json_text(json{
+                   {"tip_radius_mm", 1e3 * terms[0]},
+                   {"u_tip_radius_um", 1e6 * std::sqrt(q.map.covariance_m2()(0, 0))},
+                   {"lobing_um", 1e6 * q.lobing_m},
+                   {"terms_um", terms_um},
+                   {"centre_mm", {1e3 * q.centre_m[0], 1e3 * q.centre_m[1], 1e3 * q.centre_m[2]}},
+                   {"sigma_um", 1e6 * q.sigma_m},
+                   {"condition", q.condition}}));
     return 0;
   }
 

@@ -22,6 +22,7 @@ void add_calibrate_evemu(CLI::App& parent, int& exit);
 void add_calibrate_mfb(CLI::App& parent, int& exit);
 void add_reference(CLI::App& parent, int& exit);
 void add_machine(CLI::App& parent, int& exit);
+void add_machine_identity(CLI::App& machine, int& exit);
 void add_tracker(CLI::App& parent, int& exit);
 void add_calibrate_probe(CLI::App& parent, int& exit);
 void add_calibrate_artefact(CLI::App& parent, int& exit);

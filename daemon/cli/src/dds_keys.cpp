@@ -29,7 +29,7 @@ void print_next_steps(const KeyArguments& arguments) {
       folder, arguments.subscribers, arguments.subscribers == 1 ? "" : "s", arguments.days);
   fmt::print(
       "next:\n"
-      "  1. chown -R abbe: {0}/daemon          # the user abbed runs as\n"
+      "  1. chown -R abbe-dds: {0}/daemon      # the user abbe-dds runs as\n"
       "  2. in abbed.toml, under [dds]:  security = \"{0}/daemon\"     then restart abbed\n"
       "  3. copy {0}/subscriber-1 to the first subscriber's computer; there:\n"
       "       abbe watch --security subscriber-1\n"

@@ -14,6 +14,7 @@
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/evemu/identification.hpp"
 #include "abbe/methods/evemu/method.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/tables/evemu_files.hpp"
 #include "abbe/tables/touches_not_seen.hpp"
 #include "abbe/tables/travel_faults.hpp"
@@ -137,7 +138,7 @@ Result<EvemuInput> from_files(const EvemuInputArguments& arguments) {
   if (const auto valid = check_scales("identify evemu", what, *config, arguments.scales_corrected);
       !valid)
     return tl::make_unexpected(valid.error());
-  if (const auto& t = arguments.tip_offset_m) set_target(config->machine, *t);
+  if (const auto& t = arguments.tip_offset_m) set_target(*config, *t);
   if (const auto given = require_target(config->machine); !given)
     return fail(given.error().code, fmt::format("{}: {}", arguments.machine, given.error().text));
   const auto machine = evemu_machine(config->machine);
@@ -179,7 +180,7 @@ Result<EvemuInput> from_recording(const EvemuInputArguments& arguments) {
   input.sources.insert(input.sources.end(), entered.begin(), entered.end());
   input.recording_gap = recording->reader.damage();
   input.observed = run->observed;
-  input.utc = recording->reader.info().utc_offset;
+  input.utc = recorded_clock(recording->reader).dates;
   input.judge_source = [reader = std::make_shared<RecordingReader>(std::move(recording->reader))](
                            calib::Verdict& verdict) { judge_recording(*reader, verdict); };
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -33,14 +34,6 @@ struct ExportRequest {
   std::optional<calib::estimation::AxisTravel> travel;
   WriteOptions options;
 };
-
-/// A name from a file, for a terminal and a comment: no control characters.
-std::string one_line(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
-  }
-  return text;
-}
 
 std::string volume_text(const calib::ExportBox& box) {
   const calib::Vector3 low = kMmPerM * box.min_m, high = kMmPerM * box.max_m;
@@ -93,18 +86,26 @@ Result<ExportRequest> request_of(const ExportArguments& arguments) {
   const auto positive = positive_moves_of(arguments.positive, **facts);
   if (!positive) return tl::make_unexpected(positive.error());
 
-  auto document = model_named(arguments.model, arguments.store);
-  if (!document) return tl::make_unexpected(document.error());
-  const auto tool_m = tool_of(arguments.tool, document->model);
+  const auto forced = forced_by(arguments.force);
+  if (!forced) return tl::make_unexpected(forced.error());
+  auto named = found_model(arguments.model, arguments.store);
+  if (!named) return tl::make_unexpected(named.error());
+  auto use = statements_of_use("export " + arguments.model,
+                               obstacles_to_use(named->in_use(ModelPurpose::Control)), *forced);
+  if (!use) return tl::make_unexpected(use.error());
+  print_cautions(arguments.model, *named);
+  const auto tool_m = tool_of(arguments.tool, named->document.model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
-  ExportRequest request{*facts, *std::move(document), *tool_m, {}, {}, {}, {*names, *positive, {}}};
+  ExportRequest request{*facts, std::move(named->document), *tool_m, {}, {},
+                        {},     {*names, *positive, {}}};
   if (auto added = add_direction(request, arguments); !added)
     return tl::make_unexpected(added.error());
   if (auto added = add_nodes(request, arguments); !added) return tl::make_unexpected(added.error());
 
   auto& origin = request.options.origin;
   origin.model_hash = model_hash(request.document);
-  origin.machine = one_line(request.document.machine);
+  origin.use = *std::move(use);
+  origin.machine = printable_line(request.document.machine);
   origin.volume = volume_text(request.box);
   const calib::Vector3 tool_mm = kMmPerM * *tool_m;
   origin.tool = fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", tool_mm[0], tool_mm[1], tool_mm[2]);
@@ -254,7 +255,8 @@ void add_export(CLI::App& parent, int& exit) {
       "Write a model as compensation file of a control.\n"
       "The file is read back as the control reads it, and compared at 1000 places of the volume\n"
       "with what the format can hold; only then it gets its name. The report states the sign, and\n"
-      "in um what the format loses.");
+      "in um what the format loses. A model that must not be used (refused by the gate,\n"
+      "drifted; with -c also one of another machine configuration) is refused, unless --force.");
   command
       ->add_option("MODEL", arguments->model,
                    "model.json; or a model of the store: its id, the beginning of its id, or "
@@ -283,6 +285,9 @@ void add_export(CLI::App& parent, int& exit) {
   command->add_option("--direction", arguments->direction,
                       "of csv-grid: direction in which X, Y and Z last moved, such as +,-,0, for a "
                       "model with backlash; default: the mean of both directions");
+  add_force_options(*command, arguments->force,
+                    "export a model that must not be used; file and report state it",
+                    "reason, for the file; required with --force");
   command->add_flag("--json", arguments->json, "print the report as JSON");
   command->callback([arguments, &exit] { exit = run_export(*arguments); });
 }

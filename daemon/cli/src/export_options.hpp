@@ -7,6 +7,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/calib/export/held_correction.hpp"
 #include "abbe/exports/export_format.hpp"
+#include "force_option.hpp"
 #include "store_option.hpp"
 
 namespace abbe::daemon {
@@ -14,6 +15,7 @@ namespace abbe::daemon {
 struct ExportArguments {
   std::string model, to, out, tool, volume, axis_map, positive, direction;
   StoreOption store;
+  ForceOption force;
   std::optional<double> step_mm;
   bool json = false;
 };

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 
 namespace abbe::daemon {
@@ -112,13 +114,14 @@ std::string report_text(const ExportReport& report) {
   const auto& facts = *report.facts;
   const auto& origin = report.written.origin;
   std::string text = fmt::format("{}: {}\n", facts.name, facts.control);
+  for (const auto& sentence : origin.use) text += printable_line(sentence) + "\n";
   text += fmt::format("model {}\nmachine {}\nvolume {}, tool offset {}\n", origin.model_hash,
-                      origin.machine, origin.volume, origin.tool);
+                      printable_line(origin.machine), origin.volume, origin.tool);
   text += fmt::format("sign: a positive value moves the axis in the {} direction ({})\n",
                       report.written.positive_moves > 0 ? "positive" : "negative",
                       facts.source.empty() ? "given by --positive" : facts.source);
   text += "      added to a commanded position p: c = -V(p + c), V = actual - nominal\n";
-  for (const auto& file : report.files) text += fmt::format("file {}\n", file);
+  for (const auto& file : report.files) text += fmt::format("file {}\n", printable_line(file));
   text += fmt::format(
       "read back as the control does at {} places: differs by at most {:.6f} nm (allowed {:g} "
       "nm)\n",
@@ -134,6 +137,7 @@ std::string report_json(const ExportReport& report) {
   const auto& origin = report.written.origin;
   const nlohmann::json out{{"format", report.facts->name},
                            {"model_hash", origin.model_hash},
+                           {"use", origin.use},
                            {"files", report.files},
                            {"positive_moves", report.written.positive_moves},
                            {"places", report.proof.places},
@@ -145,7 +149,7 @@ std::string report_json(const ExportReport& report) {
                            {"tables", tables_json(report.held)},
                            {"errors", by_error_json(report.by_error)},
                            {"not_held", report.not_held}};
-  return out.dump() + "\n";
+  return json_text(out) + "\n";
 }
 
 }  // namespace abbe::daemon

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/refusal.hpp"
 #include "abbe/base/units.hpp"
 #include "follow.hpp"
@@ -29,7 +30,7 @@ int print_session_verdict(const json& session, bool as_json) {
                    "the calibration is lost: the daemon restarted; run the command again",
                    {}});
   if (as_json) {
-    fmt::print("{}\n", session.dump(1));
+    fmt::print("{}\n", indented_json_text(session));
   } else {
     fmt::print("{} {}\n{}\n", state, session["model_id"].get<std::string>(),
                session["reason"].get<std::string>());

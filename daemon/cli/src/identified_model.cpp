@@ -10,8 +10,10 @@
 #include <system_error>
 #include <utility>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/report/model_report.hpp"
@@ -29,29 +31,29 @@ void add_result_options(CLI::App& command, std::string& keep, bool& json, std::s
   command.add_option("-o,--out", out, "folder for the results; created if needed")->required();
 }
 
-Result<std::optional<ModelDocument>> active_model(const std::string& store) {
-  std::optional<ModelDocument> active;
-  if (store.empty()) return active;
+Result<std::optional<ActiveDocument>> active_model(const std::string& store) {
+  if (store.empty()) return std::nullopt;
   const auto opened = ModelStore::open(store);
   if (!opened) return tl::make_unexpected(opened.error());
-  const auto id = opened->active_id();
-  if (!id) return tl::make_unexpected(id.error());
-  if (!*id) return active;
-  auto document = opened->load(**id);
+  const auto activation = opened->activation();
+  if (!activation) return tl::make_unexpected(activation.error());
+  if (!*activation) return std::nullopt;
+  auto document = opened->load((*activation)->id);
   if (!document) return tl::make_unexpected(document.error());
-  active = std::move(*document);
-  return active;
+  return ActiveDocument{*std::move(document), (*activation)->accepted_configuration};
 }
 
 void ComparisonModel::add_note(calib::Verdict& verdict) const {
   if (!left_out.empty()) verdict.notes.push_back(left_out);
 }
 
-ComparisonModel comparison_model(const std::optional<ModelDocument>& active, const Config& config) {
+ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
+                                 const Config& config) {
   if (!active) return {};
-  if (active->machine_hash != machine_hash(config))
-    return {nullptr, std::string{kOfAnotherMachine}};
-  return {&active->model, {}};
+  const auto unfit =
+      unfit_for(active->document, present_configuration(config), active->accepted_configuration);
+  if (!unfit.empty()) return {nullptr, std::string{kOfAnotherMachine}};
+  return {&active->document.model, {}};
 }
 
 namespace {
@@ -83,8 +85,10 @@ ReportSubject judged(const ModelDocument& document, const calib::Verdict& verdic
 
 }  // namespace
 
-Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,
+Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& identified,
                             const calib::Verdict& verdict, const ResultFiles& more) {
+  ModelDocument document = identified;
+  document.verdict = model_verdict(verdict);
   const std::filesystem::path folder = place.out;
   if (auto made = create_folder(folder); !made) return made;
   if (auto done = replace_file(folder / "model.json", to_json(document)); !done) return done;
@@ -110,8 +114,8 @@ void print_verdict(const calib::Verdict& verdict) {
   fmt::print("gate        {}\n", verdict.accepted
                                      ? coloured("would accept", kGreen, STDOUT_FILENO)
                                      : coloured("would refuse", kYellow, STDOUT_FILENO));
-  for (const auto& reason : verdict.reasons) fmt::print("            {}\n", reason);
-  for (const auto& note : verdict.notes) fmt::print("note        {}\n", note);
+  for (const auto& reason : verdict.reasons) fmt::print("            {}\n", printable_line(reason));
+  for (const auto& note : verdict.notes) fmt::print("note        {}\n", printable_line(note));
 }
 
 int exit_code(const calib::Verdict& verdict) {

@@ -17,8 +17,14 @@ namespace abbe::daemon {
 /// Adds --keep, --json and --out.
 void add_result_options(CLI::App& command, std::string& keep, bool& json, std::string& out);
 
-/// The active model of the store in which the result will be kept; nullopt if `store` is empty.
-[[nodiscard]] Result<std::optional<ModelDocument>> active_model(const std::string& store);
+/// The active model of a store.
+struct ActiveDocument {
+  ModelDocument document;
+  std::string accepted_configuration;  ///< StoreEvent::accepted_configuration of its activation
+};
+
+/// That of the store in which the result will be kept; nullopt if `store` is empty.
+[[nodiscard]] Result<std::optional<ActiveDocument>> active_model(const std::string& store);
 
 /// The model with which the gate compares a candidate.
 struct ComparisonModel {
@@ -29,10 +35,10 @@ struct ComparisonModel {
   void add_note(calib::Verdict& verdict) const;  ///< adds `left_out` to the notes of `verdict`
 };
 
-/// The active model, if it was made for the machine of `config`. A model of another machine
-/// configuration is never applied to this machine; so the gate must not compare a new model with
-/// it.
-[[nodiscard]] ComparisonModel comparison_model(const std::optional<ModelDocument>& active,
+/// The active model, if it was made, or accepted, for the machine of `config`. A model of another
+/// machine configuration is never applied to this machine; so the gate must not compare a new model
+/// with it.
+[[nodiscard]] ComparisonModel comparison_model(const std::optional<ActiveDocument>& active,
                                                const Config& config);
 
 /// Where a result goes, as the options of the command state.
@@ -44,8 +50,9 @@ struct ResultPlace {
 /// File name to text.
 using ResultFiles = std::map<std::string, std::string>;
 
-/// Writes model.json, `more` and report.html, adds the model to the store with the user, and writes
-/// report.html again. Nothing is stored if a file cannot be written or the report cannot be made.
+/// Writes model.json with the verdict, `more` and report.html, adds the model to the store with the
+/// user, and writes report.html again. Nothing is stored if a file cannot be written or the report
+/// cannot be made.
 /// With a store it is the report that `abbe report` makes of the stored model; else it has the
 /// verdict, and states that the model is not active. Error Io, or that of the store.
 [[nodiscard]] Result<void> write_and_keep(const ResultPlace& place, const ModelDocument& document,

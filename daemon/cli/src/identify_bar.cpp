@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -138,7 +139,7 @@ int identify_bar(const IdentifyBarArguments& arguments) {
       !written)
     return report(written.error());
   if (arguments.json)
-    fmt::print("{}\n", bar_json(*found, arguments.out).dump(1));
+    fmt::print("{}\n", indented_json_text(bar_json(*found, arguments.out)));
   else
     print_summary(*found, arguments.out);
   return 0;

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "abbe/base/input_file.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -200,7 +201,7 @@ void print_json(const Outcome& outcome, const ModelDocument& document,
     object["artefact"] = artefact_json(*artefact);
   if (const auto& choice = outcome.solution().sparse)
     object["chosen"] = {{"lambda", choice->lambda.back()}, {"gamma", choice->gamma}};
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_summary(const Outcome& outcome, const ModelDocument& document,

@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/config/capabilities.hpp"
@@ -85,6 +86,7 @@ Result<JointOutcome> judged(const IdentifyJointArguments& arguments, const Joint
   if (!contributions) return tl::make_unexpected(error_of(contributions.error()));
 
   auto document = joint_document(input, *identified.joint, *verdict);
+  document.configuration = input.config.meaning;
   document.run = run_figures(*verdict, "legs");
   JointOutcome outcome{input,
                        std::move(identified.pairs),
@@ -107,7 +109,7 @@ int write_and_print(const IdentifyJointArguments& arguments, const JointOutcome&
     return report(done.error());
 
   if (arguments.json)
-    fmt::print("{}\n", joint_json(outcome, arguments.out).dump(1));
+    fmt::print("{}\n", indented_json_text(joint_json(outcome, arguments.out)));
   else
     print_joint_summary(outcome, arguments.out);
   return exit_code(outcome.verdict);
@@ -123,9 +125,9 @@ int run_joint(const IdentifyJointArguments& arguments) {
   if (!identified) return report(error_of(identified.error()));
   if (!identified->joint) {
     if (arguments.json)
-      fmt::print("{}\n", nlohmann::json{{"pairs", pairs_json(*input, identified->pairs)},
-                                        {"contradictions", identified->contradictions}}
-                             .dump(1));
+      fmt::print("{}\n", indented_json_text(
+                             nlohmann::json{{"pairs", pairs_json(*input, identified->pairs)},
+                                            {"contradictions", identified->contradictions}}));
     return report(contradiction_of(std::move(identified->contradictions)));
   }
 

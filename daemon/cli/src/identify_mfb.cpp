@@ -13,14 +13,17 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/mfb/touches_off.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/mfb/document.hpp"
 #include "abbe/methods/mfb/identification.hpp"
 #include "abbe/methods/mfb/inputs.hpp"
 #include "abbe/methods/mfb/method.hpp"
 #include "abbe/model/model_document.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/tables/mfb_files.hpp"
 #include "commands.hpp"
 #include "identified_model.hpp"
@@ -47,6 +50,7 @@ struct MfbInput {
   Config config;
   MfbTask task;
   std::vector<InputFile> sources;
+  std::vector<std::vector<std::size_t>> lines{};  ///< of the touches in their file; else empty
   std::vector<std::string> against_pass{};
   ObservedTimes observed{};   ///< of the recording; nullopt for files
   protocol::UtcOffset utc{};  ///< of the host clock of the recording
@@ -91,7 +95,7 @@ Result<MfbInput> input_of_recording(const IdentifyMfbArguments& arguments) {
   input.task.plan = std::move(run->plan);
   input.task.passes = std::move(run->passes);
   input.observed = run->observed;
-  input.utc = recording->reader.info().utc_offset;
+  input.utc = recorded_clock(recording->reader).dates;
   return input;
 }
 
@@ -118,6 +122,7 @@ Result<MfbInput> input_of_files(const IdentifyMfbArguments& arguments) {
                   bar->source,
                   plan->source,
                   points->source}};
+  input.lines = std::move(points->lines);
   input.against_pass = std::move(points->against_pass);
   return input;
 }
@@ -131,12 +136,30 @@ Result<MfbInput> read_input(const IdentifyMfbArguments& arguments) {
   return input;
 }
 
+/// One line for each touch that alone is not where the other touches of its measurement place it.
+std::vector<std::string> lines_of_touches_off(const std::string& file, const MfbInput& input) {
+  const auto& task = input.task;
+  std::vector<std::string> lines;
+  for (const auto& off : mfb::touches_off(task.bar, task.plan, task.passes)) {
+    const auto& touch = task.passes[off.pass][off.touch];
+    const std::string place =
+        input.lines.empty() ? file : fmt::format("{}:{}", file, input.lines[off.pass][off.touch]);
+    lines.push_back(fmt::format(
+        "{}: {} of \"{}\" alone does not fit: {:.4g} mm off, the other touches fit the plan within "
+        "{:.4g} mm rms: correct or repeat it",
+        place, mfb::name(touch.target), task.plan.measurements[off.pass].name,
+        kMmPerM * off.distance_m, kMmPerM * off.rms_others_m));
+  }
+  return lines;
+}
+
 /// Errors of an identification name measurement and feature. The file of the touches is put before,
-/// rows against their pass behind: they may be the cause.
+/// what may be the cause behind: touches that alone do not fit, rows against their pass.
 Error in_points(const IdentifyMfbArguments& arguments, const MfbInput& input, Error error) {
   const std::string& file = arguments.recording.empty() ? arguments.points : arguments.recording;
   error.text = fmt::format("{}: {}", file, error.text);
-  error.details = input.against_pass;
+  error.details = lines_of_touches_off(file, input);
+  error.details.insert(error.details.end(), input.against_pass.begin(), input.against_pass.end());
   return error;
 }
 
@@ -175,7 +198,7 @@ int run(const IdentifyMfbArguments& arguments) {
     return report(done.error());
 
   if (arguments.json)
-    fmt::print("{}\n", mfb_json(document, *candidate, arguments.out).dump(1));
+    fmt::print("{}\n", indented_json_text(mfb_json(document, *candidate, arguments.out)));
   else
     print_mfb_summary(document, *candidate, arguments.out);
   return exit_code(candidate->verdict);

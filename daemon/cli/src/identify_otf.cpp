@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
@@ -118,7 +119,7 @@ Result<std::size_t> vertices_compared(const IdentifyOtfArguments& arguments, con
 }  // namespace
 
 Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
-                                    const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                                    const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto files = read_files(arguments, bar);
   if (!files) return tl::make_unexpected(files.error());
   apply(arguments, files->config);
@@ -175,7 +176,7 @@ Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
 namespace {
 
 Result<OtfOutcome> from_files(const IdentifyOtfArguments& arguments,
-                              const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                              const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto run = identify_files(arguments, active, bar);
   if (!run) return tl::make_unexpected(run.error());
   return outcome_of({std::move(run->found.solution), std::move(run->verdict), run->mode,
@@ -224,7 +225,7 @@ void print_json(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments
     object["tracker_drift"] = tracker_drift_json(*outcome.document.tracker_drift);
   if (outcome.synchronisation)
     object["clocks"] = clock_json(*outcome.synchronisation, arguments.encoder_u_time_us);
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_summary(const OtfOutcome& outcome, const IdentifyOtfArguments& arguments) {

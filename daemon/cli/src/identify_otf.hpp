@@ -11,6 +11,7 @@
 #include "abbe/methods/otf/identification.hpp"
 #include "abbe/model/model_document.hpp"
 #include "abbe/tables/input_files.hpp"
+#include "identified_model.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -71,7 +72,7 @@ struct OtfFromFiles {
 };
 /// Identifies one run from the files --machine, --path, --tracker and --encoder.
 [[nodiscard]] Result<OtfFromFiles> identify_files(const IdentifyOtfArguments& arguments,
-                                                  const std::optional<ModelDocument>& active,
+                                                  const std::optional<ActiveDocument>& active,
                                                   ProgressBar& bar);
 
 /// Identifies the last complete run of --recording with the configuration --machine. The recorded
@@ -82,12 +83,12 @@ struct OtfFromFiles {
 
 /// Identifies the last complete run of --recording.
 [[nodiscard]] Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
-                                                const std::optional<ModelDocument>& active,
+                                                const std::optional<ActiveDocument>& active,
                                                 ProgressBar& bar);
 
 /// Identifies all 18 tables from the runs of --target.
 [[nodiscard]] Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
-                                              const std::optional<ModelDocument>& active,
+                                              const std::optional<ActiveDocument>& active,
                                               ProgressBar& bar);
 
 }  // namespace abbe::daemon

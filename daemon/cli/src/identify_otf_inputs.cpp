@@ -33,7 +33,7 @@ void apply(const IdentifyOtfArguments& arguments, Config& config) {
   otf.backlash = otf::backlash_named(arguments.backlash).value_or(otf.backlash);
   config.machine.interpolation = calib::estimation::table_interpolation(arguments.tables)
                                      .value_or(config.machine.interpolation);
-  if (const auto& t = arguments.target_offset_m) set_target(config.machine, *t);
+  if (const auto& t = arguments.target_offset_m) set_target(config, *t);
   if (const auto& p = arguments.tracker_position_m)
     config.machine.tracker_position_m = {p->x(), p->y(), p->z()};
 }

@@ -6,6 +6,7 @@
 
 #include "abbe/config/calibration_machine.hpp"
 #include "abbe/methods/otf/method.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/replay/replay.hpp"
 #include "identified_model.hpp"
 #include "identify_otf.hpp"
@@ -44,10 +45,8 @@ Result<Config> config_for(const IdentifyOtfArguments& arguments, const Config& r
                 fmt::format("{}: was recorded on a machine with the chain {}, {} has {}",
                             arguments.recording, recorded.machine.chain, arguments.machine,
                             config->machine.chain));
-  if (recorded.machine.target_given) {
-    config->machine.target_offset_m = recorded.machine.target_offset_m;
-    config->machine.target_given = true;
-  }
+  take_recorded_readings(*config, &recorded);
+  if (recorded.machine.target_given) set_target_offset(*config, recorded.machine.target_offset_m);
   if (recorded.machine.tracker_position_m)
     config->machine.tracker_position_m = recorded.machine.tracker_position_m;
   apply(arguments, *config);
@@ -82,7 +81,7 @@ Result<OtfFromFiles> identify_recorded(const IdentifyOtfArguments& arguments, Pr
 }
 
 Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
-                                  const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                                  const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto recording = open_recording(arguments.recording, arguments.machine);
   if (!recording) return tl::make_unexpected(recording.error());
   apply(arguments, recording->config);
@@ -99,7 +98,7 @@ Result<OtfOutcome> from_recording(const IdentifyOtfArguments& arguments,
   if (!recorded) return tl::make_unexpected(recorded.error());
   other.add_note(recorded->candidate.verdict);
   auto outcome = outcome_of(std::move(recorded->candidate), recording->config, {recording->source});
-  add_measured(outcome.document, recorded->observed, recording->reader.info().utc_offset);
+  add_measured(outcome.document, recorded->observed, recorded_clock(recording->reader).dates);
   outcome.document.recording_gap = recording->reader.damage();
 
   return outcome;

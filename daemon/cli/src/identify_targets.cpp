@@ -108,7 +108,7 @@ calib::otf::Solution of_all_runs(calib::otf::TargetsIdentification found) {
 }  // namespace
 
 Result<OtfOutcome> from_targets(const IdentifyOtfArguments& arguments,
-                                const std::optional<ModelDocument>& active, ProgressBar& bar) {
+                                const std::optional<ActiveDocument>& active, ProgressBar& bar) {
   auto all = read_runs(arguments, bar);
   if (!all) return tl::make_unexpected(all.error());
   apply(arguments, all->config);

@@ -14,6 +14,7 @@
 #include "abbe/tables/parts_file.hpp"
 #include "evemu_input.hpp"
 #include "identify_otf.hpp"
+#include "opened_recording.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -81,12 +82,49 @@ void note_unshared_offsets(const std::vector<RunFiles>& runs, std::vector<PartFa
   }
 }
 
+constexpr std::string_view kSimulated = "daemon.simulated";
+
+/// What take_recorded_readings() takes of a part, except whether its devices are simulated.
+MeaningEntries recorded_readings(const Config& part) {
+  MeaningEntries taken;
+  take_entries(taken, part.meaning.readings, {"machine", "axes", "target", "model", "thermal"});
+  std::erase_if(taken, [](const MeaningEntry& entry) { return entry.key == kSimulated; });
+  return taken;
+}
+
+/// One model cannot correct readings of two meanings.
+Result<void> require_same_readings(const std::string& name, const Config& part, JointInput& input) {
+  auto readings = recorded_readings(part);
+  if (!input.recorded_readings) input.recorded_readings = readings;
+  if (readings == *input.recorded_readings) return {};
+  auto [changes, changed, added] = difference(*input.recorded_readings, readings);
+  changes.insert(changes.end(), changed.begin(), changed.end());
+  if (!added.empty()) changes.push_back(keys_text(added) + " was not given");
+  return fail(ErrorCode::BadInput,
+              fmt::format("{}: its axis readings have another meaning than those of the first "
+                          "recorded run: {}",
+                          name, listed(changes)));
+}
+
+/// A recorded part gives the readings their meaning. One part of simulated devices makes the whole
+/// model one of simulated devices.
+void take_readings_of(const Config& part, Config& config) {
+  const auto* earlier = value_of(config.meaning.readings, kSimulated);
+  const std::string devices = earlier != nullptr ? *earlier : "false";
+  take_recorded_readings(config, &part);
+  if (devices != "false") set_entry(config.meaning.readings, kSimulated, devices);
+}
+
 Result<void> add_run(const IdentifyJointArguments& arguments, const RunFiles& files,
                      JointInput& input, ProgressBar& bar) {
   const IdentifyOtfArguments of_run = arguments_of(arguments, files);
   auto run = files.recording.empty() ? identify_files(of_run, std::nullopt, bar)
                                      : identify_recorded(of_run, bar);
   if (!run) return tl::make_unexpected(in_part(files.name, run.error()));
+  if (!files.recording.empty()) {
+    if (auto same = require_same_readings(files.name, run->config, input); !same) return same;
+    take_readings_of(run->config, input.config);
+  }
   const auto& solution = run->found.solution;
   if (!input.common) {
     auto common = calib::joint::tables_of(solution.model);

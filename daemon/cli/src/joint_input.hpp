@@ -40,6 +40,7 @@ struct JointInput {
   std::vector<PartFacts> facts{};                       ///< one per part
   std::deque<calib::otf::Observations> observations{};  ///< of the runs; `runs` points to them
   std::vector<calib::joint::RunOfPart> runs{};
+  std::optional<MeaningEntries> recorded_readings{};  ///< of the first recorded run
 };
 
 /// Errors of a part begin with its name. Io, BadInput with file and line, DataInsufficient.

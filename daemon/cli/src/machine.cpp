@@ -13,6 +13,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
+#include "machine_stop.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -38,8 +39,26 @@ int release_machine(const DaemonSocket& where) {
 }
 
 int stop_machine(const DaemonSocket& where) {
-  const auto answer = ask_machine(where, {{"stop", true}});
-  return answer ? 0 : report(answer.error());
+  const auto socket = socket_path(where);
+  if (!socket) return report(socket.error());
+  const auto asked = ask_daemon(*socket, {{"do", "machine"}, {"stop", true}});
+  if (!asked) {
+    Error error = asked.error();
+    if (error.code == ErrorCode::Io)
+      error.details.push_back(
+          "nobody has confirmed the stop: check the machine, use its emergency stop");
+    return report(error);
+  }
+
+  const auto number = asked->find("stop");
+  if (number == asked->end())
+    return report({ErrorCode::StopNotConfirmed,
+                   "abbed does not report whether the machine has stopped: check the machine, use "
+                   "its emergency stop"});
+  const auto stopped = await_stop(*socket, number->get<std::uint64_t>());
+  if (!stopped) return report(stopped.error());
+  fmt::print("{}\nthe machine does not move again before `abbe machine release`\n", *stopped);
+  return 0;
 }
 
 int show_machine(const DaemonSocket& where) {
@@ -50,6 +69,9 @@ int show_machine(const DaemonSocket& where) {
                (*answer)["reason"].get<std::string>());
   }
 
+  if (answer->contains("stop"))
+    fmt::print("last stop: {}: {}\n", (*answer)["stop"]["outcome"].get<std::string>(),
+               (*answer)["stop"]["text"].get<std::string>());
   if (!answer->contains("tip_m")) {
     fmt::print("the machine has not reported the position of the tip\n");
     return 0;
@@ -66,8 +88,11 @@ int show_machine(const DaemonSocket& where) {
 
 void add_machine(CLI::App& parent, int& exit) {
   auto* group = parent.add_subcommand(
-      "machine", "Control the measuring machine of the running daemon: where, stop, release");
+      "machine",
+      "Control the measuring machine of the running daemon: where, stop, release; identity of the "
+      "machine: identity");
   group->require_subcommand(1);
+  add_machine_identity(*group, exit);
 
   const auto add = [&](const char* name, const std::string& text, int (*run)(const DaemonSocket&)) {
     auto where = std::make_shared<DaemonSocket>();
@@ -79,8 +104,15 @@ void add_machine(CLI::App& parent, int& exit) {
   add("where", "Show the position of the tip, and whether the machine needs a release",
       show_machine);
   add("stop",
-      "Stop every motion that abbed has commanded (AbortE); the machine does not move again\n"
-      "before `abbe machine release`",
+      "Stop every motion that abbed has commanded (AbortE), wait for the outcome and print it; "
+      "the\n"
+      "machine does not move again before `abbe machine release`. Exit code 0: stopped, the "
+      "machine\n"
+      "has answered AbortE or no motion was under way. 6: not confirmed, AbortE was refused or "
+      "not\n"
+      "answered, or the connection was lost before the answer. 7: not sent, there is no "
+      "connection\n"
+      "to the machine. After 6 and 7 the machine may be moving: use its emergency stop.",
       stop_machine);
   add("release",
       "Confirm that a person has checked the machine. After an error of severity 2 or more, an\n"

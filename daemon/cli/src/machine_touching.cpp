@@ -1,5 +1,7 @@
 #include "machine_touching.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -9,6 +11,7 @@
 #include "abbe/base/control_protocol.hpp"
 #include "daemon_socket.hpp"
 #include "interruption.hpp"
+#include "machine_stop.hpp"
 #include "terminal.hpp"
 
 namespace abbe::daemon {
@@ -38,6 +41,9 @@ json as_json(const calib::MachineTouches& plan) {
 
 TouchesMade made_of(const json& answer, std::size_t asked) {
   TouchesMade out{{}, 0.0, answer["reason"]};
+  if (answer.contains("stop"))
+    if (const auto stopped = stop_outcome(answer["stop"]); !stopped)
+      out.code = stopped.error().code;
   for (const json& t : answer["touches"]) {
     if (out.places_m.size() == asked) break;
     const auto p = t["at_m"].get<std::array<double, 3>>();
@@ -65,7 +71,8 @@ TouchesMade follow_touches(const std::filesystem::path& socket, std::size_t aske
     if (!answer) {
       if (steady_clock::now() - answered < kDaemonTimeout) continue;
       (void)cancel(socket);
-      so_far.reason = answer.error().text;
+      so_far.reason = fmt::format("{}: the machine may be moving", answer.error().text);
+      so_far.code = ErrorCode::StopNotConfirmed;
       return so_far;
     }
 

@@ -18,6 +18,8 @@ struct TouchesMade {
   std::vector<calib::Vector3> places_m;  ///< as the machine reports them, in their order
   double u_position_m = 0.0;
   std::string reason;
+  /// Of `reason`: DataInsufficient, or that the machine is not confirmed to be stopped.
+  ErrorCode code = ErrorCode::DataInsufficient;
 };
 
 /// The position of the machine's tip, m. Refused: no machine, or the machine is not ready.

@@ -9,7 +9,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/direct/readings_off.hpp"
 #include "abbe/calib/direct/volume.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/tables/measured_file.hpp"
@@ -27,6 +30,7 @@ struct MeasuredComparison {
   std::vector<direct::TableComparison> tables;
   calib::Result<direct::VolumeComparison> volume;
   calib::Vector3 tool_m;
+  std::vector<std::string> rows_off;  ///< values that alone do not fit, one line each
 };
 
 direct::CompareOptions compare_options(const MeasuredOptions& options) {
@@ -37,6 +41,22 @@ direct::CompareOptions compare_options(const MeasuredOptions& options) {
                      .u_scale = options.u_ppm / kUmPerM}};
 }
 
+/// One line for each value that alone does not fit the others of its error.
+std::vector<std::string> lines_of_rows_off(const std::string& name, const MeasuredFile& file) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < file.errors.size(); ++i) {
+    const auto& error = file.errors[i];
+    const auto motion = calib::error_motion(error.name);
+    const bool is_angle = !motion || calib::is_rotation(motion->motion);
+    for (const auto& [reading, distance] : direct::readings_off(error))
+      lines.push_back(fmt::format(
+          "{}:{}: {} alone does not fit: {:.4g} {} off the line through its neighbours, compared "
+          "with the other runs: correct or delete it",
+          name, file.lines[i][reading], error.name, kUmPerM * distance, is_angle ? "urad" : "um"));
+  }
+  return lines;
+}
+
 Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
                                     const MeasuredOptions& options) {
   auto file = read_measured_csv(options.file);
@@ -45,11 +65,13 @@ Result<MeasuredComparison> compared(const calib::VolumetricModel& model,
   auto tables = direct::compare(file->errors, model, wanted);
   if (!tables) {
     auto error = error_of(tables.error());
-    return fail(error.code, fmt::format("{}: {}", options.file, error.text));
+    return tl::make_unexpected(Error{error.code, fmt::format("{}: {}", options.file, error.text),
+                                     lines_of_rows_off(options.file, *file)});
   }
   auto volume = direct::compare_in_volume(file->errors, model, wanted.device);
+  auto off = lines_of_rows_off(options.file, *file);
   return MeasuredComparison{std::move(*file), std::move(*tables), std::move(volume),
-                            model.tool_offsets_m().front()};
+                            model.tool_offsets_m().front(), std::move(off)};
 }
 
 bool any_with(const MeasuredComparison& found, direct::Finding finding) {
@@ -135,10 +157,11 @@ void print_measured_json(const MeasuredComparison& found, const MeasuredOptions&
       {"straightness", options.straightness},
       {"tool_mm",
        {kMmPerM * found.tool_m.x(), kMmPerM * found.tool_m.y(), kMmPerM * found.tool_m.z()}},
+      {"rows_off", found.rows_off},
       {"tables", json::array()},
       {"volume", volume_json(found.volume)}};
   for (const auto& table : found.tables) object["tables"].push_back(table_json(table));
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 // Text.
@@ -228,6 +251,7 @@ void print_measured_text(const MeasuredComparison& found) {
   for (const auto& table : found.tables) print_row(table);
   fmt::print("\n");
   for (const auto& table : found.tables) print_remarks(table);
+  for (const auto& line : found.rows_off) fmt::print("{}\n", printable_line(line));
 
   print_conventions(found);
   fmt::print(

@@ -6,6 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_comparison.hpp"
 #include "commands.hpp"
@@ -28,6 +30,7 @@ struct ModelCompareArguments {
 struct Comparison {
   std::size_t points = 0;
   calib::ModelDifference difference;
+  std::vector<std::string> cautions_a, cautions_b;
 };
 
 /// The points of comparison: those nodes of the two models that are in the validity volume of both.
@@ -43,10 +46,11 @@ std::vector<calib::Vector3> common_points(const calib::VolumetricModel& a,
 }
 
 Result<Comparison> compare(const ModelCompareArguments& arguments) {
-  const auto a = model_named(arguments.a, arguments.store);
-  if (!a) return tl::make_unexpected(a.error());
-  const auto b = model_named(arguments.b, arguments.store);
-  if (!b) return tl::make_unexpected(b.error());
+  const auto found_a = found_model(arguments.a, arguments.store);
+  if (!found_a) return tl::make_unexpected(found_a.error());
+  const auto found_b = found_model(arguments.b, arguments.store);
+  if (!found_b) return tl::make_unexpected(found_b.error());
+  const ModelDocument *const a = &found_a->document, *const b = &found_b->document;
 
   const auto travel = parse_direction(arguments.direction);
   if (!travel) return tl::make_unexpected(travel.error());
@@ -61,7 +65,7 @@ Result<Comparison> compare(const ModelCompareArguments& arguments) {
   if (!difference)
     return fail(ErrorCode::DataInsufficient,
                 fmt::format("{} and {}: {}", arguments.a, arguments.b, difference.error().text));
-  return Comparison{points.size(), *difference};
+  return Comparison{points.size(), *difference, cautions_of(*found_a), cautions_of(*found_b)};
 }
 
 void print(const char* what, const calib::VectorStatistics& s) {
@@ -70,9 +74,11 @@ void print(const char* what, const calib::VectorStatistics& s) {
 }
 
 int run_measured(const ModelCompareArguments& arguments) {
-  const auto model = model_named(arguments.a, arguments.store);
-  if (!model) return report(model.error());
-  const auto exit = compare_with_measured(model->model, arguments.measured, arguments.json);
+  const auto found = found_model(arguments.a, arguments.store);
+  if (!found) return report(found.error());
+  print_cautions(arguments.a, *found);
+  const auto exit =
+      compare_with_measured(found->document.model, arguments.measured, arguments.json);
   return exit ? *exit : report(exit.error());
 }
 
@@ -84,11 +90,15 @@ int run(const ModelCompareArguments& arguments) {
   if (arguments.json) {
     const nlohmann::json object{{"points", found->points},
                                 {"as_stated", vector_figures(d.as_stated)},
-                                {"rigid_free", vector_figures(d.rigid_free)}};
-    fmt::print("{}\n", object.dump(1));
+                                {"rigid_free", vector_figures(d.rigid_free)},
+                                {"cautions_a", found->cautions_a},
+                                {"cautions_b", found->cautions_b}};
+    fmt::print("{}\n", indented_json_text(object));
     return 0;
   }
 
+  for (const auto& caution : found->cautions_a) fmt::print("A: {}\n", printable_line(caution));
+  for (const auto& caution : found->cautions_b) fmt::print("B: {}\n", printable_line(caution));
   fmt::print("|V(A) - V(B)| at {} nodes where both are valid, um\n", found->points);
   fmt::print("{:<24}  {:>9}  {:>9}  {:>9}\n", "", "mean", "rms", "largest");
   print("as stated", d.as_stated);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/model_drift.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -86,7 +87,7 @@ int run_model_drift(const ModelDriftArguments& arguments) {
   if (!drift) return report(error_of(drift.error()));
 
   if (arguments.json) {
-    fmt::print("{}\n", drift_json(*drift).dump(1));
+    fmt::print("{}\n", indented_json_text(drift_json(*drift)));
   } else {
     print(*drift);
   }

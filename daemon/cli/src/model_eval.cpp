@@ -69,8 +69,9 @@ Result<std::vector<calib::estimation::AxisTravel>> travel_of(const ModelEvalArgu
 }
 
 Result<std::string> evaluate(const ModelEvalArguments& arguments) {
-  const auto document = model_named(arguments.model, arguments.store);
-  if (!document) return tl::make_unexpected(document.error());
+  const auto found = found_model(arguments.model, arguments.store);
+  if (!found) return tl::make_unexpected(found.error());
+  const ModelDocument* const document = &found->document;
   const auto points = read_points_csv(arguments.points);
   if (!points) return tl::make_unexpected(points.error());
   const auto tool_m = tool_of(arguments.tool, document->model);
@@ -79,9 +80,11 @@ Result<std::string> evaluate(const ModelEvalArguments& arguments) {
   const auto travel = travel_of(arguments, *points, document->model);
   if (!travel) return tl::make_unexpected(travel.error());
 
-  std::string text = arguments.correction
-                         ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
-                         : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
+  std::string text;
+  print_cautions(arguments.model, *found);
+  for (const std::string& caution : cautions_of(*found)) text += "# " + caution + "\n";
+  text += arguments.correction ? "# quantity = command_correction\nx_mm,y_mm,z_mm,cx_um,cy_um,cz_um"
+                               : "# quantity = error\nx_mm,y_mm,z_mm,ex_um,ey_um,ez_um";
   text += ",ux_um,uy_um,uz_um,inside\n";
 
   for (std::size_t i = 0; i < points->points_m.size(); ++i) {

@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
+#include "abbe/model/configuration_fit.hpp"
+#include "abbe/model/stored_model.hpp"
 #include "commands.hpp"
-#include "daemon_socket.hpp"
+#include "force_option.hpp"
 #include "store_option.hpp"
 #include "terminal.hpp"
 
@@ -20,21 +23,22 @@ namespace {
 
 struct ModelStoreArguments {
   StoreOption store;
-  std::string id, why, active;
-  bool json = false, force = false;
+  ForceOption force;
+  std::string id, active;
+  bool json = false, accept_older_hash = false;
   std::size_t keep_newest = 0;
   int keep_days = 0;
 };
 
-StoreActor actor(const ModelStoreArguments& arguments) {
-  return {user_name(), arguments.why,
-          std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())};
-}
-
 std::string state_of(const StoreEntry& entry) {
   if (!entry.fault.empty()) return "damaged";
   if (entry.active) return entry.accepted ? "active" : "active (forced)";
+  if (!entry.judged) return std::string{name(VerdictState::NotJudged)};
   return entry.accepted ? "accepted" : "refused";
+}
+
+nlohmann::json simulated_json(std::optional<bool> simulated) {
+  return simulated ? nlohmann::json(*simulated) : nlohmann::json();
 }
 
 nlohmann::json to_json(const StoreEntry& entry) {
@@ -42,7 +46,7 @@ nlohmann::json to_json(const StoreEntry& entry) {
           {"active", entry.active},   {"accepted", entry.accepted},
           {"reasons", entry.reasons}, {"added", to_text(entry.added)},
           {"method", entry.method},   {"machine", entry.machine},
-          {"fault", entry.fault}};
+          {"fault", entry.fault},     {"simulated", simulated_json(entry.simulated)}};
 }
 
 void print_table(const std::vector<StoreEntry>& entries) {
@@ -52,10 +56,14 @@ void print_table(const std::vector<StoreEntry>& entries) {
   for (const auto& entry : entries) {
     auto state = state_of(entry);
     if (entry.active) state = coloured(state, kGreen, STDOUT_FILENO);
-    if (!entry.fault.empty()) state = coloured(state, kRed, STDOUT_FILENO) + ": " + entry.fault;
+    if (!entry.fault.empty())
+      state = coloured(state, kRed, STDOUT_FILENO) + ": " + printable_line(entry.fault);
     fmt::print("{:<16}  {:<19}  {:<6}  {:<20}  {}\n", entry.id,
-               to_text(entry.added).substr(0, kSeconds), entry.method, entry.machine, state);
-    for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", reason);
+               to_text(entry.added).substr(0, kSeconds), entry.method,
+               printable_line(entry.machine), state);
+    if (entry.simulated.value_or(false))
+      fmt::print("{:18}{}\n", "", coloured("simulated devices", kYellow, STDOUT_FILENO));
+    for (const auto& reason : entry.reasons) fmt::print("{:18}{}\n", "", printable_line(reason));
   }
 }
 
@@ -67,7 +75,7 @@ int list(const ModelStoreArguments& arguments) {
   if (arguments.json) {
     nlohmann::json array = nlohmann::json::array();
     for (const auto& entry : *entries) array.push_back(to_json(entry));
-    fmt::print("{}\n", array.dump(1));
+    fmt::print("{}\n", indented_json_text(array));
   } else if (entries->empty()) {
     fmt::print(
         "the store has no models; `abbe calibrate` and `abbe identify ... --keep DIR` add "
@@ -81,22 +89,24 @@ int list(const ModelStoreArguments& arguments) {
 void print_entry(const StoreEntry& entry) {
   fmt::print("id          {}\nstate       {}\nadded       {}\n", entry.id, state_of(entry),
              to_text(entry.added));
-  for (const auto& reason : entry.reasons) fmt::print("            {}\n", reason);
+  for (const auto& reason : entry.reasons) fmt::print("            {}\n", printable_line(reason));
 }
 
 void print_model(const ModelDocument& document) {
   const auto& s = document.statistics;
   fmt::print("created     {}\nmachine     {}, chain {}\nmethod      {}, {}, gauge {}\n",
-             to_text(document.created), document.machine, document.model.chain().text(),
-             document.method, document.estimator, name(document.model.gauge()));
+             to_text(document.created), printable_line(document.machine),
+             document.model.chain().text(), document.method, document.estimator,
+             name(document.model.gauge()));
   fmt::print("solution    {} observations, {} unknowns, rank {}, condition {:.3g}, sigma0 {:.3f}\n",
              s.observations, s.unknowns, s.rank, s.condition, s.sigma0);
   fmt::print("residuals   {:.3f} um rms before, {:.3f} um after\n", s.before.rms_m * kUmPerM,
              s.after.rms_m * kUmPerM);
   for (const auto& input : document.inputs)
-    fmt::print("input       {}  sha256 {}\n", input.name, input.sha256);
+    fmt::print("input       {}  sha256 {}\n", printable_line(input.name), input.sha256);
   if (!document.recording_gap.empty())
-    fmt::print("            {}\n", cannot_be_checked(document.recording_gap));
+    fmt::print("            {}\n", printable_line(cannot_be_checked(document.recording_gap)));
+  fmt::print("devices     {}\n", devices_in_words(made_on_simulated_devices(document)));
   if (document.model.travel() != nullptr)
     fmt::print(
         "travel      V depends on the direction of travel ({}): abbe model eval --direction\n",
@@ -104,16 +114,8 @@ void print_model(const ModelDocument& document) {
   fmt::print("\n{}", to_tables_csv(document.model, document.backlash));
 }
 
-Result<StoreEntry> entry_of(const ModelStore& store, const std::string& id) {
-  const auto entries = store.list();
-  if (!entries) return tl::make_unexpected(entries.error());
-  for (const auto& entry : *entries)
-    if (entry.id == id) return entry;
-  return fail(ErrorCode::Usage, fmt::format("model {}: not in the store", id));
-}
-
-/// Shows a model file. It need not be in a store; without a store the state of the model and the
-/// verdict of the gate are not known.
+/// Shows a model file. It need not be in a store; without a store it is not known whether the model
+/// is active.
 int show_file(const ModelStoreArguments& arguments) {
   const auto document = read_model(arguments.id);
   if (!document) return report(document.error());
@@ -121,7 +123,8 @@ int show_file(const ModelStoreArguments& arguments) {
   if (arguments.json) {
     fmt::print("{}", to_json(*document));
   } else {
-    fmt::print("id          {}\nfile        {}\n", model_id(*document), arguments.id);
+    fmt::print("id          {}\nfile        {}\nverdict     {}\n", model_id(*document),
+               printable_line(arguments.id), printable_line(in_one_line(document->verdict)));
     print_model(*document);
   }
   return 0;
@@ -134,28 +137,68 @@ int show(const ModelStoreArguments& arguments) {
   if (!store) return report(store.error());
   const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
-  const auto document = store->load(*id);
-  if (!document) return report(document.error());
+  const auto stored = stored_model(*store, *id);
+  if (!stored) return report(stored.error());
 
   if (arguments.json) {
-    fmt::print("{}", to_json(*document));
+    fmt::print("{}", to_json(stored->document));
     return 0;
   }
 
-  const auto entry = entry_of(*store, *id);
-  if (!entry) return report(entry.error());
-  print_entry(*entry);
-  print_model(*document);
+  print_entry(stored->entry);
+  if (const auto& verdict = stored->document.verdict; verdict && verdict->forced)
+    fmt::print("forced by   {}\n", printable_line(who_and_when(*verdict->forced)));
+  print_model(stored->document);
 
   return 0;
 }
 
+/// The hash of the present configuration, for which the user accepts model `id`. Refused if nothing
+/// is to be accepted, or if more differs than an earlier version did not know.
+Result<std::string> accepted_configuration(const ModelStoreArguments& arguments,
+                                           const ModelStore& store, const std::string& id) {
+  const auto config = load_config(arguments.store.config);
+  if (!config) return tl::make_unexpected(config.error());
+  const auto document = store.load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto present = present_configuration(*config);
+  const auto fit = fit_of(*document, present);
+  if (fit.kind == ConfigurationFit::Kind::OlderHash) return present.hash;
+  return fail(
+      ErrorCode::Refused,
+      fmt::format("activate {}: {}", id,
+                  fit.sentence.empty() ? "the model is of this configuration: activate it without "
+                                         "--accept-older-hash"
+                                       : fit.sentence));
+}
+
+Result<void> check_activation(const ModelStoreArguments& arguments) {
+  if (const auto forced = forced_by(arguments.force); !forced)
+    return tl::make_unexpected(forced.error());
+  if (arguments.accept_older_hash && arguments.force.why.empty())
+    return fail(ErrorCode::Usage,
+                "--accept-older-hash needs --why: the store keeps who accepted the model and why");
+  if (arguments.accept_older_hash && arguments.store.config.empty())
+    return fail(ErrorCode::Usage,
+                "--accept-older-hash needs -c: the model is accepted for that configuration only");
+  return {};
+}
+
 int activate(const ModelStoreArguments& arguments) {
+  if (const auto valid = check_activation(arguments); !valid) return report(valid.error());
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const auto id = id_named(*store, arguments.id);
   if (!id) return report(id.error());
-  if (const auto done = store->activate(*id, actor(arguments), arguments.force); !done)
+  std::string accepted;
+  if (arguments.accept_older_hash) {
+    auto configuration = accepted_configuration(arguments, *store, *id);
+    if (!configuration) return report(configuration.error());
+    accepted = *std::move(configuration);
+  }
+  if (const auto done =
+          store->activate(*id, actor_now(arguments.force.why), arguments.force.force, accepted);
+      !done)
     return report(done.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -166,7 +209,7 @@ int rollback(const ModelStoreArguments& arguments) {
   if (!store) return report(store.error());
   const auto active = id_named(*store, arguments.active);
   if (!active) return report(active.error());
-  const auto id = store->rollback(actor(arguments), *active);
+  const auto id = store->rollback(actor_now(arguments.force.why), *active);
   if (!id) return report(id.error());
   fmt::print("active: {}\n", *id);
   return 0;
@@ -176,7 +219,7 @@ int prune(const ModelStoreArguments& arguments) {
   auto store = open_store(arguments.store);
   if (!store) return report(store.error());
   const ModelRetention retention{arguments.keep_newest, std::chrono::days{arguments.keep_days}};
-  const auto removed = store->remove_old(retention, actor(arguments));
+  const auto removed = store->remove_old(retention, actor_now(arguments.force.why));
   if (!removed) return report(removed.error());
   for (const auto& id : *removed) fmt::print("removed: {}\n", id);
   fmt::print("{} models removed\n", removed->size());
@@ -216,15 +259,14 @@ void add_model_activate(CLI::App& parent, int& exit) {
                    "model id, or the beginning of an id (at least 4 characters)")
       ->required();
   add_store_options(*command, arguments->store);
-  command->add_option("--why", arguments->why, "reason, for the record; required with --force");
-  command->add_flag("--force", arguments->force, "activate a model that the gate refused");
+  add_force_options(*command, arguments->force, "activate a model that the gate refused",
+                    "reason, for the record; required with --force and --accept-older-hash");
+  command->add_flag("--accept-older-hash", arguments->accept_older_hash,
+                    "accept a model of an earlier version for the configuration of -c: you have\n"
+                    "checked that the keys its hash does not contain are as they were when it was\n"
+                    "made (abbe status names them); needs -c and --why");
 
-  command->callback([arguments, &exit] {
-    exit = arguments->force && arguments->why.empty()
-               ? report({ErrorCode::Usage,
-                         "--force needs --why: a forced activation is recorded with its reason"})
-               : activate(*arguments);
-  });
+  command->callback([arguments, &exit] { exit = activate(*arguments); });
 }
 
 void add_model_rollback(CLI::App& parent, int& exit) {
@@ -237,7 +279,7 @@ void add_model_rollback(CLI::App& parent, int& exit) {
                    "id of the model to leave; refused if another one is active, so that a "
                    "repeated command does not go one model further back")
       ->type_name("ID");
-  command->add_option("--why", arguments->why, "reason, for the record");
+  command->add_option("--why,--reason", arguments->force.why, "reason, for the record");
   command->callback([arguments, &exit] { exit = rollback(*arguments); });
 }
 
@@ -257,7 +299,7 @@ void add_model_prune(CLI::App& parent, int& exit) {
       ->add_option("--keep-days", arguments->keep_days,
                    "models that were added less than this before now are kept, too")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--why", arguments->why, "reason, for the record");
+  command->add_option("--why,--reason", arguments->force.why, "reason, for the record");
   command->callback([arguments, &exit] { exit = prune(*arguments); });
 }
 

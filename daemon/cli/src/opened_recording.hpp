@@ -22,4 +22,9 @@ struct OpenedRecording {
 [[nodiscard]] Result<OpenedRecording> open_recording(const std::string& file,
                                                      const std::string& config = {});
 
+/// The samples of a recording have the meaning that the recorded configuration gives them, and may
+/// be of simulated devices, whatever `config` says of the devices. null: the recorded configuration
+/// cannot be read.
+void take_recorded_readings(Config& config, const Config* recorded);
+
 }  // namespace abbe::daemon

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/methods/mfb/bar_plan.hpp"
@@ -123,7 +124,7 @@ int run(const PlanMfbArguments& arguments) {
 
   const bool complete = plan->prediction.not_seen.empty();
   if (arguments.json)
-    fmt::print("{}\n", bar_plan_json(*plan, inputs->bar).dump(1));
+    fmt::print("{}\n", indented_json_text(bar_plan_json(*plan, inputs->bar)));
   else
     print_bar_plan(*plan, inputs->bar);
   if (!complete) return report(not_seen(*plan, *inputs));

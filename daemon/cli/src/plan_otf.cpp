@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/otf/plan.hpp"
@@ -210,7 +211,7 @@ Result<std::vector<std::string>> write_plan(const PathPlan& plan,
   std::vector<std::pair<std::string, std::string>> files{
       {"path.csv", to_path_csv(plan.path, plan.run.drive.feed_m_per_s)},
       {"map.csv", to_map_csv(plan.prediction)},
-      {"plan.json", plan_json(plan, arguments).dump(1) + "\n"}};
+      {"plan.json", indented_json_text(plan_json(plan, arguments)) + "\n"}};
   for (const auto& named : arguments.dialects) {
     if (const auto dialect = dialect_named(named))
       files.emplace_back(fmt::format("path{}", extension(*dialect)),
@@ -280,7 +281,7 @@ int run(const PlanOtfArguments& arguments) {
     written = *std::move(files);
   }
   if (arguments.json)
-    fmt::print("{}\n", plan_json(*plan, arguments).dump(1));
+    fmt::print("{}\n", indented_json_text(plan_json(*plan, arguments)));
   else
     print_plan(*plan, written, arguments.out);
   return 0;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/pipeline/reference_session.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
@@ -72,7 +73,7 @@ int print_result(const json& reference, bool as_json) {
     all = all && axis["state"] == "found";
     if (!as_json) fmt::print("{}\n", line_of(axis));
   }
-  if (as_json) fmt::print("{}\n", reference.dump(1));
+  if (as_json) fmt::print("{}\n", indented_json_text(reference));
   return all ? 0 : 1;
 }
 

@@ -13,6 +13,8 @@
 #include <string>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/replay/replay.hpp"
 #include "commands.hpp"
 #include "sample_lines.hpp"
@@ -69,9 +71,13 @@ void print_report(const RecordingReader& recording, const ReplayReport& r, doubl
   fmt::print("{} snapshots, {:.1f} s recorded, replayed in {:.2f} s: {:.0f} x real time\n",
              r.snapshots, recorded_s, wall_s, recorded_s / wall_s);
 
+  if (r.snapshots == 0)
+    fmt::print("nothing      no snapshot in {} messages and {} samples: --samples prints them\n",
+               recording.message_count(), r.samples);
+
   for (const auto& c : r.calibrations) {
     if (!c.outcome) {
-      fmt::print("calibration  {}: {}\n", name(c.ended.state), c.ended.reason);
+      fmt::print("calibration  {}: {}\n", name(c.ended.state), printable_line(c.ended.reason));
     } else if (!*c.outcome) {
       fmt::print("calibration  not identified: {}\n", c.outcome->error().text);
     } else {
@@ -99,6 +105,7 @@ void print_report(const RecordingReader& recording, const ReplayReport& r, doubl
 
 void print_json(const RecordingReader& recording, const ReplayReport& r, double wall_s) {
   json out{{"snapshots", r.snapshots},
+           {"samples", r.samples},
            {"undecodable", r.undecodable},
            {"recorded_s", std::chrono::duration<double>(r.recorded).count()},
            {"wall_s", wall_s},
@@ -115,17 +122,18 @@ void print_json(const RecordingReader& recording, const ReplayReport& r, double 
     out["reference"].push_back(
         {{"axis", d.axis}, {"live", d.live}, {"again", d.again ? json(*d.again) : json{}}});
   for (const auto& c : r.calibrations) out["calibrations"].push_back(calibration_json(c));
-  fmt::print("{}\n", out.dump(1));
+  fmt::print("{}\n", indented_json_text(out));
 }
 
 /// Exit code of the replay. A model that differs from the live one is an error, unless another
-/// configuration was given (-c).
+/// configuration was given (-c). So is a replay that gives nothing.
 int exit_code_of(const RecordingReader& recording, const ReplayReport& report,
                  const ReplayArguments& arguments) {
   constexpr int kDone = number(ExitCode::Done), kNoAnswer = number(ExitCode::DataInsufficient);
   const bool all_identified = std::all_of(report.calibrations.begin(), report.calibrations.end(),
                                           [](const auto& c) { return c.outcome && *c.outcome; });
-  const bool sound = recording.damage().empty() && report.undecodable == 0;
+  const bool any = (arguments.samples ? report.samples : report.snapshots) > 0;
+  const bool sound = any && recording.damage().empty() && report.undecodable == 0;
   const bool must_agree = !report.live_model_ids.empty() && arguments.config.empty();
   return sound && all_identified && (!must_agree || same_as_live(report)) ? kDone : kNoAnswer;
 }
@@ -135,7 +143,7 @@ int run(const ReplayArguments& arguments) {
   const auto recording = RecordingReader::open(arguments.file);
   if (!recording) return report(recording.error());
   for (const auto& loss : recording->losses())
-    fmt::print(stderr, "{}: {}\n", arguments.file, loss.what);
+    fmt::print(stderr, "{}: {}\n", printable_line(arguments.file), printable_line(loss.what));
 
   const auto config = config_of(arguments, *recording);
   if (!config) return report(config.error());
@@ -172,9 +180,10 @@ void add_replay(CLI::App& parent, int& exit) {
   auto* command = parent.add_subcommand(
       "replay",
       "Replay a recording: the same snapshots and the same model as live.\n"
-      "Exit code 1 if a calibration gives no model, or (without -c) another model than live, or\n"
-      "if the recording is damaged before its end; 3 if the recorded configuration is damaged and\n"
-      "-c is not given.");
+      "Exit code 1 if there is no snapshot (with --samples: no sample), if a calibration gives no\n"
+      "model, or (without -c) another model than live, or if the recording is damaged before its\n"
+      "end; 3 if the recorded configuration is damaged and -c is not given; 4 if the file becomes\n"
+      "shorter while it is read.");
   command->add_option("FILE", arguments->file, "recording (.mcap, also an unfinished .mcap.part)")
       ->required();
   command->add_flag("--raw", arguments->raw,

@@ -3,17 +3,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_report.hpp"
+#include "abbe/report/verdict_in_words.hpp"
 #include "certificate_file.hpp"
 #include "commands.hpp"
+#include "force_option.hpp"
 #include "output_files.hpp"
 #include "pdf_converter.hpp"
 #include "store_option.hpp"
@@ -27,9 +31,10 @@ struct ReportArguments {
   std::string out, pdf, dcc;
   bool trend = false;
   StoreOption store;
+  ForceOption force;
 };
 
-/// A model with its verdict, from the store, or a file without one.
+/// A model with its verdict, from the store or a file.
 Result<ReportSubject> subject_named(const std::string& name, const ReportArguments& arguments,
                                     const CertificateDetails& details) {
   Result<ReportSubject> subject = [&]() -> Result<ReportSubject> {
@@ -44,7 +49,14 @@ Result<ReportSubject> subject_named(const std::string& name, const ReportArgumen
     if (!id) return tl::make_unexpected(id.error());
     return report_subject(*store, *id);
   }();
-  if (subject) subject->details = details;
+  if (!subject) return subject;
+  auto machine = machine_hash_of(arguments.store);
+  if (!machine) return tl::make_unexpected(machine.error());
+  const auto forced = forced_by(arguments.force);
+  if (!forced) return tl::make_unexpected(forced.error());
+  subject->details = details;
+  subject->machine_hash = *std::move(machine);
+  subject->forced = *forced;
   return subject;
 }
 
@@ -58,7 +70,7 @@ Result<std::vector<ReportSubject>> models_of_machine(const ReportSubject& subjec
   std::vector<ReportSubject> models;
   for (const StoreEntry& entry : *entries) {
     if (!entry.fault.empty()) {
-      fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, entry.fault);
+      fmt::print(stderr, "abbe: model {} is left out: {}\n", entry.id, printable_line(entry.fault));
       continue;
     }
     if (entry.machine != subject.document.machine) continue;
@@ -136,6 +148,16 @@ std::string file_name(const ReportSubject& subject, const ReportArguments& argum
   return fmt::format("{}-{}.html", arguments.trend ? "trend" : "report", id);
 }
 
+/// Without what the model itself has: nobody can correct it, and the report states it.
+std::vector<std::string> contradictory_details(const ReportSubject& subject) {
+  auto wrong = contradictory_dates(subject, nullptr);
+  const auto of_model = contradictory_times(subject);
+  std::erase_if(wrong, [&of_model](const std::string& text) {
+    return std::ranges::find(of_model, text) != of_model.end();
+  });
+  return wrong;
+}
+
 Result<void> write_report(const ReportArguments& arguments) {
   CertificateDetails details;
   if (!arguments.details.empty()) {
@@ -143,6 +165,7 @@ Result<void> write_report(const ReportArguments& arguments) {
     if (!read) return tl::make_unexpected(read.error());
     details = *std::move(read);
   }
+  details.now = actor_now({}).when;
   const auto subject = subject_named(arguments.model, arguments, details);
   if (!subject) return tl::make_unexpected(subject.error());
   const std::string out = arguments.out.empty() ? file_name(*subject, arguments) : arguments.out;
@@ -151,6 +174,10 @@ Result<void> write_report(const ReportArguments& arguments) {
   for (const auto& file : written)
     if (auto place = file.empty() ? Result<void>{} : require_place_of(file); !place) return place;
 
+  if (auto wrong = contradictory_details(*subject); arguments.dcc.empty() && !wrong.empty())
+    return tl::make_unexpected(
+        Error{ErrorCode::BadInput, "report: dates are impossible", std::move(wrong)});
+
   // Everything is made before the first file is written.
   const auto page = page_of(*subject, arguments);
   if (!page) return tl::make_unexpected(page.error());
@@ -158,6 +185,8 @@ Result<void> write_report(const ReportArguments& arguments) {
   if (!arguments.dcc.empty()) certificate = certificate_of(*subject, arguments);
   if (!certificate) return tl::make_unexpected(certificate.error());
 
+  if (const auto verdict = verdict_in_words(*subject); verdict.signal != Signal::Green)
+    fmt::print("verdict     {}\n", verdict.text);
   if (auto done = write_file(out, *page); !done) return done;
   if (!arguments.dcc.empty())
     if (auto done = write_file(arguments.dcc, *certificate); !done) return done;
@@ -200,6 +229,10 @@ void add_report(CLI::App& parent, int& exit) {
       "--dcc", arguments->dcc,
       "also write this XML file: Digital Calibration Certificate (PTB DCC 3.2.1), not signed;\n"
       "needs --details");
+  add_force_options(*command, arguments->force,
+                    "certify a model that the gate refused; certificate and report state it",
+                    "reason, for the certificate; required with --force")
+      ->needs(dcc);
   command
       ->add_option("--as-left", arguments->as_left,
                    "model measured after the adjustment, for --dcc; MODEL is then as found")

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/option_values.hpp"
 #include "commands.hpp"
 #include "dds_keys.hpp"
 #include "examples.hpp"
@@ -38,6 +39,8 @@ std::string footer() {
               {ExitCode::Io},
               {ExitCode::Refused,
                "refused by the gate, or because of the state of the daemon or of the model store"},
+              {ExitCode::StopNotConfirmed},
+              {ExitCode::StopNotSent},
               {ExitCode::Interrupted,
                "interrupted while following a calibration, which continues"}}) +
          "\nUnits: lengths mm, small errors um, angles rad or urad, times s; every column and key\n"
@@ -125,6 +128,7 @@ int parse_and_run(const std::vector<std::string>& words) {
   app.require_subcommand(1);
   add_commands(app, exit);
   add_examples(app);
+  check_option_values(app);
 
   const std::vector<std::string> programs{kPrograms.begin(), kPrograms.end()};
   if (asks_for_help(words)) {

@@ -89,6 +89,24 @@ void print_positions(const json& status) {
   for (std::size_t i = 0; i < axes.size(); ++i)
     fmt::print("{}{}", i == 0 ? "" : "  ", position_text(axes[i], positions[i]));
   fmt::print("\n");
+  for (const json& axis : axes)
+    if (const auto missing = axis.value("missing", std::string{}); !missing.empty())
+      fmt::print("           {}: {}\n", axis["axis"].get<std::string>(),
+                 coloured(missing, kYellow, STDOUT_FILENO));
+}
+
+/// Earlier versions of abbed send none; nothing is printed then.
+void print_identity(const json& identity) {
+  if (identity.empty()) return;
+  const auto id = identity.value("machine_id", std::string{});
+  fmt::print("identity   {}{}\n", id.empty() ? "-" : id,
+             identity.value("confirmed", false) ? "" : "  not confirmed");
+  const auto show = [](const std::string& text) {
+    if (!text.empty()) fmt::print("           {}\n", coloured(text, kYellow, STDOUT_FILENO));
+  };
+  show(identity.value("reason", std::string{}));
+  if (const auto twin = identity.value("twin", std::string{}); !twin.empty())
+    show("another machine publishes with " + twin);
 }
 
 void print_next(const json& next) {
@@ -138,6 +156,13 @@ void print_release_awaited(const json& awaited) {
       awaited["command"].get<std::string>());
 }
 
+void print_machine_stop(const json& stop) {
+  const auto outcome = stop["outcome"].get<std::string>();
+  fmt::print("stop       {}: {}\n",
+             outcome == "stopped" ? outcome : coloured(outcome, kRed, STDOUT_FILENO),
+             stop["text"].get<std::string>());
+}
+
 void print_dds(const json& dds) {
   const bool connected = dds["connected"].get<bool>();
   const auto state = dds.value("state", std::string{});  // older versions of abbed do not send it
@@ -159,13 +184,38 @@ void print_dds(const json& dds) {
   fmt::print("           {}\n", security == "on" ? "DDS Security is on" : security);
 }
 
+/// Empty if neither the devices nor the active model are simulated. Older versions of abbed do not
+/// send it.
+std::string simulated_parts(const json& status) {
+  const bool devices = status.value("simulated", false);
+  const bool model = status["model"].value("simulated", false);
+  if (devices && model) return "SIMULATED devices; the model was made on simulated devices";
+  if (devices) return "SIMULATED devices";
+  return model ? "the model was made on SIMULATED devices" : "";
+}
+
+/// The file, and how far it is behind the machine.
+void print_recording(const json& status) {
+  fmt::print("recording  {}", status["recording"].get<std::string>());
+  for (const json& stream : status["streams"])
+    if (stream.contains("behind_s"))
+      fmt::print(", {:.1f} s behind", stream["behind_s"].get<double>());
+  fmt::print("\n");
+}
+
 void print_status(const json& status) {
   const json& model = status["model"];
   const std::string state = model["state"];
   fmt::print("machine    {}\n", status["machine"].get<std::string>());
+  print_identity(status.value("identity", json::object()));
+  if (const auto simulated = simulated_parts(status); !simulated.empty())
+    fmt::print("           {}\n", coloured(simulated, kYellow, STDOUT_FILENO));
   fmt::print("model      {} {} ({})\n", coloured(state, colour_of_model(state), STDOUT_FILENO),
              model.value("id", "-"), model["reason"].get<std::string>());
+  for (const json& change : status.value("clock", json::array()))
+    fmt::print("clock      {}\n", coloured(change.get<std::string>(), kYellow, STDOUT_FILENO));
   if (status.contains("release_awaited")) print_release_awaited(status["release_awaited"]);
+  if (status.contains("machine_stop")) print_machine_stop(status["machine_stop"]);
   const json& session = status["session"];
   fmt::print("session    {}, {:.0f} %, {} points: {}\n", session["state"].get<std::string>(),
              100.0 * session["progress"].get<double>(), session["points"].get<std::uint64_t>(),
@@ -190,8 +240,7 @@ void print_status(const json& status) {
   if (status.contains("unmeasured_air"))
     fmt::print("tracker    {}\n",
                coloured(status["unmeasured_air"].get<std::string>(), kYellow, STDOUT_FILENO));
-  if (status.contains("recording"))
-    fmt::print("recording  {}\n", status["recording"].get<std::string>());
+  if (status.contains("recording")) print_recording(status);
   if (status.contains("dds")) print_dds(status["dds"]);
   fmt::print("\n{:<10} {:<14} {:>10} {:>10} {:>7} {:>5} {:>7}  {}\n", "stream", "state", "rate",
              "samples", "dropped", "gaps", "faults", "last fault");

@@ -6,7 +6,10 @@
 #include <CLI/Formatter.hpp>
 #include <system_error>
 
+#include "abbe/base/printable.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/model/machine_identity.hpp"
+#include "abbe/model/stored_model.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -73,13 +76,46 @@ std::filesystem::path file_of_model(const std::string& name, const StoreOption& 
   return store && id ? store->model_path(*id) : std::filesystem::path{};
 }
 
-Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
-  if (names_a_file(name)) return read_model(name);
+Result<std::optional<std::string>> machine_hash_of(const StoreOption& where) {
+  if (where.config.empty()) return std::nullopt;
+  const auto config = load_config(where.config);
+  if (!config) return tl::unexpected(config.error());
+  return machine_hash(*config);
+}
+
+Result<FoundModel> found_model(const std::string& name, const StoreOption& where) {
+  auto machine = machine_hash_of(where);
+  if (!machine) return tl::make_unexpected(machine.error());
+  if (names_a_file(name)) {
+    auto document = read_model(name);
+    if (!document) return tl::make_unexpected(document.error());
+    return FoundModel{*std::move(document), {}, *std::move(machine)};
+  }
   const auto store = open_store(where);
   if (!store) return tl::make_unexpected(store.error());
   const auto id = id_named(*store, name);
   if (!id) return tl::make_unexpected(id.error());
-  return store->load(*id);
+  auto stored = stored_model(*store, *id);
+  if (!stored) return tl::make_unexpected(stored.error());
+  return FoundModel{std::move(stored->document), std::move(stored->events), *std::move(machine),
+                    identity_doubt(*store, *id, marks_of_this_computer())};
+}
+
+Result<ModelDocument> model_named(const std::string& name, const StoreOption& where) {
+  auto found = found_model(name, where);
+  if (!found) return tl::make_unexpected(found.error());
+  return std::move(found->document);
+}
+
+std::vector<std::string> cautions_of(const FoundModel& model) {
+  auto all = obstacles_to_use(model.in_use(ModelPurpose::Look)).statements;
+  if (state_of(model.document.verdict) == VerdictState::Accepted) all.erase(all.begin());
+  return all;
+}
+
+void print_cautions(const std::string& name, const FoundModel& model) {
+  for (const std::string& caution : cautions_of(model))
+    fmt::print(stderr, "abbe: caution: {}: {}\n", printable_line(name), printable_line(caution));
 }
 
 }  // namespace abbe::daemon

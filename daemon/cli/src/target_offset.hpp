@@ -7,9 +7,8 @@
 namespace abbe::daemon {
 
 /// Replaces [target] offset_mm: from the tool reference point to the reflector or stylus tip.
-inline void set_target(MachineConfig& machine, const calib::Vector3& offset_m) {
-  machine.target_offset_m = {offset_m.x(), offset_m.y(), offset_m.z()};
-  machine.target_given = true;
+inline void set_target(Config& config, const calib::Vector3& offset_m) {
+  set_target_offset(config, {offset_m.x(), offset_m.y(), offset_m.z()});
 }
 
 }  // namespace abbe::daemon

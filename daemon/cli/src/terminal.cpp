@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "abbe/base/printable.hpp"
+
 namespace abbe::daemon {
 
 namespace {
@@ -27,8 +29,9 @@ std::string coloured(std::string_view text, int colour, int fd) {
 }
 
 int report(const Error& error) {
-  fmt::print(stderr, "abbe: {} {}\n", coloured("error:", kRed, STDERR_FILENO), error.text);
-  for (const auto& line : error.details) fmt::print(stderr, "  {}\n", line);
+  fmt::print(stderr, "abbe: {} {}\n", coloured("error:", kRed, STDERR_FILENO),
+             printable(error.text));
+  for (const auto& line : error.details) fmt::print(stderr, "  {}\n", printable(line));
   return exit_code(error.code);
 }
 

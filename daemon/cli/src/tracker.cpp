@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "abbe/base/control_protocol.hpp"
+#include "abbe/base/json_text.hpp"
 #include "commands.hpp"
 #include "daemon_socket.hpp"
 #include "follow.hpp"
@@ -46,7 +47,7 @@ int print_outcome(const json& order, bool as_json) {
         {outcome == "refused" ? ErrorCode::Refused : ErrorCode::Io,
          fmt::format("tracker: {}: {}", text_at(order, "order"), text_at(order, "text"))});
   if (as_json) {
-    fmt::print("{}\n", order.dump(1));
+    fmt::print("{}\n", indented_json_text(order));
   } else {
     fmt::print("{}\n", text_at(order, "text"));
     print_reflectors(order);
@@ -73,7 +74,7 @@ int give_order(const TrackerArguments& arguments, const json& request) {
         {ErrorCode::Io,
          fmt::format("tracker: the outcome of order {} is lost: the daemon keeps only the latest "
                      "orders; see `abbe tracker status`",
-                     number.dump())});
+                     json_text(number))});
   };
 
   ProgressBar no_bar{false};
@@ -127,7 +128,7 @@ int show_tracker(const TrackerArguments& arguments) {
                    "tracker: the daemon's configuration has no tracker: set [tracker] host"});
 
   if (arguments.json) {
-    fmt::print("{}\n", status->at("tracker").dump(1));
+    fmt::print("{}\n", indented_json_text(status->at("tracker")));
   } else {
     print_tracker(status->at("tracker"));
   }

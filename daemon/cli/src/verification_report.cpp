@@ -56,6 +56,7 @@ std::size_t points_improved(const verify::Comparison& c) {
 void add_verdict(HtmlReport& page, const Verification& v) {
   page.heading("Verdict");
   page.paragraph(verdict_text(v.comparison) + ".");
+  for (const std::string& caution : v.cautions) page.paragraph("Of the model: " + caution + ".");
 }
 
 void add_left(HtmlReport& page, const Verification& v) {

@@ -6,10 +6,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 #include <system_error>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/base/units.hpp"
+#include "abbe/calib/fit/points_off.hpp"
 #include "abbe/cli/verification_report.hpp"
 #include "abbe/config/calib_error.hpp"
 #include "abbe/tables/input_files.hpp"
@@ -43,6 +47,7 @@ struct VerifyArguments {
 struct VerifyOutcome {
   ModelDocument document;
   Verification verification;
+  std::vector<std::string> points_off{};  ///< points that alone do not fit, one line each
 };
 
 Result<verify::Options> options_of(const VerifyArguments& arguments) {
@@ -99,12 +104,63 @@ Result<LivePoints> points_of(const VerifyArguments& arguments) {
   return points_of_daemon(*socket, arguments.count, keep_them);
 }
 
+/// The place of a point in messages: "points.csv:9", or "point 8" if it is not from a file.
+std::string place_of(const VerificationFile& file, std::size_t point) {
+  return point < file.lines.size() ? fmt::format("{}:{}", file.source.name, file.lines[point])
+                                   : fmt::format("point {}", point + 1);
+}
+
+/// One line for each point that alone does not fit the others.
+std::vector<std::string> lines_of_points_off(const VerificationFile& file,
+                                             const calib::fit::PointsOff& off,
+                                             std::string_view advice) {
+  std::vector<std::string> lines;
+  for (const auto& [point, distance_m] : off.points)
+    lines.push_back(fmt::format(
+        "{}: alone does not fit: {:.4g} mm off, the others fit within {:.4g} mm rms: {}",
+        place_of(file, point), kMmPerM * distance_m, kMmPerM * off.rms_others_m, advice));
+  return lines;
+}
+
+/// `error` of the fit of all points: if some alone do not fit, they are the cause.
+Error with_points_off(Error error, const VerificationFile& file) {
+  std::vector<calib::Vector3> measured_m, readings_m;
+  for (const auto& point : file.points) {
+    measured_m.push_back(point.measured_m);
+    readings_m.push_back(point.reading_m);
+  }
+  const auto off = calib::fit::points_off(measured_m, readings_m);
+  if (off.points.empty()) return error;
+  return {error.code,
+          fmt::format("verification: {} of {} points alone do not fit the others",
+                      off.points.size(), file.points.size()),
+          lines_of_points_off(file, off, "correct or delete it")};
+}
+
 Result<verify::Observations> observed_in(const VerifyArguments& arguments,
                                          const VerificationFile& file) {
   auto observed = verify::observe(
       file.points, arguments.frame == "fit" ? verify::Frame::BestFit : verify::Frame::Machine);
-  if (!observed) return tl::make_unexpected(error_of(observed.error()));
+  if (!observed) return tl::make_unexpected(with_points_off(error_of(observed.error()), file));
   return std::move(*observed);
+}
+
+/// The points inside the validity volume that alone do not fit the model.
+std::vector<std::string> off_with_model(const VerificationFile& file,
+                                        const verify::Comparison& compared,
+                                        const calib::VolumetricModel& model,
+                                        const calib::Vector3& tool_m) {
+  std::vector<calib::Vector3> measured_m, corrected_m;
+  for (const std::size_t point : compared.inside) {
+    const auto& [reading_m, at_m] = file.points[point];
+    measured_m.push_back(at_m);
+    corrected_m.emplace_back(reading_m + model.V_at(reading_m, tool_m));
+  }
+  // An error of the size of those of the machine is one that the model does not know.
+  auto off = calib::fit::points_off(measured_m, corrected_m, compared.before.rms_m);
+  for (auto& found : off.points) found.point = compared.inside[found.point];
+  return lines_of_points_off(
+      file, off, "check or repeat this point; if it is right, the model is wrong there");
 }
 
 /// Sets `cut_short` if points are missing, even if the comparison fails: the missing points may be
@@ -112,8 +168,9 @@ Result<verify::Observations> observed_in(const VerifyArguments& arguments,
 Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Error>& cut_short) {
   const auto options = options_of(arguments);
   if (!options) return tl::make_unexpected(options.error());
-  auto document = model_named(arguments.models.front(), arguments.store);
-  if (!document) return tl::make_unexpected(document.error());
+  auto found = found_model(arguments.models.front(), arguments.store);
+  if (!found) return tl::make_unexpected(found.error());
+  ModelDocument* const document = &found->document;
   const auto tool_m = tool_of(arguments.tool, document->model);
   if (!tool_m) return tl::make_unexpected(tool_m.error());
 
@@ -135,13 +192,15 @@ Result<VerifyOutcome> compare(const VerifyArguments& arguments, std::optional<Er
   auto compared = verify::compare(*observed, document->model, *tool_m, *options);
   if (!compared) return tl::make_unexpected(error_of(compared.error()));
 
+  auto off = off_with_model(file, *compared, document->model, *tool_m);
   v.observations = std::move(*observed);
   v.comparison = std::move(*compared);
   if (!file.source.name.empty()) v.inputs = {file.source};
   v.lines = std::move(file.lines);
   if (cut_short) v.cut_short = cut_short->text;
 
-  return VerifyOutcome{std::move(*document), std::move(v)};
+  v.cautions = cautions_of(*found);
+  return VerifyOutcome{std::move(*document), std::move(v), std::move(off)};
 }
 
 nlohmann::json figures(const verify::RatioStatistics& s) {
@@ -163,13 +222,15 @@ void print_json(const VerifyOutcome& outcome) {
   nlohmann::json object{
       {"effect", effect_name(verify::effect_at_points(c))},
       {"model", model_id(outcome.document)},
+      {"cautions", outcome.verification.cautions},
       {"points", outcome.verification.observations.readings_m.size()},
       {"inside", c.inside.size()},
       {"before", vector_figures(c.before)},
       {"after", vector_figures(c.after)},
       {"turned_urad", {kUradPerRad * turned(3), kUradPerRad * turned(4), kUradPerRad * turned(5)}},
       {"interpolation_rms_um", kUmPerM * c.interpolation_rms_m},
-      {"cut_short", outcome.verification.cut_short}};
+      {"cut_short", outcome.verification.cut_short},
+      {"points_off", outcome.points_off}};
 
   if (const auto why = why_no_ratio(c)) {
     object["R_not_given"] = *why;
@@ -178,7 +239,7 @@ void print_json(const VerifyOutcome& outcome) {
     object["R_stated"] = figures(c.R_stated);
   }
 
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_ratio(const char* what, const verify::RatioStatistics& s) {
@@ -201,8 +262,11 @@ void print_summary(const VerifyOutcome& outcome, const VerifyArguments& argument
   const auto& v = outcome.verification;
   const auto& c = v.comparison;
   fmt::print("verdict     {}\n", verdict_text(c));
+  for (const auto& line : outcome.points_off) fmt::print("one point   {}\n", line);
   fmt::print("model       {}  (machine \"{}\", {})\n", model_id(outcome.document),
-             outcome.document.machine, outcome.document.method);
+             printable_line(outcome.document.machine), outcome.document.method);
+  for (const std::string& caution : v.cautions)
+    fmt::print("caution     {}\n", printable_line(caution));
   fmt::print("points      {}, {} of them where the model is valid\n",
              v.observations.readings_m.size(), c.inside.size());
   fmt::print(

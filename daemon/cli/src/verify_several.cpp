@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/calib/verify/compare.hpp"
 #include "abbe/config/calib_error.hpp"
@@ -59,15 +61,16 @@ void print_predictions_json(const std::vector<Predicted>& all, std::size_t point
   for (const auto& [model, at_points] : all)
     object["models"].push_back({{"name", model->name},
                                 {"model", model_id(model->document)},
+                                {"cautions", model->cautions},
                                 {"effect", effect_name(verify::effect_at_points(at_points))},
                                 {"before", vector_figures(at_points.before)},
                                 {"after", vector_figures(at_points.after)}});
-  fmt::print("{}\n", object.dump(1));
+  fmt::print("{}\n", indented_json_text(object));
 }
 
 void print_prediction(const std::string& name, const char* effect,
                       const calib::VectorStatistics& s) {
-  fmt::print("{:<32}  {:>9.3f}  {:>9.3f}  {:>9.3f}  {}\n", name, kUmPerM * s.mean_m,
+  fmt::print("{:<32}  {:>9.3f}  {:>9.3f}  {:>9.3f}  {}\n", printable_line(name), kUmPerM * s.mean_m,
              kUmPerM * s.rms_m, kUmPerM * s.max_m, effect);
 }
 
@@ -80,6 +83,9 @@ void print_predictions(const std::vector<Predicted>& all, std::size_t points,
   for (const auto& [model, at_points] : all)
     print_prediction(model->name, effect_name(verify::effect_at_points(at_points)),
                      at_points.after);
+  for (const auto& [model, at_points] : all)
+    for (const std::string& caution : model->cautions)
+      fmt::print("{}: {}\n", printable_line(model->name), printable_line(caution));
 }
 
 }  // namespace
@@ -88,11 +94,12 @@ Result<std::vector<NamedModel>> models_named(const std::vector<std::string>& nam
                                              const StoreOption& store, const std::string& tool) {
   std::vector<NamedModel> models;
   for (const std::string& name : names) {
-    auto document = model_named(name, store);
-    if (!document) return tl::make_unexpected(document.error());
-    const auto tool_m = tool_of(tool, document->model);
+    auto found = found_model(name, store);
+    if (!found) return tl::make_unexpected(found.error());
+    const auto tool_m = tool_of(tool, found->document.model);
     if (!tool_m) return tl::make_unexpected(tool_m.error());
-    models.push_back({name, std::move(*document), *tool_m});
+    auto cautions = cautions_of(*found);
+    models.push_back({name, std::move(found->document), std::move(cautions), *tool_m});
   }
 
   constexpr double kSameTool_m = 1e-6;

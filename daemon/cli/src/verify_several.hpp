@@ -15,6 +15,7 @@ namespace abbe::daemon {
 struct NamedModel {
   std::string name;  ///< as given on the command line
   ModelDocument document;
+  std::vector<std::string> cautions;  ///< cautions_of()
   calib::Vector3 tool_m = calib::Vector3::Zero();
 };
 

@@ -14,7 +14,7 @@ constexpr double kCoarseStep_m = 10e-6, kCoarseStep_rad = 1e-3;
 
 }  // namespace
 
-void check_step(Section& section, double step, bool linear) {
+void check_step(ClassifiedSection& section, double step, bool linear) {
   if (std::abs(step) <= (linear ? kLargestStep_m : kLargestStep_rad)) return;
   if (linear)
     section.implausible("step_nm",

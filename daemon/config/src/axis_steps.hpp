@@ -5,6 +5,7 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -14,7 +15,7 @@ inline constexpr double kLargestStep_rad = 0.1;
 
 /// Adds a fault at step_nm or step_nrad if `step` per count is larger than that of any real scale;
 /// no fault in a recorded configuration.
-void check_step(Section& section, double step, bool linear);
+void check_step(ClassifiedSection& section, double step, bool linear);
 
 /// Adds a fault for every axis whose step is possible but improbable. `table`.`list` is the array
 /// in the file that has one element with a step per axis.

@@ -12,6 +12,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/config/section.hpp"
+#include "classified_section.hpp"
 #include "stream_names.hpp"
 
 namespace abbe::daemon {
@@ -33,18 +34,20 @@ struct ConfigKind {
 
   /// Reads and checks the table of this kind, adds the device to `out` and its name to `names`. The
   /// kinds that precede this one in DeviceConfigs have been read already.
-  void (*read)(Section& root, Config& out, StreamNames& names);
+  void (*read)(ClassifiedSection& root, Config& out, StreamNames& names);
+  /// Adds with ClassifiedSection::state() what keys of the kind mean together with other tables.
+  /// All tables have been read.
+  void (*state)(ClassifiedSection& root, const Config& config) = nullptr;
   /// Reports each value that is possible but improbable with Section::fault(). check_config() prints
   /// these faults as warnings.
   void (*doubt)(Section& root, const Config& config) = nullptr;
   /// The lines about the devices of this kind in `abbed --check-config`, one for each device.
   std::vector<std::string> (*summary)(const Config& config);
-  /// The text of this kind that enters machine_hash(): all that the meaning of a scale reading
-  /// depends on.
-  std::string (*reading_text)(const Config& config) = nullptr;
+  /// The text of this kind in former_machine_hash(). A new kind has none.
+  std::string (*former_text)(const Config& config) = nullptr;
 
   // Capabilities; see capabilities.hpp.
-  bool moves = false;  ///< it moves and touches points under its own control
+  std::optional<MotionSource> (*motion)(const Config& config) = nullptr;
   std::optional<AxisReadings> (*axes)(const Config& config) = nullptr;
   /// True: the positions of the device are the axis readings only if no other kind of device reads
   /// the axes.
@@ -55,7 +58,7 @@ struct ConfigKind {
   std::optional<TouchSource> (*touches)(const Config& config) = nullptr;
   std::optional<CountedAxes> (*counted)(const Config& config) = nullptr;
   const ReferenceMarks* (*marks)(const Config& config) = nullptr;
-  protocol::EnvironmentMask (*environment)(const Config& config) = nullptr;
+  std::vector<EnvironmentSource> (*environment)(const Config& config) = nullptr;
 };
 
 [[nodiscard]] std::span<const ConfigKind> config_kinds();

@@ -47,7 +47,7 @@ bool has(const ConfigKind& kind, Capability capability) {
     case Capability::Errors:
       return kind.points != nullptr || kind.touches != nullptr;
     case Capability::Motion:
-      return kind.moves;
+      return kind.motion != nullptr;
     case Capability::Environment:
       return kind.environment != nullptr;
   }
@@ -97,6 +97,10 @@ std::optional<TouchSource> touch_source(const Config& config) {
   return first_with(&ConfigKind::touches, config);
 }
 
+std::optional<MotionSource> motion_source(const Config& config) {
+  return first_with(&ConfigKind::motion, config);
+}
+
 std::optional<CountedAxes> counted_axes(const Config& config) {
   return first_with(&ConfigKind::counted, config);
 }
@@ -114,10 +118,19 @@ std::optional<std::chrono::nanoseconds> time_of_axis_samples(const Config& confi
   return std::nullopt;
 }
 
+std::vector<EnvironmentSource> environment_sources(const Config& config) {
+  std::vector<EnvironmentSource> all;
+  for (const ConfigKind& kind : config_kinds()) {
+    if (kind.environment == nullptr) continue;
+    const auto sources = kind.environment(config);
+    all.insert(all.end(), sources.begin(), sources.end());
+  }
+  return all;
+}
+
 protocol::EnvironmentMask measured_environment(const Config& config) {
   protocol::EnvironmentMask all = 0;
-  for (const ConfigKind& kind : config_kinds())
-    if (kind.environment != nullptr) all |= kind.environment(config);
+  for (const auto& source : environment_sources(config)) all |= source.measured;
   return all;
 }
 

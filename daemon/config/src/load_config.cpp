@@ -6,21 +6,22 @@
 #include <fstream>
 #include <sstream>
 
-#include "abbe/base/sha256.hpp"
 #include "abbe/config/bounded_toml.hpp"
 #include "config_kind.hpp"
 #include "readers.hpp"
 
 namespace abbe::daemon {
 
-Config read_all(Section& root, const std::filesystem::path& base) {
+Config read_all(const Section& file, const std::filesystem::path& base) {
   Config config;
+  ClassifiedSection root(file, "", config.meaning);
   StreamNames names;
   read_machine(root, config.machine);
   read_daemon(root, base, config);  // first, because devices depend on [daemon] simulated
   for (const ConfigKind& kind : config_kinds()) kind.read(root, config, names);
   read_thermal(root, config);
   read_air(root, config);
+  read_sensors(root, config);
   read_recording(root, base, config);
   read_models(root, config.models);
   read_dds(root, base, config);
@@ -29,8 +30,11 @@ Config read_all(Section& root, const std::filesystem::path& base) {
   read_drift(root, config);
   read_evemu(root, config);
   read_control(root, base, config);
-  (void)read_web(root, base);  // checked only: abbe-web uses it
-  (void)read_mtconnect(root);  // checked only: abbe-mtconnect uses it
+  // Checked only: abbe-web and abbe-mtconnect use them.
+  (void)read_web(root.operation_table("web"), base);
+  (void)read_mtconnect(root.operation_table("mtconnect"));
+  for (const ConfigKind& kind : config_kinds())
+    if (kind.state != nullptr) kind.state(root, config);
   root.close();
 
   return config;
@@ -82,28 +86,6 @@ std::vector<std::string> Config::connected_axes() const {
 
 bool Config::axes_compensated() const {
   return std::ranges::any_of(axis_readings(*this), &AxisReadings::compensated);
-}
-
-std::string machine_hash(const Config& config) {
-  const MachineConfig& machine = config.machine;
-  std::string text = fmt::format("{}|{}|0", machine.name, machine.chain);
-  for (const auto& axis : machine.axes)
-    text += fmt::format("|{} {} {:.17g} {:.17g} {:.17g}", axis.name, static_cast<int>(axis.kind),
-                        axis.min, axis.max, axis.reference);
-  for (const double t : machine.target_offset_m) text += fmt::format("|{:.17g}", t);
-
-  for (const auto& [axis, nodes_m] : machine.nodes_m) {
-    text += "|" + axis;
-    for (const double node_m : nodes_m) text += fmt::format(" {:.17g}", node_m);
-  }
-
-  for (const ConfigKind& kind : config_kinds())
-    if (kind.reading_text != nullptr) text += kind.reading_text(config);
-  for (const auto& thermal : config.thermal)
-    text += fmt::format("|thermal {} {:.17g} {:.17g} {}", thermal.axis, thermal.alpha_per_K,
-                        thermal.fixed_m, config.temperatures[thermal.temperature]);
-
-  return sha256_hex(text);
 }
 
 }  // namespace abbe::daemon

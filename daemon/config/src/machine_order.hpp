@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "abbe/config/config.hpp"
-#include "abbe/config/section.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -19,8 +19,8 @@ namespace abbe::daemon {
 /// has no node".
 template <class Reads>
 void put_in_order_of_the_machine(const MachineConfig& machine, std::string Reads::*name,
-                                 Section& device, std::string_view key, std::string_view what,
-                                 std::vector<Reads>& all) {
+                                 ClassifiedSection& device, std::string_view key,
+                                 std::string_view what, std::vector<Reads>& all) {
   for (const std::string needed : {"X", "Y", "Z"})
     if (std::ranges::find(all, needed, name) == all.end())
       device.fault(key, fmt::format("axis {} has no {}", needed, what));

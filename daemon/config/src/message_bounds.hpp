@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "abbe/config/section.hpp"
 #include "abbe/messages/cdr.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -23,13 +23,13 @@ template <class T>
 
 /// Reads a text that is published in messages. Adds a fault if it is longer than `most_bytes` or
 /// contains a NUL.
-inline bool get_bounded(Section& section, std::string_view key, std::string& out,
+inline bool get_bounded(ClassifiedSection& section, Key key, std::string& out,
                         std::size_t most_bytes, Need need = Need::Optional) {
   if (!section.get(key, out, need)) return false;
   if (out.size() > most_bytes)
-    section.fault(key, "must be at most " + std::to_string(most_bytes) +
-                           " bytes long, to fit into the published messages");
-  if (out.find('\0') != std::string::npos) section.fault(key, "contains a NUL");
+    section.fault(key.name, "must be at most " + std::to_string(most_bytes) +
+                                " bytes long, to fit into the published messages");
+  if (out.find('\0') != std::string::npos) section.fault(key.name, "contains a NUL");
   return true;
 }
 

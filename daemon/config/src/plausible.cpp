@@ -7,10 +7,11 @@
 #include <string>
 
 #include "abbe/base/units.hpp"
+#include "abbe/protocol/printable.hpp"
 
 namespace abbe::daemon {
 
-void check_travel_length(Section& axis, std::string_view key, const AxisConfig& config) {
+void check_travel_length(ClassifiedSection& axis, std::string_view key, const AxisConfig& config) {
   const double travel_m = config.max - config.min;
   if (config.kind != AxisKind::Linear || travel_m <= 0.0 || travel_m >= kShortestTravel_m) return;
   axis.implausible(key,
@@ -52,19 +53,13 @@ std::string fault_of_host(const std::string& host) {
   return "";
 }
 
-/// Replaces control characters, which a terminal would execute, by '?'.
-std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; }, '?');
-  return text;
-}
-
 }  // namespace
 
-bool get_host(Section& section, std::string_view key, std::string& out, Need need) {
+bool get_host(ClassifiedSection& section, Key key, std::string& out, Need need) {
   if (!section.get(key, out, need)) return false;
   const std::string fault = fault_of_host(out);
-  if (!fault.empty()) section.implausible(key, fmt::format("\"{}\" {}", printable(out), fault));
+  if (!fault.empty())
+    section.implausible(key.name, fmt::format("\"{}\" {}", protocol::printable_line(out), fault));
   return true;
 }
 

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "abbe/config/config.hpp"
-#include "abbe/config/section.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -16,9 +16,9 @@ inline constexpr double kShortestTravel_m = 1e-3;
 
 /// Adds a fault at `key` (max_mm) if a linear axis with min < max is shorter than
 /// kShortestTravel_m.
-void check_travel_length(Section& axis, std::string_view key, const AxisConfig& config);
+void check_travel_length(ClassifiedSection& axis, std::string_view key, const AxisConfig& config);
 
 /// Reads the host name or network address of a device. Adds a fault if the text can be neither.
-bool get_host(Section& section, std::string_view key, std::string& out, Need need = Need::Optional);
+bool get_host(ClassifiedSection& section, Key key, std::string& out, Need need = Need::Optional);
 
 }  // namespace abbe::daemon

@@ -8,13 +8,13 @@
 
 namespace abbe::daemon {
 
-void read_thermal(Section& root, Config& out) {
+void read_thermal(ClassifiedSection& root, Config& out) {
   std::set<std::string> axes;
   const auto connected = out.connected_axes();
-  for (auto& section : root.children("thermal")) {
+  for (auto& section : root.children("thermal", "axis")) {
     ThermalConfig config;
     std::string temperature;
-    if (section.get("axis", config.axis, Need::Required)) {
+    if (section.get(stated("axis"), config.axis, Need::Required)) {
       const AxisConfig* axis = out.machine.find_axis(config.axis);
       if (axis == nullptr || axis->kind != AxisKind::Linear)
         section.fault("axis", "no such linear axis in [axes]");
@@ -25,7 +25,7 @@ void read_thermal(Section& root, Config& out) {
                                           tables_with(Capability::NamedAxes, "nor")));
     }
 
-    if (section.get("temperature", temperature, Need::Required)) {
+    if (section.get(reading("temperature"), temperature, Need::Required)) {
       const auto found = std::find(out.temperatures.begin(), out.temperatures.end(), temperature);
       if (found == out.temperatures.end())
         section.fault("temperature", fmt::format("no {} measures it: check the name",
@@ -33,10 +33,13 @@ void read_thermal(Section& root, Config& out) {
       config.temperature = static_cast<std::uint8_t>(found - out.temperatures.begin());
     }
 
-    section.get("alpha_um_per_m_K", config.alpha_per_K, kMicro, {-50.0, 50.0}, Need::Required);
-    section.get("u_alpha_um_per_m_K", config.u_alpha_per_K, kMicro, {0.0, 50.0}, Need::Required);
-    section.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 50.0}, Need::Required);
-    section.get("fixed_mm", config.fixed_m, kMilli, kAny, Need::Required);
+    section.get(reading("alpha_um_per_m_K"), config.alpha_per_K, kMicro, {-50.0, 50.0},
+                Need::Required);
+    section.get(operation("u_alpha_um_per_m_K"), config.u_alpha_per_K, kMicro, {0.0, 50.0},
+                Need::Required);
+    section.get(operation("u_temperature_K"), config.u_temperature_K, kPlain, {0.0, 50.0},
+                Need::Required);
+    section.get(reading("fixed_mm"), config.fixed_m, kMilli, kAny, Need::Required);
 
     if (out.axes_compensated())
       section.fault("", "the control corrects these readings already (axes_compensated)");
@@ -45,23 +48,25 @@ void read_thermal(Section& root, Config& out) {
   }
 }
 
-void read_air(Section& root, Config& out) {
-  Section air = root.child("air");
+void read_air(ClassifiedSection& root, Config& out) {
+  ClassifiedSection air = root.child("air");
   AirConfig& config = out.air;
-  air.get_word<calib::IndexEquation>("equation", config.equation,
+  // Without assumed_index the index is only shown.
+  const Role index = air.has("assumed_index") ? Role::Measurement : Role::Operation;
+  air.get_word<calib::IndexEquation>(Key{"equation", index}, config.equation,
                                      {{"ciddor", calib::IndexEquation::Ciddor},
                                       {"edlen", calib::IndexEquation::Edlen},
                                       {"shop_floor", calib::IndexEquation::ShopFloor}});
-  air.get("wavelength_nm", config.wavelength_m, kNano, {350.0, 1200.0});
-  air.get("co2_ppm", config.co2_ppm, kPlain, {0.0, 2000.0});
-  air.get("u_temperature_K", config.u_temperature_K, kPlain, {0.0, 10.0});
-  air.get("u_pressure_Pa", config.u_pressure_Pa, kPlain, {0.0, 1e4});
-  air.get("u_humidity_percent", config.u_relative_humidity, {100.0}, {0.0, 100.0});
-  air.get("u_co2_ppm", config.u_co2_ppm, kPlain, {0.0, 2000.0});
-  air.get("max_age_s", config.max_age, kPlain, kPositive);
+  air.get(Key{"wavelength_nm", index}, config.wavelength_m, kNano, {350.0, 1200.0});
+  air.get(Key{"co2_ppm", index}, config.co2_ppm, kPlain, {0.0, 2000.0});
+  air.get(operation("u_temperature_K"), config.u_temperature_K, kPlain, {0.0, 10.0});
+  air.get(operation("u_pressure_Pa"), config.u_pressure_Pa, kPlain, {0.0, 1e4});
+  air.get(operation("u_humidity_percent"), config.u_relative_humidity, {100.0}, {0.0, 100.0});
+  air.get(operation("u_co2_ppm"), config.u_co2_ppm, kPlain, {0.0, 2000.0});
+  air.get(operation("max_age_s"), config.max_age, kPlain, kPositive);
   double assumed = 1.0;
 
-  if (air.get("assumed_index", assumed, kPlain, {1.0, 1.001})) {
+  if (air.get(if_given(measurement("assumed_index")), assumed, kPlain, {1.0, 1.001})) {
     config.assumed_index = assumed;
     const bool air_is_fully_measured =
         (measured_environment(out) & protocol::kAllOfTheAir) == protocol::kAllOfTheAir;

@@ -10,18 +10,18 @@ namespace abbe::daemon {
 
 namespace {
 
-void read_cpu(Section& section, std::string_view key, std::optional<int>& out) {
+void read_cpu(ClassifiedSection& section, Key key, std::optional<int>& out) {
   int cpu = 0;
   if (section.get_integer(key, cpu, 0, 1023)) out = cpu;
 }
 
-void read_scheduling(Section& section, DaemonConfig& out) {
+void read_scheduling(ClassifiedSection& section, DaemonConfig& out) {
   section.get_word<RealTimeMode>(
-      "realtime", out.realtime,
+      operation("realtime"), out.realtime,
       {{"enforce", RealTimeMode::Enforce}, {"ignore", RealTimeMode::Ignore}});
-  section.get_integer("tracker_priority", out.tracker_priority, 1, 99);
-  section.get_integer("encoder_priority", out.encoder_priority, 1, 99);
-  section.get_integer("hub_priority", out.hub_priority, 1, 99);
+  section.get_integer(operation("tracker_priority"), out.tracker_priority, 1, 99);
+  section.get_integer(operation("encoder_priority"), out.encoder_priority, 1, 99);
+  section.get_integer(operation("hub_priority"), out.hub_priority, 1, 99);
 
   if (out.hub_priority >= std::min(out.tracker_priority, out.encoder_priority))
     section.fault(
@@ -29,28 +29,43 @@ void read_scheduling(Section& section, DaemonConfig& out) {
         fmt::format("{} must be below tracker_priority {} and encoder_priority {}: otherwise a "
                     "busy hub delays the device threads",
                     out.hub_priority, out.tracker_priority, out.encoder_priority));
-  read_cpu(section, "tracker_cpu", out.tracker_cpu);
-  read_cpu(section, "encoder_cpu", out.encoder_cpu);
-  read_cpu(section, "hub_cpu", out.hub_cpu);
-  if (int us = 0; section.get_integer("cpu_latency_us", us, 0, 10'000))
+  read_cpu(section, operation("tracker_cpu"), out.tracker_cpu);
+  read_cpu(section, operation("encoder_cpu"), out.encoder_cpu);
+  read_cpu(section, operation("hub_cpu"), out.hub_cpu);
+  if (int us = 0; section.get_integer(operation("cpu_latency_us"), us, 0, 10'000))
     out.cpu_latency = std::chrono::microseconds{us};
+}
+
+/// abbe-dds as a unit has a user of its own, which cannot enter the folder of the control socket.
+std::filesystem::path default_dds_socket(const DaemonConfig& daemon, Supervise supervise) {
+  auto folder = daemon.runtime_dir;
+  if (supervise == Supervise::Systemd) folder += "-dds";
+  return folder / "dds.sock";
 }
 
 }  // namespace
 
-void read_daemon(Section& root, const std::filesystem::path& base, Config& out) {
-  Section section = root.child("daemon");
+void use_dds_unit(Config& config, bool unit) {
+  DdsConfig& dds = config.dds;
+  if (dds.supervise != Supervise::ByStart) return;
+  const bool by_default = dds.socket == default_dds_socket(config.daemon, dds.supervise);
+  dds.supervise = unit ? Supervise::Systemd : Supervise::Child;
+  if (by_default) dds.socket = default_dds_socket(config.daemon, dds.supervise);
+}
+
+void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
+  ClassifiedSection section = root.child("daemon");
   auto& daemon = out.daemon;
-  section.get("data_dir", daemon.data_dir, base);
-  section.get("runtime_dir", daemon.runtime_dir, base);
+  section.get(operation("data_dir"), daemon.data_dir, base);
+  section.get(operation("runtime_dir"), daemon.runtime_dir, base);
 
   // The longest hub_period is half of the 100 ms between the alive messages that the hub sends to
   // abbe-dds, and far below the second without a cycle after which the hub counts as hung.
-  section.get("hub_period_us", daemon.hub_period, kMicro, {50.0, 50e3});
+  section.get(operation("hub_period_us"), daemon.hub_period, kMicro, {50.0, 50e3});
   // Maximum: half of the time for which the assembler retains samples.
-  section.get("watermark_ms", daemon.watermark, kMilli, {1.0, 5e3});
-  section.get("simulated", daemon.simulated);
-  section.get("speed", daemon.speed, kPlain, {1e-3, 1e4});
+  section.get(operation("watermark_ms"), daemon.watermark, kMilli, {1.0, 5e3});
+  section.get(reading("simulated"), daemon.simulated);
+  section.get(reading("speed"), daemon.speed, kPlain, {1e-3, 1e4});
   if (daemon.speed != 1.0 && !daemon.simulated)
     section.fault("speed",
                   "may differ from 1 only with simulated = true: real devices run in real time");
@@ -58,8 +73,8 @@ void read_daemon(Section& root, const std::filesystem::path& base, Config& out) 
   section.close();
 }
 
-void read_recording(Section& root, const std::filesystem::path& base, Config& out) {
-  Section section = root.child("recording");
+void read_recording(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.operation_table("recording");
   auto& recording = out.recording;
   recording.dir = out.daemon.data_dir / "recordings";
   section.get("dir", recording.dir, base);
@@ -80,8 +95,8 @@ void read_recording(Section& root, const std::filesystem::path& base, Config& ou
   section.close();
 }
 
-void read_models(Section& root, ModelRetention& out) {
-  Section section = root.child("models");
+void read_models(ClassifiedSection& root, ModelRetention& out) {
+  Section section = root.operation_table("models");
   section.get_integer("keep_newest", out.keep_newest, 0, 1'000'000);
   int keep_days = 0;
   if (section.get_integer("keep_days", keep_days, 0, 36'500))
@@ -93,10 +108,9 @@ void read_models(Section& root, ModelRetention& out) {
   section.close();
 }
 
-void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
-  Section section = root.child("dds");
+void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.operation_table("dds");
   auto& dds = out.dds;
-  dds.socket = out.daemon.runtime_dir / "dds.sock";
   // The domain ids 0 to 232 give valid UDP port numbers [DDSI-RTPS 2.2, 9.6.1.1].
   section.get_integer("domain", dds.domain, 0, 232);
 
@@ -116,12 +130,14 @@ void read_dds(Section& root, const std::filesystem::path& base, Config& out) {
       {{"child", Supervise::Child}, {"systemd", Supervise::Systemd}, {"off", Supervise::Off}});
   section.get("profile", dds.profile, base);
   section.get("security", dds.security, base);
+  section.get_maybe_empty("user", dds.user);
   section.get("socket", dds.socket, base);
+  if (dds.socket.empty()) dds.socket = default_dds_socket(out.daemon, dds.supervise);
   section.close();
 }
 
-void read_gate(Section& root, Config& out) {
-  Section section = root.child("gate");
+void read_gate(ClassifiedSection& root, Config& out) {
+  Section section = root.operation_table("gate");
   auto& gate = out.gate;
   section.get("max_error_mm", gate.max_error_m, kMilli, kPositive);
   section.get("max_gradient", gate.max_gradient, kPlain, kPositive);
@@ -140,8 +156,8 @@ void read_gate(Section& root, Config& out) {
   section.close();
 }
 
-void read_control(Section& root, const std::filesystem::path& base, Config& out) {
-  Section section = root.child("control");
+void read_control(ClassifiedSection& root, const std::filesystem::path& base, Config& out) {
+  Section section = root.operation_table("control");
   out.control.socket = out.daemon.runtime_dir / "control.sock";
   section.get("socket", out.control.socket, base);
   section.get_maybe_empty("look_group", out.control.look_group);

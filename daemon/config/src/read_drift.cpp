@@ -14,8 +14,8 @@ bool is_table(const std::string& name) {
 
 }  // namespace
 
-void read_drift(Section& root, Config& out) {
-  Section section = root.child("drift");
+void read_drift(ClassifiedSection& root, Config& out) {
+  Section section = root.operation_table("drift");
   DriftConfig& drift = out.drift;
   section.get("test", drift.test);
   section.get("hold", drift.hold);

@@ -58,8 +58,8 @@ void read_artefact_temperature(Section& section, const std::vector<std::string>&
 
 }  // namespace
 
-void read_evemu(Section& root, Config& out) {
-  Section section = root.child("evemu");
+void read_evemu(ClassifiedSection& root, Config& out) {
+  Section section = root.operation_table("evemu");
   auto& evemu = out.evemu;
 
   if (section.get("estimator", evemu.estimator) && !calib::evemu::estimator(evemu.estimator))

@@ -19,25 +19,25 @@ namespace {
 constexpr double kDefaultNodeSpacing_m = 0.05;  // the spacing of [Sanders 2023]
 constexpr double kNodeTolerance_m = 1e-9;       // largest difference of end node and end of travel
 
-void read_axis(Section axis, const std::string& name, std::vector<AxisConfig>& out) {
+void read_axis(ClassifiedSection axis, const std::string& name, std::vector<AxisConfig>& out) {
   AxisConfig config;
   config.name = name;
-  axis.get_word<AxisKind>("kind", config.kind,
+  axis.get_word<AxisKind>(reading("kind"), config.kind,
                           {{"linear", AxisKind::Linear}, {"rotary", AxisKind::Rotary}});
   const bool linear = config.kind == AxisKind::Linear;
   const char* const min_key = linear ? "min_mm" : "min_rad";
   const char* const max_key = linear ? "max_mm" : "max_rad";
   const char* const reference_key = linear ? "reference_mm" : "reference_rad";
   const Unit unit = linear ? kMilli : kPlain;
-  const bool has_min = axis.get(min_key, config.min, unit, kAny, Need::Required);
-  const bool has_max = axis.get(max_key, config.max, unit, kAny, Need::Required);
+  const bool has_min = axis.get(reading(min_key), config.min, unit, kAny, Need::Required);
+  const bool has_max = axis.get(reading(max_key), config.max, unit, kAny, Need::Required);
   const bool has_range = has_min && has_max;
 
   if (has_range && config.min >= config.max)
     axis.fault(max_key, fmt::format("must exceed {}", min_key));
   if (has_range) check_travel_length(axis, max_key, config);
   config.reference = config.min <= 0.0 && config.max >= 0.0 ? 0.0 : config.min;
-  const bool has_reference = axis.get(reference_key, config.reference, unit, kAny);
+  const bool has_reference = axis.get(reading(reference_key), config.reference, unit, kAny);
   if (has_reference && has_range &&
       (config.reference < config.min || config.reference > config.max))
     axis.fault(reference_key, "must lie within the range of the axis");
@@ -54,7 +54,7 @@ void sort_axes(std::vector<AxisConfig>& axes) {
   });
 }
 
-void read_axes(Section axes, MachineConfig& out) {
+void read_axes(ClassifiedSection axes, MachineConfig& out) {
   for (const auto& name : axes.keys()) read_axis(axes.child(name), name, out.axes);
   if (axes.present())
     for (const std::string_view needed : {"X", "Y", "Z"})
@@ -64,16 +64,18 @@ void read_axes(Section axes, MachineConfig& out) {
 
 /// Reads [model] node_spacing_mm for one axis. The key is one number for all axes, or a table with
 /// one number per axis.
-double read_spacing(Section& model, Section* per_axis, const std::string& axis) {
+double read_spacing(ClassifiedSection& model, ClassifiedSection* per_axis,
+                    const std::string& axis) {
   double spacing_m = kDefaultNodeSpacing_m;
   if (per_axis != nullptr)
-    per_axis->get(axis, spacing_m, kMilli, kPositive);
+    per_axis->get(stated(axis), spacing_m, kMilli, kPositive);
   else
-    model.get("node_spacing_mm", spacing_m, kMilli, kPositive);
+    model.get(stated("node_spacing_mm"), spacing_m, kMilli, kPositive);
   return spacing_m;
 }
 
-void check_nodes(Section& nodes, const AxisConfig& axis, const std::vector<double>& nodes_m) {
+void check_nodes(ClassifiedSection& nodes, const AxisConfig& axis,
+                 const std::vector<double>& nodes_m) {
   const bool ascending =
       std::adjacent_find(nodes_m.begin(), nodes_m.end(), std::greater_equal<>{}) == nodes_m.end();
   if (nodes_m.size() < 2 || !ascending)
@@ -85,11 +87,11 @@ void check_nodes(Section& nodes, const AxisConfig& axis, const std::vector<doubl
                             axis.min * kMilli.per_si, axis.max * kMilli.per_si));
 }
 
-void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const AxisConfig& axis,
-                     MachineConfig& out) {
+void read_axis_nodes(ClassifiedSection& model, ClassifiedSection& nodes, ClassifiedSection* spacing,
+                     const AxisConfig& axis, MachineConfig& out) {
   const double spacing_m = read_spacing(model, spacing, axis.name);
   auto& nodes_m = out.nodes_m[axis.name];
-  if (nodes.get(axis.name, nodes_m, kMilli)) {
+  if (nodes.get(stated(axis.name), nodes_m, kMilli)) {
     check_nodes(nodes, axis, nodes_m);
     return;
   }
@@ -104,7 +106,7 @@ void read_axis_nodes(Section& model, Section& nodes, Section* spacing, const Axi
     nodes_m = equidistant->nodes_m;
 }
 
-void check_cubic_nodes(Section& model, const MachineConfig& config) {
+void check_cubic_nodes(ClassifiedSection& model, const MachineConfig& config) {
   if (config.interpolation == calib::estimation::Interpolation::Linear) return;
   constexpr std::size_t kMost = calib::estimation::AxisInterpolation::kMostCubicNodes;
   for (const auto& [axis, nodes_m] : config.nodes_m)
@@ -113,18 +115,20 @@ void check_cubic_nodes(Section& model, const MachineConfig& config) {
                                        nodes_m.size(), kMost));
 }
 
-void read_model(Section model, const toml::node* spacing_node, MachineConfig& out) {
+void read_model(ClassifiedSection model, const toml::node* spacing_node, MachineConfig& out) {
   using calib::estimation::Interpolation;
-  model.get_word<Interpolation>("basis", out.interpolation,
+  model.get_word<Interpolation>(operation("basis"), out.interpolation,
                                 {{calib::kLinearBasis, Interpolation::Linear},
                                  {calib::kCubicBasis, Interpolation::NaturalCubic},
                                  {calib::kNotAKnotCubicBasis, Interpolation::NotAKnotCubic}});
-  Section nodes = model.child("nodes_mm");
-  std::optional<Section> spacing;
+  ClassifiedSection nodes = model.child("nodes_mm");
+  std::optional<ClassifiedSection> spacing;
   if (spacing_node != nullptr && spacing_node->is_table()) spacing = model.child("node_spacing_mm");
   for (const auto& axis : out.axes)
     if (axis.kind == AxisKind::Linear && axis.min < axis.max)
       read_axis_nodes(model, nodes, spacing ? &*spacing : nullptr, axis, out);
+  for (const auto& [axis, nodes_m] : out.nodes_m)
+    model.state(Role::Reading, "nodes_mm." + axis, numbers_text(nodes_m, kMilli.per_si));
   nodes.close();
   if (spacing) spacing->close();
   check_cubic_nodes(model, out);
@@ -133,7 +137,7 @@ void read_model(Section model, const toml::node* spacing_node, MachineConfig& ou
 
 /// Adds a fault if the model has too many parameters. A configuration that otf_machine() does not
 /// accept is skipped, because its faults are reported elsewhere.
-void check_model_size(Section& model, const MachineConfig& config) {
+void check_model_size(ClassifiedSection& model, const MachineConfig& config) {
   const auto machine = otf_machine(config);
   if (!machine) return;
   const auto layout =
@@ -153,20 +157,22 @@ const AxisConfig* MachineConfig::find_axis(std::string_view axis_name) const noe
   return found == axes.end() ? nullptr : &*found;
 }
 
-void read_machine(Section& root, MachineConfig& out) {
-  Section machine = root.child("machine", Need::Required);
+void read_machine(ClassifiedSection& root, MachineConfig& out) {
+  ClassifiedSection machine = root.child("machine", Need::Required);
   if (machine.present()) {
-    get_bounded(machine, "name", out.name, bound_of<v1::Snapshot>("machine"), Need::Required);
-    if (get_bounded(machine, "chain", out.chain, bound_of<v1::ErrorModel>("chain"), Need::Required))
+    get_bounded(machine, reading("name"), out.name, bound_of<v1::Snapshot>("machine"),
+                Need::Required);
+    if (get_bounded(machine, reading("chain"), out.chain, bound_of<v1::ErrorModel>("chain"),
+                    Need::Required))
       if (const auto chain = calib::KinematicChain::parse(out.chain); !chain)
         machine.fault("chain", chain.error().text);
     machine.close();
   }
   read_axes(root.child("axes", Need::Required), out);
 
-  Section target = root.child("target");
-  std::vector<double> offset_m;
-  if (target.get("offset_mm", offset_m, kMilli)) {
+  ClassifiedSection target = root.child("target");
+  std::vector<double> offset_m(3, 0.0);  // written or not: the same machine
+  if (target.get(reading("offset_mm"), offset_m, kMilli)) {
     out.target_given = offset_m.size() == 3;
     if (out.target_given)
       std::copy(offset_m.begin(), offset_m.end(), out.target_offset_m.begin());
@@ -175,8 +181,8 @@ void read_machine(Section& root, MachineConfig& out) {
   }
   target.close();
 
-  Section model = root.child("model");
-  read_model(model, model.node("node_spacing_mm"), out);
+  ClassifiedSection model = root.child("model");
+  read_model(model, model.node(stated("node_spacing_mm")), out);
   check_model_size(model, out);
 }
 

@@ -18,8 +18,7 @@ bool is_numeric_address(const std::string& address) {
 
 }  // namespace
 
-MtconnectConfig read_mtconnect(Section& root) {
-  Section section = root.child("mtconnect");
+MtconnectConfig read_mtconnect(Section section) {
   MtconnectConfig out;
   if (section.get("address", out.address) && !is_numeric_address(out.address))
     section.fault("address",
@@ -43,7 +42,7 @@ Result<MtconnectSettings> load_mtconnect_settings(const std::filesystem::path& f
   const Config config = read_all(root, file.parent_path());
   if (faults.any()) return tl::make_unexpected(faults.to_error());
   return MtconnectSettings{.control_socket = config.control.socket,
-                           .mtconnect = read_mtconnect(root)};
+                           .mtconnect = read_mtconnect(root.child("mtconnect"))};
 }
 
 }  // namespace abbe::daemon

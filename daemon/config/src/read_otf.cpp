@@ -35,8 +35,8 @@ void read_smoothness(Section& section, std::optional<calib::otf::SmoothnessOptio
 
 }  // namespace
 
-void read_otf(Section& root, OtfConfig& out) {
-  Section section = root.child("otf");
+void read_otf(ClassifiedSection& root, OtfConfig& out) {
+  Section section = root.operation_table("otf");
   section.get_word<calib::otf::Mode>(
       "mode", out.mode,
       {{"on-the-fly", calib::otf::Mode::OnTheFly}, {"standstill", calib::otf::Mode::Standstill}});

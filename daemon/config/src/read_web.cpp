@@ -38,8 +38,7 @@ void check_reach(Section& section, const WebConfig& web) {
 
 }  // namespace
 
-WebConfig read_web(Section& root, const std::filesystem::path& base) {
-  Section section = root.child("web");
+WebConfig read_web(Section section, const std::filesystem::path& base) {
   WebConfig web;
   section.get("address", web.address);
   section.get_integer("port", web.port, 0, 65535);
@@ -66,7 +65,7 @@ Result<WebSettings> load_web_settings(const std::filesystem::path& file) {
   Section root(&*table, "", {1, 1}, faults);
   WebSettings settings{.config = read_all(root, file.parent_path()), .web = {}};
   if (faults.any()) return tl::make_unexpected(faults.to_error());
-  settings.web = read_web(root, file.parent_path());
+  settings.web = read_web(root.child("web"), file.parent_path());
   return settings;
 }
 

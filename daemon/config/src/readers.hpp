@@ -6,6 +6,7 @@
 #include "abbe/config/mtconnect_config.hpp"
 #include "abbe/config/section.hpp"
 #include "abbe/config/web_config.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -16,21 +17,22 @@ inline constexpr std::size_t kMostConfigFaults = 1000;
 /// Io if the file cannot be read.
 [[nodiscard]] Result<std::string> read_configuration_text(const std::filesystem::path& file);
 /// All tables. `base`: folder of the file, for relative paths.
-[[nodiscard]] Config read_all(Section& root, const std::filesystem::path& base);
+[[nodiscard]] Config read_all(const Section& file, const std::filesystem::path& base);
 
-void read_machine(Section& root, MachineConfig& out);
-void read_thermal(Section& root, Config& out);
-void read_air(Section& root, Config& out);
-void read_daemon(Section& root, const std::filesystem::path& base, Config& out);
-void read_recording(Section& root, const std::filesystem::path& base, Config& out);
-void read_models(Section& root, ModelRetention& out);
-void read_dds(Section& root, const std::filesystem::path& base, Config& out);
-void read_gate(Section& root, Config& out);
-void read_otf(Section& root, OtfConfig& out);
-void read_drift(Section& root, Config& out);
-void read_evemu(Section& root, Config& out);
-void read_control(Section& root, const std::filesystem::path& base, Config& out);
-[[nodiscard]] WebConfig read_web(Section& root, const std::filesystem::path& base);
-[[nodiscard]] MtconnectConfig read_mtconnect(Section& root);
+void read_machine(ClassifiedSection& root, MachineConfig& out);
+void read_thermal(ClassifiedSection& root, Config& out);
+void read_air(ClassifiedSection& root, Config& out);
+void read_sensors(ClassifiedSection& root, Config& out);
+void read_daemon(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+void read_recording(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+void read_models(ClassifiedSection& root, ModelRetention& out);
+void read_dds(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+void read_gate(ClassifiedSection& root, Config& out);
+void read_otf(ClassifiedSection& root, OtfConfig& out);
+void read_drift(ClassifiedSection& root, Config& out);
+void read_evemu(ClassifiedSection& root, Config& out);
+void read_control(ClassifiedSection& root, const std::filesystem::path& base, Config& out);
+[[nodiscard]] WebConfig read_web(Section section, const std::filesystem::path& base);
+[[nodiscard]] MtconnectConfig read_mtconnect(Section section);
 
 }  // namespace abbe::daemon

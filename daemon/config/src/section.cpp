@@ -1,4 +1,5 @@
 #include "abbe/config/section.hpp"
+#include "abbe/protocol/printable.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -155,8 +156,18 @@ bool Section::get(std::string_view key, std::string& out, Need need) {
         value ? "must not be empty" : fmt::format("must be a string, not {}", type_text(*node)));
     return false;
   }
+  check_characters(key, *value);
   out = *value;
   return true;
+}
+
+void Section::check_characters(std::string_view key, std::string_view value) {
+  const auto is_control = [](char c) {
+    return (c >= 0 && c < ' ' && c != '\n' && c != '\t') || c == '\x7f';
+  };
+  const auto found = std::ranges::find_if(value, is_control);
+  if (found != value.end())
+    implausible(key, fmt::format("contains {}", protocol::strange_character({&*found, 1})));
 }
 
 bool Section::get_maybe_empty(std::string_view key, std::string& out) {
@@ -212,6 +223,7 @@ bool Section::get(std::string_view key, std::vector<std::string>& out) {
   if (array != nullptr)
     for (const auto& element : *array)
       if (const auto value = element.value_exact<std::string>()) values.push_back(*value);
+  for (const auto& value : values) check_characters(key, value);
 
   if (array == nullptr || values.size() != array->size()) {
     fault_at(node->source().begin, key, "must be an array of strings");

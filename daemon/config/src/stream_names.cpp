@@ -4,8 +4,8 @@
 
 namespace abbe::daemon {
 
-void StreamNames::take(const std::string& name, Section& table) {
-  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security"};
+void StreamNames::take(const std::string& name, ClassifiedSection& table) {
+  static const std::set<std::string> kOwn{"recorder", "models", "dds", "dds_security", "identity"};
   if (name.empty()) return;
   if (kOwn.contains(name))
     table.fault("name", fmt::format("\"{}\" is reserved for a part of the daemon", name));

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "abbe/config/section.hpp"
+#include "classified_section.hpp"
 
 namespace abbe::daemon {
 
@@ -13,7 +13,7 @@ class StreamNames {
  public:
   /// Adds `name` to the names in use. If another device or a part of the daemon has this name
   /// already, adds a fault at the key `name` of `table` instead.
-  void take(const std::string& name, Section& table);
+  void take(const std::string& name, ClassifiedSection& table);
 
  private:
   std::set<std::string> taken_;

@@ -18,28 +18,28 @@ constexpr Unit kMega{1e-6};
 
 /// Reads how the card is connected. Keys that apply only to the other transport are refused,
 /// because ignoring them silently would hide a mistake.
-void read_card_address(Section& table, UsbCardConfig& out) {
-  table.get_word<CardTransport>("transport", out.transport,
+void read_card_address(ClassifiedSection& table, UsbCardConfig& out) {
+  table.get_word<CardTransport>(operation("transport"), out.transport,
                                 {{"usb", CardTransport::Usb}, {"usbip", CardTransport::Usbip}},
                                 Need::Required);
-  get_host(table, "host", out.host);
-  table.get_integer("port", out.port, 1, 65535);
-  table.get("bus_id", out.bus_id);
+  get_host(table, operation("host"), out.host);
+  table.get_integer(operation("port"), out.port, 1, 65535);
+  table.get(operation("bus_id"), out.bus_id);
   if (out.transport == CardTransport::Usbip) return;
   for (const auto key : {"host", "port", "bus_id"})
     if (table.has(key)) table.fault(key, "has no meaning with transport = \"usb\"");
 }
 
-void read_card_clock(Section& table, drivers::CounterCardWiring& out) {
-  table.get_integer("clock_channel", out.clock_channel, 0, kLastChannel);
-  table.get_word<drivers::ClockSource>("clock_source", out.clock_source,
+void read_card_clock(ClassifiedSection& table, drivers::CounterCardWiring& out) {
+  table.get_integer(reading("clock_channel"), out.clock_channel, 0, kLastChannel);
+  table.get_word<drivers::ClockSource>(reading("clock_source"), out.clock_source,
                                        {{"external", drivers::ClockSource::External},
                                         {"timer0", drivers::ClockSource::Timer0},
                                         {"timer1", drivers::ClockSource::Timer1}});
-  table.get("clock_MHz", out.clock_hz, kMega, kPositive);
+  table.get(reading("clock_MHz"), out.clock_hz, kMega, kPositive);
 }
 
-void read_debounce(Section& table, std::string_view key, drivers::quad08::Debounce& out) {
+void read_debounce(ClassifiedSection& table, Key key, drivers::quad08::Debounce& out) {
   std::uint8_t code = 0;
   if (!table.get_integer(key, code, 0, 15)) return;
   out = {.enabled = true, .time_code = code};

@@ -7,16 +7,23 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <string>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
+#include "abbe/base/text_file.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/announcer.hpp"
 #include "abbe/dds/interface_watch.hpp"
 #include "abbe/dds/participant.hpp"
+#include "abbe/dds/twin_watch.hpp"
 #include "abbe/dds/writers.hpp"
 #include "abbe/messages/dds_bridge.hpp"
 
@@ -31,7 +38,7 @@ using abbe::daemon::ExitCode;
 
 constexpr int kDone = number(ExitCode::Done), kUsage = number(ExitCode::Usage),
               kBadInput = number(ExitCode::BadInput), kIo = number(ExitCode::Io),
-              kInternal = number(ExitCode::Internal);
+              kRefused = number(ExitCode::Refused), kInternal = number(ExitCode::Internal);
 
 std::string footer() {
   return "Example: abbe-dds -c /etc/abbe/abbed.toml\n" +
@@ -40,6 +47,7 @@ std::string footer() {
               {ExitCode::Usage},
               {ExitCode::BadInput, "the configuration or the profile cannot be used"},
               {ExitCode::Io, "no participant or writer can be created"},
+              {ExitCode::Refused, "[dds] supervise in the configuration is \"child\" or \"off\""},
               {ExitCode::Internal}});
 }
 
@@ -59,13 +67,14 @@ void stop_on_signals() {
 }
 
 int refuse(const Error& error) {
-  std::fprintf(stderr, "abbe-dds: %s\n", error.text.c_str());
-  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
+  abbe::daemon::print_error("abbe-dds", error);
   switch (error.code) {
     case ErrorCode::Usage:
       return kUsage;
     case ErrorCode::BadInput:
       return kBadInput;
+    case ErrorCode::Refused:
+      return kRefused;
     default:
       return kIo;
   }
@@ -82,16 +91,31 @@ void log_source_change(const DdsBridge& bridge, bool& alive) {
                              : "abbe-dds: no data from abbed: ModelState INVALID is published\n");
 }
 
-/// Reads the options from abbed.toml when abbe-dds runs as a systemd service. Refused unless
-/// supervise is "systemd": with another value abbed starts an abbe-dds of its own.
+/// The configuration as abbe-dds.service passes it on (LoadCredential=), because the user of abbe-dds
+/// may not read it; else the file itself. Its paths are relative to the folder of `file` either way.
+abbe::daemon::Result<abbe::daemon::Config> configuration_of(const std::string& file) {
+  const char* const credentials = std::getenv("CREDENTIALS_DIRECTORY");
+  const auto passed_on =
+      std::filesystem::path{credentials != nullptr ? credentials : ""} / "abbed.toml";
+  std::error_code error;
+  if (credentials == nullptr || !std::filesystem::exists(passed_on, error))
+    return abbe::daemon::load_config(file);
+  const auto text = abbe::daemon::read_regular_file(passed_on);
+  if (!text) return tl::make_unexpected(text.error());
+  return abbe::daemon::parse_config(*text, file);
+}
+
+/// Reads the options from abbed.toml when abbe-dds runs as a systemd service. Refused if [dds]
+/// supervise names another way: abbed then starts an abbe-dds of its own, or none.
 abbe::daemon::Result<void> take_from_config(Options& options) {
-  auto config = abbe::daemon::load_config(options.config);
+  auto config = configuration_of(options.config);
   if (!config) return tl::make_unexpected(config.error());
+  abbe::daemon::use_dds_unit(*config, true);
   if (config->dds.supervise != abbe::daemon::Supervise::Systemd) {
-    return abbe::daemon::fail(ErrorCode::BadInput,
+    return abbe::daemon::fail(ErrorCode::Refused,
                               options.config +
-                                  ": [dds] supervise is not \"systemd\": abbed starts abbe-dds "
-                                  "itself, or abbe-dds is switched off");
+                                  ": abbe-dds.service is not used: [dds] supervise is \"child\" "
+                                  "or \"off\"");
   }
 
   options.socket = config->dds.socket;
@@ -141,11 +165,18 @@ std::optional<int> publish(const Options& options) {
   DdsBridge bridge(*writers);
   DdsFeed feed(options.socket, bridge);
   abbe::dds::Announcer announcer(*participant, *writers);
+  abbe::dds::TwinWatch twins(*participant);
+  if (!twins.looks())
+    std::fputs(
+        "abbe-dds: other machines of this name are not noticed: the permissions of the keys do not "
+        "allow abbe-dds to read abbe/v1/Identity; `abbe dds keys` makes keys that do\n",
+        stderr);
   bool alive = false;
 
   while (stop_requested == 0 && !parent_is_gone(options)) {
     feed.cycle();
     announcer.cycle(Clock::now());
+    feed.report_twin(twins.cycle(writers->identity(), Clock::now()));
     manager.cycle(Clock::now());
     log_source_change(bridge, alive);
     if (const auto added = interfaces.cycle(participant->allowed_addresses(), Clock::now())) {
@@ -163,6 +194,7 @@ std::optional<int> publish(const Options& options) {
 
 /// Replaces this process by a new one with the same arguments. Returns only if that fails.
 int start_again(char** argv) {
+  abbe::daemon::drain_stderr();
   ::close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
   ::execv("/proc/self/exe", argv);
   std::perror("abbe-dds: /proc/self/exe");
@@ -172,6 +204,7 @@ int start_again(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-dds");
   CLI::App app{
       "Publishes over DDS the data that abbed sends over its local socket, and publishes "
       "ModelState INVALID when abbed is lost."};
@@ -192,8 +225,8 @@ int main(int argc, char** argv) {
       "folder of keys from `abbe dds keys` (default: DDS Security is off, unless the profile "
       "switches it on)");
   app.add_option("-c,--config", options.config,
-                 "take socket, domain, profile and security from this abbed.toml; it must contain "
-                 "[dds] supervise = \"systemd\"")
+                 "take socket, domain, profile and security from this abbed.toml; for "
+                 "abbe-dds.service")
       ->excludes(socket)
       ->excludes(domain)
       ->excludes(profile)
@@ -202,6 +235,7 @@ int main(int argc, char** argv) {
                  "process id; exit when it is no longer the parent process (set by abbed)");
 
   try {
+    abbe::daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;
@@ -213,12 +247,16 @@ int main(int argc, char** argv) {
 
   try {
     if (!options.config.empty()) {
-      if (auto taken = take_from_config(options); !taken) return refuse(taken.error());
+      if (auto taken = take_from_config(options); !taken) {
+        if (taken.error().code == ErrorCode::Refused)  // no fault: the unit ends without an error
+          abbe::daemon::notify_ready("not used: see [dds] supervise");
+        return refuse(taken.error());
+      }
     }
     if (const auto code = publish(options)) return *code;
     return start_again(argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "abbe-dds: internal error: %s\n", e.what());
+    abbe::daemon::print_message("abbe-dds", std::string("internal error: ") + e.what());
     return kInternal;
   }
 }

@@ -16,6 +16,8 @@
 
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/known_errors.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/config/config.hpp"
 #include "abbe/dds/grid_nodes.hpp"
 #include "abbe/dds/participant.hpp"
@@ -53,11 +55,11 @@ std::string footer() {
               {ExitCode::Internal}});
 }
 
-/// In the order in which the readers are read. ModelState is first, because Readers::take() reads
-/// topic by topic: every other sample is then judged by the latest ModelState.
-constexpr std::array kTopics{Topic::ModelState,      Topic::ErrorModel, Topic::ErrorGrid,
-                             Topic::Snapshot,        Topic::Health,     Topic::Compensation,
-                             Topic::CalibrationEvent};
+/// In the order in which the readers are read. Identity and ModelState are first, because
+/// Readers::take() reads topic by topic: every other sample is then judged by the latest of them.
+constexpr std::array kTopics{Topic::Identity,     Topic::ModelState,      Topic::ErrorModel,
+                             Topic::ErrorGrid,    Topic::Snapshot,        Topic::Health,
+                             Topic::Compensation, Topic::CalibrationEvent};
 
 /// If no sample has arrived for this time, a message tells the user what may be wrong. The time
 /// exceeds the second after which ModelState is repeated.
@@ -79,8 +81,7 @@ struct Options {
 };
 
 int exit_code_of(const Error& error) {
-  std::fprintf(stderr, "abbe-watch: %s\n", error.text.c_str());
-  for (const auto& detail : error.details) std::fprintf(stderr, "  %s\n", detail.c_str());
+  daemon::print_error("abbe-watch", error);
   switch (error.code) {
     case ErrorCode::DataInsufficient:
       return kNoAnswer;
@@ -181,7 +182,7 @@ int watch(const Options& options, dds::Readers& readers, const dds::ParticipantA
   bool silence_reported = false;
   while (stop_requested == 0 &&
          std::chrono::duration<double>(WallClock::now() - start).count() < options.timeout_s) {
-    readers.wait(std::chrono::milliseconds{100});
+    readers.wait(machines.until_next_loss(std::chrono::milliseconds{100}));
     readers.take([&](const dds::Arrival& arrival) { machines.take(arrival); });
     machines.notice_losses();
 
@@ -198,8 +199,7 @@ int watch(const Options& options, dds::Readers& readers, const dds::ParticipantA
   }
 
   if (!options.ends_with_model()) return kDone;
-  std::fprintf(stderr, "abbe-watch: no model that may be applied: %s\n",
-               machines.why_not().c_str());
+  daemon::print_message("abbe-watch", "no model that may be applied: " + machines.why_not());
   return kNoAnswer;
 }
 
@@ -250,7 +250,12 @@ int main(int argc, char** argv) {
                  "in daemon/ those in subscriber-1/ beside it are used")
       ->excludes(domain)
       ->excludes(profile);
-  app.add_option("--machine", options.show.machine, "only this machine (default: all)");
+  auto* const machine =
+      app.add_option("--machine", options.show.machine, "only this machine (default: all)");
+  app.add_option("--machine-id", options.show.machine_id,
+                 "identity of this machine, from `abbe machine identity` (default: the first one "
+                 "that publishes under the name, while abbe-watch runs)")
+      ->needs(machine);
   app.add_flag("--json", options.show.json, "print one line with a JSON object per sample");
   app.add_flag("--until-model", options.until_model,
                "exit with code 0 as soon as a model that may be applied has arrived");
@@ -264,6 +269,7 @@ int main(int argc, char** argv) {
                  "errors V in this CSV file: x_mm,y_mm,z_mm,ex_um,ey_um,ez_um");
 
   try {
+    daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

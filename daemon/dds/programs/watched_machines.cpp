@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "abbe/base/json_text.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/printable.hpp"
 #include "abbe/dds/json_lines.hpp"
 #include "abbe/messages/cdr.hpp"
 
@@ -15,6 +19,9 @@ namespace abbe::dds {
 namespace {
 
 using daemon::Topic;
+
+/// A subscriber of all machines keeps no more; a stranger may make up names.
+constexpr std::size_t kMostMachines = 256;
 
 /// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher
 /// repeats ModelState once a second, even if nothing changes.
@@ -35,12 +42,18 @@ std::string millimetres(const std::vector<double>& position_m, unsigned missing_
   return text + " mm";
 }
 
+/// Texts may come from any participant and need not be valid UTF-8.
+void print_object(const nlohmann::ordered_json& object) {
+  std::printf("%s\n", daemon::json_text(object).c_str());
+  std::fflush(stdout);
+}
+
 template <class T, class F>
 void with(std::span<const std::byte> payload, F&& use) {
   if (auto value = daemon::decode<T>(payload)) {
     use(*value);
   } else {
-    std::fprintf(stderr, "abbe-watch: %s\n", value.error().text.c_str());
+    daemon::print_message("abbe-watch", value.error().text);
   }
 }
 
@@ -60,30 +73,103 @@ void WatchedMachines::take(const Arrival& arrival) {
   if (!key || (!options_.machine.empty() && key->machine != options_.machine)) return;
   received_ = true;
   const std::string name(key->machine);
-  auto& machine = machines_[name];
+  if (machines_.size() >= kMostMachines && !machines_.contains(name)) return;
+  auto& machine =
+      machines_.try_emplace(name, Machine{.pin = PublisherPin(options_.machine_id)}).first->second;
   const auto from = participant_of(arrival.writer);
   const auto former = machine.pin.pinned();
-  const auto verdict = machine.pin.heard(from, WallClock::now());
+  const auto verdict = judge(arrival, machine.pin);
   auto& publisher = machine.publisher(from);
   keep(arrival, publisher);
-  if (verdict == Verdict::Waiting) return;
-  if (verdict == Verdict::Foreign) return report_foreign_publisher(name, machine, from);
+  if (verdict != Verdict::Pinned && verdict != Verdict::NewlyPinned) {
+    keep_for_later(arrival, publisher);
+    return report_ignored_publisher(name, machine, from, verdict);
+  }
+
   if (former && former != from) show_successor(name, from, *former);
+  show_kept(name, machine, publisher);
   show(arrival, name, machine, publisher);
+}
+
+PublisherPin::Verdict WatchedMachines::judge(const Arrival& arrival, PublisherPin& pin) {
+  const auto from = participant_of(arrival.writer);
+  const auto now = WallClock::now();
+  if (arrival.topic != Topic::Identity) return pin.heard(from, now);
+  const auto identity = daemon::decode<v1::Identity>(arrival.payload);
+  return identity ? pin.identified(from, identity->machine_id(), identity->twin(), now)
+                  : pin.heard(from, now);
+}
+
+void WatchedMachines::keep_for_later(const Arrival& arrival, Publisher& publisher) {
+  constexpr std::size_t kMost = 256;  // slices and streams of a machine, with a margin
+  const auto& traits = daemon::traits(arrival.topic);
+  const auto key = daemon::payload_key(arrival.topic, arrival.payload);
+  if (!options_.json || traits.kind != daemon::TopicTraits::Kind::Durable || !key) return;
+  const auto* begin = reinterpret_cast<const char*>(key->bytes.data());
+  std::string bytes(begin, key->bytes.size());
+  if (publisher.not_shown.size() >= kMost) return;
+  publisher.not_shown[{arrival.topic, std::move(bytes)}] = {arrival.payload.begin(),
+                                                            arrival.payload.end()};
+}
+
+void WatchedMachines::show_kept(const std::string& name, Machine& machine, Publisher& publisher) {
+  for (const auto& [key, payload] : std::exchange(publisher.not_shown, {}))
+    print_sample(key.first, payload);
+  show_liveness(name, machine);
+  show_state(name, machine, publisher);
+  show_model(machine, publisher);
 }
 
 void WatchedMachines::notice_losses() {
   for (auto& [name, machine] : machines_) {
     for (auto& [id, publisher] : machine.publishers)
-      if (!alive(publisher)) publisher.state_from.reset();
+      if (!alive(&publisher)) publisher.state_from.reset();
     show_liveness(name, machine);
+    withdraw(name, machine);
   }
+}
+
+std::chrono::milliseconds WatchedMachines::until_next_loss(
+    std::chrono::milliseconds at_most) const {
+  const auto now = WallClock::now();
+  for (const auto& [name, machine] : machines_) {
+    if (!machine.applied) continue;
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(machine.applied->valid_until - now);
+    at_most = std::clamp(left, std::chrono::milliseconds{1}, at_most);
+  }
+  return at_most;
+}
+
+Decision WatchedMachines::decide_on(Machine& machine, const Publisher& publisher,
+                                    const v1::Compensation& c) const {
+  const auto now = WallClock::now();
+  auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(&publisher));
+  machine.applied.reset();
+  if (decision.apply) machine.applied = {c, *publisher.last_delay, now, now + decision.valid_for};
+  return decision;
+}
+
+void WatchedMachines::withdraw(const std::string& name, Machine& machine) {
+  if (!machine.applied) return;
+  const Applied& a = *machine.applied;
+  const Publisher* const publisher = machine.pinned();
+  const auto decision =
+      decide(a.vector, a.delay + (WallClock::now() - a.arrived),
+             publisher == nullptr ? std::nullopt : publisher->model.state(), alive(publisher));
+  if (decision.apply) return;
+
+  if (options_.json) print_decision(a.vector, decision);
+  print(fmt::format("{}  do not apply: {}", name, decision.reason));
+  machine.shown_apply = false;
+  machine.applied.reset();
 }
 
 const ReceivedModel* WatchedMachines::applicable() const {
   for (const auto& [name, machine] : machines_) {
-    const Publisher& publisher = machine.pinned();
-    const auto& model = publisher.model;
+    const Publisher* const publisher = machine.pinned();
+    if (publisher == nullptr) continue;
+    const auto& model = publisher->model;
     if (!model.model() || !model.decide(alive(publisher)).apply) continue;
     if (model.model()->model_id() == model.state()->model_id()) return &model;
   }
@@ -93,16 +179,22 @@ const ReceivedModel* WatchedMachines::applicable() const {
 std::string WatchedMachines::why_not() const {
   std::string text;
   for (const auto& [name, machine] : machines_) {
-    const auto decision = machine.pinned().model.decide(alive(machine.pinned()));
-    text += name + ": " +
-            (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
+    const Publisher* const publisher = machine.pinned();
+    text += name + ": ";
+    if (publisher == nullptr) {
+      text += machine.why_none + "; ";
+      continue;
+    }
+    const auto decision = publisher->model.decide(alive(publisher));
+    text += (decision.apply ? std::string("no ErrorModel received") : decision.reason) + "; ";
   }
   return text.empty() ? "nothing received" : text;
 }
 
-bool WatchedMachines::alive(const Publisher& publisher) const {
-  return publisher.state_from && WallClock::now() - publisher.state_at < kLongestSilence &&
-         readers_.is_alive(*publisher.state_from);
+bool WatchedMachines::alive(const Publisher* publisher) const {
+  return publisher != nullptr && publisher->state_from &&
+         WallClock::now() - publisher->state_at < kLongestSilence &&
+         readers_.is_alive(*publisher->state_from);
 }
 
 void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
@@ -125,6 +217,7 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
       return with<v1::Compensation>(arrival.payload, [&](auto& m) {
         publisher.last_delay = publisher.delay.of(m, WallClock::now());
       });
+    case Topic::Identity:
     case Topic::Health:
     case Topic::CalibrationEvent:
       return;  // shown when it arrives, not kept
@@ -134,7 +227,7 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
 void WatchedMachines::show(const Arrival& arrival, const std::string& name, Machine& machine,
                            const Publisher& publisher) {
   const auto& payload = arrival.payload;
-  if (options_.json) print_json(arrival.topic, payload);
+  if (options_.json) print_sample(arrival.topic, payload);
   show_liveness(name, machine);
   show_state(name, machine, publisher);
   if (arrival.topic == Topic::ErrorModel) show_model(machine, publisher);
@@ -145,24 +238,21 @@ void WatchedMachines::show(const Arrival& arrival, const std::string& name, Mach
     with<v1::Compensation>(payload, [&](auto& m) { show_vector(machine, publisher, m); });
 }
 
-void WatchedMachines::print_json(Topic topic, std::span<const std::byte> payload) {
+void WatchedMachines::print_sample(Topic topic, std::span<const std::byte> payload) {
   if (const auto line = json_line(topic, payload)) std::printf("%s\n", line->c_str());
   std::fflush(stdout);
 }
 
 void WatchedMachines::print(const std::string& line) {
   if (options_.json) return;
-  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", line.c_str());
+  std::printf("%s%s\n", on_terminal_ ? "\r\033[K" : "", daemon::printable_line(line).c_str());
   std::fflush(stdout);
 }
 
 void WatchedMachines::show_liveness(const std::string& name, Machine& machine) {
   const bool now = alive(machine.pinned());
   if (std::exchange(machine.shown_alive, now) == now) return;
-  if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"publisher_alive\":{}}}\n", name, now);
-    std::fflush(stdout);
-  }
+  if (options_.json) print_object({{"machine", name}, {"publisher_alive", now}});
   print(fmt::format("{}  {}", name,
                     now ? "publisher is alive" : "publisher is not alive: do not apply"));
 }
@@ -174,29 +264,41 @@ std::string WatchedMachines::described(const ParticipantId& id) const {
 
 void WatchedMachines::show_successor(const std::string& name, const ParticipantId& id,
                                      const ParticipantId& former) {
-  if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"publisher\":\"{}\",\"former\":\"{}\"}}\n", name, text_of(id),
-               text_of(former));
-    std::fflush(stdout);
-  }
+  if (options_.json)
+    print_object({{"machine", name}, {"publisher", text_of(id)}, {"former", text_of(former)}});
   print(fmt::format("{}  publisher is now {}: {} sends no more", name, described(id),
                     text_of(former)));
 }
 
-void WatchedMachines::report_foreign_publisher(const std::string& name, Machine& machine,
-                                               const ParticipantId& id) {
+void WatchedMachines::report_ignored_publisher(const std::string& name, Machine& machine,
+                                               const ParticipantId& id,
+                                               PublisherPin::Verdict verdict) {
+  using Verdict = PublisherPin::Verdict;
   constexpr std::chrono::seconds kReportPeriod{10};
+  if (verdict == Verdict::Waiting) return;
+  const std::string stated = machine.pin.stated_by(id).value_or("");
+  std::string why = "another publisher " + described(id) +
+                    ": ignored; stop it, or use DDS Security (abbe dds keys)";
+  if (verdict == Verdict::OtherMachine)
+    why = fmt::format("another machine of this name, machine_id {}, publisher {}: ignored", stated,
+                      described(id));
+  if (verdict == Verdict::Ambiguous)
+    why = fmt::format(
+        "several machines have this name: nothing is used without --machine-id; publisher {} has "
+        "machine_id {}",
+        described(id), stated);
+  machine.why_none = why;
+
   const auto now = WallClock::now();
-  if (machine.foreign_reported && now - *machine.foreign_reported < kReportPeriod) return;
-  machine.foreign_reported = now;
-  if (options_.json) {
-    fmt::print("{{\"machine\":\"{}\",\"rival\":\"{}\",\"address\":\"{}\"}}\n", name, text_of(id),
-               addresses_.of(id));
-    std::fflush(stdout);
-  }
-  print(
-      fmt::format("{}  another publisher {}: ignored; stop it, or use DDS Security (abbe dds keys)",
-                  name, described(id)));
+  if (machine.ignored_reported && now - *machine.ignored_reported < kReportPeriod) return;
+  machine.ignored_reported = now;
+  if (options_.json)
+    print_object({{"machine", name},
+                  {"rival", text_of(id)},
+                  {"address", addresses_.of(id)},
+                  {"machine_id", stated},
+                  {"reason", why}});
+  print(name + "  " + why);
 }
 
 void WatchedMachines::show_state(const std::string& name, Machine& machine,
@@ -229,31 +331,30 @@ void WatchedMachines::show_event(const v1::CalibrationEvent& e) {
   if (std::exchange(calibration_[e.machine()], line) != line) print(line);
 }
 
-/// The decision on the vector of the line before.
-void WatchedMachines::print_decision(const Publisher& publisher, const v1::Compensation& c) {
-  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
-  const nlohmann::ordered_json line{{"machine", c.machine()},
-                                    {"decision",
-                                     {{"sequence_number", c.sequence_number()},
-                                      {"apply", decision.apply},
-                                      {"reason", decision.reason}}}};
-  std::printf("%s\n", line.dump().c_str());
-  std::fflush(stdout);
+void WatchedMachines::print_decision(const v1::Compensation& c, const Decision& decision) {
+  const auto now = WallClock::now().time_since_epoch();
+  print_object({{"machine", c.machine()},
+                {"decision",
+                 {{"sequence_number", c.sequence_number()},
+                  {"apply", decision.apply},
+                  {"reason", decision.reason},
+                  {"monotonic_ns", std::chrono::nanoseconds(now).count()},
+                  {"valid_for_ns", decision.valid_for.count()}}}});
 }
 
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
                                   const v1::Compensation& c) {
-  if (options_.json) return print_decision(publisher, c);
+  const auto decision = decide_on(machine, publisher, c);
+  if (options_.json) return print_decision(c, decision);
   const auto now = WallClock::now();
-  if (now - machine.last_live <
-      (on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1}))
-    return;
+  const auto period = on_terminal_ ? std::chrono::milliseconds{100} : std::chrono::seconds{1};
+  if (decision.apply == machine.shown_apply && now - machine.last_live < period) return;
   machine.last_live = now;
-  const auto decision = decide(c, publisher.last_delay, publisher.model.state(), alive(publisher));
+  machine.shown_apply = decision.apply;
   const std::string line =
       fmt::format("{}  {}  V {}  {}", c.machine(), publisher.position, micrometres(c.vector_m()),
                   decision.apply ? "apply" : "do not apply: " + decision.reason);
-  std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", line.c_str());
+  std::printf(on_terminal_ ? "\r\033[K%s" : "%s\n", daemon::printable_line(line).c_str());
   std::fflush(stdout);
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "abbe/dds/participant_addresses.hpp"
 #include "abbe/dds/publisher_pin.hpp"
@@ -18,8 +19,9 @@
 namespace abbe::dds {
 
 struct WatchOptions {
-  std::string machine;  ///< empty: all machines
-  bool json = false;    ///< one line with a JSON object per sample, instead of text
+  std::string machine;     ///< empty: all machines
+  std::string machine_id;  ///< of this machine; empty: the first one is pinned
+  bool json = false;       ///< one line with a JSON object per sample, instead of text
 };
 
 /// Keeps the received data of every machine, and prints what has changed.
@@ -33,8 +35,11 @@ class WatchedMachines {
   [[nodiscard]] bool received() const { return received_; }
   void take(const Arrival& arrival);
   /// Discards the ModelState of each publisher that is not alive, and shows the change. A publisher
-  /// that becomes alive again repeats its ModelState within a second.
+  /// that becomes alive again repeats its ModelState within a second. Withdraws the decision to apply
+  /// the last vector when it is no longer true, also when nothing arrives any more.
   void notice_losses();
+  /// When the next of these vectors becomes older than its validity, at most `at_most` from now.
+  [[nodiscard]] std::chrono::milliseconds until_next_loss(std::chrono::milliseconds at_most) const;
   /// The first received model that is complete and may be applied; nullptr if there is none.
   [[nodiscard]] const ReceivedModel* applicable() const;
   /// Why applicable() is nullptr, for each machine.
@@ -49,8 +54,17 @@ class WatchedMachines {
     std::optional<WriterId> state_from;  ///< writer of the last valid ModelState
     WallClock::time_point state_at{};    ///< when that ModelState arrived
     std::string position;
+    /// The last samples of the durable topics, until the publisher is pinned, for --json.
+    std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;
     Delay delay;
     std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
+  };
+
+  /// The last vector of a machine, while it may be applied.
+  struct Applied {
+    v1::Compensation vector;
+    std::chrono::nanoseconds delay;  ///< when it arrived
+    WallClock::time_point arrived, valid_until;
   };
 
   /// Several participants of a domain may publish data of the same machine. Only the data of the
@@ -60,40 +74,60 @@ class WatchedMachines {
     std::map<ParticipantId, Publisher> publishers;
     bool shown_alive = false;
     std::string shown_state, shown_model;
+    std::optional<Applied> applied;
+    bool shown_apply = false;
     WallClock::time_point last_live{};
-    std::optional<WallClock::time_point> foreign_reported;
+    std::optional<WallClock::time_point> ignored_reported;
+    /// Why no publisher is pinned.
+    std::string why_none = "no publisher has stated its identity (topic abbe/v1/Identity)";
 
-    /// Valid once a sample of the machine was received.
-    [[nodiscard]] const Publisher& pinned() const { return publishers.at(*pin.pinned()); }
+    /// nullptr: no publisher is pinned.
+    [[nodiscard]] const Publisher* pinned() const {
+      const auto found = pin.pinned() ? publishers.find(*pin.pinned()) : publishers.end();
+      return found == publishers.end() ? nullptr : &found->second;
+    }
 
     Publisher& publisher(const ParticipantId& id) {
       const auto [found, is_new] = publishers.try_emplace(id);
-      if (is_new && pin.pinned() != id) found->second.delay = pinned().delay.for_next_publisher();
+      if (is_new && pin.pinned() != id && pinned() != nullptr)
+        found->second.delay = pinned()->delay.for_next_publisher();
       if (is_new) std::erase_if(publishers, [&](const auto& p) { return !pin.remembers(p.first); });
       return found->second;
     }
   };
 
-  [[nodiscard]] bool alive(const Publisher& publisher) const;
+  [[nodiscard]] bool alive(const Publisher* publisher) const;
   /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
   /// Shows a sample of the pinned publisher, after keep().
   void show(const Arrival& arrival, const std::string& name, Machine& machine,
             const Publisher& publisher);
-  void print_json(daemon::Topic topic, std::span<const std::byte> payload);
+  void print_sample(daemon::Topic topic, std::span<const std::byte> payload);
   void print(const std::string& line);
   void show_liveness(const std::string& name, Machine& machine);
   /// Participant id and announced addresses; the addresses are not verified.
   [[nodiscard]] std::string described(const ParticipantId& id) const;
   void show_successor(const std::string& name, const ParticipantId& id,
                       const ParticipantId& former);
-  void report_foreign_publisher(const std::string& name, Machine& machine, const ParticipantId& id);
+  /// Keeps a sample of a publisher that is not pinned until show_kept().
+  void keep_for_later(const Arrival& arrival, Publisher& publisher);
+  /// Shows what arrived before the publisher was pinned.
+  void show_kept(const std::string& name, Machine& machine, Publisher& publisher);
+  [[nodiscard]] static PublisherPin::Verdict judge(const Arrival& arrival, PublisherPin& pin);
+  /// Reports, every 10 s, why the samples of `id` are not used.
+  void report_ignored_publisher(const std::string& name, Machine& machine, const ParticipantId& id,
+                                PublisherPin::Verdict verdict);
   void show_state(const std::string& name, Machine& machine, const Publisher& publisher);
   void show_model(Machine& machine, const Publisher& publisher);
   void show_health(const v1::Health& h);
   void show_event(const v1::CalibrationEvent& e);
-  void print_decision(const Publisher& publisher, const v1::Compensation& c);
+  /// Decides on a vector that has just arrived, and keeps it while it may be applied.
+  Decision decide_on(Machine& machine, const Publisher& publisher, const v1::Compensation& c) const;
+  /// Shows that the vector that was to be applied may not be applied any more.
+  void withdraw(const std::string& name, Machine& machine);
+  /// One line of JSON, with the instant of CLOCK_MONOTONIC and the validity from then on.
+  static void print_decision(const v1::Compensation& c, const Decision& decision);
   /// Prints the line with position, vector and decision. On a terminal the line is updated in
   /// place; otherwise a new line is printed once a second.
   void show_vector(Machine& machine, const Publisher& publisher, const v1::Compensation& c);

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/dds/received_model.hpp"
 #include "abbe/messages/cdr.hpp"
 
@@ -94,6 +95,18 @@ Json fields(const v1::ModelState& m) {
       FIELD(reason),  FIELD(model_id),        FIELD(age_ns),       FIELD(validity_ns)};
 }
 
+Json fields(const v1::Identity& m) {
+  return {FIELD(machine),
+          FIELD(sequence_number),
+          FIELD(host_time_ns),
+          FIELD(machine_id),
+          FIELD(twin),
+          FIELD(twin_seen),
+          FIELD(model_id),
+          FIELD(model_simulated),
+          FIELD(devices_simulated)};
+}
+
 Json fields(const v1::Health& m) {
   return {FIELD(machine), FIELD(stream),           FIELD(sequence_number), FIELD(host_time_ns),
           FIELD(state),   FIELD(rate_hz),          FIELD(samples),         FIELD(dropped),
@@ -115,7 +128,7 @@ daemon::Result<std::string> line(std::span<const std::byte> payload) {
   Json object{{"topic", daemon::topic_name<T>()}};
   object.update(fields(*value));
   // The text may come from any participant and need not be valid UTF-8.
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return daemon::json_text(object);
 }
 
 }  // namespace
@@ -136,6 +149,8 @@ daemon::Result<std::string> json_line(Topic topic, std::span<const std::byte> pa
       return line<v1::Health>(payload);
     case Topic::CalibrationEvent:
       return line<v1::CalibrationEvent>(payload);
+    case Topic::Identity:
+      return line<v1::Identity>(payload);
   }
 
   return daemon::fail(daemon::ErrorCode::BadInput, "unknown topic");

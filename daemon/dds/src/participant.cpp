@@ -6,7 +6,9 @@
 #include <fastdds/dds/log/StdoutErrConsumer.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <string>
@@ -22,6 +24,10 @@ namespace {
 
 namespace fast = eprosima::fastdds::dds;
 const auto kSuccess = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+
+/// Fast DDS tries so many ports for its participant. With its default of 100 the participants
+/// beyond the first hundred of a computer receive nothing, and no error is reported.
+constexpr std::uint32_t kMostParticipantsOfAHost = 400;
 
 /// Directs the log of Fast DDS to stderr. By default its errors go to stdout, which is reserved for
 /// the output of the program.
@@ -108,9 +114,13 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   if (auto secured = add_security(options, *qos); !secured)
     return tl::make_unexpected(secured.error());
 
+  // Also where the profile of a site was written before it had this value.
+  auto& tries = qos->wire_protocol().builtin.mutation_tries;
+  tries = std::max(tries, kMostParticipantsOfAHost);
+
   auto allowed = white_list(*qos);
   for (auto& transport : qos->transport().user_transports)
-    transport = with_message_filter(transport);
+    transport = with_message_filter(transport, has_security(*qos));
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
 
@@ -126,13 +136,16 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
 
 Result<fast::Topic*> Participant::topic(daemon::Topic topic) {
   const auto& traits = daemon::traits(topic);
+  // abbe-dds writes and reads Identity.
+  const std::string name(traits.name);
+  if (auto* known = dynamic_cast<fast::Topic*>(participant_->lookup_topicdescription(name)))
+    return known;
   fast::TypeSupport type(new PayloadType(topic));
 
   // An announced TypeInformation prevents Cyclone DDS 0.10 from matching; an announced TypeObject
   // crashes Fast DDS 2.9 participants that do not know the type.
   type->auto_fill_type_information(false);
   type->auto_fill_type_object(false);
-  const std::string name(traits.name);
   auto* created =
       type.register_type(participant_.get()) == kSuccess
           ? participant_->create_topic(name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT)

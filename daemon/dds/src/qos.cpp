@@ -16,6 +16,9 @@ const Duration_t kHeartbeatPeriod(0, 100'000'000);
 /// Most instances of a topic. Fast DDS's default is 10, but a grid may have more slices and a
 /// machine more streams.
 constexpr int kMostInstances = 128;
+/// A reader also gets the instances of strangers. Where its table is full, Fast DDS 2.9 removes an
+/// instance of a writer that has left, and aborts if a sample of it was not delivered yet.
+constexpr int kMostInstancesOfReader = 1024;
 constexpr int kInstancesAtStart = 4;
 
 bool is_durable(daemon::Topic topic) {
@@ -59,6 +62,8 @@ DataWriterQos writer_qos(daemon::Topic topic) {
 DataReaderQos reader_qos(daemon::Topic topic) {
   DataReaderQos qos;
   set_common(topic, qos);
+  qos.resource_limits().max_samples = kMostInstancesOfReader;
+  qos.resource_limits().max_instances = kMostInstancesOfReader;
   qos.type_consistency().representation.m_value = {XCDR_DATA_REPRESENTATION};
   return qos;
 }

@@ -9,7 +9,7 @@ namespace abbe::dds {
 namespace {
 
 Decision refuse(std::string reason) {
-  return {false, std::move(reason)};
+  return {false, std::move(reason), {}};
 }
 
 Decision decide_by_state(const std::optional<v1::ModelState>& state, bool publisher_alive) {
@@ -19,7 +19,7 @@ Decision decide_by_state(const std::optional<v1::ModelState>& state, bool publis
     return refuse(std::string("ModelState is ") + name_of(state->state()) +
                   (state->reason().empty() ? "" : ": " + state->reason()));
   }
-  return {true, name_of(state->state())};
+  return {true, name_of(state->state()), {}};
 }
 
 }  // namespace
@@ -39,6 +39,9 @@ void ReceivedModel::state(v1::ModelState state) {
 void ReceivedModel::slice(v1::ErrorGrid slice) {
   // Enough for the model that ModelState names, the next one, and remaining slices of old models.
   constexpr std::size_t kMostModels = 4;
+  // Several times what abbe-dds sends for the largest grid: a stranger must not fill the memory.
+  constexpr std::uint32_t kMostSlices = 64;
+  if (slice.slices() == 0 || slice.slices() > kMostSlices || slice.slice() >= slice.slices()) return;
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
     std::erase_if(slices_,
                   [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
@@ -80,6 +83,7 @@ Decision decide(const v1::Compensation& c, std::optional<std::chrono::nanosecond
   // The values may come from any participant, so the comparison avoids sums, which could overflow.
   if (c.age_ns() < 0 || c.validity_ns() < 0 || c.age_ns() > c.validity_ns() - delay->count())
     return refuse("older than its validity");
+  decision.valid_for = std::chrono::nanoseconds{c.validity_ns() - delay->count() - c.age_ns()};
   return decision;
 }
 

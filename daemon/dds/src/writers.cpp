@@ -61,6 +61,7 @@ Result<Writers> Writers::create(Participant& participant) {
 
 bool Writers::write(daemon::Topic topic, std::span<const std::byte> payload) {
   buffer_.bytes.assign(payload.begin(), payload.end());
+  if (topic == daemon::Topic::Identity) identity_ = buffer_.bytes;
   return writers_[index_of(topic)]->write(&buffer_);
 }
 

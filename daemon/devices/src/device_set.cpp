@@ -116,12 +116,22 @@ void DeviceSet::measure(std::span<const drivers::ProbePoint> points) {
   if (state_->motion != nullptr) state_->motion->measure(points);
 }
 
-void DeviceSet::stop_machine() {
-  if (state_->motion != nullptr) state_->motion->stop();
+Result<std::uint64_t> DeviceSet::stop_machine() {
+  return state_->motion != nullptr ? Result<std::uint64_t>{state_->motion->stop()}
+                                   : SampleSource::stop_machine();
+}
+
+drivers::IppStop DeviceSet::machine_stop() const {
+  return state_->motion != nullptr ? state_->motion->last_stop() : drivers::IppStop{};
 }
 
 void DeviceSet::end_machine() {
   if (state_->motion != nullptr) state_->motion->end();
+}
+
+std::optional<drivers::IppStop> DeviceSet::finish_machine() {
+  if (state_->motion == nullptr) return std::nullopt;
+  return state_->motion->finish();
 }
 
 bool DeviceSet::moves() const {

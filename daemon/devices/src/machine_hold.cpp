@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <system_error>
 
 #include "abbe/base/text_file.hpp"
+#include "machine_hold_writer.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -15,25 +16,6 @@ namespace {
 /// First line of the file while a motion is under way.
 constexpr std::string_view kMoving = "a motion is under way\n";
 constexpr std::string_view kSince = "since before the restart: ";
-
-void write_hold(const std::filesystem::path& file, const drivers::IppMachine& machine) {
-  std::error_code failed;
-  if (machine == drivers::IppMachine{}) {
-    std::filesystem::remove(file, failed);
-    if (failed)
-      fmt::print(stderr, "abbed: {}: cannot be removed: {}\n", file.string(), failed.message());
-    return;
-  }
-
-  auto written = create_folder(file.parent_path());
-  if (written)
-    written = replace_file(file, fmt::format("{}{}", machine.moving ? kMoving : "", machine.held));
-  if (!written)
-    fmt::print(stderr,
-               "abbed: {}: not saved; after a restart the measuring machine will not await a "
-               "release\n",
-               written.error().text);
-}
 
 drivers::IppMachine unreadable(const std::filesystem::path& file, const std::string& why) {
   return {fmt::format("{}unknown reason, {} cannot be read: {}", kSince, file.string(), why), true};
@@ -61,12 +43,19 @@ drivers::IppMachine read_hold(const std::filesystem::path& file) {
 
 }  // namespace
 
+std::string hold_text(const drivers::IppMachine& machine) {
+  return fmt::format("{}{}", machine.moving ? kMoving : "", machine.held);
+}
+
 void keep_hold(const std::filesystem::path& data_dir, drivers::IppDeviceOptions& options) {
   const auto file = data_dir / "machine-hold";
   const drivers::IppMachine machine = read_hold(file);
   options.session.held = machine.held;
   options.session.moving = machine.moving;
-  options.machine_changed = [file](const drivers::IppMachine& m) { write_hold(file, m); };
+  // Shared by the two functions, which end with the device.
+  const auto writer = std::make_shared<MachineHoldWriter>(file, machine);
+  options.machine_changed = [writer](const drivers::IppMachine& m) { writer->keep(m); };
+  options.machine_stored = [writer] { return writer->stored(); };
 }
 
 }  // namespace abbe::daemon

@@ -5,13 +5,17 @@
 /// read the file, it stops the motion (AbortE) and awaits a release.
 
 #include <filesystem>
+#include <string>
 
 #include "abbe/drivers/ippdme/device.hpp"
 
 namespace abbe::daemon {
 
-/// Sets session.held and session.moving in `options` from the file, and sets machine_changed to a
-/// function that writes the file.
+/// The content of the file for this state.
+[[nodiscard]] std::string hold_text(const drivers::IppMachine& machine);
+
+/// Sets session.held and session.moving in `options` from the file, and machine_changed and
+/// machine_stored to functions of a MachineHoldWriter for the file.
 void keep_hold(const std::filesystem::path& data_dir, drivers::IppDeviceOptions& options);
 
 }  // namespace abbe::daemon

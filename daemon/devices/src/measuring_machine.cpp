@@ -24,6 +24,7 @@ drivers::IppDeviceOptions machine_options(const CmmConfig& config, double speed)
   options.session.tool = config.tool;
   options.session.home = config.home;
   options.session.poll_period = stretched(options.session.poll_period, speed);
+  options.session.store_timeout = stretched(options.session.store_timeout, speed);
   options.session.connect_timeout = stretched(options.session.connect_timeout, speed);
   options.session.command_timeout = stretched(config.command_timeout, speed);
   options.session.motion_timeout = stretched(config.motion_timeout, speed);
@@ -36,9 +37,9 @@ drivers::IppDeviceOptions machine_options(const CmmConfig& config, double speed)
 // Wall time. A tip position older than this is not used; a machine that is ready to move reports
 // ten positions in this time.
 constexpr auto kPositionIsOld = std::chrono::seconds{1};
-// Largest delay until the device thread handles a request to stop. At 200 mm/s the machine moves 2
+// Largest delay until the device thread handles a request to stop. At 200 mm/s the machine moves 1
 // mm in this time.
-constexpr auto kMostStopDelay = std::chrono::milliseconds{10};
+constexpr auto kMostStopDelay = std::chrono::milliseconds{5};
 
 /// A measuring machine behind an I++ DME server, as source of touches, and also of axis samples if
 /// the configuration has no other device that reads the axes.
@@ -71,8 +72,13 @@ class RunningMachine final : public RunningDevices, private MachineMotion {
   void measure(std::span<const drivers::ProbePoint> points) override {
     running_.device->measure(points);
   }
-  void stop() override { running_.device->abort(); }
+  std::uint64_t stop() override { return running_.device->abort(); }
+  [[nodiscard]] drivers::IppStop last_stop() const override { return running_.device->last_stop(); }
   void end() override { running_.device->end(); }
+  drivers::IppStop finish() override {
+    running_.thread->stop();
+    return running_.device->finish();
+  }
   [[nodiscard]] std::size_t points_left() const override { return running_.device->points_left(); }
   [[nodiscard]] std::optional<std::string> release_awaited() const override {
     if (!running_.device->held()) return std::nullopt;

@@ -21,12 +21,25 @@ std::string printable(std::string_view text) {
   return out;
 }
 
+/// Reasons may be long; a control may limit the length of a line.
+void add_lines(std::string_view text, std::vector<std::string>& lines) {
+  constexpr std::size_t kLongest = 100;
+  while (text.size() > kLongest) {
+    auto end = text.rfind(' ', kLongest);
+    if (end == std::string_view::npos || end == 0) end = kLongest;
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(text[end] == ' ' ? end + 1 : end);
+  }
+  lines.emplace_back(text);
+}
+
 /// One line each.
 std::vector<std::string> statements_of(const ExportOrigin& origin, std::string_view sign) {
-  std::vector<std::string> all{fmt::format("abbe export of model {}", origin.model_hash),
-                               fmt::format("machine: {}", printable(origin.machine)),
-                               fmt::format("valid for {}, tool offset {}", printable(origin.volume),
-                                           printable(origin.tool))};
+  std::vector<std::string> all{fmt::format("abbe export of model {}", origin.model_hash)};
+  for (const std::string& text : origin.use) add_lines(printable(text), all);
+  all.push_back(fmt::format("machine: {}", printable(origin.machine)));
+  all.push_back(fmt::format("valid for {}, tool offset {}", printable(origin.volume),
+                            printable(origin.tool)));
   if (!origin.direction.empty())
     all.push_back(fmt::format("direction of travel: {}", printable(origin.direction)));
   all.emplace_back(sign);

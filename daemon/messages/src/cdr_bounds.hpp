@@ -109,6 +109,13 @@ void visit(const v1::ModelState& m, V&& v) {
   v("model_id", m.model_id(), 64);
 }
 template <class V>
+void visit(const v1::Identity& m, V&& v) {
+  v("machine", m.machine(), 64);
+  v("machine_id", m.machine_id(), 36);
+  v("twin_seen", m.twin_seen(), 256);
+  v("model_id", m.model_id(), 64);
+}
+template <class V>
 void visit(const v1::Health& m, V&& v) {
   v("machine", m.machine(), 64);
   v("stream", m.stream(), 32);

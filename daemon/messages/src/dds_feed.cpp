@@ -2,6 +2,7 @@
 #include <sys/socket.h>
 
 #include <cerrno>
+#include <string>
 #include <utility>
 
 #include "abbe/base/unix_socket.hpp"
@@ -17,6 +18,7 @@ struct DdsFeed::State {
   DdsBridge& bridge;
   FileDescriptor peer;
   FrameReader frames;
+  std::string reported_twin;
 
   void connect() {
     auto fd = connect_unix(socket);
@@ -24,6 +26,7 @@ struct DdsFeed::State {
     peer = std::move(*fd);
     frames = FrameReader();
     bridge.connected();
+    reported_twin.clear();
   }
 
   void disconnect() {
@@ -57,6 +60,15 @@ struct DdsFeed::State {
     static_cast<void>(::send(peer.get(), &alive, 1, MSG_DONTWAIT | MSG_NOSIGNAL));
   }
 
+  /// Tried again with the next cycle if the socket is full; a part is never sent, because abbed
+  /// reads at once what is this short.
+  void report(const std::string& twin) {
+    if (!peer || twin == reported_twin) return;
+    const auto bytes = twin_report(twin);
+    const ssize_t n = ::send(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (n == static_cast<ssize_t>(bytes.size())) reported_twin = twin;
+  }
+
   void feed() {
     while (const auto frame = frames.next()) {
       const auto now = std::chrono::steady_clock::now();
@@ -81,6 +93,10 @@ void DdsFeed::cycle() {
   pollfd ready{s.peer.get(), POLLIN, 0};
   if (::poll(&ready, 1, static_cast<int>(kRetryPeriod.count())) > 0) s.read();
   s.bridge.cycle(std::chrono::steady_clock::now());
+}
+
+void DdsFeed::report_twin(const std::string& seen) {
+  state_->report(seen);
 }
 
 bool DdsFeed::connected() const noexcept {

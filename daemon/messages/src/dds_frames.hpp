@@ -1,6 +1,7 @@
 #pragma once
 /// The frames on the local socket from abbed to abbe-dds: a header of 16 bytes, then a payload.
-/// abbe-dds answers each beat with one byte of any value.
+/// abbe-dds answers each beat with the byte 00, and reports what it sees of another publisher that
+/// claims to be this machine: 01, the length of the text in two bytes, little endian, the text.
 ///
 ///   bytes 0..3  length of the payload, little endian
 ///   byte  4     kind
@@ -19,6 +20,8 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "abbe/messages/topics.hpp"
@@ -49,6 +52,51 @@ struct ReceivedFrame {
   FrameInstant at{};
   std::span<std::byte> payload;
 };
+
+inline constexpr std::byte kAnswerAlive{0}, kAnswerTwin{1};
+inline constexpr std::size_t kLongestTwinText = 256;  // as in the IDL, Identity::twin_seen
+
+/// Reads what abbe-dds sends. Sans-I/O.
+class AnswerReader {
+ public:
+  void take(std::span<const std::byte> bytes) {
+    for (const std::byte b : bytes) take(b);
+  }
+  /// The last report; empty: no other publisher claims to be this machine.
+  [[nodiscard]] const std::string& twin() const noexcept { return twin_; }
+
+ private:
+  void take(std::byte b) {
+    if (header_left_ > 0) {
+      length_ |= std::to_integer<std::size_t>(b) << (header_left_ == 2 ? 0 : 8);
+      if (--header_left_ == 0) text_.clear();
+    } else if (length_ > 0) {
+      --length_;
+      if (text_.size() < kLongestTwinText) text_.push_back(std::to_integer<char>(b));
+    } else if (b == kAnswerTwin) {
+      header_left_ = 2;
+      in_text_ = true;
+    }
+    if (in_text_ && header_left_ == 0 && length_ == 0) {
+      twin_ = text_;
+      in_text_ = false;
+    }
+  }
+
+  int header_left_ = 0;
+  std::size_t length_ = 0;
+  bool in_text_ = false;
+  std::string text_, twin_;
+};
+
+/// The report for AnswerReader; a longer text is cut.
+inline std::vector<std::byte> twin_report(std::string_view text) {
+  text = text.substr(0, kLongestTwinText);
+  std::vector<std::byte> bytes{kAnswerTwin, static_cast<std::byte>(text.size() & 0xffu),
+                               static_cast<std::byte>(text.size() >> 8)};
+  for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
+  return bytes;
+}
 
 inline void append_frame(std::vector<std::byte>& out, const Frame& frame) {
   const auto n = static_cast<std::uint32_t>(frame.payload.size());

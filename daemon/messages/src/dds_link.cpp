@@ -1,10 +1,13 @@
 #include "abbe/messages/dds_link.hpp"
 
+#include <fmt/format.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <cstring>
 #include <optional>
 #include <utility>
 
@@ -22,16 +25,32 @@ struct Pending {
   bool to_send = true;
 };
 
-/// Whether the process at the other end, as the kernel reports it, is the supervised abbe-dds;
-/// without supervision, whether it belongs to the user of abbed.
-bool may_connect(int fd, const DdsProcess* process) {
+bool may_connect(int fd, const DdsLinkPeer& peer) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
   if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return false;
-  if (process == nullptr) return credentials.uid == ::geteuid();
+  const DdsProcess* const process = peer.process;
+  if (process == nullptr) return credentials.uid == (peer.user ? peer.user->uid : ::geteuid());
   // A process of another PID namespace has the pid 0, which pid() also returns while no abbe-dds
   // runs.
   return credentials.pid != 0 && credentials.pid == process->pid();
+}
+
+/// Lets the group of `user` open the socket. A folder with the setgid bit has done so already, and
+/// abbed.service does not permit chown(). Io: after a person has corrected the folder, a restart
+/// succeeds.
+Result<void> open_to_group(const std::filesystem::path& socket,
+                           const std::optional<Account>& user) {
+  if (!user) return {};
+  struct stat status {};
+  if (::stat(socket.c_str(), &status) == 0 && status.st_gid == user->gid) return {};
+  if (::chown(socket.c_str(), static_cast<uid_t>(-1), user->gid) == 0) return {};
+  return fail(
+      ErrorCode::Io,
+      fmt::format("{}: its group cannot be set to that of abbe-dds: {}: set [dds] socket to "
+                  "a file in /run/abbe-dds, or give its folder to this group with the mode "
+                  "2750 (systemd-tmpfiles --create)",
+                  socket.string(), std::strerror(errno)));
 }
 
 /// Tracks the unanswered beats of one connection.
@@ -58,6 +77,7 @@ class Beats {
 struct DdsLink::State {
   std::filesystem::path path;
   FileDescriptor listener;
+  DdsLinkPeer allowed;
   DdsProcess* process = nullptr;
   FileDescriptor peer;
   std::vector<std::byte> out;  ///< not yet sent: at most the rest of one frame
@@ -67,6 +87,7 @@ struct DdsLink::State {
   RetainedPayloads<WallTime> live;
   WallTime last_beat{};
   Beats beats;
+  AnswerReader answers;
   DdsLinkCounters counters;
 
   void accept_newest();
@@ -86,7 +107,7 @@ void DdsLink::State::accept_newest() {
     FileDescriptor accepted(
         ::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (!accepted) return;
-    if (!may_connect(accepted.get(), process)) {
+    if (!may_connect(accepted.get(), allowed)) {
       ++counters.foreign_connections;
       continue;
     }
@@ -95,17 +116,18 @@ void DdsLink::State::accept_newest() {
     peer = std::move(accepted);
     ++counters.connections;
     beats = {};
+    answers = {};
     last_beat = {};  // the next beat is sent at once
     for (auto& entry : durable.entries()) entry.extra.to_send = true;
   }
 }
 
-/// Reads the answers to beats. abbe-dds sends one byte for each beat that it has read, and nothing
-/// else.
+/// Reads the answers to beats, and reports of twins.
 void DdsLink::State::read_answers() {
-  std::array<std::byte, 64> bytes{};
+  std::array<std::byte, 512> bytes{};
   const ssize_t n = ::recv(peer.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
   if (n > 0) beats.answered();
+  if (n > 0) answers.take(std::span(bytes).first(static_cast<std::size_t>(n)));
   if (n > 0 && process != nullptr) process->answered(WallTime::clock::now());
   if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) disconnect();
 }
@@ -185,7 +207,10 @@ void DdsLink::State::send_or_keep(const Frame& frame, const PayloadKey& key) {
 Result<DdsLink> DdsLink::listen(const std::filesystem::path& socket, DdsLinkPeer peer) {
   auto listener = listen_unix(socket);
   if (!listener) return tl::make_unexpected(listener.error());
+  if (auto opened = open_to_group(socket, peer.user); !opened)
+    return tl::make_unexpected(opened.error());
   auto state = std::make_unique<State>();
+  state->allowed = peer;
   state->path = socket;
   state->listener = std::move(*listener);
   state->process = peer.process;
@@ -241,6 +266,10 @@ bool DdsLink::connected() const noexcept {
 
 bool DdsLink::answers() const noexcept {
   return connected() && state_->beats.silence() <= kUnanswered;
+}
+
+const std::string& DdsLink::twin() const noexcept {
+  return state_->answers.twin();
 }
 
 const char* DdsLink::state() const noexcept {

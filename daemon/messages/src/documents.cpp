@@ -48,6 +48,11 @@ std::string governance_document() {
 std::string permissions_document(const std::string& common_name, DdsRole role,
                                  ValidityPeriod period) {
   const char* const may = role == DdsRole::Daemon ? "publish" : "subscribe";
+  // The daemon looks for other machines of its name.
+  const char* const twins =
+      role == DdsRole::Daemon
+          ? "<subscribe><topics><topic>abbe/v1/Identity</topic></topics></subscribe>"
+          : "";
   return fmt::format(R"(<?xml version="1.0" encoding="UTF-8"?>
 <dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="omg_shared_ca_permissions.xsd">
   <permissions>
@@ -57,13 +62,15 @@ std::string permissions_document(const std::string& common_name, DdsRole role,
       <allow_rule>
         {3}
         <{4}><topics><topic>abbe/v1/*</topic></topics></{4}>
+        {5}
       </allow_rule>
       <default>DENY</default>
     </grant>
   </permissions>
 </dds>
 )",
-                     common_name, xml_time(period.begin), xml_time(period.end), kDomains, may);
+                     common_name, xml_time(period.begin), xml_time(period.end), kDomains, may,
+                     twins);
 }
 
 }  // namespace abbe::daemon

@@ -22,6 +22,7 @@ constexpr std::array<TopicTraits, kTopicCount> kTopics{{
     {Topic::Health, "abbe/v1/Health", "abbe::v1::Health", Kind::Durable, Key::MachineAndText, 10s},
     {Topic::CalibrationEvent, "abbe/v1/CalibrationEvent", "abbe::v1::CalibrationEvent",
      Kind::Durable, Key::Machine, 10s},
+    {Topic::Identity, "abbe/v1/Identity", "abbe::v1::Identity", Kind::Durable, Key::Machine, 1s},
 }};
 
 /// Reads CDR_LE. `body` begins after the encapsulation header; alignment is relative to this point.

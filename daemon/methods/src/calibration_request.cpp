@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/messages/attachment_content.hpp"
 
 namespace abbe::daemon {
@@ -57,7 +58,7 @@ RecordingAttachment to_attachment(const CalibrationRequest& request) {
 }
 
 RecordingAttachment to_attachment(const CalibrationTask& task) {
-  std::string content = to_json(task).dump();
+  std::string content = json_text(to_json(task));
   content.replace(0, 1, fmt::format("{}{:{}},", kFromKey, 0, kDigitsOfFrom));
   return {.name = fmt::format("{}{}{}", kRequestNamePrefix, method_of(task), kRequestNameSuffix),
           .media_type = "application/json",

@@ -127,7 +127,7 @@ RunFigures run_figures(const calib::Verdict& verdict, std::string_view held_out)
   return {.held_out = std::string(held_out),
           .held_out_before_m = or_none(verdict.held_out.no_compensation_rms_m),
           .held_out_after_m = or_none(verdict.held_out.candidate_rms_m),
-          .notes = verdict.notes,
+          .notes = {},  // in ModelDocument::verdict
           .residuals = {}};
 }
 

@@ -8,9 +8,11 @@
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 
@@ -29,24 +31,41 @@ constexpr auto kTable =
     "CREATE TABLE model(id TEXT PRIMARY KEY, inode INTEGER, modified_ns INTEGER, bytes INTEGER, "
     "summary TEXT, sum TEXT) WITHOUT ROWID";
 
+json json_of(const std::optional<ModelVerdict>& verdict) {
+  if (!verdict) return {};
+  return {{"accepted", verdict->accepted}, {"reasons", verdict->reasons}};
+}
+
 std::string text_of(const ModelSummary& summary) {
-  return json{{"method", summary.method},
-              {"machine", summary.machine},
-              {"inputs", summary.inputs},
-              {"fault", summary.fault}}
-      .dump(-1, ' ', false, json::error_handler_t::replace);
+  return json_text(json{{"method", summary.method},
+                        {"machine", summary.machine},
+                        {"inputs", summary.inputs},
+                        {"verdict", json_of(summary.verdict)},
+                        {"simulated", summary.simulated ? json(*summary.simulated) : json()},
+                        {"fault", summary.fault}});
+}
+
+/// Throws json::exception, as summary_from().
+std::optional<ModelVerdict> verdict_from(const json& object) {
+  if (object.is_null()) return std::nullopt;
+  return ModelVerdict{object.at("accepted").get<bool>(),
+                      object.at("reasons").get<std::vector<std::string>>()};
 }
 
 /// Throws json::exception if a member is missing or has the wrong type.
 ModelSummary summary_from(const std::string& text) {
   const json object = json::parse(text);
-  return {object.at("method").get<std::string>(), object.at("machine").get<std::string>(),
-          object.at("inputs").get<std::vector<std::string>>(),
-          object.at("fault").get<std::string>()};
+  const json& simulated = object.at("simulated");
+  return {.method = object.at("method").get<std::string>(),
+          .machine = object.at("machine").get<std::string>(),
+          .inputs = object.at("inputs").get<std::vector<std::string>>(),
+          .verdict = verdict_from(object.at("verdict")),
+          .simulated = simulated.is_null() ? std::nullopt : std::optional{simulated.get<bool>()},
+          .fault = object.at("fault").get<std::string>()};
 }
 
-/// SQLite has no checksums, and a changed bit must not rename a machine. Another version of abbe may
-/// read a file that this one cannot.
+/// SQLite has no checksums, and a changed bit must not rename a machine. With the version of abbe:
+/// another one may read a file in which this one found a fault.
 std::string checksum(const std::string& id, const StoreStamp& file, const std::string& summary) {
   return sha256_hex(fmt::format("{} {} {} {} {} {}", ABBE_VERSION, id, file.inode, file.modified_ns,
                                 file.bytes, summary));
@@ -98,7 +117,7 @@ ModelIndex::ModelIndex(const fs::path& folder) : file_(folder / "index.sqlite") 
 }
 
 void ModelIndex::make_again() {
-  database_.reset();
+  database_ = nullptr;
   if (::access(file_.parent_path().c_str(), W_OK) != 0) return;
   try {
     database_ = create_index(file_);
@@ -112,6 +131,7 @@ ModelIndex::~ModelIndex() = default;
 std::unordered_map<std::string, IndexedModel> ModelIndex::rows() {
   std::unordered_map<std::string, IndexedModel> found;
   if (database_ == nullptr) return found;
+  bool damaged = false;
 
   try {
     SQLite::Statement row{*database_,
@@ -128,15 +148,21 @@ std::unordered_map<std::string, IndexedModel> ModelIndex::rows() {
       found.insert_or_assign(std::move(id), std::move(model));
     }
   } catch (const SQLite::Exception& error) {  // the rows so far have their checksums
-    if (is_damage(error)) make_again();
+    damaged = is_damage(error);
   } catch (const json::exception&) {  // a version of abbe with other members and the same number
     found.clear();
+  }
+  // After the statement, which uses the database. The rows are read from the files again.
+  if (damaged) {
+    found.clear();
+    make_again();
   }
   return found;
 }
 
 void ModelIndex::put(std::span<const IndexedModel> models) {
   if (database_ == nullptr || models.empty()) return;
+  bool damaged = false;
   try {
     SQLite::Transaction change{*database_};
     SQLite::Statement row{*database_, "INSERT OR REPLACE INTO model VALUES(?, ?, ?, ?, ?, ?)"};
@@ -149,9 +175,10 @@ void ModelIndex::put(std::span<const IndexedModel> models) {
       row.reset();
     }
     change.commit();
-  } catch (const SQLite::Exception& error) {  // else read-only, busy or full: they are read again
-    if (is_damage(error)) make_again();
+  } catch (const SQLite::Exception& error) {  // else read-only, busy or full: read again later
+    damaged = is_damage(error);
   }
+  if (damaged) make_again();
 }
 
 void ModelIndex::remove(std::span<const std::string> ids) {
@@ -170,7 +197,10 @@ void ModelIndex::remove(std::span<const std::string> ids) {
 }
 
 ModelSummary summary_of(const ModelDocument& document) {
-  ModelSummary summary{.method = document.method, .machine = document.machine};
+  ModelSummary summary{.method = document.method,
+                       .machine = document.machine,
+                       .verdict = document.verdict,
+                       .simulated = made_on_simulated_devices(document)};
   for (const InputFile& input : document.inputs) summary.inputs.push_back(input.name);
   return summary;
 }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -24,8 +25,10 @@ namespace abbe::daemon {
 /// What lists show of a model, and what retention of recordings needs.
 struct ModelSummary {
   std::string method{}, machine{};
-  std::vector<std::string> inputs{};  ///< names of the files that the model was made of
-  std::string fault{};                ///< why the file is not a model; then all others are empty
+  std::vector<std::string> inputs{};      ///< names of the files that the model was made of
+  std::optional<ModelVerdict> verdict{};  ///< of the file: decision and reasons
+  std::optional<bool> simulated{};        ///< made_on_simulated_devices()
+  std::string fault{};  ///< why the file is not a model; then all others are empty
   bool operator==(const ModelSummary&) const = default;
 };
 
@@ -44,14 +47,14 @@ class ModelIndex {
   ModelIndex& operator=(const ModelIndex&) = delete;
   ~ModelIndex();
 
-  /// All rows with a correct checksum, by id.
+  /// All rows with a correct checksum, by id; none, and an empty index, if SQLite finds damage.
   [[nodiscard]] std::unordered_map<std::string, IndexedModel> rows();
-  /// Adds rows, or replaces those of the same id.
+  /// Adds rows, or replaces those of the same id. A damaged index is then empty.
   void put(std::span<const IndexedModel> models);
   void remove(std::span<const std::string> ids);
 
  private:
-  /// Replaces the file by an empty index, if the folder is writable.
+  /// An empty index in place of the present one; none if the folder is not writable.
   void make_again();
 
   std::filesystem::path file_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "abbe/base/text_file.hpp"
@@ -70,13 +71,29 @@ Result<std::vector<std::string>> ids_in_store(const fs::path& folder, const Stor
   return ids;
 }
 
-/// Writes the file of a model, and adds it to the index.
-Result<void> write_model(const fs::path& folder, const fs::path& file, const std::string& id,
-                         const ModelDocument& document) {
-  if (auto written = replace_file(file, to_json(document)); !written) return written;
-  const IndexedModel indexed{id, stamp_of_file(file), summary_of(document)};
-  ModelIndex{folder}.put({&indexed, 1});
-  return {};
+/// That of the state; where it was lost, that of the file.
+std::optional<ModelVerdict> verdict_on(const StoreState& state, const ModelDocument& document) {
+  const StoreEvent* added = state.last_added(model_id(document));
+  if (added == nullptr) return document.verdict;
+  return ModelVerdict{added->accepted, added->reasons};
+}
+
+void set_verdict(StoreEntry& entry, const std::optional<ModelVerdict>& verdict) {
+  entry.judged = verdict.has_value();
+  if (!verdict) return;
+  entry.accepted = verdict->accepted;
+  entry.reasons = verdict->reasons;
+}
+
+/// Notes may differ.
+bool same_decision(const std::optional<ModelVerdict>& a, const ModelVerdict& b) {
+  return a && a->accepted == b.accepted && a->reasons == b.reasons;
+}
+
+/// The document with its own verdict, or with `verdict` if it has another one.
+ModelDocument with_verdict(ModelDocument document, const ModelVerdict& verdict) {
+  if (!same_decision(document.verdict, verdict)) document.verdict = verdict;
+  return document;
 }
 
 constexpr std::size_t kShortestPrefix = 4;
@@ -131,15 +148,24 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
                                     std::vector<std::string> reasons, const StoreActor& actor) {
   const auto id = model_id(document);
   // The model file is written first and without the lock. Another process may write the same file,
-  // but with the same model, because the id is a hash of the model. A damaged file of this id is
-  // replaced.
-  if (!load(id))
-    if (const auto written = write_model(folder_, model_path(id), id, document); !written)
+  // but with the same model, because the id is a hash of the model. A file of this id that is
+  // damaged, or has another verdict, is replaced.
+  const ModelVerdict verdict{accepted, reasons};
+  const auto write_model_file = [&]() -> Result<void> {
+    const ModelDocument judged = with_verdict(document, verdict);
+    if (auto written = replace_file(model_path(id), to_json(judged)); !written) return written;
+    const IndexedModel indexed{id, stamp_of_file(model_path(id)), summary_of(judged)};
+    ModelIndex{folder_}.put({&indexed, 1});
+    return {};
+  };
+  if (const auto known = load(id); !known || !same_decision(known->verdict, verdict))
+    if (const auto written = write_model_file(); !written)
       return tl::make_unexpected(written.error());
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
-  if (stamp_of_file(model_path(id)) == StoreStamp{})  // remove_old() removed it meanwhile
-    if (const auto written = write_model(folder_, model_path(id), id, document); !written)
+  // remove_old() of another process may have deleted the file meanwhile.
+  if (std::error_code seen; !fs::exists(model_path(id), seen) && !seen)
+    if (const auto written = write_model_file(); !written)
       return tl::make_unexpected(written.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
@@ -155,23 +181,26 @@ Result<std::string> ModelStore::add(const ModelDocument& document, bool accepted
   return id;
 }
 
-Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force) {
+Result<void> ModelStore::activate(const std::string& id, const StoreActor& actor, bool force,
+                                  std::string accepted_configuration) {
   const auto lock = lock_store(folder_, lock_patience_);
   if (!lock) return tl::make_unexpected(lock.error());
   auto state = read_state(folder_);
   if (!state) return tl::make_unexpected(state.error());
-  if (const auto document = load(id); !document) return tl::make_unexpected(document.error());
-  const StoreEvent* added = state->last_added(id);
-  const bool accepted = added != nullptr && added->accepted;
+  const auto document = load(id);
+  if (!document) return tl::make_unexpected(document.error());
+  const auto verdict = verdict_on(*state, *document);
+  const bool accepted = verdict && verdict->accepted;
   if (!accepted && !force)
     return fail(ErrorCode::Refused,
-                added == nullptr
-                    ? fmt::format("activate {}: it has no verdict of the gate (use force)", id)
-                    : fmt::format("activate {}: the gate refused it: {}", id,
-                                  fmt::join(added->reasons, "; ")));
+                verdict
+                    ? fmt::format("activate {}: the gate refused it: {}", id,
+                                  fmt::join(verdict->reasons, "; "))
+                    : fmt::format("activate {}: it has no verdict of the gate (use force)", id));
   const auto action = accepted ? StoreAction::Activated : StoreAction::Forced;
 
-  return append(folder_, std::move(*state), StoreEvent{action, id, actor, accepted, {}});
+  return append(folder_, std::move(*state),
+                StoreEvent{action, id, actor, accepted, {}, std::move(accepted_configuration)});
 }
 
 Result<void> ModelStore::add_drift(const std::string& id, const StoreActor& actor) {
@@ -250,19 +279,24 @@ Result<std::vector<StoreEntry>> ModelStore::list() const {
     StoreEntry entry{.id = (*ids)[i]};
     entry.active = active == entry.id;
     if (const auto added = models.find(entry.id); added != models.end()) {
-      entry.accepted = added->second->accepted;
-      entry.reasons = added->second->reasons;
+      set_verdict(entry, ModelVerdict{added->second->accepted, added->second->reasons});
       entry.added = added->second->actor.when;
+    } else {
+      set_verdict(entry, found[i].verdict);
     }
     entry.method = std::move(found[i].method);
     entry.machine = std::move(found[i].machine);
     entry.inputs = std::move(found[i].inputs);
     entry.fault = std::move(found[i].fault);
+    entry.simulated = found[i].simulated;
     entries.push_back(std::move(entry));
   }
 
-  std::stable_sort(entries.begin(), entries.end(),
-                   [](const auto& a, const auto& b) { return a.added > b.added; });
+  // In the order of the events, not of their dates: the clock may have been set back in between.
+  std::ranges::stable_sort(entries, std::greater<>{}, [&models](const StoreEntry& entry) {
+    const auto added = models.find(entry.id);
+    return added == models.end() ? nullptr : added->second;
+  });
   return entries;
 }
 

@@ -12,6 +12,7 @@
 #include "read_bar_figures.hpp"
 #include "read_run_figures.hpp"
 #include "read_travel.hpp"
+#include "verdict_json.hpp"
 
 namespace abbe::daemon {
 
@@ -223,6 +224,38 @@ std::vector<InputFile> read_inputs(ModelReader& in) {
   return inputs;
 }
 
+MeaningEntries read_entries(ModelReader& in, const ModelJson& configuration,
+                            const std::string& key) {
+  MeaningEntries entries;
+  const ModelJson* list = in.find(configuration, "configuration", key);
+  if (list == nullptr || !list->is_object()) return entries;
+  for (const auto& [name, value] : list->items()) {
+    if (value.is_string())
+      set_entry(entries, name, value.get<std::string>());
+    else
+      in.fault(fmt::format("configuration.{}.{}", key, name), "must be a string");
+  }
+  return entries;
+}
+
+/// Absent in models of earlier versions.
+std::optional<Meaning> read_configuration(ModelReader& in) {
+  if (!in.root().is_object() || !in.root().contains("configuration")) return std::nullopt;
+  const ModelJson& entry = in.root().at("configuration");
+  return Meaning{read_entries(in, entry, "readings"), read_entries(in, entry, "measurements")};
+}
+
+void check_configuration(ModelReader& in, const ModelDocument& document) {
+  if (!document.configuration) return;
+  if (hash_of(document.configuration->readings) != document.machine_hash)
+    in.fault("configuration.readings",
+             "machine_hash is not their hash: the file was changed or damaged");
+  const auto simulated = made_on_simulated_devices(document);
+  const ModelJson stated = simulated ? ModelJson(*simulated) : ModelJson();
+  if (!in.root().contains("simulated") || in.root().at("simulated") != stated)
+    in.fault("simulated", "differs from the configuration: the file was changed or damaged");
+}
+
 Result<ModelDocument> read_document(ModelReader& in) {
   if (in.text("schema") != kModelSchema) {
     in.fault("schema", fmt::format("must be \"{}\"", kModelSchema));
@@ -249,18 +282,24 @@ Result<ModelDocument> read_document(ModelReader& in) {
   const auto tracker_drift = read_tracker_drift(in);
   const auto bar = read_bar_figures(in);
   const auto run = read_run_figures(in);
+  const auto verdict = read_verdict(in);
+  const auto configuration = read_configuration(in);
   const auto recording_gap = read_optional(in, "recording_gap"), mode = read_optional(in, "mode"),
              software = read_optional(in, "abbe_version");
   const auto method = in.text("method"), estimator = in.text("estimator"),
              machine = in.text("machine"), machine_hash = in.text("machine_hash"),
              hash = in.text("hash");
   if (in.any()) return tl::make_unexpected(in.to_error());
-  ModelDocument document{std::move(*model), method,        estimator,  machine,
-                         machine_hash,      *created,      statistics, inputs,
-                         artefact,          recording_gap, mode,       backlash,
-                         tracker_drift,     bar,           run,        software};
-  if (hash == model_hash(document)) return document;
-  in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+  ModelDocument document{
+      std::move(*model), method, estimator, machine,       machine_hash, *created,
+      statistics,        inputs, artefact,  recording_gap, mode,         backlash,
+      tracker_drift,     bar,    run,       software,      verdict,      configuration};
+  check_configuration(in, document);
+  if (hash != model_hash(document))
+    in.fault("hash", "is not the hash of the content: the file was changed or damaged");
+  else if (!verdict_is_whole(in, document))
+    in.fault("verdict", "is not the verdict on this model: the file was changed or damaged");
+  if (!in.any()) return document;
 
   return tl::make_unexpected(in.to_error());
 }

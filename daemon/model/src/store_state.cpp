@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/utc_text.hpp"
 
 namespace abbe::daemon {
@@ -25,12 +26,21 @@ bool is_activation(const StoreEvent& event) {
          event.action == StoreAction::RolledBack;
 }
 
+std::string accepted_configuration(const std::vector<StoreEvent>& events, std::string_view id) {
+  const auto last = std::find_if(events.rbegin(), events.rend(), [&](const StoreEvent& event) {
+    return event.id == id && !event.accepted_configuration.empty();
+  });
+  return last == events.rend() ? std::string{} : last->accepted_configuration;
+}
+
 json to_json(const StoreEvent& event) {
   json object{{"action", kActions[static_cast<std::size_t>(event.action)]},
               {"id", event.id},
               {"who", event.actor.who},
               {"why", event.actor.why},
               {"when", to_text(event.actor.when)}};
+  if (!event.accepted_configuration.empty())
+    object["accepted_configuration"] = event.accepted_configuration;
   if (event.action == StoreAction::Added) {
     object["accepted"] = event.accepted;
     object["reasons"] = event.reasons;
@@ -50,6 +60,7 @@ std::optional<StoreEvent> event_from(const json& object) {
   event.id = object.at("id").get<std::string>();
   event.actor = {object.at("who").get<std::string>(), object.at("why").get<std::string>(), *when};
 
+  event.accepted_configuration = object.value("accepted_configuration", std::string{});
   if (event.action == StoreAction::Added) {
     event.accepted = object.at("accepted").get<bool>();
     event.reasons = object.at("reasons").get<std::vector<std::string>>();
@@ -84,6 +95,8 @@ std::optional<StoreEvent> StoreState::activation() const {
   StoreEvent event = *last;
   const StoreEvent* added = last_added(*id);
   event.accepted = added != nullptr && added->accepted;
+  if (added != nullptr && !added->accepted) event.reasons = added->reasons;
+  event.accepted_configuration = accepted_configuration(events, *id);
   return event;
 }
 
@@ -133,7 +146,7 @@ std::string to_text(const StoreState& state) {
   json root{{"schema", kSchema},
             {"active", active ? json(*active) : json()},
             {"events", std::move(events)}};
-  return root.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+  return indented_json_text(root) + "\n";
 }
 
 Result<StoreState> store_state_from_text(std::string_view text, const std::string& file) {

@@ -17,8 +17,8 @@ struct StoreState {
   /// The ids of all activations that were not rolled back, oldest first; the last one is active.
   [[nodiscard]] std::vector<std::string> activations() const;
   [[nodiscard]] std::optional<std::string> active() const;
-  /// The event that made the active model active; `accepted` is the verdict of the gate when the
-  /// model was added.
+  /// The event that made the active model active; `accepted` and `reasons` are the verdict of the
+  /// gate when the model was added, `accepted_configuration` the last one of the model.
   [[nodiscard]] std::optional<StoreEvent> activation() const;
   /// Reason of the last Drifted event since the last activation; empty: there is none.
   [[nodiscard]] std::string drift() const;

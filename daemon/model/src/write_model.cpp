@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <nlohmann/json.hpp>
-
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_document.hpp"
 #include "decimal.hpp"
 #include "model_format.hpp"
+#include "verdict_json.hpp"
 
 namespace abbe::daemon {
 
@@ -25,9 +24,7 @@ class JsonText {
     key(name);
     text_ += quoted(text);
   }
-  [[nodiscard]] static std::string quoted(std::string_view text) {
-    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  }
+  [[nodiscard]] static std::string quoted(std::string_view text) { return quoted_json(text); }
   [[nodiscard]] std::string finish() { return text_ + "\n}\n"; }
 
  private:
@@ -312,6 +309,24 @@ void write_artefact(JsonText& out, const calib::Expansion& artefact) {
       to_decimal(calib::u_expansion_factor(artefact), 0)));
 }
 
+std::string entries_json(const MeaningEntries& entries) {
+  std::string text;
+  for (const auto& [key, value] : entries)
+    text += fmt::format("{}\n      {}: {}", text.empty() ? "" : ",", JsonText::quoted(key),
+                        JsonText::quoted(value));
+  return text.empty() ? "{}" : "{" + text + "}";
+}
+
+void write_configuration(JsonText& out, const ModelDocument& document) {
+  const auto simulated = made_on_simulated_devices(document);
+  out.key("simulated");
+  out.raw(!simulated ? "null" : *simulated ? "true" : "false");
+  out.key("configuration");
+  out.raw(fmt::format("{{\"readings\": {},\n    \"measurements\": {}}}",
+                      entries_json(document.configuration->readings),
+                      entries_json(document.configuration->measurements)));
+}
+
 void write_inputs(JsonText& out, const std::vector<InputFile>& inputs) {
   out.key("inputs");
   out.raw("[");
@@ -339,6 +354,11 @@ std::string to_json(const ModelDocument& document) {
   if (!document.mode.empty()) out.member("mode", document.mode);
   out.member("machine", document.machine);
   out.member("machine_hash", document.machine_hash);
+  if (document.verdict) {
+    out.key("verdict");
+    out.raw(verdict_to_json(document));
+  }
+  if (document.configuration) write_configuration(out, document);
   out.member("chain", model.chain().text());
   out.member("gauge", name(model.gauge()));
   out.member("squareness", "travel");

@@ -14,7 +14,10 @@
 #include <string_view>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/config/mtconnect_config.hpp"
 #include "abbe/mtconnect/daemon_poll.hpp"
 #include "abbe/mtconnect/limited_log.hpp"
@@ -51,12 +54,11 @@ std::string footer() {
 }
 
 void log_line(std::string_view line) {
-  fmt::print(stderr, "abbe-mtconnect: {}\n", line);
+  abbe::daemon::print_message("abbe-mtconnect", line);
 }
 
 int refuse(const Error& error) {
-  log_line(error.text);
-  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  abbe::daemon::print_error("abbe-mtconnect", error);
   return exit_code(error.code);
 }
 
@@ -166,6 +168,7 @@ void add_options(CLI::App& app, Options& out) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-mtconnect");
   CLI::App app{
       "MTConnect adapter: sends calibration, uncertainty and health of the machine as SHDR to "
       "agents."};
@@ -175,6 +178,7 @@ int main(int argc, char** argv) {
   add_options(app, options);
 
   try {
+    abbe::daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

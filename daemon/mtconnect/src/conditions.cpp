@@ -20,7 +20,8 @@ struct Part {
   Level when_bad;
 };
 constexpr std::array kParts{Part{"recorder", Level::Fault}, Part{"models", Level::Fault},
-                            Part{"dds", Level::Warning}, Part{"dds_security", Level::Warning}};
+                            Part{"dds", Level::Warning}, Part{"dds_security", Level::Warning},
+                            Part{"identity", Level::Warning}};
 
 const Part* part_of(const std::string& stream) {
   const auto* const part = std::ranges::find(kParts, stream, &Part::stream);
@@ -62,9 +63,17 @@ Condition system_condition(const json& status) {
   for (const json& stream : status.at("streams")) {
     const auto name = stream.at("name").get<std::string>();
     const Part* const part = part_of(name);
-    if (part != nullptr && !stream.at("connected").get<bool>())
+    if (part == nullptr) continue;
+    const auto condition = stream.at("condition").get<std::string>();
+    if (!stream.at("connected").get<bool>()) {
       out[name] = {part->when_bad, text_of_state(stream)};
+    } else if (!condition.empty()) {
+      out[name] = {Level::Warning, condition};
+    }
   }
+
+  if (status.contains("clock"))
+    out["CLOCK"] = {Level::Warning, status.at("clock").at(0).get<std::string>()};
 
   if (status.contains("release_awaited"))
     out["release"] = {Level::Fault,
@@ -82,6 +91,9 @@ Condition model_condition(const json& status) {
   if (state != "ACTIVE")
     out["MODEL_" + state] = {state == "INVALID" ? Level::Fault : Level::Warning,
                              model.at("reason").get<std::string>()};
+
+  if (model.contains("refused"))
+    out["MODEL_REFUSED"] = {Level::Warning, model.at("reason").get<std::string>()};
 
   const json& session = status.at("session");
   if (session.at("state") == "refused")

@@ -16,7 +16,7 @@ using nlohmann::json;
 
 constexpr std::array kEvents{"avail",       "process_state", "process_id", "process_kind",
                              "model_state", "model_id",      "model_hash", "model_date",
-                             "u_volume",    "u_type"};
+                             "u_volume",    "u_type",        "simulated"};
 constexpr std::array kConditions{"devices", "system", "calibration"};
 
 /// The state of a calibration as PROCESS_STATE.
@@ -61,6 +61,13 @@ void observe_model(const json& model, Observations& out) {
   out["u_type"] = std::optional<std::string>("COMBINED");
 }
 
+/// YES if the devices or the active model are simulated. Older versions of abbed do not report it.
+std::optional<std::string> simulated(const json& status) {
+  if (!status.contains("simulated")) return std::nullopt;
+  const bool model = status.at("model").value("simulated", false);
+  return model || status.at("simulated").get<bool>() ? "YES" : "NO";
+}
+
 }  // namespace
 
 Observations nothing_observed() {
@@ -76,6 +83,7 @@ Observations observations_of(const json& status) {
   out["avail"] = std::optional<std::string>("AVAILABLE");
   observe_session(status.at("session"), out);
   observe_model(status.at("model"), out);
+  out["simulated"] = simulated(status);
   out["devices"] = std::optional(device_condition(status));
   out["system"] = std::optional(system_condition(status));
   out["calibration"] = std::optional(model_condition(status));

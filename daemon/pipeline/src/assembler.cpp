@@ -57,15 +57,20 @@ Assembler::Assembler(AssemblerOptions options)
     : options_(std::move(options)), environment_(options_.environment, options_.watermark) {}
 
 void Assembler::take(const Batch& batch) {
+  if (batch.taken != HostTime{}) latest_ = batch.taken + options_.watermark;
+  const auto advance_to = [&](HostTime t) {
+    if (t <= latest_) newest_ = std::max(newest_, t);
+  };
+
   points_.insert(points_.end(), batch.points.begin(), batch.points.end());
-  for (const auto& point : batch.points) newest_ = std::max(newest_, point.head.time);
+  for (const auto& point : batch.points) advance_to(point.head.time);
   for (const AxisSample& sample : batch.axes) {
-    newest_ = std::max(newest_, sample.head.time);
+    advance_to(sample.head.time);
     take(sample);
   }
   environment_.take(batch);
   touches_.insert(touches_.end(), batch.touches.begin(), batch.touches.end());
-  for (const auto& touch : batch.touches) newest_ = std::max(newest_, touch.head.time);
+  for (const auto& touch : batch.touches) advance_to(touch.head.time);
 }
 
 /// Inserts the sample by its time: after a bus-off or a restart of the bus, it may be earlier than
@@ -78,7 +83,7 @@ void Assembler::take(const AxisSample& sample) {
 }
 
 bool Assembler::ready(HostTime t) const {
-  if (newest_ - t > options_.watermark) return true;
+  if (newest_ - t > options_.watermark || t > latest_) return true;
   return axes_.size() >= 3 && t <= axes_[axes_.size() - 3].head.time;
 }
 
@@ -103,7 +108,7 @@ void Assembler::emit_first_touch(std::vector<Snapshot>& out) {
   touches_.pop_front();
 }
 
-Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
+Snapshot Assembler::assemble(const protocol::TrackerPoint& point) {
   Snapshot s = begin(point.head);
   s.has_tracker_point = true;
   s.tracker_point = point;
@@ -113,7 +118,7 @@ Snapshot Assembler::assemble(const protocol::TrackerPoint& point) const {
   return s;
 }
 
-Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
+Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) {
   Snapshot s = begin(touch.head);
   s.has_trigger = true;
   s.trigger = touch;
@@ -136,7 +141,7 @@ Snapshot Assembler::assemble(const protocol::ProbeTrigger& touch) const {
 }
 
 /// Begins a snapshot: its head, and the environment values that apply at the time in the head.
-Snapshot Assembler::begin(const protocol::SampleHead& head) const {
+Snapshot Assembler::begin(const protocol::SampleHead& head) {
   Snapshot s;
   s.head = head;
   s.axes_compensated = options_.axes_compensated;

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
 #include "abbe/config/capabilities.hpp"
@@ -153,7 +154,7 @@ std::string counting_set_up(const Config& config) {
       {"reference", std::move(marks)},
       {"speed", config.daemon.speed}};
 
-  return set_up.dump();
+  return json_text(set_up);
 }
 
 std::string boot_id() {
@@ -170,10 +171,9 @@ std::filesystem::path counting_state_file(const std::filesystem::path& data_dir)
 
 std::string to_text(const CountingState& state) {
   const json content = json_of(state);
-  return json{{"schema", kCountingSchema},
-              {"sha256", sha256_hex(content.dump())},
-              {"state", content}}
-             .dump(1) +
+  return indented_json_text(json{{"schema", kCountingSchema},
+                                 {"sha256", sha256_hex(json_text(content))},
+                                 {"state", content}}) +
          "\n";
 }
 
@@ -185,7 +185,7 @@ Result<CountingState> counting_state_from_text(std::string_view text, std::strin
       return fail(ErrorCode::BadInput,
                   fmt::format("{}: schema {}, expected {}", what, schema, kCountingSchema));
     const json& content = parsed->at("state");
-    if (parsed->at("sha256").get<std::string>() != sha256_hex(content.dump()))
+    if (parsed->at("sha256").get<std::string>() != sha256_hex(json_text(content)))
       return fail(ErrorCode::BadInput, fmt::format("{}: its checksum is wrong", what));
     auto state = state_from(content);
     if (!state) return fail(ErrorCode::BadInput, fmt::format("{}: a number is out of range", what));

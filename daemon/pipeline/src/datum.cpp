@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/config/capabilities.hpp"
 #include "abbe/messages/attachment_content.hpp"
 
@@ -123,16 +124,16 @@ RecordingAttachment to_attachment(const FoundDatum& datum) {
                      {"u", datum.u},
                      {"stated", datum.stated},
                      {"from_ns", datum.from.time_since_epoch().count()}};
-  return {
-      .name = std::string{kDatumName}, .media_type = "application/json", .content = content.dump()};
+  return {.name = std::string{kDatumName},
+          .media_type = "application/json",
+          .content = json_text(content)};
 }
 
 RecordingAttachment to_attachment(const DatumState& state) {
-  return {
-      .name = std::string{kDatumStateName},
-      .media_type = "application/json",
-      .content =
-          json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}}.dump()};
+  return {.name = std::string{kDatumStateName},
+          .media_type = "application/json",
+          .content = json_text(
+              json{{"at_ns", state.at.time_since_epoch().count()}, {"unknown", state.unknown}})};
 }
 
 Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attachment) {
@@ -152,7 +153,7 @@ Result<DatumState> datum_state_from_attachment(const RecordingAttachment& attach
 RecordingAttachment reference_request(protocol::HostTime from) {
   return {.name = std::string{kReferenceRequestName},
           .media_type = "application/json",
-          .content = json{{"from_ns", from.time_since_epoch().count()}}.dump()};
+          .content = json_text(json{{"from_ns", from.time_since_epoch().count()}})};
 }
 
 Result<protocol::HostTime> reference_request_from(const RecordingAttachment& attachment) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <utility>
 
 #include "abbe/calib/environment/thermal_expansion.hpp"
 #include "abbe/calib/root_sum_of_squares.hpp"
@@ -40,23 +41,32 @@ void merge(const EnvironmentSample& from, EnvironmentMask mask, bool too_old,
 
 /// Inserts the sample by its time: after a restart of a device's clock, it may be earlier than the
 /// sample that arrived before it.
-void insert_by_time(std::deque<EnvironmentSample>& in_order, const EnvironmentSample& sample) {
-  const auto later = [](HostTime t, const EnvironmentSample& other) { return t < other.head.time; };
-  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), sample.head.time, later),
-                  sample);
+void insert_by_time(std::deque<CheckedEnvironment>& in_order, const CheckedEnvironment& checked) {
+  const auto later = [](HostTime t, const CheckedEnvironment& other) {
+    return t < other.sample.head.time;
+  };
+  in_order.insert(
+      std::upper_bound(in_order.begin(), in_order.end(), checked.sample.head.time, later), checked);
+}
+
+void insert_by_time(std::vector<FromEnvironment>& in_order, const FromEnvironment& from) {
+  const auto later = [](const FromEnvironment& a, const FromEnvironment& b) {
+    return std::pair{a.sample.head.time, a.device} < std::pair{b.sample.head.time, b.device};
+  };
+  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), from, later), from);
 }
 
 /// The latest sample whose time is not after `t`; null if there is none.
-const EnvironmentSample* latest_at(const std::deque<EnvironmentSample>& samples, HostTime t) {
-  const auto later = [](HostTime at, const EnvironmentSample& sample) {
-    return at < sample.head.time;
+const CheckedEnvironment* latest_at(const std::deque<CheckedEnvironment>& samples, HostTime t) {
+  const auto later = [](HostTime at, const CheckedEnvironment& checked) {
+    return at < checked.sample.head.time;
   };
   const auto after = std::upper_bound(samples.begin(), samples.end(), t, later);
   return after == samples.begin() ? nullptr : &*std::prev(after);
 }
 
-void forget_before(std::deque<EnvironmentSample>& samples, HostTime t) {
-  while (samples.size() > 1 && samples[1].head.time <= t) samples.pop_front();
+void forget_before(std::deque<CheckedEnvironment>& samples, HostTime t) {
+  while (samples.size() > 1 && samples[1].sample.head.time <= t) samples.pop_front();
 }
 
 }  // namespace
@@ -66,6 +76,7 @@ EnvironmentUseOptions environment_use(const Config& config) {
   use.max_age = config.air.max_age;
   use.measured = measured_environment(config);
   use.air = config.air;
+  use.sensors = sensor_check_options(config);
   if (const auto tracker = tracker_source(config)) {
     use.tracker_u_scale = tracker->u_scale;
     use.unmeasured_air = unmeasured_air_text(config, tracker->u_scale);
@@ -82,38 +93,62 @@ EnvironmentUseOptions environment_use(const Config& config) {
 }
 
 EnvironmentMerge::EnvironmentMerge(const EnvironmentUseOptions& options, nanoseconds lag)
-    : measured_(options.measured), max_age_(options.max_age), lag_(lag) {}
+    : measured_(options.measured), max_age_(options.max_age), lag_(lag), checks_(options.sensors) {}
 
 void EnvironmentMerge::take(const Batch& batch) {
   for (const auto& sample : batch.environment) {
-    insert_by_time(weather_, sample);
+    insert_by_time(weather_, checks_.checked(sample, static_cast<EnvironmentMask>(sample.measured &
+                                                                                  ~measured_)));
     newest_ = std::max(newest_, sample.head.time);
   }
-  for (const auto& [device, sample] : batch.measured_environment) {
-    if (device >= devices_.size()) devices_.resize(device + 1);
-    insert_by_time(devices_[device], sample);
-    newest_ = std::max(newest_, sample.head.time);
+  for (const auto& from : batch.measured_environment) {
+    insert_by_time(unchecked_, from);
+    newest_ = std::max(newest_, from.sample.head.time);
   }
   for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
+  check_until(newest_ - lag_);
 }
 
-std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) const {
+/// Checks the samples of the devices up to `t` in the order of their instants: the order of arrival
+/// then has no effect on sensors that are compared with each other.
+void EnvironmentMerge::check_until(HostTime t) {
+  std::size_t checked = 0;
+  for (; checked < unchecked_.size() && unchecked_[checked].sample.head.time <= t; ++checked) {
+    const auto& [device, sample] = unchecked_[checked];
+    if (device >= devices_.size()) devices_.resize(device + 1);
+    insert_by_time(devices_[device], checks_.checked(sample, sample.measured));
+  }
+  unchecked_.erase(unchecked_.begin(), unchecked_.begin() + static_cast<std::ptrdiff_t>(checked));
+}
+
+void EnvironmentMerge::merge_device(const CheckedEnvironment& from, HostTime t,
+                                    EnvironmentSample& to) const {
+  EnvironmentSample applied = from.sample;
+  for (std::size_t i = 0; i < protocol::kMaxTemperatures; ++i)
+    applied.temperature_K[i] = checks_.applied(from, i, t);
+  merge(applied, applied.measured, t - applied.head.time > max_age_, to);
+}
+
+std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
+  check_until(t - lag_);
   EnvironmentSample merged;
   merged.measured = 0;
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
   bool any = false;
 
-  if (const auto* weather = latest_at(weather_, t); weather != nullptr && weather->measured != 0) {
+  if (const auto* weather = latest_at(weather_, t);
+      weather != nullptr && weather->sample.measured != 0) {
     // The tracker's controller sends its weather values only when they change, so their age is not
     // checked.
-    merge(*weather, static_cast<EnvironmentMask>(weather->measured & ~measured_), false, merged);
+    merge(weather->sample, static_cast<EnvironmentMask>(weather->sample.measured & ~measured_),
+          false, merged);
     any = true;
   }
 
   for (const auto& samples : devices_) {
-    const auto* sample = latest_at(samples, t - lag_);
-    if (sample == nullptr) continue;
-    merge(*sample, sample->measured, t - sample->head.time > max_age_ + lag_, merged);
+    const auto* from = latest_at(samples, t - lag_);
+    if (from == nullptr) continue;
+    merge_device(*from, t - lag_, merged);
     any = true;
   }
 

@@ -75,6 +75,22 @@ void LiveView::take(const protocol::AxisSample& sample) {
   if (axes_known(view_)) axes_known_at_ = sample.head.time;
 }
 
+std::vector<std::string> LiveView::missing_scales() const {
+  std::vector<std::string> reasons(view_.axis_count);
+  const auto findings = sensor_findings();
+  for (const ThermalAxis& thermal : use_.thermal) {
+    const std::size_t channel = thermal.config.temperature;
+    const bool known =
+        view_.has_environment && std::isfinite(view_.environment.temperature_K[channel]);
+    if (thermal.axis >= reasons.size() || known) continue;
+    reasons[thermal.axis] = "no value of the temperature of its scale arrives";
+    for (const SensorFinding& finding : findings)
+      if (std::ranges::find(finding.axes, thermal.config.axis) != finding.axes.end())
+        reasons[thermal.axis] = finding.text;
+  }
+  return reasons;
+}
+
 /// Removes a tracker point and a touch that are older than kCurrentFor. The published message has a
 /// single instant, that of the axes: after the tracker has lost its beam or connection, its last
 /// point would otherwise appear to be as new as the axes.

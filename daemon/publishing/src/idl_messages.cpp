@@ -15,7 +15,7 @@ using std::chrono::nanoseconds;
 constexpr std::size_t kNodesPerSlice = 456;   // ErrorGrid::nodes in the IDL
 constexpr std::size_t kMostGridNodes = 4096;  // 9 slices: the number a late joiner receives at once
 constexpr std::size_t kHullBound = 512;       // ErrorModel::validity_hull
-constexpr std::size_t kReasonBound = 256;     // ModelState::reason, Health::fault
+constexpr std::size_t kReasonBound = 256;  // ModelState::reason, Health::fault, Identity::twin_seen
 constexpr std::size_t kEventReasonBound = 512;
 
 std::int64_t ns(protocol::HostTime t) {
@@ -190,6 +190,23 @@ v1::ModelState state_message(v1::ModelStatus status, std::string_view reason,
   return m;
 }
 
+v1::Identity identity_message(const PublishedIdentity& identity, const PublishedModel* active,
+                              const Stamp& stamp) {
+  v1::Identity m;
+  m.machine(std::string{stamp.machine});
+  m.sequence_number(stamp.sequence_number);
+  m.host_time_ns(ns(stamp.now));
+  m.machine_id(identity.machine_id);
+  m.twin(!identity.twin_seen.empty());
+  m.twin_seen(cut(identity.twin_seen, kReasonBound));
+  if (active != nullptr) {
+    m.model_id(active->id);
+    m.model_simulated(active->simulated);
+  }
+  m.devices_simulated(identity.devices_simulated);
+  return m;
+}
+
 v1::Compensation compensation_message(v1::ModelStatus status, const PublishedModel* active,
                                       const protocol::Snapshot& s,
                                       const std::array<double, 3>& tool_offset_m,
@@ -225,6 +242,17 @@ v1::Compensation compensation_message(v1::ModelStatus status, const PublishedMod
   return m;
 }
 
+namespace {
+
+/// What is wrong now, then the last fault.
+std::string fault_text(const drivers::DeviceStatus& d) {
+  if (d.condition.empty() || d.last_fault.empty() || d.condition == d.last_fault)
+    return d.condition.empty() ? d.last_fault : d.condition;
+  return d.condition + "; last fault: " + d.last_fault;
+}
+
+}  // namespace
+
 v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double latency_p50_s,
                           double latency_p99_s, const Stamp& stamp) {
   v1::Health m;
@@ -240,7 +268,7 @@ v1::Health health_message(const drivers::DeviceStatus& d, double rate_hz, double
   m.clock_residual_s(std::chrono::duration<double>(d.clock.residual).count());
   m.latency_p50_s(latency_p50_s);
   m.latency_p99_s(latency_p99_s);
-  m.fault(cut(d.last_fault, kReasonBound));
+  m.fault(cut(fault_text(d), kReasonBound));
 
   return m;
 }

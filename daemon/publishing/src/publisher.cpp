@@ -72,12 +72,16 @@ void Publisher::model(const ActiveModelState& active, protocol::HostTime now, Wa
     next_state_ = wall;
   }
 
-  const bool changed = active.status != sent_status_ || active.reason != sent_reason_;
+  options_.identity.twin_seen = link_.twin();
+  const bool changed = active.status != sent_status_ || active.reason != sent_reason_ ||
+                       options_.identity != sent_identity_;
   if (!changed && wall < next_state_) return;
+  send(Topic::Identity, identity_message(options_.identity, active.model, stamp(now)));
   send(Topic::ModelState,
        state_message(active.status, active.reason, active.model, options_.validity, stamp(now)));
   sent_status_ = active.status;
   sent_reason_ = active.reason;
+  sent_identity_ = options_.identity;
   next_state_ = wall + kStatePeriod;
 }
 

@@ -139,6 +139,8 @@ void Recorder::record(const protocol::EnvironmentSample& sample, std::string_vie
   state_->add_marked(Stream::Environment, State::dates_of(sample.head.time, taken), device,
                      state_->environment);
   state_->keep_environment(sample, device);
+  state_->sensors_at = sample.head.time;
+  (void)state_->sensors.checked(sample, state_->sensors.mask_of(device));
 }
 
 void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample,
@@ -211,6 +213,10 @@ void Recorder::fail(const std::string& what) {
   if (state_->status.state == RecorderStatus::State::Recording)
     return state_->enter_fault({0, what});
   if (state_->status.state != RecorderStatus::State::Closed) state_->note_fault({0, what});
+}
+
+std::optional<Recorder::WallTime> Recorder::open_chunk_since() const {
+  return state_->chunk.empty() ? std::nullopt : std::optional{state_->chunk_since};
 }
 
 RecordingDigest Recorder::digest() const {

@@ -51,6 +51,14 @@ void Recorder::State::forget_finished_requests() {
   attachments.assign(std::make_move_iterator(kept.rbegin()), std::make_move_iterator(kept.rend()));
 }
 
+/// A further file begins with the state of the sensor checks, so that its replay uses the values
+/// that the live run used.
+void Recorder::State::carry_sensors_on() {
+  std::erase_if(attachments,
+                [](const TimedAttachment& a) { return a.attachment.name == kSensorStateName; });
+  attachments.push_back({sensors.to_attachment(), utc_ns(sensors_at)});
+}
+
 IoResult Recorder::State::begin_file() {
   // The directory is created here and not in open(), because the disk may have been read-only at
   // that time.
@@ -71,6 +79,7 @@ IoResult Recorder::State::begin_file() {
   forget_finished_requests();
   if (part > 0 && axes_known)
     recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
+  if (part > 0 && !options.sensors.sensors.empty()) carry_sensors_on();
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;

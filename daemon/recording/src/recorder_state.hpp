@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/sensor_checks.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/recording/recorder.hpp"
@@ -40,7 +41,10 @@ struct Recorder::State {
   }
 
   State(RecorderOptions o, RecordingInfo i)
-      : options(std::move(o)), info(std::move(i)), chunk(options.chunk_bytes) {}
+      : options(std::move(o)),
+        info(std::move(i)),
+        chunk(options.chunk_bytes),
+        sensors(options.sensors) {}
 
   [[nodiscard]] std::uint64_t utc_ns(protocol::HostTime time) const {
     return static_cast<std::uint64_t>(
@@ -52,6 +56,7 @@ struct Recorder::State {
                                      protocol::mcap::SummaryBuilder& fresh_summary) const;
   [[nodiscard]] IoResult end_file();
   void forget_finished_requests();
+  void carry_sensors_on();
   [[nodiscard]] std::string gap_of_run() const;
   [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
   void put(Stream stream, Dates dates, std::span<const std::byte> payload);
@@ -100,6 +105,8 @@ struct Recorder::State {
   /// and do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
   std::optional<DatumState> axes_known;  ///< from the last axis sample
+  SensorChecks sensors;                  ///< after the last environment sample
+  protocol::HostTime sensors_at{};       ///< of that sample
   RecorderStatus status;
   recording::LossLedger lost;  ///< messages lost, not yet reported in a later message
   /// messages of the open chunk, plus the losses they report: all are lost if the chunk cannot be

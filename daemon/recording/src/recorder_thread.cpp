@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <deque>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -82,6 +85,7 @@ struct Waiting {
   std::vector<OfCycle<v1::CalibrationEvent>> events;
   std::vector<Attachment> attachments;
   std::vector<DigestRequest> digests;
+  std::uint64_t number = 0;  ///< of the last batch (Unwritten)
   /// True after a batch was dropped. Further batches are then dropped until the recorder has taken
   /// this object, so that the recording gets one gap and not many.
   bool full = false;
@@ -110,6 +114,7 @@ struct Waiting {
     events.clear();
     attachments.clear();
     digests.clear();
+    number = 0;
     full = false;
   }
 };
@@ -147,6 +152,39 @@ void append(std::vector<OfCycle<EnvironmentOf>>& to, protocol::HostTime taken,
   report_dropped(to.back().what.sample.head, dropped);
 }
 
+/// When batches were handed over that the recorder has not taken yet. One entry stands for the
+/// batches of 50 ms: a stalled disk of an hour is 72,000 entries.
+class Unwritten {
+ public:
+  using WallTime = Recorder::WallTime;
+
+  /// A batch is handed over at `now`; returns its number.
+  std::uint64_t add(WallTime now) {
+    ++number_;
+    if (entries_.empty() || now - entries_.back().since >= kSpacing)
+      entries_.push_back({number_, now});
+    else
+      entries_.back().last = number_;
+    return number_;
+  }
+  /// The recorder has the batches up to the number `passed`.
+  void forget(std::uint64_t passed) {
+    while (!entries_.empty() && entries_.front().last <= passed) entries_.pop_front();
+  }
+  [[nodiscard]] std::optional<WallTime> oldest() const {
+    return entries_.empty() ? std::nullopt : std::optional{entries_.front().since};
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kSpacing{50};
+  struct Entry {
+    std::uint64_t last = 0;
+    WallTime since{};
+  };
+  std::deque<Entry> entries_;
+  std::uint64_t number_ = 0;
+};
+
 }  // namespace
 
 /// The hub and the recorder share one pointer, `waiting`: to the Waiting that is being filled, or
@@ -159,6 +197,9 @@ struct RecorderThread::State {
   std::atomic<RecorderStatus*> new_status{nullptr};  // set by the recorder, taken by status()
   RecorderStatus known;                              // used by the thread that calls status()
   Dropped unreported;                                // used by the hub
+  mutable Unwritten unwritten;                       // used by the hub
+  std::atomic<std::uint64_t> passed{0};              // to the recorder: hand-overs until now
+  std::atomic<std::int64_t> chunk_since_ns{0};       // see Recorder::open_chunk_since(); 0: none
   std::uint64_t dropped_before_run = 0;              // used by the hub
   std::string internal_error;  // of the recorder thread; not yet passed to Recorder::fail()
   std::atomic<std::uint64_t> dropped{0};
@@ -207,10 +248,21 @@ struct RecorderThread::State {
       // acquire: pairs with the release in ~RecorderThread()
       last = stopping.load(std::memory_order_acquire);
       taken = take_waiting(std::move(taken));
+      const std::uint64_t number = taken->number;
       write_all(*taken);
+      note_written(number);
       taken->clear();  // also breaks the promises of digests that were not made
       report();
     }
+  }
+
+  /// The batches up to `number` are in the file, in the open chunk or lost.
+  void note_written(std::uint64_t number) {
+    const auto since = recorder.open_chunk_since();
+    chunk_since_ns.store(since ? since->time_since_epoch().count() : 0, std::memory_order_relaxed);
+    // release: pairs with the acquire in behind(), which then sees the open chunk
+    if (number > passed.load(std::memory_order_relaxed))
+      passed.store(number, std::memory_order_release);
   }
 
   void report() {
@@ -300,6 +352,7 @@ struct RecorderThread::State {
     if (waiting->bytes_here() < kMostInOnePart) return;
     auto next = std::make_unique<Waiting>();
     next->bytes_earlier = waiting->bytes();
+    next->number = waiting->number;
     next->full = waiting->full;
     next->earlier.reset(waiting.to);
     waiting.to = next.release();
@@ -344,6 +397,9 @@ void RecorderThread::hand_over(const Batch& batch) {
   if (adding->full) return state_->drop(batch);
   State::make_room(adding);
   Waiting& waiting = *adding.to;
+  // acquire: pairs with the release in note_written()
+  state_->unwritten.forget(state_->passed.load(std::memory_order_acquire));
+  waiting.number = state_->unwritten.add(Recorder::WallTime::clock::now());
   const DeviceNames& names = state_->options.devices;
   const auto taken = batch.taken;
 
@@ -394,6 +450,16 @@ const RecorderStatus& RecorderThread::status() const {
       state_->new_status.exchange(nullptr, std::memory_order_acq_rel)};
   if (latest) state_->known = std::move(*latest);
   return state_->known;
+}
+
+std::chrono::nanoseconds RecorderThread::behind(Recorder::WallTime now) const {
+  // acquire: pairs with the release in note_written()
+  state_->unwritten.forget(state_->passed.load(std::memory_order_acquire));
+  const auto chunk_ns = state_->chunk_since_ns.load(std::memory_order_relaxed);
+  auto oldest = state_->unwritten.oldest().value_or(now);
+  if (chunk_ns != 0)
+    oldest = std::min(oldest, Recorder::WallTime{std::chrono::nanoseconds{chunk_ns}});
+  return std::max(now - oldest, Recorder::WallTime::duration{0});
 }
 
 std::uint64_t RecorderThread::dropped() const noexcept {

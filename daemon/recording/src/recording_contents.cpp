@@ -3,173 +3,258 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
+
+#include "contents_collector.hpp"
 
 namespace abbe::daemon::recording {
 namespace {
 
 namespace mcap = protocol::mcap;
+using mcap::Opcode;
 using ChunkState = mcap::ScannedChunk::State;
 
-std::map<std::string, std::string> owned(mcap::StringMap entries) {
-  std::map<std::string, std::string> map;
-  while (const auto entry = entries.take()) map.emplace(entry->first, entry->second);
-  return map;
-}
+/// Largest summary and largest truncated chunk that are read; those of abbe have at most some MB.
+/// A larger one is damaged bytes that look like one.
+constexpr std::uint64_t kLargestRead = std::uint64_t{256} << 20;
+/// Records outside of chunks are kept in pieces of about this size.
+constexpr std::uint64_t kLooseBytes = std::uint64_t{1} << 20;
 
-/// Collects the contents in file order, whether found by the summary or by reading all records.
-class Collector {
- public:
-  Contents contents;
-  bool cut_is_damage = false;  ///< a truncated chunk is damage within the recording
-
-  void lost(std::uint64_t offset, std::uint64_t bytes, std::string what, bool inside = true) {
-    contents.losses.push_back({offset, bytes, std::move(what), inside});
-  }
-  void add(const mcap::Channel& channel) { contents.topics.emplace(channel.id, channel.topic); }
-
-  void add_metadata(const mcap::Record& record) {
-    const auto metadata = mcap::decode<mcap::Metadata>(record.content);
-    if (!metadata) return lost_record(record, "metadata cannot be decoded");
-    contents.metadata.emplace(metadata->name, owned(metadata->entries));
-  }
-  void add_attachment(const mcap::Record& record) {
-    const auto attachment = mcap::decode<mcap::Attachment>(record.content);
-    if (!attachment) return lost_record(record, "an attachment is damaged");
-    const std::string_view text{reinterpret_cast<const char*>(attachment->data.data()),
-                                attachment->data.size()};
-    contents.attachments.push_back(
-        {std::string(attachment->name), std::string(attachment->media_type), std::string(text)});
-  }
-
-  void add(const mcap::ScannedChunk& chunk, std::uint64_t bytes) {
-    ++chunk_number_;
-    const auto damaged = [&](std::string_view how) {
-      lost(chunk.offset, bytes,
-           fmt::format("chunk {} at byte {}: {}", chunk_number_, chunk.offset, how),
-           chunk.state != ChunkState::Cut || cut_is_damage);
-    };
-
-    switch (chunk.state) {
-      case ChunkState::Whole:
-        read(chunk.chunk.records);
-        return;
-      case ChunkState::Cut:
-        return damaged(fmt::format("cut off by the end of the file after {} whole messages",
-                                   read(chunk.chunk.records)));
-      case ChunkState::BadCrc:
-        return damaged("its checksum is wrong, skipped");
-      case ChunkState::Compressed:
-        return damaged(
-            fmt::format("compressed ({}), which is not supported", chunk.chunk.head.compression));
-      case ChunkState::Malformed:
-        return damaged("malformed, skipped");
-    }
-  }
-
- private:
-  void lost_record(const mcap::Record& record, std::string_view what) {
-    lost(record.offset, record.end() - record.offset,
-         fmt::format("{} at byte {}", what, record.offset));
-  }
-
-  std::uint64_t read(mcap::Bytes records) {
-    ReadableChunk chunk{records, ~std::uint64_t{0}, 0, 0};
-    mcap::MessageReader messages{records};
-    while (const auto message = messages.next()) {
-      chunk.earliest_ns = std::min(chunk.earliest_ns, message->log_time_ns);
-      chunk.last_time_ns = std::max(chunk.last_time_ns, message->log_time_ns);
-      ++chunk.messages;
-    }
-    contents.messages += chunk.messages;
-    if (chunk.messages > 0) contents.chunks.push_back(chunk);
-    return chunk.messages;
-  }
-
-  std::size_t chunk_number_ = 0;
+struct PlacedRecord {
+  Opcode opcode = Opcode::Header;
+  std::uint64_t offset = 0;  ///< of its opcode in the file
+  std::uint64_t length = 0;  ///< of its content
+  [[nodiscard]] std::uint64_t content() const { return offset + mcap::kRecordHeadSize; }
+  [[nodiscard]] std::uint64_t end() const { return content() + length; }
 };
 
-void collect_by_summary(mcap::Bytes file, const mcap::Summary& summary, Collector& collector) {
+/// The record at `offset`; nullopt if no whole record is there.
+std::optional<PlacedRecord> record_in(ByteWindow& file, std::uint64_t offset) {
+  const auto bytes = file.at(offset, mcap::kRecordHeadSize);
+  const auto head = bytes ? mcap::read_head(*bytes) : std::nullopt;
+  if (!head) return std::nullopt;
+  const PlacedRecord record{head->opcode, offset, head->length};
+  if (head->length > file.file_size() - record.content()) return std::nullopt;
+  return record;
+}
+
+/// The chunk of a whole Chunk record, with its content.
+mcap::ScannedChunk scanned_chunk(ByteWindow& file, const PlacedRecord& record,
+                                 mcap::Bytes& content) {
+  const mcap::ScannedChunk malformed{ChunkState::Malformed, 0, {}};
+  const auto bytes = file.at(record.offset, mcap::kRecordHeadSize + record.length);
+  if (!bytes) return malformed;
+  content = bytes->subspan(mcap::kRecordHeadSize);
+  return mcap::chunk_at(*bytes, 0).value_or(malformed);
+}
+
+void add_whole_chunk(ByteWindow& file, const PlacedRecord& record, ContentsCollector& collector) {
+  mcap::Bytes content;
+  const auto chunk = scanned_chunk(file, record, content);
+  collector.add_chunk(chunk, content, record.offset, record.end() - record.offset);
+}
+
+// --- by the indexes
+
+/// Content of the record at the place of an index; nullopt if no such record is there.
+std::optional<mcap::Bytes> indexed(ByteWindow& file, Opcode opcode, std::uint64_t offset,
+                                   std::uint64_t length) {
+  const auto record = offset < file.file_size() ? record_in(file, offset) : std::nullopt;
+  if (!record || record->opcode != opcode || record->end() - offset != length) return std::nullopt;
+  return file.at(record->content(), record->length);
+}
+
+void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
+                        ContentsCollector& collector) {
   for (const auto& channel : summary.channels) collector.add(channel);
   for (const auto& index : summary.metadata) {
-    const auto record = mcap::record_at(file, index.offset, mcap::Opcode::Metadata);
-    if (record && record->end() - record->offset == index.length)
-      collector.add_metadata(*record);
+    if (const auto content = indexed(file, Opcode::Metadata, index.offset, index.length))
+      collector.add_metadata(*content, index.offset);
     else
       collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged", index.name));
   }
 
   for (const auto& index : summary.attachments) {
-    const auto record = mcap::record_at(file, index.offset, mcap::Opcode::Attachment);
-    if (record && record->end() - record->offset == index.length)
-      collector.add_attachment(*record);
+    if (const auto content = indexed(file, Opcode::Attachment, index.offset, index.length))
+      collector.add_attachment(*content, index.offset);
     else
       collector.lost(index.offset, index.length,
                      fmt::format("attachment {} is damaged", index.name));
   }
 
   for (const auto& index : summary.chunks) {
-    const auto chunk = mcap::chunk_at(file, index.chunk_start);
-    const mcap::ScannedChunk damaged{
-        ChunkState::Malformed, static_cast<std::size_t>(index.chunk_start), {}};
-    collector.add(chunk.value_or(damaged), index.chunk_length);
+    const auto record = record_in(file, index.chunk_start);
+    if (record && record->opcode == Opcode::Chunk)
+      add_whole_chunk(file, *record, collector);
+    else
+      collector.add_chunk({ChunkState::Malformed, 0, {}}, {}, index.chunk_start,
+                          index.chunk_length);
   }
 }
 
-void collect(const mcap::LinearScan::Item& item, Collector& collector) {
-  if (item.chunk) return collector.add(*item.chunk, item.record.end() - item.record.offset);
-  if (item.record.opcode == mcap::Opcode::Metadata) return collector.add_metadata(item.record);
-  if (item.record.opcode == mcap::Opcode::Attachment) return collector.add_attachment(item.record);
-  if (item.record.opcode != mcap::Opcode::Channel) return;
-  if (const auto channel = mcap::decode<mcap::Channel>(item.record.content))
-    collector.add(*channel);
+/// True if the indexes list everything that the statistics count. MCAP requires neither.
+bool indexes_are_complete(const mcap::Summary& summary) {
+  const auto& counted = summary.statistics;
+  const bool channels = counted && summary.channels.size() >= counted->channel_count &&
+                        (counted->message_count == 0 || !summary.channels.empty());
+  return channels && counted->chunk_count == summary.chunks.size() &&
+         counted->metadata_count == summary.metadata.size() &&
+         counted->attachment_count == summary.attachments.size();
 }
 
-/// True if `rest`, the bytes behind the last whole record, is what a killed recorder or a power cut
+// --- by reading all records
+
+/// Consecutive records outside of chunks, among them messages.
+class LooseRecords {
+ public:
+  LooseRecords(ByteWindow& file, ContentsCollector& collector)
+      : file_(file), collector_(collector) {}
+  void add(const PlacedRecord& record) {
+    if (end_ != record.offset || end_ - begin_ >= kLooseBytes) finish();
+    if (begin_ == end_) begin_ = record.offset;
+    end_ = record.end();
+  }
+  void finish() {
+    if (begin_ != end_)
+      if (const auto bytes = file_.at(begin_, end_ - begin_))
+        collector_.add_records(*bytes, begin_);
+    begin_ = end_ = 0;
+  }
+
+ private:
+  ByteWindow& file_;
+  ContentsCollector& collector_;
+  std::uint64_t begin_ = 0, end_ = 0;
+};
+
+void collect_record(ByteWindow& file, const PlacedRecord& record, LooseRecords& loose,
+                    ContentsCollector& collector) {
+  switch (record.opcode) {
+    case Opcode::Chunk:
+      loose.finish();  // the contents are in file order
+      return add_whole_chunk(file, record, collector);
+    case Opcode::Channel:
+    case Opcode::Message:
+      return loose.add(record);
+    case Opcode::Metadata:
+      if (const auto content = file.at(record.content(), record.length))
+        collector.add_metadata(*content, record.offset);
+      return;
+    case Opcode::Attachment:
+      if (const auto content = file.at(record.content(), record.length))
+        collector.add_attachment(*content, record.offset);
+      return;
+    default:  // indexes, schemas, and records of later versions of MCAP
+      return;
+  }
+}
+
+/// The chunk at `offset` that is cut off by the end of the file. False if there is none.
+bool collect_cut_chunk(ByteWindow& file, std::uint64_t offset, ContentsCollector& collector) {
+  const auto head = file.at(offset, mcap::kRecordHeadSize);
+  const auto record = head ? mcap::read_head(*head) : std::nullopt;
+  if (!record || record->opcode != Opcode::Chunk) return false;
+  const auto content = file.at(offset + mcap::kRecordHeadSize, kLargestRead);
+  const auto chunk = content ? mcap::decode_cut_chunk(*content) : mcap::Decoded<mcap::Chunk>{};
+  if (!content || !chunk || !chunk->head.compression.empty()) return false;
+  collector.add_chunk({ChunkState::Cut, 0, *chunk}, *content, offset, file.file_size() - offset);
+  return true;
+}
+
+/// True if the bytes from `offset` to the end of the file are what a killed recorder or a power cut
 /// leaves: a truncated record, or zeros.
-bool is_truncated_end(mcap::Bytes rest) {
-  return rest.front() != std::byte{0} ||
-         std::ranges::all_of(rest, [](std::byte b) { return b == std::byte{0}; });
+bool is_truncated_end(ByteWindow& file, std::uint64_t offset) {
+  constexpr std::uint64_t kPiece = 65536;
+  const auto first = file.at(offset, 1);
+  if (!first || first->empty() || first->front() != std::byte{0}) return true;
+  for (; offset < file.file_size(); offset += kPiece) {
+    const auto bytes = file.at(offset, kPiece);
+    if (!bytes || !std::ranges::all_of(*bytes, [](std::byte b) { return b == std::byte{0}; }))
+      return false;
+  }
+  return true;
 }
 
-void collect_by_scan(mcap::Bytes file, Collector& collector) {
+/// Offset of the end of the whole records. Sets closed_cleanly if DataEnd follows.
+std::uint64_t collect_records(ByteWindow& file, ContentsCollector& collector) {
+  LooseRecords loose(file, collector);
+  std::uint64_t at = mcap::kMagic.size();
+  while (at < file.file_size()) {
+    const auto record = record_in(file, at);
+    if (!record) break;
+    at = record->end();
+    collector.contents.closed_cleanly = record->opcode == Opcode::DataEnd;
+    if (collector.contents.closed_cleanly) break;
+    collect_record(file, *record, loose, collector);
+  }
+  loose.finish();
+  return at;
+}
+
+/// `why`: why the file has no usable indexes; nullopt if it does not need them.
+void collect_by_scan(ByteWindow& file, std::optional<mcap::SummaryError> why,
+                     ContentsCollector& collector) {
   // The recording ends with the magic, so it was closed: if the records do not continue to this
   // end, they are damaged, not truncated.
-  collector.cut_is_damage = mcap::ends_with_magic(file);
-  mcap::LinearScan scan{file};
-  bool cut_chunk = false;
+  const auto size = file.file_size();
+  const auto last = file.at(size - std::min<std::uint64_t>(size, mcap::kMagic.size()), size);
+  collector.cut_is_damage = last && mcap::ends_with_magic(*last);
 
-  while (const auto item = scan.next()) {
-    collect(*item, collector);
-    cut_chunk = item->chunk && item->chunk->state == ChunkState::Cut;
-  }
-
-  const std::size_t end = scan.whole_until();
-  collector.contents.closed_cleanly = scan.complete();
-  if (scan.complete()) {
+  const std::uint64_t end = collect_records(file, collector);
+  const bool absent = !why || *why == mcap::SummaryError::NoSummary;
+  if (collector.contents.closed_cleanly && !absent) {
     collector.lost(
-        end, file.size() - end,
+        end, size - end,
         fmt::format("the indexes at byte {} are damaged: all records were read instead", end),
         false);
-  } else if (end < file.size() && !cut_chunk) {
-    collector.lost(end, file.size() - end, fmt::format("cut off or damaged from byte {} on", end),
-                   collector.cut_is_damage || !is_truncated_end(file.subspan(end)));
+  } else if (!collector.contents.closed_cleanly && end < size &&
+             !collect_cut_chunk(file, end, collector)) {
+    collector.lost(end, size - end, fmt::format("cut off or damaged from byte {} on", end),
+                   collector.cut_is_damage || !is_truncated_end(file, end));
   }
+}
+
+// --- both
+
+/// The summary of the file. Its views are into `bytes`.
+tl::expected<mcap::Summary, mcap::SummaryError> summary_of(const RecordedBytes& file,
+                                                           std::vector<std::byte>& bytes) {
+  const auto tail_of = [&](std::uint64_t from) {
+    bytes.resize(file.size() - from);
+    return file.read(from, bytes);
+  };
+  const std::uint64_t begin = file.size() - std::min<std::uint64_t>(file.size(), mcap::kLeastTail);
+  if (!tail_of(begin)) return tl::unexpected(mcap::SummaryError::NoMagic);
+  const auto footer = mcap::read_footer(bytes, begin);
+  if (!footer) return tl::unexpected(footer.error());
+  if (file.size() - footer->summary_start > kLargestRead || !tail_of(footer->summary_start))
+    return tl::unexpected(mcap::SummaryError::BadRecord);
+  return mcap::read_summary(bytes, footer->summary_start);
 }
 
 }  // namespace
 
-Contents contents_of(mcap::Bytes file) {
-  Collector collector;
-  if (const auto summary = mcap::read_summary(file)) {
+Contents contents_of(const RecordedBytes& file) {
+  std::vector<std::byte> summary_bytes;
+  const auto summary = summary_of(file, summary_bytes);
+  std::optional<std::uint64_t> counted;
+  if (summary && summary->statistics) counted = summary->statistics->message_count;
+  ByteWindow window(file);
+
+  if (summary && indexes_are_complete(*summary)) {
+    ContentsCollector collector;
     collector.contents.closed_cleanly = true;
-    collect_by_summary(file, *summary, collector);
-  } else {
-    collect_by_scan(file, collector);
+    collect_by_indexes(window, *summary, collector);
+    // Messages outside of chunks have no index.
+    if (!collector.contents.losses.empty() || collector.contents.messages == counted)
+      return collector.finish(counted);
   }
-  auto& chunks = collector.contents.chunks;
-  for (std::size_t i = chunks.size(); i-- > 1;)
-    chunks[i - 1].earliest_ns = std::min(chunks[i - 1].earliest_ns, chunks[i].earliest_ns);
-  return std::move(collector.contents);  // NOLINT: a member is not moved out by itself
+
+  ContentsCollector collector;
+  if (summary)
+    for (const auto& channel : summary->channels) collector.add(channel);
+  collect_by_scan(window, summary ? std::nullopt : std::optional(summary.error()), collector);
+  return collector.finish(counted);
 }
 
 }  // namespace abbe::daemon::recording

@@ -1,6 +1,6 @@
 #pragma once
-/// The contents of a recording, complete or damaged: found by its summary, or without a summary by
-/// reading all records from the front.
+/// The contents of a recording, complete or damaged: found by its indexes, or without complete
+/// indexes, which MCAP does not require, by reading all records from the front.
 
 #include <map>
 #include <optional>
@@ -9,13 +9,16 @@
 
 #include "abbe/protocol/mcap/reader.hpp"
 #include "abbe/recording/recording_reader.hpp"
+#include "recorded_bytes.hpp"
 
 namespace abbe::daemon::recording {
 
-/// A chunk whose messages can be read. The times are computed from the messages of the chunk, not
-/// read from the chunk's head, which may be damaged.
+/// A part of the file with messages: the records of a chunk, or consecutive records outside of
+/// chunks. The times are computed from the messages, not read from the chunk's head, which may be
+/// damaged.
 struct ReadableChunk {
-  protocol::mcap::Bytes records;
+  std::uint64_t offset = 0;  ///< of its first record in the file
+  std::uint64_t size = 0;
   std::uint64_t earliest_ns = 0;  ///< of this chunk and all after it
   std::uint64_t last_time_ns = 0;
   std::uint64_t messages = 0;
@@ -28,10 +31,12 @@ struct Contents {
   std::vector<RecordingAttachment> attachments;
   std::vector<RecordingLoss> losses;
   std::uint64_t messages = 0;
+  std::string compression;  ///< of the first chunk that is compressed; empty: none is
   bool closed_cleanly = false;
 };
 
-/// Accepts any bytes after the MCAP magic. Precondition: the bytes start with the magic.
-[[nodiscard]] Contents contents_of(protocol::mcap::Bytes file);
+/// Accepts any bytes after the MCAP magic. Precondition: the bytes start with the magic. Bytes that
+/// cannot be read are missing in the contents; `file.intact()` is then an Error.
+[[nodiscard]] Contents contents_of(const RecordedBytes& file);
 
 }  // namespace abbe::daemon::recording

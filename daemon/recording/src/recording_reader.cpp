@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <iterator>
+#include <list>
 #include <utility>
 
 #include "abbe/base/sha256.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
-#include "mapped_file.hpp"
 #include "metadata_checksum.hpp"
+#include "recorded_bytes.hpp"
 #include "recording_contents.hpp"
 #include "sample_messages.hpp"
 #include "streams.hpp"
@@ -115,7 +118,7 @@ bool deliver(const RecordedMessage& message, const RecordingSink& sink) {
 // --- the file
 
 struct RecordingReader::State {
-  recording::MappedFile file;
+  std::unique_ptr<recording::RecordedBytes> file;
   Contents contents;
   RecordingInfo info;
   MetadataCheck configuration;
@@ -131,16 +134,31 @@ bool log_time_is_cycle(const Contents& contents) {
 
 }  // namespace
 
+namespace {
+
+bool begins_with_magic(const recording::RecordedBytes& file) {
+  std::array<std::byte, mcap::kMagic.size()> magic{};
+  return file.size() >= magic.size() && file.read(0, magic) && mcap::starts_with_magic(magic);
+}
+
+}  // namespace
+
 Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
-  auto file = recording::MappedFile::open(path);
+  auto file = recording::RecordedBytes::open(path);
   if (!file) return tl::unexpected(file.error());
-  if (!mcap::starts_with_magic(file->bytes())) {
+  if (!begins_with_magic(**file)) {
     return fail(ErrorCode::BadInput,
                 fmt::format("read {}: is not an MCAP file: it does not begin with the MCAP magic",
                             path.string()));
   }
 
-  Contents contents = recording::contents_of(file->bytes());
+  Contents contents = recording::contents_of(**file);
+  if (auto intact = (*file)->intact(); !intact) return tl::unexpected(intact.error());
+  if (contents.messages == 0 && !contents.compression.empty())
+    return fail(ErrorCode::BadInput,
+                fmt::format("read {}: its chunks are compressed with {}, which is not supported: "
+                            "write it again without compression (mcap decompress)",
+                            path.string(), contents.compression));
   const auto info = info_of(contents);
   if (!info) {
     return fail(
@@ -193,7 +211,7 @@ std::uint64_t RecordingReader::message_count() const noexcept {
   return state_->contents.messages;
 }
 std::uint64_t RecordingReader::size_bytes() const noexcept {
-  return state_->file.bytes().size();
+  return state_->file->size();
 }
 
 std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader::time_range()
@@ -207,9 +225,16 @@ std::optional<std::pair<protocol::HostTime, protocol::HostTime>> RecordingReader
 }
 
 std::string RecordingReader::sha256() const {
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
   Sha256 hash;
-  hash.update(state_->file.bytes());
+  recording::ByteWindow window(*state_->file);
+  for (std::uint64_t at = 0; at < window.file_size(); at += kPiece)
+    if (const auto bytes = window.at(at, kPiece)) hash.update(*bytes);
   return hash.hex();
+}
+
+Result<void> RecordingReader::intact() const {
+  return state_->file->intact();
 }
 
 std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
@@ -227,44 +252,80 @@ std::uint64_t RecordingReader::read(const RecordingSink& sink) const {
 /// stream after the other. The cursor opens chunks in file order and delivers a message once no
 /// unopened chunk can contain an earlier message.
 struct RecordingReader::Cursor::State {
+  struct OpenChunk {
+    std::vector<std::byte> bytes;
+    std::uint64_t left = 0;  ///< messages that are not delivered
+  };
+  struct OpenMessage {
+    mcap::Message message;  ///< views into the bytes of the chunk
+    std::uint64_t number;   ///< in the order of recording
+    std::list<OpenChunk>::iterator chunk;
+  };
+
   const RecordingReader::State* recording = nullptr;
   std::size_t next_chunk = 0;
-  std::vector<mcap::Message> open;  ///< messages of opened chunks, by time
-  std::size_t given = 0;            ///< the first `given` messages of `open` are delivered
-  std::uint64_t given_in_all = 0;
+  std::list<OpenChunk> chunks;
+  std::vector<std::byte> spare;   ///< memory of a chunk that is delivered
+  std::vector<OpenMessage> open;  ///< messages of opened chunks, by time
+  std::size_t given = 0;          ///< the first `given` messages of `open` are delivered
+  std::uint64_t given_in_all = 0, opened_in_all = 0;
   std::map<std::uint16_t, std::uint64_t> latest_ns;  ///< by channel
 
   [[nodiscard]] bool must_open_chunk() const {
-    const auto& chunks = recording->contents.chunks;
-    if (next_chunk == chunks.size()) return false;
-    return given == open.size() || open[given].log_time_ns >= chunks[next_chunk].earliest_ns;
+    const auto& all = recording->contents.chunks;
+    if (next_chunk == all.size()) return false;
+    return given == open.size() || open[given].message.log_time_ns >= all[next_chunk].earliest_ns;
   }
-  void open_chunk();
+  void forget_given();
+  [[nodiscard]] bool open_chunk();
+  void take_messages(std::list<OpenChunk>::iterator chunk);
 };
 
-void RecordingReader::Cursor::State::open_chunk() {
-  // At equal times the message that was recorded first comes first: it has the lower address,
-  // because the file is mapped.
-  const auto earlier = [](const mcap::Message& a, const mcap::Message& b) {
-    return a.log_time_ns != b.log_time_ns ? a.log_time_ns < b.log_time_ns
-                                          : std::less<>{}(a.data.data(), b.data.data());
-  };
-
+/// Drops the delivered messages, and the chunks that have no others.
+void RecordingReader::Cursor::State::forget_given() {
+  for (std::size_t i = 0; i < given; ++i) {
+    const auto chunk = open[i].chunk;
+    if (--chunk->left > 0) continue;
+    spare = std::move(chunk->bytes);
+    chunks.erase(chunk);
+  }
   open.erase(open.begin(), open.begin() + static_cast<std::ptrdiff_t>(given));
   given = 0;
-  const auto before = static_cast<std::ptrdiff_t>(open.size());
-  mcap::MessageReader messages{recording->contents.chunks[next_chunk++].records};
+}
 
+void RecordingReader::Cursor::State::take_messages(std::list<OpenChunk>::iterator chunk) {
+  mcap::MessageReader messages{chunk->bytes};
   while (auto message = messages.next()) {
     if (!recording->log_time_is_cycle) message->publish_time_ns = message->log_time_ns;
     std::uint64_t& latest = latest_ns[message->channel_id];
     latest = message->log_time_ns = std::max(message->log_time_ns, latest);
-    open.push_back(*message);
+    open.push_back({*message, opened_in_all++, chunk});
+    ++chunk->left;
   }
+}
+
+/// False if the chunk cannot be read any more.
+bool RecordingReader::Cursor::State::open_chunk() {
+  const auto earlier = [](const OpenMessage& a, const OpenMessage& b) {
+    return a.message.log_time_ns != b.message.log_time_ns
+               ? a.message.log_time_ns < b.message.log_time_ns
+               : a.number < b.number;
+  };
+
+  forget_given();
+  const auto before = static_cast<std::ptrdiff_t>(open.size());
+  const ReadableChunk& wanted = recording->contents.chunks[next_chunk++];
+  chunks.push_back({std::move(spare), 0});
+  const auto chunk = std::prev(chunks.end());
+  chunk->bytes.resize(wanted.size);
+  if (!recording->file->read(wanted.offset, chunk->bytes)) return false;
+  take_messages(chunk);
+  if (chunk->left != wanted.messages) return recording->file->mark_changed(), false;
 
   const auto fresh = open.begin() + before;
   if (!std::is_sorted(fresh, open.end(), earlier)) std::sort(fresh, open.end(), earlier);
   std::inplace_merge(open.begin(), fresh, open.end(), earlier);
+  return true;
 }
 
 RecordingReader::Cursor RecordingReader::messages() const {
@@ -280,9 +341,13 @@ RecordingReader::Cursor& RecordingReader::Cursor::operator=(Cursor&&) noexcept =
 
 std::optional<RecordedMessage> RecordingReader::Cursor::next() {
   State& s = *state_;
-  while (s.must_open_chunk()) s.open_chunk();
+  while (s.must_open_chunk()) {
+    if (s.open_chunk()) continue;
+    s.next_chunk = s.recording->contents.chunks.size();
+    s.given = s.open.size();
+  }
   if (s.given == s.open.size()) return std::nullopt;
-  const mcap::Message& message = s.open[s.given++];
+  const mcap::Message& message = s.open[s.given++].message;
   ++s.given_in_all;
   const auto topic = s.recording->contents.topics.find(message.channel_id);
   return RecordedMessage{

@@ -18,6 +18,7 @@
 #include "abbe/pipeline/counting_state.hpp"
 #include "abbe/pipeline/datum.hpp"
 #include "abbe/pipeline/pipeline.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "live_cycles.hpp"
 #include "mark_search.hpp"
 #include "raw_decoder.hpp"
@@ -302,6 +303,13 @@ class FromBytes {
   LiveCycles<protocol::EnvironmentSample> weather_;
 };
 
+/// Earlier versions of abbe used the readings of sensors without checking them.
+AssemblerOptions assembling(const RecordingReader& recording, const Config& config) {
+  auto options = assembler_options(config);
+  if (!has_rule(recording, kSensorRule)) options.environment.sensors = {};
+  return options;
+}
+
 /// Gives the pipeline the batches of the live run, cycle by cycle.
 class Replay : private PipelineObserver {
  public:
@@ -314,7 +322,7 @@ class Replay : private PipelineObserver {
         datum_(std::move(attached.datum)),
         marks_(std::move(attached.marks)),
         calibrations_(recording, std::move(attached.requests), config, options),
-        pipeline_(assembler_options(config),
+        pipeline_(assembling(recording, config),
                   options.source == ReplaySource::RawBytes ? &datum_ : nullptr),
         set_up_(recording) {
     pipeline_.add(*this);
@@ -329,6 +337,14 @@ class Replay : private PipelineObserver {
   Replay(const Replay&) = delete;
   Replay& operator=(const Replay&) = delete;
 
+  /// A further file begins with the state of the sensors at the end of the previous one.
+  [[nodiscard]] Result<void> go_on() {
+    for (const auto& attachment : recording_.attachments()) {
+      if (attachment.name != kSensorStateName) continue;
+      if (auto read = pipeline_.go_on(attachment); !read) return read;
+    }
+    return {};
+  }
   [[nodiscard]] ReplayReport run() {
     const auto range = recording_.time_range();
     if (!range) return {};
@@ -403,6 +419,8 @@ class Replay : private PipelineObserver {
     if (bytes_) set_up_.apply(batch, datum_);
   }
   void on_samples(const Batch& batch) override {
+    report_.samples += batch.points.size() + batch.axes.size() + batch.touches.size() +
+                       batch.environment.size() + batch.measured_environment.size();
     if (options_.samples) options_.samples(batch, begin_);
   }
   void on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime /*taken*/) override {
@@ -442,6 +460,8 @@ void judge_recording(const RecordingReader& recording, calib::Verdict& verdict) 
   if (recording.configuration_check() == MetadataCheck::Unchecked)
     verdict.notes.emplace_back(
         "the recorded configuration has no checksum: damage in it would not be detected");
+  for (std::string& change : in_words(recorded_clock(recording).change, "abbed started"))
+    verdict.notes.push_back(std::move(change));
 }
 
 Result<Config> recorded_config(const RecordingReader& recording, const std::string& file) {
@@ -457,7 +477,11 @@ Result<ReplayReport> replay(const RecordingReader& recording, const Config& conf
                             const ReplayOptions& options) {
   auto attached = attached_to(recording, config);
   if (!attached) return tl::unexpected(attached.error());
-  return Replay{recording, config, options, std::move(*attached)}.run();
+  Replay again{recording, config, options, std::move(*attached)};
+  if (const auto begun = again.go_on(); !begun) return tl::unexpected(begun.error());
+  auto report = again.run();
+  if (auto intact = recording.intact(); !intact) return tl::unexpected(intact.error());
+  return report;
 }
 
 }  // namespace abbe::daemon

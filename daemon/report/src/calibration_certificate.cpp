@@ -93,9 +93,32 @@ void write_people(XmlText& out, const CertificateDetails& d) {
   write_contact(out, "dcc:customer", d.customer);
 }
 
-void write_statements(XmlText& out, const ReportSubject& subject, bool has_as_left) {
+/// What the certificate states about the use of its models, first of all.
+Result<std::vector<std::string>> use_of(const ReportSubject& subject, const char* state) {
+  return statements_of_use(
+      fmt::format("certificate of model {} ({})", model_id(subject.document), state),
+      obstacles_to_use(in_use(subject, ModelPurpose::Certificate)), subject.forced);
+}
+
+struct UseOfModels {
+  std::vector<std::string> as_found, as_left;
+};
+
+Result<UseOfModels> use_of_both(const ReportSubject& as_found, const ReportSubject* as_left) {
+  auto found = use_of(as_found, "as found");
+  if (!found) return tl::make_unexpected(found.error());
+  if (as_left == nullptr) return UseOfModels{*std::move(found), {}};
+  auto left = use_of(*as_left, "as left");
+  if (!left) return tl::make_unexpected(left.error());
+  return UseOfModels{*std::move(found), *std::move(left)};
+}
+
+void write_statements(XmlText& out, const ReportSubject& subject, const UseOfModels& use,
+                      bool has_as_left) {
   const ModelDocument& document = subject.document;
   out.open("dcc:statements");
+  write_statement(out, has_as_left ? "Model, as found" : "Model", use.as_found);
+  if (has_as_left) write_statement(out, "Model, as left", use.as_left);
   write_statement(out, "Gauge", {gauge_in_words(document.model)});
   write_statement(out, "Signs", signs_in_words());
   write_statement(out, "Not contained in the uncertainty", not_in_the_uncertainty(document));
@@ -107,7 +130,7 @@ void write_statements(XmlText& out, const ReportSubject& subject, bool has_as_le
 }
 
 void write_administrative_data(XmlText& out, const ReportSubject& subject,
-                               const ReportSubject* as_left) {
+                               const ReportSubject* as_left, const UseOfModels& use) {
   out.open("dcc:administrativeData");
   out.open("dcc:dccSoftware");
   write_software(out, ABBE_VERSION);
@@ -115,7 +138,7 @@ void write_administrative_data(XmlText& out, const ReportSubject& subject,
   write_core_data(out, subject, measurement_days(subject, as_left));
   write_item(out, subject);
   write_people(out, subject.details);
-  write_statements(out, subject, as_left != nullptr);
+  write_statements(out, subject, use, as_left != nullptr);
   out.close();
 }
 
@@ -138,6 +161,9 @@ Result<std::string> calibration_certificate(const ReportSubject& as_found,
               "certificate: entries are missing or invalid; give them with --details FILE",
               std::move(missing)});
 
+  const auto use = use_of_both(as_found, left);
+  if (!use) return tl::make_unexpected(use.error());
+
   XmlText out;
   out.open("dcc:digitalCalibrationCertificate",
            {{"xmlns:dcc", "https://ptb.de/dcc"},
@@ -145,7 +171,7 @@ Result<std::string> calibration_certificate(const ReportSubject& as_found,
             {"xmlns:xsi", "http://www.w3.org/2001/XMLSchema-instance"},
             {"xsi:schemaLocation", "https://ptb.de/dcc https://ptb.de/dcc/v3.2.1/dcc.xsd"},
             {"schemaVersion", "3.2.1"}});
-  write_administrative_data(out, as_found, left);
+  write_administrative_data(out, as_found, left, *use);
   out.open("dcc:measurementResults");
   if (auto done = write_result(out, as_found, State::AsFound, as_found.details); !done)
     return tl::make_unexpected(done.error());

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <optional>
 
+#include "abbe/report/calibration_certificate.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
@@ -27,6 +28,11 @@ std::optional<std::string> last_day(const ReportSubject& subject) {
   return measured ? std::optional(day_of((*measured)[1])) : std::nullopt;
 }
 
+bool has_only_dates(const CertificateDetails& d) {
+  return std::ranges::all_of(std::array{d.begin_date, d.end_date, d.issue_date},
+                             [](const std::string& date) { return date.empty() || is_date(date); });
+}
+
 /// Dates of the details that no time zone makes agree with the measurement of the model.
 void compare_with_model(const CertificateDetails& d, const ReportSubject& subject,
                         std::string_view state, std::vector<std::string>& wrong) {
@@ -39,6 +45,44 @@ void compare_with_model(const CertificateDetails& d, const ReportSubject& subjec
   if (!d.end_date.empty() && d.end_date < day_of(last - kMostBehindUtc))
     wrong.push_back(fmt::format("certificate.end_date: {} is before {} ended, {} (UTC)", d.end_date,
                                 state, day_of(last)));
+}
+
+/// A measurement cannot end after the model was identified.
+void compare_with_identification(const CertificateDetails& d, const ReportSubject& subject,
+                                 bool is_last, std::vector<std::string>& wrong) {
+  const protocol::UtcTime created = subject.document.created;
+  const std::string latest = day_of(created + kMostAheadOfUtc);
+  const auto require = [&](const std::string& day, const char* key) {
+    if (day > latest)
+      wrong.push_back(fmt::format("certificate.{}: {} is after the model was identified, {} (UTC)",
+                                  key, day, day_of(created)));
+  };
+  require(d.begin_date, "begin_date");
+  if (is_last) require(d.end_date, "end_date");
+}
+
+/// Times of the model alone that contradict each other, or the present time `now`.
+void compare_clocks(const ModelDocument& document, const std::optional<protocol::UtcTime>& now,
+                    std::vector<std::string>& wrong) {
+  const protocol::UtcTime created = document.created;
+  const auto measured = measured_of(document);
+  if (measured && (*measured)[1] > created + kMostAheadOfUtc)
+    wrong.push_back(fmt::format(
+        "model {}: measured until {}, but identified {} (UTC): one of the clocks was wrong; "
+        "identify it again",
+        model_id(document), to_seconds((*measured)[1]), to_seconds(created)));
+  if (now && created > *now + kMostAheadOfUtc)
+    wrong.push_back(
+        fmt::format("model {}: identified {}, which is in the future (now {} UTC): the "
+                    "clock of this or that computer is wrong",
+                    model_id(document), to_seconds(created), to_seconds(*now)));
+}
+
+/// Dates after the present day.
+void compare_with_today(const CertificateDetails& d, std::vector<std::string>& wrong) {
+  if (d.now && d.issue_date > day_of(*d.now + kMostAheadOfUtc))
+    wrong.push_back(fmt::format("certificate.issue_date: {} is in the future, today is {} (UTC)",
+                                d.issue_date, day_of(*d.now)));
 }
 
 void compare_measurements(const ReportSubject& as_found, const ReportSubject& as_left,
@@ -78,17 +122,13 @@ MeasurementDays measurement_days(const ReportSubject& as_found, const ReportSubj
   return days;
 }
 
-std::vector<std::string> wrong_dates(const ReportSubject& as_found, const ReportSubject* as_left) {
+std::vector<std::string> contradictory_dates(const ReportSubject& as_found,
+                                             const ReportSubject* as_left) {
   const CertificateDetails& d = as_found.details;
-  for (const std::string& date : {d.begin_date, d.end_date, d.issue_date})
-    if (!date.empty() && !is_date(date)) return {"certificate: dates such as \"2026-11-26\""};
+  if (!has_only_dates(d)) return {"certificate: dates such as \"2026-11-26\""};
 
   std::vector<std::string> wrong;
   const MeasurementDays days = measurement_days(as_found, as_left);
-  constexpr const char* kNotKnown =
-      "certificate.{}: the model does not have the time of its measurement";
-  if (days.begin.empty()) wrong.push_back(fmt::format(kNotKnown, "begin_date"));
-  if (days.end.empty()) wrong.push_back(fmt::format(kNotKnown, "end_date"));
   if (!days.end.empty() && days.end < days.begin)
     wrong.push_back(
         fmt::format("certificate.end_date: {} is before begin_date, {}", days.end, days.begin));
@@ -98,12 +138,37 @@ std::vector<std::string> wrong_dates(const ReportSubject& as_found, const Report
                     d.issue_date, days.end));
 
   compare_with_model(d, as_found, as_left != nullptr ? "as found" : "the measurement", wrong);
+  compare_with_identification(d, as_found, as_left == nullptr, wrong);
+  compare_with_today(d, wrong);
+  compare_clocks(as_found.document, d.now, wrong);
+  if (as_left == nullptr) return wrong;
+  compare_with_model(d, *as_left, "as left", wrong);
+  compare_with_identification(d, *as_left, true, wrong);
+  compare_clocks(as_left->document, d.now, wrong);
+  compare_measurements(as_found, *as_left, wrong);
+  return wrong;
+}
+
+std::vector<std::string> contradictory_times(const ReportSubject& subject) {
+  std::vector<std::string> wrong;
+  compare_clocks(subject.document, subject.details.now, wrong);
+  return wrong;
+}
+
+std::vector<std::string> wrong_dates(const ReportSubject& as_found, const ReportSubject* as_left) {
+  const CertificateDetails& d = as_found.details;
+  std::vector<std::string> wrong = contradictory_dates(as_found, as_left);
+  if (!has_only_dates(d)) return wrong;
+  const MeasurementDays days = measurement_days(as_found, as_left);
+  constexpr const char* kNotKnown =
+      "certificate.{}: the model does not have the time of its measurement";
+  if (days.begin.empty()) wrong.push_back(fmt::format(kNotKnown, "begin_date"));
+  if (days.end.empty()) wrong.push_back(fmt::format(kNotKnown, "end_date"));
+
   if (as_left == nullptr) {
     compare_equipment(d.equipment, EquipmentUse::AsFound, "the measurement", days.end, wrong);
     return wrong;
   }
-  compare_with_model(d, *as_left, "as left", wrong);
-  compare_measurements(as_found, *as_left, wrong);
   compare_equipment(d.equipment, EquipmentUse::AsFound, "as found",
                     last_day(as_found).value_or(days.begin), wrong);
   compare_equipment(d.equipment, EquipmentUse::AsLeft, "as left", days.end, wrong);

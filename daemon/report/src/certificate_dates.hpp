@@ -23,8 +23,8 @@ struct MeasurementDays {
 [[nodiscard]] MeasurementDays measurement_days(const ReportSubject& as_found,
                                                const ReportSubject* as_left);
 
-/// Days that are missing, contradict each other or the models, or are later than the calibration of
-/// the equipment is valid.
+/// Days that are missing, and contradictory_dates(), and equipment whose calibration was not valid
+/// any more.
 [[nodiscard]] std::vector<std::string> wrong_dates(const ReportSubject& as_found,
                                                    const ReportSubject* as_left);
 

@@ -40,17 +40,29 @@ void add_conditions(Facts& facts, const ReportSubject& subject) {
   facts.emplace_back("tool offsets", tools_in_words(subject.document.model));
 }
 
+/// "tracker.reflector = A; tracker.weather = compute".
+std::string measured_with(const ModelDocument& document) {
+  if (!document.configuration) return {};
+  std::string text;
+  for (const auto& [key, value] : document.configuration->measurements)
+    text += fmt::format("{}{} = {}", text.empty() ? "" : "; ", key, value);
+  return text;
+}
+
 Facts facts_of(const ReportSubject& subject) {
   const CertificateDetails& d = subject.details;
   const ModelDocument& document = subject.document;
   Facts facts;
   add_if(facts, "certificate", d.number);
   facts.emplace_back("machine", document.machine);
+  add_if(facts, "machine_id", subject.machine_id);
   add_if(facts, "manufacturer, model, serial number",
          joined({d.machine_manufacturer, d.machine_model, d.machine_serial}));
   facts.emplace_back("kinematic chain (ISO 10791-6)", document.model.chain().text());
   facts.emplace_back("model", fmt::format("{}, hash {}", model_id(document), model_hash(document)));
   facts.emplace_back("hash of the machine configuration", document.machine_hash);
+  facts.emplace_back("devices", devices_in_words(made_on_simulated_devices(document)));
+  add_if(facts, "settings of the measuring devices", measured_with(document));
   facts.emplace_back("method", method_in_words(document));
   if (const auto measured = measured_of(document))
     facts.emplace_back("measured (UTC)", fmt::format("{} to {}", to_seconds((*measured)[0]),

@@ -1,29 +1,31 @@
+#include "abbe/model/machine_identity.hpp"
 #include "abbe/report/model_report.hpp"
+
+#include <utility>
 
 namespace abbe::daemon {
 
-// ModelStore::list() would read every model of the store.
-Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id) {
-  auto document = store.load(id);
-  if (!document) return tl::make_unexpected(document.error());
-  const auto active = store.active_id();
-  if (!active) return tl::make_unexpected(active.error());
-  const auto history = store.history();
-  if (!history) return tl::make_unexpected(history.error());
+ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose) {
+  return {.document = subject.document,
+          .events = subject.events,
+          .machine_hash = subject.machine_hash,
+          .purpose = purpose,
+          .identity_doubt = subject.identity_doubt};
+}
 
-  ReportSubject subject{.document = *std::move(document)};
-  for (const StoreEvent& event : *history) {
-    if (event.id != id) continue;
-    subject.events.push_back(event);
-    if (event.action == StoreAction::Added)
-      subject.entry = StoreEntry{.id = id,
-                                 .active = *active == id,
-                                 .accepted = event.accepted,
-                                 .reasons = event.reasons,
-                                 .added = event.actor.when,
-                                 .method = subject.document.method,
-                                 .machine = subject.document.machine};
-  }
+Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id) {
+  auto stored = stored_model(store, id);
+  if (!stored) return tl::make_unexpected(stored.error());
+  ReportSubject subject{.document = std::move(stored->document),
+                        .entry = std::move(stored->entry),
+                        .events = std::move(stored->events)};
+  // A report is made also where the identity cannot be read.
+  subject.identity_doubt = identity_doubt(store, id, marks_of_this_computer());
+  const auto identity = identity_of(store);
+  if (!identity || !*identity) return subject;
+  const auto history = store.history();
+  auto known = history ? machine_id_of_model(**identity, *history, id) : std::nullopt;
+  subject.machine_id = known ? *known : (*identity)->machine_id_at(subject.document.created);
   return subject;
 }
 

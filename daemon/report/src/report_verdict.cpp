@@ -1,19 +1,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "abbe/base/utc_text.hpp"
+#include "abbe/report/calibration_certificate.hpp"
 #include "abbe/report/model_words.hpp"
 #include "certificate_dates.hpp"
 #include "report_sections.hpp"
 
 namespace abbe::daemon {
 namespace {
-
-std::string who_and_when(const StoreEvent& event) {
-  return fmt::format("{}, {} (UTC){}{}", event.actor.who, to_text(event.actor.when),
-                     event.actor.why.empty() ? "" : ": ", event.actor.why);
-}
 
 /// Equipment whose calibration was not valid any more on the last day of the measurement; of a model
 /// that does not have this day, on the day of its identification.
@@ -28,35 +25,46 @@ void add_expired_equipment(const ReportSubject& subject, std::vector<std::string
                       e.name, e.valid_until, end.empty() ? "identified" : "measured", day));
 }
 
+/// What its user must know apart from the verdict, which is the first statement. Some of it is among
+/// the notes already.
+void add_obstacles(const ReportSubject& subject, std::vector<std::string>& notes) {
+  const auto found = obstacles_to_use(in_use(subject, ModelPurpose::Look)).statements;
+  for (std::size_t i = 1; i < found.size(); ++i)
+    if (std::ranges::find(notes, found[i]) == notes.end()) notes.push_back(found[i]);
+}
+
 /// What happened to the model in the store, apart from its verdict.
 std::vector<std::string> notes_of(const ReportSubject& subject) {
   std::vector<std::string> notes;
-  if (subject.document.run) notes = subject.document.run->notes;
+  if (const auto& verdict = subject.document.verdict) notes = verdict->notes;
+  if (notes.empty() && subject.document.run) notes = subject.document.run->notes;
   for (const StoreEvent& event : subject.events) {
     switch (event.action) {
       case StoreAction::Added:
         break;
       case StoreAction::Activated:
-        notes.push_back("activated by " + who_and_when(event));
+        notes.push_back("activated by " + who_and_when(event.actor));
         break;
       case StoreAction::Forced:
-        notes.push_back("activated against the verdict by " + who_and_when(event));
+        notes.push_back("activated against the verdict by " + who_and_when(event.actor));
         break;
       case StoreAction::RolledBack:
-        notes.push_back("activated again by " + who_and_when(event));
+        notes.push_back("activated again by " + who_and_when(event.actor));
         break;
       case StoreAction::Drifted:
-        notes.push_back("a later run found drift: " + who_and_when(event));
+        notes.push_back("a later run found drift: " + who_and_when(event.actor));
         break;
       case StoreAction::Removed:
-        notes.push_back("removed from the store by " + who_and_when(event));
+        notes.push_back("removed from the store by " + who_and_when(event.actor));
         break;
     }
   }
-  if (const auto& gap = subject.document.recording_gap; !gap.empty()) {
-    const std::string note = cannot_be_checked(gap);  // of a run of abbed it is among its notes
-    if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
-  }
+  const auto certified = obstacles_to_use(in_use(subject, ModelPurpose::Certificate));
+  if (subject.forced && !certified.refusals.empty())
+    notes.push_back("a certificate of it was made nevertheless, forced by " +
+                    who_and_when(*subject.forced));
+  for (auto& wrong : contradictory_times(subject)) notes.push_back(std::move(wrong));
+  add_obstacles(subject, notes);
   add_expired_equipment(subject, notes);
   return notes;
 }
@@ -65,29 +73,35 @@ bool has_drifted(const ReportSubject& subject) {
   return !subject.events.empty() && subject.events.back().action == StoreAction::Drifted;
 }
 
+std::string_view place_in_words(const ReportSubject& subject) {
+  if (!subject.entry) return "It is read from a file: whether it is active is not known.";
+  return subject.entry->active ? "It is the active model." : "It is not active.";
+}
+
 }  // namespace
 
 VerdictInWords verdict_in_words(const ReportSubject& subject) {
-  VerdictInWords verdict{.text = {}, .reasons = {}, .notes = notes_of(subject)};
-  if (!subject.entry) {
-    verdict.text = "No verdict: this model is a file; only a store knows the verdict of the gate.";
-    return verdict;
-  }
+  VerdictInWords words{.text = {}, .reasons = {}, .notes = notes_of(subject)};
+  const auto& verdict = subject.document.verdict;
+  const auto set = [&](Signal signal, std::string_view text) {
+    words.signal = signal;
+    words.text = fmt::format("{} {}", text, place_in_words(subject));
+  };
 
-  const StoreEntry& entry = *subject.entry;
-  const std::string_view state = entry.active ? "It is the active model." : "It is not active.";
-  if (!entry.accepted) {
-    verdict.signal = Signal::Red;
-    verdict.text = fmt::format("Red: the gate refused the model. {}", state);
-    verdict.reasons = entry.reasons;
+  if (!verdict) {
+    set(Signal::Unlit, "No verdict: neither the model nor a store has one.");
+  } else if (!verdict->accepted) {
+    set(Signal::Red, verdict->forced ? "Red: the gate refused the model; it was activated by force."
+                                     : "Red: the gate refused the model.");
+    words.reasons = verdict->reasons;
+  } else if (is_of_another_machine(in_use(subject, ModelPurpose::Look))) {
+    set(Signal::Yellow, "Yellow: accepted, but made for another machine configuration.");
   } else if (has_drifted(subject)) {
-    verdict.signal = Signal::Yellow;
-    verdict.text = fmt::format("Yellow: accepted, but the machine has changed since. {}", state);
+    set(Signal::Yellow, "Yellow: accepted, but the machine has changed since.");
   } else {
-    verdict.signal = Signal::Green;
-    verdict.text = fmt::format("Green: the gate accepted the model. {}", state);
+    set(Signal::Green, "Green: the gate accepted the model.");
   }
-  return verdict;
+  return words;
 }
 
 void add_verdict_of(HtmlReport& page, const ReportSubject& subject) {

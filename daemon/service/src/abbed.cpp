@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -19,9 +20,11 @@
 #include <thread>
 #include <utility>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/base/clock_steps.hpp"
 #include "abbe/base/control_protocol.hpp"
 #include "abbe/base/control_server.hpp"
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/exit_codes.hpp"
 #include "abbe/base/exit_deadline.hpp"
 #include "abbe/base/text_file.hpp"
@@ -34,11 +37,13 @@
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
+#include "abbe/recording/recorded_clock.hpp"
 #include "abbe/service/background_tasks.hpp"
 #include "abbe/service/control_api.hpp"
 #include "abbe/service/counting_state_thread.hpp"
 #include "abbe/service/hub.hpp"
 #include "abbe/service/journal_thread.hpp"
+#include "abbe/service/process_signals.hpp"
 #include "abbed_options.hpp"
 #include "model_status_name.hpp"
 #include "outcome.hpp"
@@ -53,15 +58,17 @@ using WallTime = std::chrono::steady_clock::time_point;
 constexpr auto kTidyPeriod = 1h;    // period of the search for old recordings
 constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
 constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer for this long it hangs
-// for the control socket (3 s at most), the journal and the hub to end
-constexpr auto kEndTimeout = 5s;
+constexpr auto kNameServiceTimeout = 1s;  // at the start
 constexpr int kHubHangs = number(ExitCode::Internal);
 
-/// UTC minus host time, both read now. The only conversion between the two clocks.
-protocol::UtcOffset utc_offset(const drivers::TimeSource& time) {
-  const auto utc = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(utc) -
-          time.now().time_since_epoch()};
+/// nullopt until the outcome of the latest request to stop the machine is known.
+std::optional<ObservedStop> observed_stop(const drivers::IppStop& stop) {
+  using enum drivers::IppStopOutcome;
+  if (stop.outcome == None || stop.outcome == Pending) return std::nullopt;
+  return ObservedStop{.number = stop.number,
+                      .outcome = name_of(stop.outcome),
+                      .text = stop.text,
+                      .confirmed = stop.outcome == Stopped};
 }
 
 /// "abbe-2026-11-21T03-40-12Z-4711": readable, sorts by time, unique for each daemon process.
@@ -97,15 +104,18 @@ struct Abbed::State {
   Config config;
   AbbedOptions options;
   drivers::MonotonicTime time;
-  protocol::UtcOffset utc;
+  WallClock clock;          // first reading: the start of abbed
+  protocol::UtcOffset utc;  // of recordings and messages, constant
   std::vector<std::string> warnings;
   std::optional<drivers::CpuLatencyBound> cpu_latency;
   std::optional<ModelAuthority> authority;
+  std::optional<IdentityWatch> machine_identity;
   std::unique_ptr<RecorderThread> recorder;
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
   std::optional<VerificationService> verification;
   DdsProcess dds_process;
+  std::optional<uid_t> network_user;  ///< of abbe-dds, if it has a user of its own
   std::optional<Publisher> publisher;
   std::optional<DdsSupervisor> supervisor;
   std::optional<DeviceSet> devices;
@@ -132,30 +142,40 @@ struct Abbed::State {
       std::make_shared<std::atomic<bool>>(false);
   std::future<Result<std::vector<LeftRecording>>> closing_left;
   const std::string recording = recording_name();
-  ClockSteps clock_steps{read_clocks()};
-  bool tidies = true;  // false after the clock was set
+  ClockSteps clock_steps{clock.read()};
+  ClockChange clock_change{};  // as reported
+  bool tidies = true;          // false after the clock was set
+  bool has_ended = false;
   WallTime next_tidying = WallTime::clock::now() + kTidyFirst;
 
   State(Config c, AbbedOptions o)
       : config(std::move(c)),
         options(std::move(o)),
         time(config.daemon.speed),
-        utc(utc_offset(time)) {}
+        clock(options.clock),
+        utc(clock.offset(time.now())) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
-  ~State() {
+  ~State() { (void)end(); }
+
+  /// The first call ends everything.
+  std::optional<drivers::IppStop> end() {
+    if (std::exchange(has_ended, true)) return {};
     if (devices) devices->end_machine();  // first: the machine must stop even if a later step hangs
     *stop_closing = true;
     end_hub();
+    const auto machine = devices ? devices->finish_machine() : std::nullopt;
     counting_state.reset();  // waits for the disk
+    return machine;
   }
 
   void end_hub() {
     const ExitDeadline deadline{
-        kEndTimeout, kHubHangs,
+        kLongestHubEnd, kHubHangs,
         fmt::format("abbed: the hub does not end within {} s: exit code {}; what was "
                     "recorded stays readable in {}.mcap.part\n",
-                    std::chrono::seconds{kEndTimeout}.count(), kHubHangs, recording)};
+                    kLongestHubEnd.count(), kHubHangs, recording),
+        &stop_machines_at_once};
     control.reset();
     journal.reset();  // both call the hub a last time
 
@@ -183,7 +203,8 @@ struct Abbed::State {
                        .versions = {{"abbe", ABBE_VERSION},
                                     {kAxisSamplesRule, "1"},
                                     {kDatumRule, "2"},
-                                    {kRotaryTravelRule, "1"}}};
+                                    {kRotaryTravelRule, "1"},
+                                    {kSensorRule, "1"}}};
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
@@ -193,18 +214,43 @@ struct Abbed::State {
   }
 
   Result<void> open_models() {
-    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, utc, time.now()));
+    authority.emplace(ModelAuthority::open(config.daemon.models_dir(), config, clock, time.now()));
     if (!authority->fault().empty()) warnings.push_back(authority->fault());
+    return {};
+  }
+
+  /// Nothing is refused: acquisition and recording do not need the identity.
+  Result<void> open_machine_identity() {
+    const auto now = std::chrono::system_clock::now();
+    machine_identity.emplace(
+        IdentityWatch::open(config.daemon.data_dir, marks_of_this_computer(),
+                            std::chrono::time_point_cast<std::chrono::nanoseconds>(now)));
+    authority->set_identity(&*machine_identity);
+    const auto& known = machine_identity->known();
+    if (!known.machine_id.empty())
+      fmt::print(stderr, "abbed: machine {}, machine_id {}\n", config.machine.name,
+                 known.machine_id);
+    if (!known.doubt.empty()) warnings.push_back(known.doubt);
+    if (known.doubt.empty() && !known.fault.empty())
+      warnings.push_back(
+          fmt::format("the machine has no identity beside its name: {}", known.fault));
     return {};
   }
 
   Result<void> open_dds() {
     if (config.dds.supervise == Supervise::Off) return {};
+    if (options.dds_unit && config.dds.supervise == Supervise::Child)
+      warnings.emplace_back(
+          "[dds] supervise = \"child\": abbe-dds, which reads the network, runs with the rights of "
+          "abbed; remove this line, and it runs as a user of its own");
     const bool supervised = config.dds.supervise == Supervise::Child;
-    auto link =
-        DdsLink::listen(config.dds.socket, {.process = supervised ? &dds_process : nullptr});
+    const auto peer = dds_peer();
+    if (!peer) return tl::unexpected(peer.error());
+    auto link = DdsLink::listen(config.dds.socket, *peer);
     if (!link) return tl::unexpected(link.error());
-    publisher.emplace(std::move(*link), publisher_options(config), utc);
+    auto publishes = publisher_options(config);
+    publishes.identity.machine_id = machine_identity->known().machine_id;
+    publisher.emplace(std::move(*link), std::move(publishes), utc);
     check_dds_security();
     if (!supervised) return {};
     auto started = DdsSupervisor::start(abbe_dds_options(config, options.dds_program, dds_process),
@@ -215,16 +261,31 @@ struct Abbed::State {
     return {};
   }
 
+  /// The process that may connect to the socket for abbe-dds.
+  Result<DdsLinkPeer> dds_peer() {
+    if (config.dds.supervise == Supervise::Child) return DdsLinkPeer{.process = &dds_process};
+    if (config.dds.user.empty()) return DdsLinkPeer{};
+    const auto account = account_of(config.dds.user);
+    if (!account)
+      return fail(
+          ErrorCode::Io,
+          fmt::format("[dds] user: there is no user \"{}\", as which systemd runs abbe-dds: "
+                      "systemd-sysusers makes it",
+                      config.dds.user));
+    if (account->uid != ::geteuid()) network_user = account->uid;
+    return DdsLinkPeer{.user = account};
+  }
+
   /// Warns only: acquisition and recording do not need abbe-dds, and abbe-dds itself refuses
   /// unusable keys.
   void check_dds_security() {
     if (!dds_is_secured(config.dds.security, config.dds.profile)) {
       warnings.push_back(dds_security_is_off(config.dds.domain));
-    } else if (!config.dds.security.empty()) {
-      const auto identity =
+    } else if (!config.dds.security.empty() && !network_user) {  // else only abbe-dds can read it
+      const auto keys =
           find_dds_identity(config.dds.security, DdsRole::Daemon, std::chrono::system_clock::now());
-      if (!identity)
-        warnings.push_back(identity.error().text +
+      if (!keys)
+        warnings.push_back(keys.error().text +
                            "; nothing is published over DDS until this is corrected");
     }
   }
@@ -272,11 +333,15 @@ struct Abbed::State {
     auto listener = listen_unix(config.control.socket);
     if (!listener) return tl::unexpected(listener.error());
     control_listener = std::move(*listener);
+    // So that the first requests find the groups of a name service that answers in time.
+    const std::array groups{config.control.look_group, config.control.change_group,
+                            config.control.move_group};
+    account_names().look_up(groups, kNameServiceTimeout);
     return {};
   }
 
   Result<void> run() {
-    calibration.emplace(config, *authority, recorder.get(), utc);
+    calibration.emplace(config, *authority, recorder.get(), clock);
     std::optional<Counting> left;
     if (left_counting.state) {
       recorder->attach(to_attachment(*left_counting.state), time.now());
@@ -299,7 +364,9 @@ struct Abbed::State {
                          .touching = &*touching,
                          .verification = &*verification,
                          .tracker = &*tracker,
-                         .store_changes = &*store_changes});
+                         .store_changes = &*store_changes,
+                         .network_user = network_user,
+                         .identity = &*machine_identity});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 
@@ -354,7 +421,8 @@ struct Abbed::State {
                           .session = calibration->status(),
                           .model = {.state = std::string{status_name(active.status)},
                                     .id = active.model != nullptr ? active.model->id : "",
-                                    .reason = active.reason}};
+                                    .reason = active.reason},
+                          .stop = observed_stop(devices->machine_stop())};
         },
         kHubTimeout);
     Observed now = seen ? std::move(*seen) : Observed{.hub_answers = false};
@@ -362,6 +430,28 @@ struct Abbed::State {
     now.participant = participant;
 
     return now;
+  }
+
+  /// Reports and records each change of the wall clock once: the dates of the recording are those of
+  /// the start.
+  void follow_clock() {
+    const ClockChange change = clock.since_start();
+    const auto further = [](auto a, auto b) {
+      return std::chrono::abs(a - b) >= kLeastClockChange;
+    };
+    if (!further(change.step, clock_change.step) &&
+        !further(change.suspended, clock_change.suspended))
+      return;
+    const auto attached = hub->call(
+        [this, attachment = to_attachment(change)]() mutable {
+          recorder->attach(std::move(attachment), time.now());
+          return true;
+        },
+        kHubTimeout);
+    if (!attached) return;  // again in the next cycle
+    clock_change = change;
+    for (const std::string& text : in_words(change, "abbed started"))
+      fmt::print(stderr, "abbed: {}\n", text);
   }
 
   void supervise(WallTime now) {
@@ -384,7 +474,7 @@ struct Abbed::State {
                    config.recording.keep.count());
     }
 
-    if (clock_steps.look(read_clocks()) && std::exchange(tidies, false))
+    if (clock_steps.look(clock.read()) && std::exchange(tidies, false))
       fmt::print(stderr,
                  "abbed: the clock was set: no old recordings are removed until the next start\n");
     if (!tidies || tidying.valid() || now < next_tidying) return;
@@ -426,6 +516,7 @@ struct Abbed::State {
     try {
       hub->run();
     } catch (const std::exception& error) {  // alive() then returns false
+      (void)devices->stop_machine();  // without the hub nothing notices that its operator is gone
       fmt::print(stderr, "abbed: the hub ended with an internal error: {}\n", error.what());
     }
   }
@@ -436,6 +527,7 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   auto state = std::make_unique<State>(std::move(config), std::move(options));
   prepare_background_tasks();
 
+  use_dds_unit(state->config, state->options.dds_unit);
   for (const auto& directory :
        {state->config.daemon.runtime_dir, state->config.control.socket.parent_path(),
         state->config.dds.socket.parent_path()}) {
@@ -446,9 +538,9 @@ Result<std::unique_ptr<Abbed>> Abbed::start(Config config, AbbedOptions options)
   using Step = Result<void> (State::*)();
   // The recorder is the last step that can fail: repeated failed starts then leave no files.
   for (const Step step :
-       {&State::refuse_second_daemon, &State::open_models, &State::open_dds,
-        &State::bound_cpu_latency, &State::start_devices, &State::start_hub_thread,
-        &State::listen_control, &State::open_recorder, &State::run}) {
+       {&State::refuse_second_daemon, &State::open_models, &State::open_machine_identity,
+        &State::open_dds, &State::bound_cpu_latency, &State::start_devices,
+        &State::start_hub_thread, &State::listen_control, &State::open_recorder, &State::run}) {
     if (auto done = ((*state).*step)(); !done) return tl::unexpected(done.error());
   }
 
@@ -461,9 +553,18 @@ Abbed::~Abbed() = default;
 void Abbed::cycle() {
   const auto now = WallTime::clock::now();
   state_->supervise(now);
+  state_->follow_clock();
   state_->tidy_recordings(now);
   state_->store_upkeep.cycle(now);
   state_->report_left_recordings();
+}
+
+std::optional<drivers::IppStop> Abbed::end() {
+  return state_->end();
+}
+
+void Abbed::stop_machine() {
+  (void)state_->devices->stop_machine();
 }
 
 bool Abbed::alive() const {

@@ -15,6 +15,7 @@ RecorderThreadOptions recorder_options(const Config& config, const std::string& 
   options.recorder.chunk_period = config.recording.chunk_period;
   options.recorder.min_free_bytes = config.recording.min_free_bytes;
   options.recorder.max_file_bytes = config.recording.max_file_bytes;
+  options.recorder.sensors = sensor_check_options(config);
   options.raw = config.recording.raw;
 
   options.devices = device_names(config);
@@ -29,7 +30,8 @@ PublisherOptions publisher_options(const Config& config) {
           .validity = config.dds.validity,
           .security_warning = dds_is_secured(config.dds.security, config.dds.profile)
                                   ? std::string{}
-                                  : dds_security_is_off(config.dds.domain)};
+                                  : dds_security_is_off(config.dds.domain),
+          .identity = {.devices_simulated = config.daemon.simulated}};
 }
 
 DdsSupervisor::Options abbe_dds_options(const Config& config, const std::string& program,

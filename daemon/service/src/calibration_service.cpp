@@ -50,12 +50,12 @@ bool ready(const std::future<T>& work) {
 }  // namespace
 
 CalibrationService::CalibrationService(const Config& config, ModelAuthority& authority,
-                                       RecorderThread* recorder, protocol::UtcOffset utc)
+                                       RecorderThread* recorder, WallClock clock)
     : config_(config),
       shared_config_(std::make_shared<const Config>(config)),
       authority_(authority),
       recorder_(recorder),
-      utc_(utc),
+      clock_(std::move(clock)),
       session_(Methods::options(config)),
       live_tables_(shared_config_),
       state_(std::make_shared<IdentificationState>()) {}
@@ -216,7 +216,7 @@ void CalibrationService::begin_identification(Acquisition acquired) {
       .active_left_out = left_out,
       .digest = recorder_ != nullptr ? recorder_->digest() : std::future<RecordingDigest>{},
       .keeper = authority_.keeper(),
-      .utc = utc_,
+      .clock = clock_,
       .who = who_});
 }
 

@@ -197,10 +197,25 @@ OnHub with_reference(std::function<Result<void>(ReferenceService&, const HubPart
   };
 }
 
+/// The axes that a request names. The hub compares them with those of the counter card, so there
+/// are at most as many as a card counts.
+Result<std::vector<std::string>> axes_of(const json& request) {
+  const auto named = request.find("axes");
+  if (named == request.end()) return {};
+  if (named->is_array() && named->size() > protocol::kMaxAxes)
+    return fail(ErrorCode::Usage,
+                fmt::format("reference: {} axes are named: at most {} are counted", named->size(),
+                            protocol::kMaxAxes));
+  auto axes = named->get<std::vector<std::string>>();
+  for (auto& name : axes) name = remark_of(std::move(name));
+  return axes;
+}
+
 Result<OnHub> reference_here(const HubParts&, const json& request) {
-  return with_reference([axes = request.value("axes", std::vector<std::string>{}),
-                         u = request.value("u", SetDatumHere::kByEye)](ReferenceService& service,
-                                                                       const HubParts& parts) {
+  auto axes = axes_of(request);
+  if (!axes) return tl::unexpected(axes.error());
+  return with_reference([axes = std::move(*axes), u = request.value("u", SetDatumHere::kByEye)](
+                            ReferenceService& service, const HubParts& parts) {
     return service.set_datum_here(stand_here(parts, axes, u));
   });
 }
@@ -344,11 +359,15 @@ Result<const Verb*> verb_of(const json& request) {
 }
 
 /// The task for the request. Refused if `peer` does not have the role that the request requires.
-Result<Verb::Task> task_of(const json& request, const ControlPeer& peer,
-                           const ControlConfig& control) {
+Result<Verb::Task> task_of(const json& request, const ControlPeer& peer, const HubParts& parts) {
+  if (parts.network_user && peer.uid == *parts.network_user && peer.uid != 0)
+    return fail(ErrorCode::Refused,
+                fmt::format("{} is the user of abbe-dds, which reads the network: it may request "
+                            "nothing here",
+                            peer.user));
   const auto verb = verb_of(request);
   if (!verb) return tl::unexpected(verb.error());
-  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, control); !may)
+  if (const auto may = check_role(peer, (*verb)->role, (*verb)->name, parts.config.control); !may)
     return tl::unexpected(may.error());
   return (*verb)->task;
 }
@@ -363,7 +382,7 @@ std::vector<ControlVerb> control_verbs() {
 }
 
 json answer_on_hub(const Hub& hub, const json& request, const ControlPeer& peer) {
-  const auto task = task_of(request, peer, hub.parts().config.control);
+  const auto task = task_of(request, peer, hub.parts());
   if (!task) return refusal(task.error());
   const auto on_hub = (*task)(hub.parts(), request);
   return on_hub ? (*on_hub)(hub)() : refusal(on_hub.error());
@@ -371,7 +390,7 @@ json answer_on_hub(const Hub& hub, const json& request, const ControlPeer& peer)
 
 json answer_request(Hub& hub, const json& request, const ControlPeer& peer,
                     std::chrono::milliseconds time_out) {
-  const auto task = task_of(request, peer, hub.parts().config.control);
+  const auto task = task_of(request, peer, hub.parts());
   if (!task) return refusal(task.error());
   auto on_hub = (*task)(hub.parts(), request);
   if (!on_hub) return refusal(on_hub.error());

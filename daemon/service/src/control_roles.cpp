@@ -1,32 +1,19 @@
 #include "abbe/service/control_roles.hpp"
 
 #include <fmt/format.h>
-#include <grp.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <optional>
 #include <string>
-#include <vector>
+
+#include "abbe/base/account_names.hpp"
 
 namespace abbe::daemon {
 namespace {
 
-constexpr std::size_t kLargestGroupEntry = 1u << 20;  // with all its members
-
-std::optional<gid_t> gid_of(const std::string& name) {
-  std::vector<char> strings(16384);
-  group entry{};
-  group* found = nullptr;
-  while (::getgrnam_r(name.c_str(), &entry, strings.data(), strings.size(), &found) == ERANGE &&
-         strings.size() < kLargestGroupEntry)
-    strings.resize(2 * strings.size());
-  return found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
-}
-
 bool is_in(const ControlPeer& peer, const std::string& group) {
-  const auto gid = group.empty() ? std::nullopt : gid_of(group);
+  const auto gid = group.empty() ? std::nullopt : account_names().group(group);
   return gid && std::ranges::find(peer.groups, *gid) != peer.groups.end();
 }
 
@@ -65,9 +52,11 @@ std::string remedy(const ControlPeer& peer, const RoleWords& words) {
   if (words.group.empty())
     return fmt::format("[control] {} names no group: only root and the daemon's own user may",
                        words.key);
-  if (!gid_of(words.group))
+  if (!account_names().group(words.group))
     return fmt::format(
-        "the group \"{}\" ([control] {}) does not exist on this computer: groupadd --system {}",
+        "the group \"{}\" ([control] {}) does not exist on this computer, or the name service has "
+        "not "
+        "answered yet: groupadd --system {}",
         words.group, words.key, words.group);
   return fmt::format(
       "this requires the group \"{}\" ([control] {}): gpasswd -a {} {}, then log in again",

@@ -23,9 +23,32 @@ void sleep_until(std::chrono::steady_clock::time_point t) {
   (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
 }
 
-StreamHealth health_of(const RecorderThread& recorder) {
+/// The largest of 1, 2, 5, 10, 20, 50 ... that is not above `value`; 0 below 1. A text with it does
+/// not change every second.
+int round_down(double value) {
+  int step = 1;
+  for (const int factor : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000})
+    if (value >= factor) step = factor;
+  return value >= 1.0 ? step : 0;
+}
+
+/// Warning from twice the period in which chunks are written; empty: none.
+std::string text_of_lag(std::chrono::nanoseconds behind, std::chrono::nanoseconds chunk_period) {
+  if (behind < 2 * chunk_period) return {};
+  return fmt::format(
+      "the file is more than {} s behind the machine (chunk_period_ms = {}): what is not written "
+      "is lost if abbed ends; check the disk and the load of the computer",
+      round_down(std::chrono::duration<double>(behind).count()),
+      std::chrono::duration_cast<std::chrono::milliseconds>(chunk_period).count());
+}
+
+StreamHealth health_of(const RecorderThread& recorder, std::chrono::nanoseconds chunk_period,
+                       std::chrono::steady_clock::time_point wall) {
   const RecorderStatus& r = recorder.status();
   StreamHealth h;
+  const auto behind = recorder.behind(wall);
+  h.behind_s = std::chrono::duration<double>(behind).count();
+  h.status.condition = text_of_lag(behind, chunk_period);
   h.status.name = "recorder";
   h.status.state = name(r.state);
   h.status.connected = r.state == RecorderStatus::State::Recording;
@@ -53,6 +76,33 @@ StreamHealth health_of(const ModelAuthority& authority, const CalibrationService
                                         : "unreadable";
   h.status.last_fault = unstored.empty() ? authority.fault() : unstored;
   return h;
+}
+
+/// Adds to the health of each device what is wrong with its sensors.
+void add_findings(const std::vector<SensorFinding>& findings, std::vector<StreamHealth>& health) {
+  for (const SensorFinding& finding : findings) {
+    // The first reading after a start waits for a second one that agrees; that is no fault.
+    if (finding.doubt == calib::SensorDoubt::Unconfirmed) continue;
+    for (StreamHealth& stream : health) {
+      if (stream.status.name != finding.device) continue;
+      std::string& text = stream.status.condition;
+      text += fmt::format("{}{}", text.empty() ? "" : "; ", finding.text);
+    }
+  }
+}
+
+/// Counts readings that were not used as faults of their device. A single one is over when health
+/// is collected: then its text is the last fault.
+void add_doubts(const std::vector<SensorDoubts>& doubts, std::vector<StreamHealth>& health) {
+  for (const SensorDoubts& sensor : doubts) {
+    for (StreamHealth& stream : health) {
+      if (stream.status.name != sensor.device) continue;
+      stream.status.faults += sensor.count;
+      if (sensor.latest < stream.status.last_fault_at) continue;
+      stream.status.last_fault = sensor.latest_text;
+      stream.status.last_fault_at = sensor.latest;
+    }
+  }
 }
 
 /// Text about the restarts and the last end of abbe-dds; empty if abbe-dds has not ended yet.
@@ -119,8 +169,14 @@ Hub::WallTime Hub::last_cycle() const noexcept {
 }
 
 ActiveModelState Hub::model_state() const {
-  return parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(),
-                                      parts_.time.host(kAxesTimeout));
+  const auto patience = parts_.time.host(kAxesTimeout);
+  const auto known_at = live_.axes_known_at();
+  auto state = parts_.authority.model_state(parts_.time.now(), known_at, patience);
+  const bool known = known_at && parts_.time.now() - *known_at <= patience;
+  if (!known && state.model != nullptr && !missing_scale_.empty())
+    state.reason += ": " + missing_scale_;
+  if (parts_.identity != nullptr) parts_.identity->restrict(state);
+  return state;
 }
 
 void Hub::cycle(WallTime wall) {
@@ -154,12 +210,12 @@ void Hub::on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime t
 }
 
 /// Passes the batch to the running touch job, together with the last fault of the machine. The
-/// fault is looked up only if the job may have ended, because collecting health takes too long for
-/// every cycle.
+/// fault is looked up only if the job may have ended, and not while it waits for the outcome of a
+/// stop, because collecting health takes too long for every cycle.
 void Hub::touch(std::size_t points_left, WallTime wall) {
   if (parts_.touching == nullptr || !parts_.touching->status().running) return;
   std::string seen;
-  if (points_left == 0 && batch_.touches.empty()) {
+  if (points_left == 0 && batch_.touches.empty() && !parts_.touching->awaits_stop()) {
     collect_health(parts_.time.now());
     for (const auto& h : health_)
       if (h.status.name == touches_by_) seen = h.status.last_fault;
@@ -177,16 +233,36 @@ void Hub::publish(bool fresh, HostTime now) {
   if (wall >= next_health_) {
     next_health_ = wall + kHealthPeriod;
     (void)parts_.authority.follow_store(now);
+    follow_identity(wall);
     collect_health(now);
     if (publisher != nullptr) publisher->health(health_, now);
   }
   if (publisher != nullptr) publisher->model(model_state(), now, wall);
 }
 
+void Hub::follow_identity(WallTime wall) {
+  if (parts_.identity == nullptr) return;
+  parts_.identity->follow(wall);
+  if (parts_.publisher == nullptr) return;
+  auto identity = parts_.publisher->identity();
+  identity.machine_id = parts_.identity->known().machine_id;
+  parts_.publisher->set_identity(std::move(identity));
+}
+
 void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
+  add_findings(live_.sensor_findings(), health_);
+  add_doubts(live_.sensor_doubts(), health_);
+  missing_scale_ = {};
+  for (const auto& reason : live_.missing_scales())
+    if (missing_scale_.empty()) missing_scale_ = reason;
   health_.push_back(health_of(parts_.authority, parts_.calibration));
-  if (parts_.recorder != nullptr) health_.push_back(health_of(*parts_.recorder));
+  if (parts_.recorder != nullptr)
+    health_.push_back(
+        health_of(*parts_.recorder, parts_.config.recording.chunk_period, cycle_began_));
+  if (parts_.identity != nullptr)
+    health_.push_back(parts_.identity->health(
+        parts_.publisher != nullptr ? parts_.publisher->link().twin() : std::string{}));
   if (parts_.publisher == nullptr) return;
   health_.push_back(health_of(*parts_.publisher));
   health_.push_back(health_of_security(*parts_.publisher));

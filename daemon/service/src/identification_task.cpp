@@ -52,9 +52,9 @@ std::vector<calib::otf::Backlash> determined_backlash(const calib::VolumetricMod
   return all;
 }
 
-/// The notes of the verdict on a stored model are in the model, for its report.
-void keep_notes(ModelDocument& document, const calib::Verdict& verdict) {
-  if (document.run) document.run->notes = verdict.notes;
+/// The verdict is in the model: who gets its file knows it.
+void keep_verdict(ModelDocument& document, const calib::Verdict& verdict) {
+  document.verdict = model_verdict(verdict);
 }
 
 /// The document of an update: that of the run with the updated model. Its parents, the run and the
@@ -92,10 +92,10 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
   RecordingDigest recording =
       digest.valid() ? digest_of(digest, state->stopped) : RecordingDigest{};
   cite(recording, inputs);
-  const auto created = utc.to_utc(state->now);
+  const auto created = clock.now();
   auto document = document_of(*candidate, *config, std::move(inputs), created);
   document.recording_gap = std::move(recording.gap);
-  add_measured(document, observed(run), utc);
+  add_measured(document, observed(run), clock.offset(state->now));
   auto id = model_id(document);
   auto why = fmt::format("calibrate {}", method_of(*candidate));
 
@@ -106,7 +106,7 @@ Result<std::shared_ptr<JudgedModel>> IdentificationTask::judged_model() {
                       .actor = {.who = who, .why = std::move(why), .when = created}}};
   add_notes(*model);
   if (active) compare_with_active(*model, run);
-  keep_notes(model->document, model->verdict);
+  keep_verdict(model->document, model->verdict);
   return model;
 }
 
@@ -115,6 +115,8 @@ void IdentificationTask::add_notes(JudgedModel& model) const {
   if (active_left_out) notes.emplace_back(kOfAnotherMachine);
   if (const auto& gap = model.document.recording_gap; !gap.empty())
     notes.push_back(cannot_be_checked(gap));
+  for (std::string& change : in_words(clock.since_start(), "abbed started"))
+    notes.push_back(std::move(change));
 }
 
 /// Adds drift of the active model to the verdict. With [drift] continuous, an update of the active
@@ -140,7 +142,7 @@ void IdentificationTask::compare_with_active(JudgedModel& model, const Calibrati
     return;
   }
 
-  keep_notes(model.document, model.verdict);
+  keep_verdict(model.document, model.verdict);
   model.beside.run = model.document;
   model.beside.run_accepted = model.verdict.accepted;
   model.beside.run_reasons = model.verdict.reasons;

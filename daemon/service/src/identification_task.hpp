@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/methods/calibration_run.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
@@ -74,7 +75,7 @@ struct IdentificationTask {
   bool active_left_out = false;         ///< the active model is for another machine configuration
   std::future<RecordingDigest> digest;  ///< invalid: nothing is recorded
   ModelKeeper keeper;
-  protocol::UtcOffset utc;
+  WallClock clock;
   std::string who;
 
   /// An error before begin_storing() means that no model was identified; an error after it means

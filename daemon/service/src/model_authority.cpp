@@ -1,6 +1,7 @@
 #include "abbe/service/model_authority.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
@@ -16,12 +17,19 @@ using protocol::HostTime;
 // or restore it from a backup, which does not change the stamp of the store.
 constexpr auto kRepairPeriod = std::chrono::seconds{10};
 
+/// Why the gate refused the active model; empty: it accepted it, or its reasons are not known.
+std::string refusal_of(const StoreEvent& activation) {
+  return fmt::format("{}", fmt::join(activation.reasons, "; "));
+}
+
 /// The reason of the state ACTIVE: the gate accepted the model, or a user, who is named, forced its
 /// activation.
 std::string reason_of(const StoreEvent& activation) {
-  const auto done_by = [&activation](std::string_view what) {
+  const std::string refused = refusal_of(activation);
+  const auto done_by = [&](std::string_view what) {
     const auto& [who, why, when] = activation.actor;
-    return fmt::format("{} by {}{}{}", what, who, why.empty() ? "" : ": ", why);
+    return fmt::format("{} by {}{}{}{}{}", what, who, why.empty() ? "" : ": ", why,
+                       refused.empty() ? "" : "; the gate had refused it: ", refused);
   };
 
   switch (activation.action) {
@@ -30,8 +38,11 @@ std::string reason_of(const StoreEvent& activation) {
     case StoreAction::RolledBack:
       return done_by(activation.accepted ? "rolled back"
                                          : "rolled back to a model the gate did not accept,");
-    case StoreAction::Added:
     case StoreAction::Activated:
+      if (!activation.accepted_configuration.empty())
+        return done_by("accepted with the configuration hash of an earlier version");
+      break;
+    case StoreAction::Added:
     case StoreAction::Drifted:
     case StoreAction::Removed:
       break;
@@ -50,9 +61,9 @@ ModelAuthority::ModelAuthority(ModelKeeper keeper, bool axes_compensated)
     : keeper_(std::move(keeper)), axes_compensated_(axes_compensated), seen_(keeper_.stamp()) {}
 
 ModelAuthority ModelAuthority::open(const std::filesystem::path& store_folder, const Config& config,
-                                    protocol::UtcOffset utc, HostTime now) {
-  ModelKeeper keeper{store_folder, config, utc};
-  keeper.tidy_store(now);
+                                    WallClock clock, HostTime now) {
+  ModelKeeper keeper{store_folder, config, std::move(clock)};
+  keeper.tidy_store();
   ModelAuthority authority{std::move(keeper), config.axes_compensated()};
   if (auto active = authority.keeper_.read_active(now)) {
     authority.set_active(std::move(*active));
@@ -79,6 +90,12 @@ void ModelAuthority::set_active(ActiveModel active, std::uint64_t since) {
 
 void ModelAuthority::raise_drift(const std::string& id, std::string drift) {
   if (active_.model != nullptr && active_.model->id == id) active_.drift = std::move(drift);
+}
+
+std::shared_ptr<const PublishedModel> ModelAuthority::comparison_model() const {
+  if (active_.model == nullptr || !active_.unfit.empty()) return nullptr;
+  const bool objected = identity_ != nullptr && !identity_->objection_to(active_.model->id).empty();
+  return objected ? nullptr : active_.model;
 }
 
 ModelAuthority::Following ModelAuthority::follow_store(HostTime now) {
@@ -158,6 +175,7 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
                                                 std::chrono::nanoseconds patience) const {
   ActiveModelState s{.model = active_model(), .revision = revision_};
   if (s.model != nullptr) s.publication = &active_.publication;
+  if (s.model != nullptr) s.refused = refusal_of(active_.activation);
   if (!active_.model) {
     s.status = active_.fault.empty() ? v1::ModelStatus::MODEL_NONE : v1::ModelStatus::MODEL_INVALID;
     s.reason = active_.fault.empty() ? "no model has been activated" : active_.fault;
@@ -168,8 +186,8 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
   if (axes_compensated_) {
     s.status = v1::ModelStatus::MODEL_INVALID;
     s.reason = "the control already corrects these axes: axes_compensated = true";
-  } else if (!active_.made_for_this_machine) {
-    s.reason = "the model was made for another machine configuration";
+  } else if (!active_.unfit.empty()) {
+    s.reason = active_.unfit;
   } else if (!axes_known_at) {
     s.reason = "no axis positions yet";
   } else if (now - *axes_known_at > patience) {
@@ -180,6 +198,8 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
   } else {
     s.status = v1::ModelStatus::MODEL_ACTIVE;
     s.reason = reason_of(active_.activation);
+    if (!active_.measured_otherwise.empty())
+      s.reason += "; since the model was made: " + active_.measured_otherwise;
     if (!active_.recording_gap.empty()) s.reason += "; " + cannot_be_checked(active_.recording_gap);
   }
 

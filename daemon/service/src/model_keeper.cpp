@@ -31,15 +31,15 @@ std::string not_known_since(const std::string& damaged_state) {
 }  // namespace
 
 ModelKeeper::ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
-                         protocol::UtcOffset utc)
+                         WallClock clock)
     : store_(store_folder),
       machine_(config.machine.name),
-      machine_hash_(machine_hash(config)),
-      utc_(utc) {}
+      configuration_(std::make_shared<const PresentConfiguration>(present_configuration(config))),
+      clock_(std::move(clock)) {}
 
-void ModelKeeper::tidy_store(protocol::HostTime now) {
+void ModelKeeper::tidy_store() {
   store_.remove_leftovers();
-  (void)store_.rename_damaged_state(utc_.to_utc(now));
+  (void)store_.rename_damaged_state(clock_.now());
 }
 
 Result<KeptModel> ModelKeeper::keep(const ModelDocument& document, const calib::Verdict& verdict,
@@ -93,7 +93,7 @@ Result<ActiveModel> ModelKeeper::read_active_or_set_aside(protocol::HostTime now
   auto active = read_active(now);
   if (active) return active;
   store_.set_lock_timeout(kRenameTimeout);
-  if (const auto renamed = store_.rename_damaged_state(utc_.to_utc(now)); !renamed)
+  if (const auto renamed = store_.rename_damaged_state(clock_.now()); !renamed)
     return fail(active.error().code,
                 fmt::format("{}; {}", active.error().text, renamed.error().text));
   return read_active(now);
@@ -128,18 +128,20 @@ Result<ActiveModel> ModelKeeper::read_active(protocol::HostTime now) const {
 ActiveModel ModelKeeper::active_of(const StoreEvent& activation, ModelDocument document,
                                    protocol::HostTime now) const {
   ActiveModel active{.activation = activation};
-  active.made_for_this_machine = document.machine_hash == machine_hash_;
+  active.unfit = unfit_for(document, *configuration_, activation.accepted_configuration);
+  active.measured_otherwise = changed_measurements(document, *configuration_);
   active.recording_gap = document.recording_gap;
-  auto model = std::make_shared<const PublishedModel>(
-      PublishedModel{.id = activation.id,
-                     .method = document.method,
-                     .estimator = document.estimator,
-                     .recording_sha256 = provenance(document),
-                     .created = document.created,
-                     .active_since = std::min(now, utc_.to_host(activation.actor.when)),
-                     .hash = model_hash(document),
-                     .largest_U_m = largest_U_m(document.model),
-                     .model = std::move(document.model)});
+  auto model = std::make_shared<const PublishedModel>(PublishedModel{
+      .id = activation.id,
+      .method = document.method,
+      .estimator = document.estimator,
+      .recording_sha256 = provenance(document),
+      .created = document.created,
+      .active_since = std::min(now, clock_.offset(now).to_host(activation.actor.when)),
+      .hash = model_hash(document),
+      .largest_U_m = largest_U_m(document.model),
+      .simulated = made_on_simulated_devices(document).value_or(false),
+      .model = std::move(document.model)});
   auto publication = encode_model(*model, machine_);
 
   if (!publication) {

@@ -35,20 +35,29 @@ struct SeenTouches {
   bool running = false;
   std::size_t asked = 0;
   std::string reason;
+  drivers::IppStop stop;
   std::vector<Made> touches;
 };
 
 json touches_json(const SeenTouches& seen) {
   json made = json::array();
   for (const auto& t : seen.touches) made.push_back({{"at_m", t.at_m}, {"u_m", t.u_m}});
-  return {{"ok", true},
-          {"running", seen.running},
-          {"asked", seen.asked},
-          {"reason", seen.reason},
-          {"touches", std::move(made)}};
+  json out{{"ok", true},
+           {"running", seen.running},
+           {"asked", seen.asked},
+           {"reason", seen.reason},
+           {"touches", std::move(made)}};
+  add_stop(out, seen.stop);
+  return out;
 }
 
 }  // namespace
+
+void add_stop(json& answer, const drivers::IppStop& stop) {
+  if (stop.outcome == drivers::IppStopOutcome::None) return;
+  answer["stop"] = {
+      {"number", stop.number}, {"outcome", name_of(stop.outcome)}, {"text", stop.text}};
+}
 
 Result<OnHub> cancel_touching(const HubParts&, const json&) {
   return with_touching([](TouchService& service) { return reply_done(service.cancel()); });
@@ -61,7 +70,7 @@ Result<OnHub> where_it_stands(const HubParts&, const json&) {
   });
 }
 
-Result<OnHub> begin_touching(const HubParts&, const json& request) {
+Result<OnHub> begin_touching(const HubParts& parts, const json& request) {
   std::vector<TouchRequest> wanted;
   for (const json& point : request.at("points")) {
     TouchRequest& one = wanted.emplace_back();
@@ -73,7 +82,7 @@ Result<OnHub> begin_touching(const HubParts&, const json& request) {
   std::vector<drivers::ProbePoint> leave;
   for (const json& place : request.value("leave", json::array()))
     leave.push_back(place_from(place, false));
-  auto job = touch_job(std::move(wanted), std::move(leave));
+  auto job = touch_job(motion_volume(parts.config), std::move(wanted), std::move(leave));
   if (!job) return tl::unexpected(job.error());
 
   return with_touching(
@@ -85,8 +94,11 @@ Result<OnHub> begin_touching(const HubParts&, const json& request) {
 Result<OnHub> look_at_touches(const HubParts&, const json&) {
   return with_touching([](TouchService& service) -> Reply {
     const TouchService::Status& status = service.look();
-    SeenTouches seen{
-        .running = status.running, .asked = status.asked, .reason = status.reason, .touches = {}};
+    SeenTouches seen{.running = status.running,
+                     .asked = status.asked,
+                     .reason = status.reason,
+                     .stop = status.stop,
+                     .touches = {}};
     seen.touches.reserve(status.touches.size());
     for (const auto& t : status.touches)
       seen.touches.push_back({{t.position[0], t.position[1], t.position[2]}, t.u_position[0]});
@@ -104,12 +116,14 @@ Result<OnHub> release_machine(const HubParts&, const json&) {
   };
 }
 
-Result<OnHub> stop_machine(const HubParts&, const json&) {
-  return [](const Hub& hub) {
+Result<OnHub> stop_machine(const HubParts& parts, const json&) {
+  // On the client's thread: a hub that hangs does not delay AbortE.
+  const auto number = parts.devices.stop_machine();
+  if (!number) return tl::unexpected(number.error());
+  return [number = *number](const Hub& hub) {
     auto* const touching = hub.parts().touching;
-    if (touching == nullptr || !touching->status().running || !touching->cancel())
-      hub.parts().devices.stop_machine();
-    return reply(json{{"ok", true}});
+    if (touching != nullptr && touching->status().running) (void)touching->cancel();
+    return reply(json{{"ok", true}, {"stop", number}});
   };
 }
 
@@ -123,6 +137,7 @@ Result<OnHub> machine_state(const HubParts&, const json&) {
       out["tip_m"] = tip->at_m;
       out["tip_age_s"] = in_seconds(tip->age);
     }
+    add_stop(out, devices.machine_stop());
     return reply(std::move(out));
   };
 }

@@ -17,9 +17,12 @@ namespace abbe::daemon {
 [[nodiscard]] Result<OnHub> look_at_touches(const HubParts& parts, const nlohmann::json& request);
 /// {"do": "machine", "release": true}: only for a person who has looked at the machine.
 [[nodiscard]] Result<OnHub> release_machine(const HubParts& parts, const nlohmann::json& request);
-/// {"do": "machine", "stop": true}: stops every motion.
+/// {"do": "machine", "stop": true}: stops every motion, and answers with the number of the stop.
 [[nodiscard]] Result<OnHub> stop_machine(const HubParts& parts, const nlohmann::json& request);
 /// {"do": "machine"}
 [[nodiscard]] Result<OnHub> machine_state(const HubParts& parts, const nlohmann::json& request);
+
+/// Adds "stop" with number, outcome and text, if there was a request to stop.
+void add_stop(nlohmann::json& answer, const drivers::IppStop& stop);
 
 }  // namespace abbe::daemon

@@ -24,10 +24,12 @@ constexpr std::string_view kDeviceId = "5f0c8a7be4f94c0f9d0e6a3f1b7c2d41";
 constexpr std::string_view kRecorderId = "8d3b1f6a27c54e0b9a4f7c5e2d1a6b93";
 constexpr std::string_view kStoreId = "c1e7d0948b3a4f52a6f0b9d47e5c8132";
 constexpr std::string_view kLinkId = "2b9f64d1c08e4a7785d3e1f6a4b0c957";
+constexpr std::string_view kIdentityId = "0f6b8f3c1c5e4b0fa7d2f4b2f1e09a6d";
 constexpr std::string_view kSecurityId = "4ac1f08b65d24e3d9b7f20e6c85a31d4";
 constexpr std::string_view kSessionId = "e84a05c3f1d74b9c92b6d7e30f5a1c68";
 constexpr std::string_view kModelId = "93d6f7b20a4c4e81b5e9c20d8f1a7346";
 constexpr std::string_view kParticipantId = "70c5e2a9d6b84f13a1d4f8067b3e9c25";
+constexpr std::string_view kStopId = "3ed07b5c94f14d6a8b12e7f05a6c8d9e";
 constexpr std::string_view kHubId = "b64f1d83e7a0495c8e2b0c9f53d7a61e";
 
 struct StreamKind {
@@ -47,6 +49,9 @@ StreamKind kind_of(const std::string& stream) {
   if (stream == "dds_security")
     return {"", kSecurityId, "anyone on the domain can publish as this machine", Urgency::Warning};
 
+  if (stream == "identity")
+    return {"", kIdentityId, "see `abbe machine identity`", Urgency::Warning};
+
   return {"device ", kDeviceId,
           "check its power, its cable and its table in the configuration; abbed tries again",
           Urgency::Warning};
@@ -56,18 +61,24 @@ ObservedPart part_of(const StreamHealth& stream) {
   const auto& d = stream.status;
   const StreamKind kind = kind_of(d.name);
   const std::uint64_t lost = d.dropped + d.raw_dropped;
-  ObservedPart part{.key = "stream " + d.name,
-                    .state = fmt::format("{}\n{}\n{}", d.state, d.connected, d.last_fault),
-                    .message = fmt::format("{}{}: {}", kind.word, d.name, d.state),
-                    .message_id = kind.message_id,
-                    .urgency = d.connected && d.last_fault.empty() ? Urgency::Info : kind.when_bad,
-                    .fields = {{"ABBE_DEVICE", d.name},
-                               {"ABBE_STATE", std::string{d.state}},
-                               {"ABBE_FAULTS", std::to_string(d.faults)},
-                               {"ABBE_LOST", std::to_string(lost)},
-                               {"ABBE_GAPS", std::to_string(d.gaps)}},
-                    .counted = d.faults + lost};
+  ObservedPart part{
+      .key = "stream " + d.name,
+      .state = fmt::format("{}\n{}\n{}\n{}", d.state, d.connected, d.condition, d.last_fault),
+      .message = fmt::format("{}{}: {}", kind.word, d.name, d.state),
+      .message_id = kind.message_id,
+      .urgency = d.connected && d.last_fault.empty() && d.condition.empty() ? Urgency::Info
+                                                                            : kind.when_bad,
+      .fields = {{"ABBE_DEVICE", d.name},
+                 {"ABBE_STATE", std::string{d.state}},
+                 {"ABBE_FAULTS", std::to_string(d.faults)},
+                 {"ABBE_LOST", std::to_string(lost)},
+                 {"ABBE_GAPS", std::to_string(d.gaps)}},
+      .counted = d.faults + lost};
 
+  if (!d.condition.empty()) {
+    part.message += fmt::format("; {}", d.condition);
+    part.fields.push_back({"ABBE_CONDITION", d.condition});
+  }
   if (!d.last_fault.empty()) {
     part.message += fmt::format("; last fault: {}", d.last_fault);
     part.fields.push_back({"ABBE_FAULT", d.last_fault});
@@ -109,6 +120,17 @@ ObservedPart part_of(const ObservedModel& model) {
       .message_id = kModelId,
       .urgency = bad ? Urgency::Warning : Urgency::Notice,
       .fields = {{"ABBE_MODEL", model.id}, {"ABBE_STATE", model.state}}};
+}
+
+ObservedPart part_of(const ObservedStop& stop) {
+  return {.key = "stop",
+          .state = fmt::format("{}\n{}", stop.number, stop.outcome),
+          .message = fmt::format(
+              "measuring machine: {}{}: {}{}", stop.confirmed ? "" : "stop ", stop.outcome,
+              stop.text, stop.confirmed ? "" : "; check the machine, use its emergency stop"),
+          .message_id = kStopId,
+          .urgency = stop.confirmed ? Urgency::Notice : Urgency::Error,
+          .fields = {{"ABBE_STATE", stop.outcome}}};
 }
 
 ObservedPart part_of(const ObservedParticipant& participant) {
@@ -157,6 +179,7 @@ std::vector<ObservedPart> parts_of(const Observed& now) {
   if (now.participant) parts.push_back(part_of(*now.participant));
   if (!now.hub_answers) return parts;
   for (const auto& stream : now.streams) parts.push_back(part_of(stream));
+  if (now.stop) parts.push_back(part_of(*now.stop));
   parts.push_back(part_of(now.session));
   parts.push_back(part_of(now.model));
   return parts;

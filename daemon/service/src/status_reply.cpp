@@ -17,6 +17,7 @@
 #include "abbe/config/capabilities.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "model_status_name.hpp"
+#include "motion_requests.hpp"
 #include "tracker_requests.hpp"
 
 namespace abbe::daemon {
@@ -38,24 +39,26 @@ json latency_json(const drivers::LatencyHistogram::Counts& counts) {
 
 json device_json(const StreamHealth& h) {
   const auto& d = h.status;
-  return {{"name", d.name},
-          {"state", d.state},
-          {"connected", d.connected},
-          {"rate_hz", h.rate_hz},
-          {"samples", d.samples},
-          {"dropped", d.dropped + d.raw_dropped},
-          {"gaps", d.gaps},
-          {"faults", d.faults},
-          {"condition", d.condition},
-          {"last_fault", d.last_fault},
-          {"clock",
-           {{"settled", d.clock.settled},
-            {"skew_ppm", d.clock.skew * 1e6},
-            {"residual_s", in_seconds(d.clock.residual)},
-            {"u_time_s", in_seconds(d.clock.u_time)}}},
-          {"latency_p50_s", h.latency_p50_s},
-          {"latency_p99_s", h.latency_p99_s},
-          {"latency_counts", latency_json(h.latency)}};
+  json out{{"name", d.name},
+           {"state", d.state},
+           {"connected", d.connected},
+           {"rate_hz", h.rate_hz},
+           {"samples", d.samples},
+           {"dropped", d.dropped + d.raw_dropped},
+           {"gaps", d.gaps},
+           {"faults", d.faults},
+           {"condition", d.condition},
+           {"last_fault", d.last_fault},
+           {"clock",
+            {{"settled", d.clock.settled},
+             {"skew_ppm", d.clock.skew * 1e6},
+             {"residual_s", in_seconds(d.clock.residual)},
+             {"u_time_s", in_seconds(d.clock.u_time)}}},
+           {"latency_p50_s", h.latency_p50_s},
+           {"latency_p99_s", h.latency_p99_s},
+           {"latency_counts", latency_json(h.latency)}};
+  if (h.behind_s) out["behind_s"] = *h.behind_s;
+  return out;
 }
 
 json features_json(const std::vector<FeatureToTouch>& features) {
@@ -137,7 +140,10 @@ json session_json(const SessionStatus& s, const std::optional<calib::HeldOutFigu
 /// A copy of the active model's state.
 struct SeenModel {
   explicit SeenModel(const ActiveModelState& active)
-      : status(active.status), reason(active.reason), known(active.model != nullptr) {
+      : status(active.status),
+        reason(active.reason),
+        refused(active.refused),
+        known(active.model != nullptr) {
     if (!known) return;
     id = active.model->id;
     method = active.model->method;
@@ -145,13 +151,15 @@ struct SeenModel {
     hash = active.model->hash;
     created = active.model->created;
     largest_U_m = active.model->largest_U_m;
+    simulated = active.model->simulated;
   }
   v1::ModelStatus status;
-  std::string reason;
+  std::string reason, refused;
   bool known;
   std::string id, method, recording_sha256, hash;
   protocol::UtcTime created{};
   std::optional<double> largest_U_m;
+  bool simulated = false;
 };
 
 json model_json(const SeenModel& model) {
@@ -162,6 +170,8 @@ json model_json(const SeenModel& model) {
     out["recording_sha256"] = model.recording_sha256;
     out["hash"] = model.hash;
     out["created"] = to_text(model.created);
+    out["simulated"] = model.simulated;
+    if (!model.refused.empty()) out["refused"] = model.refused;
     if (model.largest_U_m) out["largest_U_um"] = *model.largest_U_m * kUmPerM;
   }
   return out;
@@ -232,7 +242,7 @@ json positions_json(const protocol::Snapshot& live, bool old) {
 /// Names and kinds of the axes of "position_m", in the same order: the axes that have an encoder or
 /// a counter, or if there are none, the first axes of the machine, which a measuring machine
 /// reports.
-json axes_json(const Config& config, std::size_t count) {
+json axes_json(const Config& config, std::size_t count, const std::vector<std::string>& missing) {
   const auto& axes_of_machine = config.machine.axes;
   auto names = config.connected_axes();
   if (names.empty())
@@ -243,7 +253,8 @@ json axes_json(const Config& config, std::size_t count) {
   for (const std::string& name : names) {
     const auto axis = std::ranges::find(axes_of_machine, name, &AxisConfig::name);
     const bool rotary = axis != axes_of_machine.end() && axis->kind == AxisKind::Rotary;
-    axes.push_back({{"axis", name}, {"kind", rotary ? "rotary" : "linear"}});
+    json& out = axes.emplace_back(json{{"axis", name}, {"kind", rotary ? "rotary" : "linear"}});
+    if (const auto& reason = missing.at(axes.size() - 1); !reason.empty()) out["missing"] = reason;
   }
 
   return axes;
@@ -281,6 +292,14 @@ json dds_json(const SeenLink& link) {
   return out;
 }
 
+json identity_json(const IdentityWatch::Known& identity, const std::string& twin) {
+  json out{{"machine_id", identity.machine_id}, {"confirmed", identity.doubt.empty()}};
+  if (const auto& why = identity.doubt.empty() ? identity.fault : identity.doubt; !why.empty())
+    out["reason"] = why;
+  if (!twin.empty()) out["twin"] = twin;
+  return out;
+}
+
 /// What `status` reports, copied on the hub's thread.
 struct SeenStatus {
   std::vector<StreamHealth> streams;
@@ -289,12 +308,16 @@ struct SeenStatus {
   std::optional<calib::HeldOutFigures> held_out;
   std::deque<SessionStatus> ended;
   protocol::Snapshot live;
+  std::vector<std::string> missing_scales;
   bool positions_are_old = true;
   std::optional<SeenReference> reference;
   std::optional<std::vector<std::string>> without_zero;
   std::optional<std::string> release_awaited, recording;
+  drivers::IppStop machine_stop;
   std::optional<SeenTracker> tracker;
   std::optional<SeenLink> dds;
+  std::optional<IdentityWatch::Known> identity;
+  std::string twin;
 };
 
 bool positions_are_old(const Hub& hub) {
@@ -311,13 +334,17 @@ SeenStatus look_at_status(const Hub& hub) {
                   .held_out = parts.calibration.held_out(),
                   .ended = parts.calibration.ended(),
                   .live = hub.live().view(),
+                  .missing_scales = hub.live().missing_scales(),
                   .positions_are_old = positions_are_old(hub),
                   .reference = {},
                   .without_zero = {},
                   .release_awaited = parts.devices.release_awaited(),
                   .recording = {},
+                  .machine_stop = parts.devices.machine_stop(),
                   .tracker = look_at_tracker(parts),
-                  .dds = {}};
+                  .dds = {},
+                  .identity = {},
+                  .twin = {}};
 
   if (const auto* reference = parts.reference; reference != nullptr) {
     if (reference->configured())
@@ -327,7 +354,25 @@ SeenStatus look_at_status(const Hub& hub) {
 
   if (parts.recorder != nullptr) seen.recording = parts.recorder->status().file.string();
   if (parts.publisher != nullptr) seen.dds.emplace(*parts.publisher);
+  if (parts.publisher != nullptr) seen.twin = parts.publisher->link().twin();
+  if (parts.identity != nullptr) seen.identity = parts.identity->known();
   return seen;
+}
+
+/// Why each axis has no position; empty: it has one.
+std::vector<std::string> missing_reasons(const SeenStatus& seen) {
+  std::vector<std::string> reasons(seen.live.axis_count);
+  for (std::size_t axis = 0; axis < reasons.size(); ++axis) {
+    if (seen.positions_are_old)
+      reasons[axis] = "no reading of the axes arrives: see the device that reads them";
+    else if (has(seen.live.head.flags, protocol::SampleFlag::BusOff))
+      reasons[axis] = "the bus of the encoders is off";
+    else if (axis < seen.missing_scales.size() && !seen.missing_scales[axis].empty())
+      reasons[axis] = seen.missing_scales[axis];
+    else if ((seen.live.missing_mask >> axis & 1u) != 0)
+      reasons[axis] = "its encoder gives no reading, or the axis is not referenced";
+  }
+  return reasons;
 }
 
 json status_json(const SeenStatus& seen, const Config& config) {
@@ -336,13 +381,14 @@ json status_json(const SeenStatus& seen, const Config& config) {
   json out{{"ok", true},
            {"process", ::getpid()},
            {"machine", config.machine.name},
+           {"simulated", config.daemon.simulated},
            {"model", model_json(seen.model)},
            {"session", session_json(seen.session, seen.held_out)},
            {"streams", std::move(devices)}};
   json& ended = out["ended_sessions"] = json::array();
   for (const auto& session : seen.ended) ended.push_back(session_json(session, {}));
   out["position_m"] = positions_json(seen.live, seen.positions_are_old);
-  out["axes"] = axes_json(config, seen.live.axis_count);
+  out["axes"] = axes_json(config, seen.live.axis_count, missing_reasons(seen));
   if (seen.live.has_environment) out["environment"] = environment_json(seen.live, config);
   const auto tracker = tracker_source(config);
   if (const auto air = tracker ? unmeasured_air_text(config, tracker->u_scale) : std::nullopt)
@@ -352,17 +398,26 @@ json status_json(const SeenStatus& seen, const Config& config) {
   if (seen.release_awaited)
     out["release_awaited"] = {{"reason", *seen.release_awaited},
                               {"command", "abbe machine release"}};
+  if (const auto machine = motion_source(config)) out["measuring_machine"] = machine->device;
+  json stopped = json::object();
+  add_stop(stopped, seen.machine_stop);
+  if (stopped.contains("stop")) out["machine_stop"] = stopped["stop"];
   if (seen.tracker) out["tracker"] = tracker_json(*seen.tracker);
   if (seen.recording) out["recording"] = *seen.recording;
   if (seen.dds) out["dds"] = dds_json(*seen.dds);
+  if (seen.identity) out["identity"] = identity_json(*seen.identity, seen.twin);
 
   return out;
 }
 }  // namespace
 
 Reply status_reply(const Hub& hub) {
-  return [seen = look_at_status(hub), &config = hub.parts().config] {
-    return status_json(seen, config);
+  return [seen = look_at_status(hub), &config = hub.parts().config,
+          &clock = hub.parts().calibration.clock()] {
+    json out = status_json(seen, config);
+    if (const auto changes = in_words(clock.since_start(), "abbed started"); !changes.empty())
+      out["clock"] = changes;
+    return out;
   };
 }
 

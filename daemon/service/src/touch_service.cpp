@@ -18,7 +18,7 @@ Result<std::array<double, 3>> TouchService::where() const {
   return devices_.machine_position();
 }
 
-Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
+Result<TouchJob> touch_job(const MotionVolume& volume, std::vector<TouchRequest> touches,
                            std::vector<drivers::ProbePoint> leave) {
   if (touches.empty()) return fail(ErrorCode::Usage, "touch: no point to touch");
   std::size_t places = leave.size();
@@ -30,6 +30,8 @@ Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
             "touch: {} touches with {} places exceed the limits of one request ({} and {}): "
             "send several requests",
             touches.size(), places, TouchJob::kMostTouches, TouchJob::kMostPlaces));
+  if (const auto inside = check_places(volume, touches, leave); !inside)
+    return tl::unexpected(inside.error());
   TouchJob job{.touches = std::move(touches), .leave = std::move(leave), .made = {}};
   job.made.reserve(job.touches.size());
 
@@ -44,6 +46,7 @@ Result<void> TouchService::start(TouchJob&& job) {
   status_.running = true;
   status_.asked = job.touches.size();
   status_.reason.clear();
+  status_.stop = {};
   std::swap(status_.touches, job.made);
   std::swap(requests_, job.touches);
   std::swap(leave_, job.leave);
@@ -70,7 +73,7 @@ const TouchService::Status& TouchService::look() {
 /// operator can judge which path is free.
 void TouchService::stop(std::string reason) {
   if (std::exchange(stopping_, true)) return;
-  devices_.stop_machine();
+  stop_number_ = devices_.stop_machine().value_or(0);
   next_ = requests_.size();
   status_.reason = std::move(reason);
 }
@@ -82,7 +85,19 @@ void TouchService::stopping(const Batch& batch, std::size_t points_left) {
     if (made && !leaving_ && status_.touches.size() < status_.asked)
       status_.touches.push_back(touch);
   }
-  if (points_left == 0) end(status_.reason + "; " + tip_text());
+  if (points_left != 0) return;
+  status_.stop = devices_.machine_stop();
+  const bool outstanding = status_.stop.number < stop_number_ ||
+                           status_.stop.outcome == drivers::IppStopOutcome::Pending;
+  if (!outstanding) end(status_.reason + "; " + stop_text() + tip_text());
+}
+
+std::string TouchService::stop_text() const {
+  using enum drivers::IppStopOutcome;
+  const auto& [number, outcome, text] = status_.stop;
+  if (outcome == None) return {};
+  if (outcome == Stopped) return fmt::format("the machine is stopped: {}; ", text);
+  return fmt::format("the stop of the machine is {}: {}; ", name_of(outcome), text);
 }
 
 std::string TouchService::tip_text() const {

@@ -46,7 +46,8 @@ class TouchRows {
         pattern_(bar.pattern),
         plan_(plan),
         faults_(faults),
-        passes_(plan.plan.measurements.size()) {}
+        passes_(plan.plan.measurements.size()),
+        lines_(passes_.size()) {}
 
   void read(std::size_t row) {
     const auto measurement = static_cast<std::size_t>(table_.at(row, kMeasurement));
@@ -56,6 +57,7 @@ class TouchRows {
     if (!target) return;
     check_repeated(row, measurement, *target);
     passes_[measurement].push_back({.target = *target, .reading_m = reading_m(row)});
+    lines_[measurement].push_back(table_.line(row));
   }
 
   /// A fault for every measurement of the plan without a row.
@@ -68,6 +70,7 @@ class TouchRows {
                         plan_.source.name, plan_.lines[i]));
   }
   [[nodiscard]] std::vector<PassTouches> take() { return std::move(passes_); }
+  [[nodiscard]] std::vector<std::vector<std::size_t>> take_lines() { return std::move(lines_); }
 
  private:
   calib::Vector3 reading_m(std::size_t row) const {
@@ -122,6 +125,7 @@ class TouchRows {
   const BarPlanFile& plan_;
   Faults& faults_;
   std::vector<PassTouches> passes_;
+  std::vector<std::vector<std::size_t>> lines_;
   std::map<std::size_t, bool> rows_of_;
   std::map<std::tuple<std::size_t, Feature, std::size_t, Side, std::size_t>, std::size_t> seen_;
 };
@@ -220,7 +224,7 @@ Result<BarPointsFile> read_bar_points_csv(const std::filesystem::path& file, con
   rows.check_complete();
   check_readings(table, nodes, faults);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
-  BarPointsFile out{source, rows.take(), {}};
+  BarPointsFile out{source, rows.take(), rows.take_lines(), {}};
   out.against_pass = rows_against_pass(file.string(), table, out.passes, plan.plan.measurements);
   return out;
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/tables/gauge_file.hpp"
 
@@ -58,7 +59,8 @@ std::string covariance_toml(const Eigen::MatrixXd& covariance_m2) {
 }  // namespace
 
 std::string bar_toml(const calib::mfb::Bar& bar, std::string_view comment) {
-  std::string text = fmt::format("{}[bar]\nname = {}\n", comment, nlohmann::json(bar.name).dump());
+  std::string text =
+      fmt::format("{}[bar]\nname = {}\n", comment, json_text(nlohmann::json(bar.name)));
   const auto out = std::back_inserter(text);
   if (bar.expansion)
     fmt::format_to(out, "alpha_um_per_m_K = {:.15g}\nu_alpha_um_per_m_K = {:.15g}\n",
@@ -79,7 +81,7 @@ std::string gauge_toml(const calib::mfb::StepGauge& gauge, std::string_view comm
   std::string text = fmt::format(
       "{}[gauge]\nname = {}\norigin_mm = {}\ntool_offset_mm = {}\nu_um = {:.15g}\n"
       "u_um_per_m = {:.15g}\ntemperature_C = {:.15g}\nu_temperature_K = {:.15g}\n",
-      comment, nlohmann::json(gauge.name).dump(), toml_list(gauge.origin_m, kMmPerM),
+      comment, json_text(nlohmann::json(gauge.name)), toml_list(gauge.origin_m, kMmPerM),
       toml_list(gauge.tool_offset_m, kMmPerM), kUmPerM * gauge.u_m, kUmPerM * gauge.u_per_m,
       gauge.temperature_K - kZeroCelsius_K, gauge.u_temperature_K);
   const auto out = std::back_inserter(text);

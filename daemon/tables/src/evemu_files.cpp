@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/parsed_table.hpp"
 #include "abbe/base/sha256.hpp"
 #include "abbe/base/text_file.hpp"
@@ -172,7 +173,7 @@ std::string calibrator_toml(const calib::evemu::Calibrator& calibrator,
 
   std::string out{comment};
   out += fmt::format("[calibrator]\nname = {}\ntip_radius_mm = {:.17g}\n",
-                     nlohmann::json(calibrator.name).dump(), kMmPerM * calibrator.tip_radius_m);
+                     json_text(nlohmann::json(calibrator.name)), kMmPerM * calibrator.tip_radius_m);
   if (const auto& expansivity = calibrator.expansivity)
     out += fmt::format("alpha_um_per_m_K = {:.17g}\nu_alpha_um_per_m_K = {:.17g}\n",
                        kUmPerM * expansivity->alpha_per_K, kUmPerM * expansivity->u_alpha_per_K);

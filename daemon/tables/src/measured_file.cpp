@@ -50,9 +50,11 @@ class MeasuredRows {
     check_repeated(row, name, reading);
     if (table_.has(kLine)) take_line(row, motion, error);
     error.readings.push_back(reading);
+    lines_[static_cast<std::size_t>(&error - errors_.data())].push_back(table_.line(row));
   }
 
   [[nodiscard]] std::vector<MeasuredError> take() { return std::move(errors_); }
+  [[nodiscard]] std::vector<std::vector<std::size_t>> take_lines() { return std::move(lines_); }
 
  private:
   void fault(std::size_t row, std::string_view column, std::string_view what) {
@@ -62,6 +64,7 @@ class MeasuredRows {
   MeasuredError& error_named(const std::string& name) {
     const auto found = std::ranges::find(errors_, name, &MeasuredError::name);
     if (found != errors_.end()) return *found;
+    lines_.emplace_back();
     return errors_.emplace_back(MeasuredError{.name = name, .readings = {}});
   }
 
@@ -125,6 +128,7 @@ class MeasuredRows {
   Faults& faults_;
   std::vector<std::string> names_;
   std::vector<MeasuredError> errors_;
+  std::vector<std::vector<std::size_t>> lines_;
   std::map<std::tuple<std::string, int, bool, long long>, std::size_t> seen_;
 };
 
@@ -151,7 +155,7 @@ Result<MeasuredFile> read_measured_csv(const std::filesystem::path& file) {
   MeasuredRows rows(table, faults);
   for (std::size_t row = 0; row < table.rows(); ++row) rows.read(row);
   if (faults.any()) return tl::make_unexpected(faults.to_error());
-  return MeasuredFile{source, rows.take()};
+  return MeasuredFile{source, rows.take(), rows.take_lines()};
 }
 
 }  // namespace abbe::daemon

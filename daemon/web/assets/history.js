@@ -24,7 +24,9 @@ async function activate(model, active, again) {
   const why = await ask({ title: `Activate ${model.id}?`, yes: "Activate",
     lines: [active ? `Active now: ${active.id}, added ${when(active.added)}.` : "No model is active now.",
       `Then: ${model.id}, added ${when(model.added)}.`,
-      ...(model.accepted ? [] : ["The gate refused this model: it may make the machine worse."])],
+      ...(model.simulated ? ["It was made on simulated devices: it describes no real machine."] : []),
+      ...(model.accepted ? [] : [model.judged ? "The gate refused this model: it may make the machine worse."
+        : "The gate has not judged this model: it may make the machine worse."])],
     reason: "Reason, for the record", required: !model.accepted });
   if (why === null) return;
   await change("api/activate", { id: model.id, why, force: !model.accepted },
@@ -42,9 +44,10 @@ async function rollBack(active, again) {
 
 function verdict(model) {
   if (model.fault) return h("span", { class: "bad" }, `damaged: ${model.fault}`);
-  const word = model.active ? "active" : model.accepted ? "accepted" : "refused";
+  const word = model.active ? "active" : model.accepted ? "accepted" : model.judged ? "refused" : "not judged";
   const kind = model.active ? "good" : model.accepted ? "" : "warn";
   return h("div", {}, h("span", { class: kind }, model.active && !model.accepted ? "active (forced)" : word),
+    model.simulated ? h("span", { class: "warn" }, " simulated devices") : null,
     model.reasons.length ? list(model.reasons) : null);
 }
 

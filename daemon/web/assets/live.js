@@ -13,7 +13,8 @@ function axisCards(place, axes) {
     place.append(h("div", { class: "axis", role: "group", "aria-label": `axis ${axis.axis}` },
       h("div", { class: "name" }, axis.axis),
       h("div", { class: "value current" }, value,
-        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm"))));
+        h("span", { class: "unit" }, rotary ? " \u00b0" : " mm")),
+      axis.missing ? h("div", { class: "warn" }, axis.missing) : ""));
     return { value, factor: rotary ? kDegrees : 1e3 };
   });
   return (positions) => values.forEach(({ value, factor }, i) => {
@@ -47,14 +48,23 @@ function environment(status) {
   ])];
 }
 
+/** The file, and how far it is behind the machine. */
+function recording(status) {
+  const recorder = status.streams.find((stream) => stream.behind_s !== undefined);
+  if (!status.recording || !recorder) return status.recording;
+  return `${status.recording}, ${fixed(recorder.behind_s, 1)} s behind`;
+}
+
 function state_of(status) {
   const dds = status.dds;
   return facts("state", [
     ["model", `${status.model.id ?? "-"}: ${status.model.reason}`],
     ["session", `${status.session.state}: ${status.session.reason}`],
-    ["recording", status.recording],
+    ["recording", recording(status)],
     ["DDS", dds ? `${dds.connected ? "connected" : "not connected"}, ${dds.sent} messages` : ""],
     ["release", status.release_awaited?.reason],
+    ["clock", status.clock?.join("; ")],
+    ["stop", status.machine_stop ? `${status.machine_stop.outcome}: ${status.machine_stop.text}` : ""],
     ["axes not referenced", status.axes_without_zero?.join(", ")],
     ["tracker", status.unmeasured_air],
   ]);
@@ -77,7 +87,8 @@ export function show(place) {
     }
     // A table that has the focus, for scrolling, is replaced later.
     if (!streams.contains(document.activeElement))
-      streams.replaceChildren(table("streams", streamColumns, status.streams.map(streamRow)));
+      streams.replaceChildren(table("streams", streamColumns, status.streams.map(streamRow)),
+        ...(status.identity ? [h("p", {}, `Identity of the machine: ${status.identity.machine_id || "-"}`)] : []));
     if (!below.contains(document.activeElement))
       below.replaceChildren(h("h2", {}, "State"), state_of(status), ...environment(status));
   };

@@ -76,8 +76,16 @@ listen("notice", ({ text }) => {
 
 listen("status", (status) => {
   if (!status) return;
+  const danger = status.streams.map((stream) => stream.condition ?? "")
+    .filter((condition) => condition.startsWith("the machine may be moving"));
+  find("danger").hidden = danger.length === 0;
+  find("danger").textContent = danger.join("; ");
+  find("stop").hidden = !status.measuring_machine || !state.me.csrf;
   find("machine").textContent = status.machine;
   const model = status.model;
+  const simulated = status.simulated ? "Simulated devices" : model.simulated ? "Model of simulated devices" : "";
+  find("simulated").hidden = simulated === "";
+  find("simulated").replaceChildren(h("strong", { class: "warn" }, simulated));
   const good = model.state === "ACTIVE" ? "good" : model.state === "INVALID" ? "bad" : "warn";
   find("model-state").replaceChildren("Model ", h("strong", { class: good }, model.state));
   find("model-state").title = model.reason;
@@ -108,6 +116,14 @@ find("log-in").addEventListener("click", async () => {
   }
   await post("api/logout").catch(() => {});
   await get("api/me").then(changeUser, (error) => message(error.message));
+});
+find("stop").addEventListener("click", async () => {
+  try {
+    const stop = await post("api/stop");
+    message(`Machine stopped: ${stop.text}`);
+  } catch (error) {
+    message(error.message);
+  }
 });
 find("log-in-cancel").addEventListener("click", () => find("log-in-dialog").close());
 find("log-in-form").addEventListener("submit", async (event) => {

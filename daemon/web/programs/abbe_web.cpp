@@ -16,7 +16,10 @@
 #include <utility>
 
 #include "abbe/base/exit_codes.hpp"
+#include "abbe/base/message.hpp"
+#include "abbe/base/option_values.hpp"
 #include "abbe/base/service_manager.hpp"
+#include "abbe/base/standard_error.hpp"
 #include "abbe/web/page_server.hpp"
 #include "abbe/web/web_users.hpp"
 
@@ -46,12 +49,11 @@ std::string footer() {
 
 /// A line to stderr, which is the journal under systemd.
 void log_line(const std::string& text) {
-  fmt::print(stderr, "abbe-web: {}\n", text);
+  abbe::daemon::print_message("abbe-web", text);
 }
 
 int refuse(const Error& error) {
-  log_line(error.text);
-  for (const auto& detail : error.details) fmt::print(stderr, "  {}\n", detail);
+  abbe::daemon::print_error("abbe-web", error);
   return exit_code(error.code);
 }
 
@@ -169,6 +171,7 @@ int serve(const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  abbe::daemon::unblock_stderr("abbe-web");
   CLI::App app{
       "Serves the page of abbe: live axes, calibration, models, recordings. Asks abbed over its "
       "control socket. Read-only unless a user logs in."};
@@ -186,6 +189,7 @@ int main(int argc, char** argv) {
       ->needs(hash);
 
   try {
+    abbe::daemon::check_option_values(app);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kUsage;

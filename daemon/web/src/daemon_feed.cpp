@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/model/model_store.hpp"
 #include "bar_drawing.hpp"
@@ -27,7 +28,7 @@ constexpr double kFirstStep_m = 1e-3;  ///< shortest distance of two points of t
 
 /// One line; invalid UTF-8, which devices may have sent, is replaced.
 std::string event_text(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+  return daemon::json_text(value);
 }
 
 /// Changes when a file of the folder is added, removed or renamed.

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "abbe/base/text_file.hpp"
+#include "abbe/base/json_text.hpp"
 #include "abbe/base/units.hpp"
 #include "abbe/base/utc_text.hpp"
 #include "abbe/model/model_store.hpp"
@@ -39,7 +39,7 @@ constexpr std::size_t kMostEvents = 200;       ///< the newest
 
 /// Invalid UTF-8, which names of files may contain, is replaced.
 std::string text_of(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+  return daemon::json_text(value);
 }
 
 std::string_view action_in_words(StoreAction action) {
@@ -64,11 +64,13 @@ json entry_json(const StoreEntry& entry) {
   return {{"id", entry.id},
           {"active", entry.active},
           {"accepted", entry.accepted},
+          {"judged", entry.judged},
           {"reasons", entry.reasons},
           {"added", daemon::to_text(entry.added)},
           {"method", entry.method},
           {"machine", entry.machine},
-          {"fault", entry.fault}};
+          {"fault", entry.fault},
+          {"simulated", entry.simulated.value_or(false)}};
 }
 
 json event_json(const StoreEvent& event) {
@@ -252,12 +254,6 @@ Result<std::string> trend_text(const ModelStore& store, std::map<std::string, Tr
       {{"models", std::move(models)}, {"values", std::move(rows)}, {"tables", std::move(curves)}});
 }
 
-Result<std::string> report_text(const ModelStore& store, const std::string& id) {
-  const auto subject = daemon::report_subject(store, id);
-  if (!subject) return tl::unexpected(subject.error());
-  return daemon::model_report(*subject);
-}
-
 }  // namespace
 
 Result<std::string> ModelViews::kept(const std::string& key, const std::string& stamp,
@@ -289,6 +285,12 @@ std::optional<std::string> ModelViews::find_kept(const std::string& key, const s
   return known->second.text;
 }
 
+Result<daemon::ReportSubject> ModelViews::subject(const std::string& id) const {
+  auto found = daemon::report_subject(ModelStore{store_}, id);
+  if (found) found->machine_hash = machine_hash_;
+  return found;
+}
+
 Result<std::string> ModelViews::history() {
   const ModelStore store{store_};
   return kept("history", stamp_of(store), making_history_,
@@ -301,9 +303,9 @@ Result<std::string> ModelViews::model(const std::string& name) {
   if (!id) return tl::unexpected(id.error());
   return kept("model " + *id, stamp_of(store.model_path(*id)) + events_stamp(store), making_model_,
               [&]() -> Result<std::string> {
-                const auto subject = daemon::report_subject(store, *id);
-                if (!subject) return tl::unexpected(subject.error());
-                return text_of(model_json(*subject));
+                const auto found = subject(*id);
+                if (!found) return tl::unexpected(found.error());
+                return text_of(model_json(*found));
               });
 }
 
@@ -317,15 +319,23 @@ Result<std::string> ModelViews::report(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
   if (!id) return tl::unexpected(id.error());
-  return kept("report " + *id, stamp_of(store), making_model_,
-              [&store, &id] { return report_text(store, *id); });
+  return kept("report " + *id, stamp_of(store), making_model_, [&]() -> Result<std::string> {
+    const auto found = subject(*id);
+    if (!found) return tl::unexpected(found.error());
+    return daemon::model_report(*found);
+  });
 }
 
-Result<std::string> ModelViews::model_file(const std::string& name) const {
+Result<std::string> ModelViews::model_file(const std::string& name) {
   const ModelStore store{store_};
   const auto id = id_of(store, name);
   if (!id) return tl::unexpected(id.error());
-  return daemon::read_regular_file(store.model_path(*id));
+  return kept("file " + *id, stamp_of(store.model_path(*id)) + events_stamp(store), making_model_,
+              [&]() -> Result<std::string> {
+                const auto stored = daemon::stored_model(store, *id);
+                if (!stored) return tl::unexpected(stored.error());
+                return daemon::to_json(stored->document);
+              });
 }
 
 }  // namespace abbe::web

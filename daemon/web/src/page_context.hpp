@@ -25,7 +25,8 @@ struct PageContext {
   explicit PageContext(PageOptions given)
       : options(std::move(given)),
         report(options.report),
-        models(options.settings.config.daemon.models_dir()),
+        models(options.settings.config.daemon.models_dir(),
+               daemon::machine_hash(options.settings.config)),
         sessions(options.settings.web.users,
                  {.idle = seconds_of(options.settings.web.session_idle)},
                  [this](const std::string& line) { report.always(line); }),

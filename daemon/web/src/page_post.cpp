@@ -24,6 +24,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kStorePatience{10}, kTurnPatience{3};
 constexpr std::chrono::milliseconds kStorePeriod{100};
+constexpr std::chrono::seconds kStopPatience{15};
+constexpr std::chrono::milliseconds kStopPeriod{50};
 constexpr daemon::JsonBounds kBodyBounds{.bytes = kMostRequestBytes, .depth = 8};
 
 /// A request that changes something, the role that it needs, and the request to abbed that it
@@ -153,6 +155,39 @@ void change(PageContext& context, const WebSession& session, const Change& asked
   send_result(response, answer);
 }
 
+/// The outcome of a request to stop the measuring machine: {"number", "outcome", "text"}.
+Result<json> stop_outcome(PageContext& context) {
+  const auto& socket = context.options.settings.config.control.socket;
+  const auto asked = daemon::ask_daemon(socket, {{"do", "machine"}, {"stop", true}});
+  if (!asked) return asked;
+  const auto number = asked->value("stop", std::uint64_t{1});
+  for (const auto until = Clock::now() + kStopPatience; Clock::now() < until && !context.stopping;
+       std::this_thread::sleep_for(kStopPeriod)) {
+    const auto answer = daemon::ask_daemon(socket, {{"do", "machine"}});
+    if (!answer) return answer;
+    const json stop = answer->value("stop", json::object());
+    if (stop.value("number", std::uint64_t{0}) >= number &&
+        stop.value("outcome", "pending") != "pending")
+      return stop;
+  }
+  return daemon::fail(ErrorCode::StopNotConfirmed,
+                      "the machine has not confirmed its stop yet: it may be moving");
+}
+
+/// Any user may stop the machine. It waits for no other request.
+void stop_machine(PageContext& context, const WebSession& session, httplib::Response& response) {
+  auto stop = stop_outcome(context);
+  if (stop && (*stop)["outcome"] != "stopped") {
+    stop = daemon::fail(
+        (*stop)["outcome"] == "not sent" ? ErrorCode::StopNotSent : ErrorCode::StopNotConfirmed,
+        fmt::format("the stop of the machine is {}: {}; use its emergency stop",
+                    (*stop)["outcome"].get<std::string>(), (*stop)["text"].get<std::string>()));
+  }
+  context.report.always(fmt::format("{}: stop of the machine: {}", session.user,
+                                    stop ? (*stop)["text"].get<std::string>() : stop.error().text));
+  send_result(response, stop);
+}
+
 void replay(PageContext& context, const WebSession& session, const json& body,
             httplib::Response& response) {
   const auto recording = body.at("name").get<std::string>();
@@ -176,6 +211,7 @@ void refuse_role(PageContext& context, const httplib::Request& request, const We
 void answer_change(PageContext& context, const httplib::Request& request, const WebSession& session,
                    const json& body, httplib::Response& response) {
   if (request.path == "/api/logout") return log_out(context, request, session, response);
+  if (request.path == "/api/stop") return stop_machine(context, session, response);
   if (request.path == "/api/replay") {
     if (session.role < WebRole::Calibrate)
       return refuse_role(context, request, session, WebRole::Calibrate, response);

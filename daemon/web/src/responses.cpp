@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "abbe/base/json_text.hpp"
+
 namespace abbe::web {
 namespace {
 
@@ -24,6 +26,8 @@ int status_of(ErrorCode code) {
     case ErrorCode::DataInsufficient:
       return 422;
     case ErrorCode::Io:
+    case ErrorCode::StopNotConfirmed:
+    case ErrorCode::StopNotSent:
       return 503;
   }
   return 500;
@@ -67,8 +71,7 @@ void send_text(httplib::Response& response, int status, std::string text, const 
 }
 
 void send_json(httplib::Response& response, const nlohmann::json& value, int status) {
-  send_text(response, status, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
-            kJson);
+  send_text(response, status, daemon::json_text(value), kJson);
 }
 
 void send_error(httplib::Response& response, int status, const std::string& text) {

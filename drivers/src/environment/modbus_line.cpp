@@ -25,9 +25,9 @@ tl::unexpected<Error> failed(std::string_view what, int error) {
   return tl::unexpected(Error{code, fmt::format("{}: {}", what, modbus_strerror(error))});
 }
 
-modbus_t* make_context(const ModbusAddress& address) {
+modbus_t* make_context(const ModbusAddress& address, const std::string& tcp_address) {
   if (const auto* tcp = std::get_if<ModbusTcp>(&address))
-    return modbus_new_tcp_pi(tcp->host.c_str(), std::to_string(tcp->port).c_str());
+    return modbus_new_tcp_pi(tcp_address.c_str(), std::to_string(tcp->port).c_str());
   const auto& serial = std::get<ModbusSerial>(address);
   return modbus_new_rtu(serial.path.c_str(), serial.baud, static_cast<char>(serial.parity),
                         kDataBits, serial.stop_bits);
@@ -68,7 +68,14 @@ Result<void> ModbusLine::open(const ModbusAddress& address, nanoseconds wall) {
   decltype(lock_) lock;
   if (const auto* serial = std::get_if<ModbusSerial>(&address))
     if (auto locked = lock.take(serial->path); !locked) return locked;
-  decltype(context_) fresh{make_context(address)};
+  std::string tcp_address;
+  if (const auto* tcp = std::get_if<ModbusTcp>(&address)) {
+    if (!host_) host_.emplace(tcp->host, tcp->port);
+    const auto found = host_->next();
+    if (!found) return tl::unexpected(Error{found.error().code, "open: " + found.error().text});
+    tcp_address = text_of(*found);
+  }
+  decltype(context_) fresh{make_context(address, tcp_address)};
   if (!fresh) return failed("configure", errno);
 
   // The response time-out of libmodbus also limits connecting. It must not be below 1 us.

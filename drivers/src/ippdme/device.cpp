@@ -1,10 +1,19 @@
 #include "abbe/drivers/ippdme/device.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
 namespace abbe::drivers {
+namespace {
+
+/// Host time. A state that is not stored after this is reported; a healthy disk needs some ms.
+constexpr std::chrono::seconds kSavedSoon{1};
+constexpr auto kOutcomes = static_cast<std::uint64_t>(IppStopOutcome::NotSent) + 1;
+
+}  // namespace
 
 Result<std::unique_ptr<IppDevice>> IppDevice::create(const IppDeviceOptions& options,
                                                      const TimeSource& time) {
@@ -29,28 +38,41 @@ IppDevice::IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSo
 
 IppDevice::~IppDevice() {
   try {
-    handle(IppStopRequested{});
-    await_standstill();
-    leave(IppStopRequested{});
+    finish();
   } catch (...) {  // NOLINT(bugprone-empty-catch)
     // Out of memory: the connection closes, and the server ends the session of a lost client.
   }
+}
+
+IppStop IppDevice::finish() {
+  if (ended_) return session().stop();
+  read_stops(requests_.take());  // of a person, since the last cycle: they hold the machine
+  handle(IppStopRequested{});
+  await_standstill();
+  session().give_up_stop();
+  leave(IppStopRequested{});
+  report_machine();
+  show_session();
+  ended_ = true;
+  return session().stop();
 }
 
 /// Waits until AbortE is answered: if the connection were closed before, the machine might not
 /// stop.
 void IppDevice::await_standstill() {
   constexpr auto kLook = std::chrono::milliseconds{20};
-  const auto& time_out = options_.session.command_timeout;
+  const auto time_out = options_.session.connect_timeout + options_.session.command_timeout;
   const auto until = std::chrono::steady_clock::now() + time_.wall(time_out);
-  while (session().state() == IppState::Aborting && std::chrono::steady_clock::now() < until) {
+  while (session().stopping_motion() && std::chrono::steady_clock::now() < until) {
     wait(time_.host(kLook));
     receive();
   }
 }
 
-void IppDevice::abort() {
-  requests_.put(IppAbortRequested{});
+std::uint64_t IppDevice::abort() {
+  const auto number = stops_asked_.fetch_add(1, std::memory_order_relaxed) + 1;
+  requests_.put(IppAbortRequested{number});
+  return number;
 }
 
 void IppDevice::end() {
@@ -65,67 +87,140 @@ void IppDevice::measure(std::span<const ProbePoint> points) {
   asked_.fetch_add(points.size(), std::memory_order_relaxed);
   // put() also orders the increment of asked_ before the device thread counts these points as
   // finished.
-  requests_.put(std::vector<ProbePoint>{points.begin(), points.end()});
+  requests_.put(IppPath{points.begin(), points.end()});
 }
 
 void IppDevice::wait(std::chrono::nanoseconds at_most) {
+  constexpr std::chrono::milliseconds kLookAtStore{1};
   handle_posted_messages();
   read_requests();
+  begin_stored_motion();
   if (!reads_before_due()) {
     handle(IppTick{});
-    poll(at_most);
+    const bool storing = session().state() == IppState::Storing;
+    poll(storing ? std::min(at_most, time_.host(kLookAtStore)) : at_most);
   }
-  show_session();
   report_machine();
+  show_session();
   count_points();
 }
 
 void IppDevice::show_session() {
   show();
+  emergency_stop_.set_moving(session().moving());
   held_.store(session().held(), std::memory_order_relaxed);
   releasable_.store(session().releasable(), std::memory_order_relaxed);
+  show_stop();
+  show_condition();
+}
+
+void IppDevice::show_stop() {
+  const IppStop& now = session().stop();
+  if (now.number == stop_.number && now.outcome == stop_.outcome) return;
+  stop_ = now;
+  stop_text_.set(time_.now(), now.text);
+  // release: pairs with the acquire in last_stop()
+  stop_shown_.store(now.number * kOutcomes + static_cast<std::uint64_t>(now.outcome),
+                    std::memory_order_release);
+}
+
+IppStop IppDevice::last_stop() const {
+  const auto shown = stop_shown_.load(std::memory_order_acquire);  // pairs with show_stop()
+  return {.number = shown / kOutcomes,
+          .outcome = static_cast<IppStopOutcome>(shown % kOutcomes),
+          .text = stop_text_.read().text};
+}
+
+/// What a person must know at once: that the machine may be moving, or that a restart would not
+/// know its state.
+void IppDevice::show_condition() {
+  std::string condition = session().danger();
+  const auto add = [&condition](std::string_view what) {
+    condition += fmt::format("{}{}", condition.empty() ? "" : "; ", what);
+  };
+  const IppStored now = stored();
+  if (now.done || machine_ == IppMachine{})
+    unsaved_since_.reset();
+  else if (!unsaved_since_)
+    unsaved_since_ = time_.now();
+  if (unsaved_since_ && !now.fault.empty())
+    add(fmt::format("not saved, a restart of abbed would not await a release: {}", now.fault));
+  else if (unsaved_since_ && time_.now() - *unsaved_since_ > kSavedSoon)
+    add("not saved yet, a restart of abbed would not await a release: the disk does not answer");
+  if (condition == condition_) return;
+  condition_ = std::move(condition);
+  board_.set_condition(time_.now(), condition_);
 }
 
 void IppDevice::report_machine() {
-  const IppMachine machine{session().hold_reason(), session().moving()};
+  const IppMachine machine{session().hold_reason(), session().may_move()};
   if (machine == machine_) return;
   machine_ = machine;
   if (options_.machine_changed) options_.machine_changed(machine);
+}
+
+IppStored IppDevice::stored() const {
+  return options_.machine_stored ? options_.machine_stored() : IppStored{.done = true, .fault = {}};
+}
+
+void IppDevice::begin_stored_motion() {
+  report_machine();
+  if (session().state() != IppState::Storing) return;
+  const IppStored now = stored();
+  if (now.done)
+    handle(IppMotionStored{});
+  else if (!now.fault.empty())
+    handle(IppMotionNotStored{now.fault});
 }
 
 DeviceStatus IppDevice::status() const {
   return board_.read(options_.name, touches_.dropped() + positions_.dropped(), raw_.dropped());
 }
 
+/// First without the session, whose state is unknown after an exception: it may count AbortE as sent
+/// although it is not. A second AbortE changes nothing. A message of the server that caused the
+/// exception is not handled again.
+bool IppDevice::stop_after_failure() {
+  if (!session().may_move()) return false;
+  emergency_stop_.set_moving(true);
+  (void)send_emergency_stops({});
+  discard_posted_messages();
+  // The number is that of the latest request: the exception may have lost the request itself.
+  handle(IppAbortRequested{.number = stops_asked_.load(std::memory_order_relaxed),
+                           .reason = "stopped after an internal error of abbed"});
+  show_session();
+  return session().may_move();
+}
+
+/// Stops first: an exception from a later request must not lose one. Paths and releases before the
+/// last stop are discarded.
 void IppDevice::read_requests() {
   const auto requests = requests_.take();
-  const auto is_abort = [](const Request& r) {
-    return std::holds_alternative<IppAbortRequested>(r);
-  };
+  const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), is_stop).base();
+  for (const Request& request : requests)
+    if (const auto* path = std::get_if<IppPath>(&request)) taken_ += path->size();
 
-  const auto is_end = [](const Request& r) { return std::holds_alternative<IppStopRequested>(r); };
-  const auto stops = [&](const Request& r) { return is_abort(r) || is_end(r); };
-  const auto after_last_stop = std::find_if(requests.rbegin(), requests.rend(), stops).base();
-
-  for (auto request = requests.begin(); request != requests.end(); ++request) {
-    if (const auto* points = std::get_if<std::vector<ProbePoint>>(&*request)) {
-      taken_ += points->size();
-      if (request >= after_last_stop) request_points(*points);  // earlier points are not begun
-    } else if (is_abort(*request)) {
-      handle(IppAbortRequested{});
-    } else if (is_end(*request)) {
-      handle(IppStopRequested{});
-    } else {
+  read_stops(requests);
+  for (auto request = after_last_stop; request != requests.end(); ++request) {
+    if (const auto* path = std::get_if<IppPath>(&*request))
+      handle(*path);
+    else
       handle(IppReleaseRequested{});
-    }
   }
 }
 
-/// Passes points to the session. If one of them causes a fault, the remaining ones are discarded.
-void IppDevice::request_points(const std::vector<ProbePoint>& points) {
-  const auto faults_before = session().fault().count;
-  for (const ProbePoint& point : points)
-    if (session().fault().count == faults_before) handle(point);
+bool IppDevice::is_stop(const Request& request) {
+  return std::holds_alternative<IppAbortRequested>(request) ||
+         std::holds_alternative<IppStopRequested>(request);
+}
+
+void IppDevice::read_stops(const std::vector<Request>& requests) {
+  for (const Request& request : requests) {
+    if (const auto* abort = std::get_if<IppAbortRequested>(&request))
+      handle(*abort);
+    else if (std::holds_alternative<IppStopRequested>(request))
+      handle(IppStopRequested{});
+  }
 }
 
 void IppDevice::count_points() {
@@ -134,7 +229,7 @@ void IppDevice::count_points() {
 }
 
 std::span<const std::byte> IppDevice::encode(const IppSend& command) {
-  report_machine();  // the state is stored before the machine moves
+  emergency_stop_.set_moving(session().moving());
   const auto bytes = std::as_bytes(std::span{command.line});
   const protocol::HostTime now = time_.now();  // one value: a replay has only the recorded time
   raw_.push_bytes(now, protocol::RawBlock::Direction::ToDevice, bytes);
@@ -144,6 +239,7 @@ std::span<const std::byte> IppDevice::encode(const IppSend& command) {
 
 /// The receiver must be reset for the new connection before the first command on it.
 void IppDevice::connected() {
+  emergency_stop_.set_socket(descriptor());
   raw_.push_bytes(arrival_, protocol::RawBlock::Direction::FromDevice, {});
   receiver_.push({}, arrival_);
 }

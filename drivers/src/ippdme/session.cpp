@@ -35,6 +35,8 @@ const char* name_of(IppState state) noexcept {
       return "configuring";
     case IppState::Ready:
       return "ready";
+    case IppState::Storing:
+      return "storing";
     case IppState::Measuring:
       return "measuring";
     case IppState::Aborting:
@@ -52,12 +54,30 @@ const char* name_of(IppState state) noexcept {
   return "?";
 }
 
+const char* name_of(IppStopOutcome outcome) noexcept {
+  switch (outcome) {
+    case IppStopOutcome::None:
+      return "none";
+    case IppStopOutcome::Pending:
+      return "pending";
+    case IppStopOutcome::Stopped:
+      return "stopped";
+    case IppStopOutcome::NotConfirmed:
+      return "not confirmed";
+    case IppStopOutcome::NotSent:
+      return "not sent";
+  }
+
+  return "?";
+}
+
 Result<void> check(const IppSessionOptions& o) {
   const nanoseconds zero{};
   // The server gives at most 10 reports a second.
   if (o.poll_period < std::chrono::milliseconds{100})
     return bad(o, "poll period below 100 ms: a server gives at most 10 reports a second");
-  if (o.connect_timeout <= zero || o.command_timeout <= zero || o.motion_timeout <= zero)
+  if (o.connect_timeout <= zero || o.command_timeout <= zero || o.motion_timeout <= zero ||
+      o.store_timeout <= zero)
     return bad(o, "all time-outs must be above 0");
   if (o.first_pause <= zero || o.longest_pause < o.first_pause)
     return bad(o, "first pause must be above 0 and not above the longest pause");
@@ -87,12 +107,11 @@ void IppSession::write_script() {
         {.state = Configuring, .method = fmt::format("SetTool(\"{}\")", options_.tool)});
   script_.push_back({.state = Configuring, .method = "OnPtMeasReport(X(),Y(),Z())"});
 
-  if (options_.move_reports) {
-    script_.push_back(
-        {.state = Configuring,
-         .method = fmt::format("OnMoveReportE(Time({}),Dis(1),X(),Y(),Z())",
-                               ippdme::number_text(ipp_text::seconds(options_.poll_period))),
-         .event = kMoveReportTag});
+  const auto period = ippdme::number_text(ipp_text::seconds(options_.poll_period));
+  if (options_.move_reports && period) {
+    script_.push_back({.state = Configuring,
+                       .method = fmt::format("OnMoveReportE(Time({}),Dis(1),X(),Y(),Z())", *period),
+                       .event = kMoveReportTag});
   }
 }
 
@@ -137,6 +156,8 @@ IppAction IppSession::give_up(IppState into, const std::string& what) {
 }
 
 IppAction IppSession::close(IppState into) {
+  settle(open_ ? IppStopOutcome::NotConfirmed : IppStopOutcome::NotSent,
+         fmt::format("{}{}", last_note_, moving_ ? ": the machine may be moving" : ""));
   pending_.reset();
   deadlines_.cancel_all();
   open_ = in_session_ = false;
@@ -164,6 +185,10 @@ IppAction IppSession::take(const IppTick&) {
       return give_up(
           IppState::Disconnected,
           fmt::format("no connection in {:g} s", ipp_text::seconds(options_.connect_timeout)));
+    case Due::Store:
+      return take(
+          IppMotionNotStored{fmt::format("the state of the machine is not stored after {:g} s",
+                                         ipp_text::seconds(options_.store_timeout))});
     case Due::Poll:
       return send(
           {.state = IppState::Ready, .method = "Get(X(),Y(),Z())", .purpose = Purpose::Get});
@@ -210,15 +235,22 @@ IppAction IppSession::take(const IppConnectionLost& lost) {
   return IppNothing{};  // the connection is already closed
 }
 
-/// A point requested while the connection is lost is discarded: the caller planned it from a
-/// position that may have changed, so it must not move the machine after a reconnection.
-IppAction IppSession::take(const ProbePoint& point) {
+/// A path requested while the connection is lost is discarded: the caller planned it from a
+/// position that may have changed, so it must not move the machine after a reconnection. A path
+/// with a target that cannot be written is discarded as a whole.
+IppAction IppSession::take(const IppPath& path) {
   if (stopped_) return IppNothing{};
-  if (state_ != IppState::Ready && state_ != IppState::Measuring) {
+  const bool accepts =
+      state_ == IppState::Ready || state_ == IppState::Storing || state_ == IppState::Measuring;
+  if (!accepts) {
     note(fmt::format("asked to move while {}: the request was discarded", name_of(state_)));
     return IppNothing{};
   }
-  points_.push_back(point);
+  if (const auto valid = check(path); !valid) {
+    note(valid.error().text);
+    return IppNothing{};
+  }
+  points_.insert(points_.end(), path.begin(), path.end());
   return state_ == IppState::Ready && !pending_ ? ready() : IppAction{IppNothing{}};
 }
 
@@ -235,6 +267,31 @@ IppAction IppSession::send(const Step& step) {
   return IppSend{fmt::format("{} {}\r\n", ippdme::to_string(tag), step.method)};
 }
 
+/// Sends a motion once it is stored that the machine moves: see IppMotionStored. A stop, an error or
+/// a lost connection in between discards the motion.
+IppAction IppSession::begin_motion(Step step) {
+  step.moves = true;
+  state_ = IppState::Storing;
+  prepared_ = std::move(step);
+  wait_only_for(Due::Store, now_ + options_.store_timeout);
+  return IppNothing{};
+}
+
+IppAction IppSession::take(const IppMotionStored&) {
+  return state_ == IppState::Storing ? send(prepared_) : IppAction{IppNothing{}};
+}
+
+IppAction IppSession::take(const IppMotionNotStored& failed) {
+  if (state_ != IppState::Storing) return IppNothing{};
+  const std::string what =
+      fmt::format("{} was not sent: {}", ipp_text::method_name(prepared_.method), failed.why);
+  if (prepared_.state == IppState::Configuring) return give_up(IppState::Faulted, what);
+  note(what);
+  points_.clear();
+  wait_only_for(Due::Poll, now_);
+  return ready();
+}
+
 IppAction IppSession::next_step() {
   if (step_ < script_.size()) return send(script_[step_++]);
   pause_ = options_.first_pause;
@@ -248,10 +305,11 @@ IppAction IppSession::ready() {
   if (points_.empty()) return IppNothing{};
   const ProbePoint point = points_.front();
   points_.pop_front();
-  return send({.state = IppState::Measuring,
-               .method = point.touch ? ipp_text::pt_meas(point) : ipp_text::go_to(point),
-               .purpose = point.touch ? Purpose::Touch : Purpose::Move,
-               .moves = true});
+  auto method = point.touch ? ipp_text::pt_meas(point) : ipp_text::go_to(point);
+  if (!method) return give_up(IppState::Faulted, method.error().text);
+  return begin_motion({.state = IppState::Measuring,
+                       .method = std::move(*method),
+                       .purpose = point.touch ? Purpose::Touch : Purpose::Move});
 }
 
 /// True for the tag of a command that is neither the pending one nor an event.
@@ -373,7 +431,7 @@ IppAction IppSession::check_homed(const std::string& data) {
   if (!options_.home)
     return give_up(IppState::Faulted, "the machine is not homed: home it at its controller");
   if (!may_home_) return hold("the machine is not homed any more");
-  return send({.state = IppState::Configuring, .method = "Home()", .moves = true});
+  return begin_motion({.state = IppState::Configuring, .method = "Home()"});
 }
 
 /// Handles a refused command. StartSession is refused while another client's session, or the

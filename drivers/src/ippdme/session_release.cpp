@@ -1,6 +1,7 @@
 // Stopping a motion after a fault or on request, and waiting for the release by an operator.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "abbe/drivers/ippdme/session.hpp"
@@ -21,7 +22,11 @@ IppAction IppSession::stop_motion(bool close_then) {
 
 IppAction IppSession::stopped_moving() {
   moving_ = false;
-  if (stopped_) return end_session();
+  settle(IppStopOutcome::Stopped, "AbortE was answered: the motion is stopped");
+  if (stopped_) {
+    if (!asked_reason_.empty()) hold_for(asked_reason_);
+    return in_session_ ? end_session() : close(IppState::Disconnected);
+  }
   hold_for(stop_reason_);
   return close_then_ ? close(IppState::AwaitingRelease) : await_release();
 }
@@ -31,8 +36,11 @@ IppAction IppSession::stopped_moving() {
 /// starts a session before it sends AbortE, and the connection after that does not. No session is
 /// started for a machine that is held.
 IppAction IppSession::abort_unanswered() {
-  note(fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
-                   ipp_text::seconds(options_.command_timeout)));
+  const std::string what =
+      fmt::format("no answer to AbortE in {:g} s: the machine may still be moving",
+                  ipp_text::seconds(options_.command_timeout));
+  note(what);
+  settle(IppStopOutcome::NotConfirmed, what);
   if (!in_session_) session_first_ = !session_first_ && !held_;
   return stopped_ ? end_session() : close(IppState::Faulted);
 }
@@ -48,6 +56,7 @@ IppAction IppSession::abort_refused(const IppError& error) {
   const std::string what = fmt::format("AbortE was refused: {}: the machine may still be moving",
                                        ipp_text::text_of(error));
   note(what);
+  settle(IppStopOutcome::NotConfirmed, what);
   if (stopped_) return end_session();
   hold_for(what);
   session_first_ = false;
@@ -78,16 +87,54 @@ IppAction IppSession::await_release() {
   return IppNothing{};
 }
 
-IppAction IppSession::take(const IppAbortRequested&) {
+/// Sets the outcome of the outstanding request to stop, if there is one.
+void IppSession::settle(IppStopOutcome outcome, std::string text) {
+  if (stop_.outcome != IppStopOutcome::Pending) return;
+  stop_.outcome = outcome;
+  stop_.text = std::move(text);
+}
+
+IppAction IppSession::take(const IppAbortRequested& request) {
+  stop_ = {std::max(stop_.number, request.number), IppStopOutcome::Pending, {}};
   points_.clear();
-  const bool ended =
-      state_ == IppState::Aborting || state_ == IppState::Stopping || held_ || stopped_;
-  if (ended || (moving_ && !open_)) return IppNothing{};  // the next connection begins with AbortE
-  if (open_ && !moving_) return hold("stopped by request");
-  note("stopped by request");
-  if (open_) return stop_motion(false);
-  hold_for("stopped by request");
+  if (state_ == IppState::Aborting) return IppNothing{};  // its answer is the outcome
+  if (moving_ && open_) return stop_motion_by_request(request.reason);
+  if (moving_) {
+    asked_reason_ = request.reason;
+    return connect_to_abort();
+  }
+  if (!open_) return stop_without_connection(request.reason);
+
+  settle(IppStopOutcome::Stopped, "no motion of abbed was under way");
+  const bool ended = state_ == IppState::Stopping || held_ || stopped_;
+  return ended ? IppAction{IppNothing{}} : hold(std::string{request.reason});
+}
+
+IppAction IppSession::stop_motion_by_request(std::string_view reason) {
+  if (!held_) note(std::string{reason});
+  return stop_motion(false);
+}
+
+/// The connection was lost during a motion: another one is opened at once, and it begins with
+/// AbortE. If it cannot be opened, the request to stop is not sent.
+IppAction IppSession::connect_to_abort() {
+  return state_ == IppState::Connecting ? IppAction{IppNothing{}} : connect();
+}
+
+IppAction IppSession::stop_without_connection(std::string_view reason) {
+  settle(IppStopOutcome::NotSent,
+         "there is no connection to the machine; no motion of abbed was under way");
+  if (held_ || stopped_) return IppNothing{};
+  note(std::string{reason});
+  hold_for(std::string{reason});
   return close(IppState::AwaitingRelease);
+}
+
+std::string IppSession::danger() const {
+  if (!moving_ || state_ == IppState::Aborting) return {};
+  if (!open_)
+    return "the machine may be moving: AbortE is not confirmed, and there is no connection";
+  return in_session_ ? std::string{} : "the machine may be moving: AbortE is not confirmed";
 }
 
 /// True also between the attempts to send AbortE for a motion that an earlier connection began.
@@ -101,8 +148,10 @@ bool IppSession::releasable() const noexcept {
 /// cleared.
 IppAction IppSession::take(const IppReleaseRequested&) {
   if (!releasable()) return IppNothing{};
+  settle(IppStopOutcome::NotSent, "a person has released the machine before AbortE was sent");
   held_ = moving_ = session_first_ = false;  // an operator has inspected the machine
   hold_reason_.clear();
+  asked_reason_.clear();
   may_home_ = options_.home;
   pause_ = options_.first_pause;
   if (open_ && in_session_)
@@ -116,11 +165,28 @@ IppAction IppSession::take(const IppReleaseRequested&) {
   return IppNothing{};
 }
 
+/// A hold that follows the answer to AbortE follows it also when the session ends before: the next
+/// start of abbed awaits a release.
 IppAction IppSession::take(const IppStopRequested&) {
   if (std::exchange(stopped_, true)) return IppNothing{};
   points_.clear();
-  if (state_ == IppState::Aborting) return IppNothing{};
-  return moving_ && open_ ? stop_motion(false) : end_session();
+  if (stop_.outcome != IppStopOutcome::Pending) stop_ = {stop_.number, IppStopOutcome::Pending, {}};
+  if (state_ == IppState::Aborting) {
+    hold_for(stop_reason_);
+    return IppNothing{};
+  }
+  if (moving_) return open_ ? stop_motion(false) : connect_to_abort();
+  settle(IppStopOutcome::Stopped, "no motion of abbed was under way");
+  return end_session();
+}
+
+void IppSession::give_up_stop() {
+  if (open_)
+    settle(IppStopOutcome::NotConfirmed,
+           "AbortE was not answered before the connection was closed: the machine may be moving");
+  else
+    settle(IppStopOutcome::NotSent,
+           "there was no connection before the end of abbed: the machine may be moving");
 }
 
 IppAction IppSession::end_session() {

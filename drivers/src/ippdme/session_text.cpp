@@ -2,13 +2,33 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <utility>
+
 namespace abbe::drivers::ipp_text {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1e3;
 
-std::string mm(double m) {
-  return ippdme::number_text(kMillimetresPerMetre * m);
+/// Texts of three numbers. An error names the number that I++ DME cannot express.
+Result<std::array<std::string, 3>> texts_of(const std::array<double, 3>& values, double factor,
+                                            const std::array<const char*, 3>& names,
+                                            std::string_view unit) {
+  std::array<std::string, 3> out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    auto text = ippdme::number_text(factor * values[i]);
+    if (!text)
+      return tl::unexpected(
+          Error{ErrorCode::BadConfiguration,
+                fmt::format("{} = {:g}{} cannot be sent: I++ DME has no such number", names[i],
+                            factor * values[i], unit)});
+    out[i] = std::move(*text);
+  }
+  return out;
+}
+
+Result<std::array<std::string, 3>> place_of(const ProbePoint& p) {
+  return texts_of(p.position_m, kMillimetresPerMetre, {"X", "Y", "Z"}, " mm");
 }
 
 }  // namespace
@@ -37,16 +57,36 @@ std::string_view method_name(std::string_view method) {
   return method.substr(0, method.find('('));
 }
 
-std::string go_to(const ProbePoint& p) {
-  return fmt::format("GoTo(X({}),Y({}),Z({}))", mm(p.position_m[0]), mm(p.position_m[1]),
-                     mm(p.position_m[2]));
+Result<std::string> go_to(const ProbePoint& p) {
+  const auto place = place_of(p);
+  if (!place) return tl::unexpected(place.error());
+  const auto& [x, y, z] = *place;
+  return fmt::format("GoTo(X({}),Y({}),Z({}))", x, y, z);
 }
 
-std::string pt_meas(const ProbePoint& p) {
-  const auto number = [](double v) { return ippdme::number_text(v); };
-  return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", mm(p.position_m[0]),
-                     mm(p.position_m[1]), mm(p.position_m[2]), number(p.normal[0]),
-                     number(p.normal[1]), number(p.normal[2]));
+Result<std::string> pt_meas(const ProbePoint& p) {
+  const auto place = place_of(p);
+  if (!place) return tl::unexpected(place.error());
+  const auto normal = texts_of(p.normal, 1.0, {"I", "J", "K"}, "");
+  if (!normal) return tl::unexpected(normal.error());
+  const auto& [x, y, z] = *place;
+  const auto& [i, j, k] = *normal;
+  return fmt::format("PtMeas(X({}),Y({}),Z({}),IJK({},{},{}))", x, y, z, i, j, k);
 }
 
 }  // namespace abbe::drivers::ipp_text
+
+namespace abbe::drivers {
+
+Result<void> check(std::span<const ProbePoint> path) {
+  for (std::size_t n = 0; n < path.size(); ++n) {
+    const auto text = path[n].touch ? ipp_text::pt_meas(path[n]) : ipp_text::go_to(path[n]);
+    if (!text)
+      return tl::unexpected(
+          Error{text.error().code, fmt::format("target {} of {}: {}: nothing of it is sent", n + 1,
+                                               path.size(), text.error().text)});
+  }
+  return {};
+}
+
+}  // namespace abbe::drivers

@@ -20,7 +20,8 @@ inline constexpr int kProtocolError = 8;
 /// Text such as "1006 Surface not found (severity 2)".
 [[nodiscard]] std::string text_of(const IppError& error);
 [[nodiscard]] std::string_view method_name(std::string_view method);
-[[nodiscard]] std::string go_to(const ProbePoint& point);
-[[nodiscard]] std::string pt_meas(const ProbePoint& point);
+/// An error if a number of the point cannot be written.
+[[nodiscard]] Result<std::string> go_to(const ProbePoint& point);
+[[nodiscard]] Result<std::string> pt_meas(const ProbePoint& point);
 
 }  // namespace abbe::drivers::ipp_text

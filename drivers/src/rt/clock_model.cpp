@@ -37,8 +37,7 @@ ClockModel::Observed ClockModel::observe(protocol::DeviceTime last_point,
     return Observed::Followed;  // the same instant contains no new information
 
   if (device_s < last_device_s_ || jumped(p, arrival)) {
-    reset();
-    ++restarts_;
+    restart();
     begin_with(last_point, arrival);
     return Observed::Restarted;
   }
@@ -69,6 +68,18 @@ bool ClockModel::jumped(const Point& p, protocol::HostTime arrival) ABBE_RT {
   if (!late_) late_since_ = arrival;
   late_ = true;
   return arrival - late_since_ > kLateForTooLong;
+}
+
+bool ClockModel::is_ahead(protocol::DeviceTime t, protocol::HostTime arrival) const ABBE_RT {
+  if (count_ == 0) return false;
+  const double device_s = seconds(t - origin_device_);
+  const double offset_s = seconds(arrival - origin_host_) - device_s;
+  return offset_s - line_at(device_s) < -seconds(options_.jump);
+}
+
+void ClockModel::restart() ABBE_RT {
+  reset();
+  ++restarts_;
 }
 
 void ClockModel::reset() ABBE_RT {

@@ -37,6 +37,9 @@ SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
   return SampleFlag::PointInvalid;  // also for unknown values
 }
 
+/// A point that arrives later than this was stored by a stalled network; the controller stores less.
+constexpr std::chrono::minutes kLongestDelay{1};
+
 bool finite(const std::array<double, 3>& v) ABBE_RT {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
@@ -72,7 +75,9 @@ void TrackerReceiver::connection_began() ABBE_RT {
   framer_.reset();
   clock_.reset();
   accepting_ = silenced_ = beam_lost_ = environment_known_ = false;
-  last_ = {};
+  points_came_ = false;
+  times_.reset();
+  last_.reset();
   weather_due_.reset();
   pending_flags_ = static_cast<protocol::SampleFlags>(SampleFlag::Restarted);
 }
@@ -139,7 +144,7 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::StatusChange& 
 /// Called for an unsolicited error. The manual does not state the error code of a broken beam, so
 /// any unsolicited error while points arrive counts as a beam loss.
 void TrackerReceiver::beam_lost() ABBE_RT {
-  if (!last_.known || beam_lost_) return;
+  if (!points_came_ || beam_lost_) return;
   beam_lost_ = true;
   ++counters_.beam_losses;
 }
@@ -173,7 +178,7 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::SingleResult& 
   if (beam_lost_) point.head.flags |= SampleFlag::BeamReturned;
   beam_lost_ = false;
   mark_pending(point.head);
-  last_.known = true;
+  points_came_ = true;
   weather(result.environment, point.head);
 
   return burst(1);
@@ -185,15 +190,74 @@ std::optional<TrackerMessage> TrackerReceiver::take(const emscon::MultiResult& r
     counters_.points_refused += result.size();
     return std::nullopt;
   }
-  const auto newest = result.point(result.size() - 1).time.to_device_time();
-  if (clock_.observe(newest, arrival_) == ClockModel::Observed::Restarted) {
-    last_.known = false;
-    pending_flags_ |= SampleFlag::Restarted;
+  points_came_ = true;
+  for (std::size_t first = 0; first < result.size();) {
+    const std::size_t end = judge_times(result, first);
+    convert(result, first, end);
+    if (end < result.size()) begin_time_base();
+    first = end;
   }
-  for (std::size_t k = 0; k < result.size(); ++k)
-    convert(result.point(k), result.head().status, points_[k]);
   weather(result.head().environment, points_[0].head);
   return burst(result.size());
+}
+
+/// Without observations the clock model accepts any time: then a large step within the packet shows
+/// it.
+bool TrackerReceiver::is_ahead(protocol::DeviceTime t) const ABBE_RT {
+  if (clock_.is_ahead(t, arrival_)) return true;
+  return !clock_.has_observations() && times_.known() &&
+         t - times_.last() > DeviceTimeCheck::kLargestStep;
+}
+
+/// Judges the points from `first` on, up to the first one on a new time base; returns its index, or
+/// the number of points. The points that were refused until the new base was certain belong to it.
+std::size_t TrackerReceiver::judge_times(const emscon::MultiResult& result,
+                                         std::size_t first) ABBE_RT {
+  for (std::size_t k = first; k < result.size(); ++k) {
+    const auto t = result.point(k).time.to_device_time();
+    verdicts_[k] = times_.judge(t, is_ahead(t));
+    if (verdicts_[k] != TimeVerdict::Jumped) continue;
+    const std::size_t agreed_before = DeviceTimeCheck::kAgreeing - 1;
+    std::size_t begin = k;
+    while (begin > first && k - begin < agreed_before &&
+           verdicts_[begin - 1] == TimeVerdict::Refused)
+      --begin;
+    return begin;
+  }
+  return result.size();
+}
+
+/// The tracker's clock has jumped: a new clock model begins with the next point.
+void TrackerReceiver::begin_time_base() ABBE_RT {
+  times_.reset();
+  clock_.restart();
+  last_.reset();
+  ++counters_.time_jumps;
+  pending_flags_ |= SampleFlag::Restarted | SampleFlag::GapBefore;
+}
+
+/// Converts points of one time base. The last one that was not refused updates the clock model.
+void TrackerReceiver::convert(const emscon::MultiResult& result, std::size_t first,
+                              std::size_t end) ABBE_RT {
+  for (std::size_t k = end; k-- > first;) {
+    if (verdicts_[k] != TimeVerdict::Follows) continue;
+    if (clock_.observe(result.point(k).time.to_device_time(), arrival_) ==
+        ClockModel::Observed::Restarted) {
+      last_.reset();
+      pending_flags_ |= SampleFlag::Restarted;
+    }
+    break;
+  }
+
+  for (std::size_t k = first; k < end; ++k) {
+    convert(result.point(k), result.head().status, points_[k]);
+    if (verdicts_[k] == TimeVerdict::Refused) {
+      refuse_time(points_[k]);
+    } else {
+      follow(points_[k]);
+      mark_pending(points_[k].head);
+    }
+  }
 }
 
 void TrackerReceiver::convert(const emscon::MultiPoint& from, emscon::Status status,
@@ -210,25 +274,24 @@ void TrackerReceiver::convert(const emscon::MultiPoint& from, emscon::Status sta
   if (!finite(from.value)) to.head.flags |= SampleFlag::PointInvalid;
   if (!emscon::accepted(status))
     to.head.flags |= SampleFlag::DeviceError | SampleFlag::PointInvalid;
-  follow(to);
-  mark_pending(to.head);
 }
 
-/// Compares the point with the previous one: the device time must increase; a gap in it means lost
-/// points or a lost beam.
+/// The time of the point does not fit those of the others. Its instant is then not known: it gets
+/// its arrival, so that it does not lie in the future or hours ago.
+void TrackerReceiver::refuse_time(TrackerPoint& point) ABBE_RT {
+  ++counters_.time_disorder;
+  point.head.flags |= SampleFlag::PointInvalid;
+  const auto early = arrival_ - point.head.time;
+  if (early >= -options_.clock.jump && early <= kLongestDelay) return;
+  point.head.time = arrival_;
+  point.head.u_time = kLongestDelay;
+}
+
+/// Compares the point with the previous one: a gap in the device time means lost points or a lost
+/// beam.
 void TrackerReceiver::follow(TrackerPoint& point) ABBE_RT {
-  if (!last_.known) {
-    last_ = {point.device_time, true};
-    return;
-  }
-  const auto since_last = point.device_time - last_.device_time;
-  if (since_last <= std::chrono::nanoseconds{0}) {
-    ++counters_.time_disorder;
-    point.head.flags |= SampleFlag::PointInvalid;
-    return;
-  }
-  mark_hole(since_last, point);
-  last_.device_time = point.device_time;
+  if (last_) mark_hole(point.device_time - *last_, point);
+  last_ = point.device_time;
 }
 
 void TrackerReceiver::mark_hole(std::chrono::nanoseconds since_last, TrackerPoint& point) ABBE_RT {

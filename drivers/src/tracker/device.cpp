@@ -57,6 +57,7 @@ void TrackerDevice::wait(std::chrono::nanoseconds at_most) {
     poll(at_most);
   }
   report_clock();
+  report_times();
   report_cause();
   show();
 }
@@ -95,6 +96,24 @@ void TrackerDevice::report_clock() {
                   "points are marked ClockUnsettled; have the tracker serviced",
                   peer_.name, kPpm * std::abs(skew), skew > 0.0 ? "fast" : "slow",
                   kPpm * options_.clock.max_skew));
+}
+
+/// Reports points whose time did not fit, and jumps of the tracker's clock.
+void TrackerDevice::report_times() {
+  const auto& counters = receiver_.counters();
+  const auto refused =
+      counters.time_disorder - std::exchange(times_refused_seen_, counters.time_disorder);
+  const auto jumps = counters.time_jumps - std::exchange(time_jumps_seen_, counters.time_jumps);
+  if (jumps > 0) {
+    board_.fault(time_.now(),
+                 fmt::format("{}: the tracker's clock jumped: the points before and after the jump "
+                             "are not used together; do not set its clock during a run",
+                             peer_.name));
+  } else if (refused > 0) {
+    board_.fault(time_.now(), fmt::format("{}: the times of {} points do not fit those of the "
+                                          "others: these points are not used",
+                                          peer_.name, refused));
+  }
 }
 
 /// Reports why there are no points, if that is no fault. show() reports faults.

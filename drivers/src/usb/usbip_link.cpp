@@ -27,7 +27,9 @@ bool gone(UrbStatus status) {
 }  // namespace
 
 UsbipLink::UsbipLink(const UsbipOptions& options, const TimeSource& time)
-    : options_(options), time_(time), buffer_(kBuffer) {}
+    : options_(options), time_(time), buffer_(kBuffer) {
+  tcp_.look_up(options_.host, options_.port);
+}
 
 std::string UsbipLink::name() const {
   return fmt::format("USB/IP {}:{} {}", options_.host, options_.port, options_.bus_id);
@@ -35,7 +37,7 @@ std::string UsbipLink::name() const {
 
 void UsbipLink::open() {
   close();
-  const auto opened = tcp_.open(options_.host, options_.port);
+  const auto opened = tcp_.open();
   if (!opened) return lose(opened.error().code, opened.error().text);
   state_ = State::Connecting;
 }

@@ -13,8 +13,8 @@ std::string to_string(Tag tag) {
   return (tag.event ? "E" : "") + std::string(width - std::min(width, digits.size()), '0') + digits;
 }
 
-std::string number_text(double value) {
-  if (!(value > -1e15 && value < 1e15)) return "0";
+std::optional<std::string> number_text(double value) {
+  if (!(value > -1e15 && value < 1e15)) return std::nullopt;
   char text[40];
   // Nine decimals of 1 mm are 1 pm; lengths below 10 km then have at most 16 digits.
   const int decimals = value > -1e6 && value < 1e6 ? 9 : 0;

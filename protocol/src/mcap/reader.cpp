@@ -109,6 +109,15 @@ std::optional<LinearScan::Item> LinearScan::cut_chunk() noexcept {
   return Item{record, ScannedChunk{ScannedChunk::State::Cut, offset, *chunk}};
 }
 
+std::optional<RecordHead> read_head(Bytes bytes) noexcept {
+  if (bytes.size() < kRecordHeadSize || bytes.front() == std::byte{0}) return std::nullopt;
+  FieldReader fields{bytes};
+  RecordHead head;
+  head.opcode = static_cast<Opcode>(fields.integer<std::uint8_t>());
+  head.length = fields.integer<std::uint64_t>();
+  return head;
+}
+
 std::optional<Record> record_at(Bytes file, std::uint64_t offset, Opcode expected) noexcept {
   if (offset >= file.size()) return std::nullopt;
   RecordReader reader{file, static_cast<std::size_t>(offset)};

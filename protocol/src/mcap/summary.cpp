@@ -41,27 +41,25 @@ bool keep(Summary& summary, const Record& record) {
 
 struct FooterAt {
   Footer footer;
-  std::size_t offset = 0;  ///< of its opcode
+  std::size_t offset = 0;  ///< of its opcode in the tail
 };
 
-tl::expected<FooterAt, SummaryError> find_footer(Bytes file) noexcept {
-  if (!starts_with_magic(file) || !ends_with_magic(file)) return unexpected(SummaryError::NoMagic);
-  if (file.size() < 2 * kMagic.size() + kFooterRecordSize)
-    return unexpected(SummaryError::NoFooter);
-  const std::size_t offset = file.size() - kMagic.size() - kFooterRecordSize;
-  const auto record = record_at(file, offset, Opcode::Footer);
+/// `begin`: offset of the tail in the file.
+tl::expected<FooterAt, SummaryError> find_footer(Bytes tail, std::uint64_t begin) noexcept {
+  if (!ends_with_magic(tail)) return unexpected(SummaryError::NoMagic);
+  if (tail.size() < kMagic.size() + kFooterRecordSize) return unexpected(SummaryError::NoFooter);
+  const std::size_t offset = tail.size() - kMagic.size() - kFooterRecordSize;
+  const auto record = record_at(tail, offset, Opcode::Footer);
   if (!record) return unexpected(SummaryError::NoFooter);
   const auto footer = decode<Footer>(record->content);
-  if (!footer || footer->summary_start > offset) return unexpected(SummaryError::NoFooter);
+  if (!footer || footer->summary_start > begin + offset) return unexpected(SummaryError::NoFooter);
   if (footer->summary_start == 0) return unexpected(SummaryError::NoSummary);
   return FooterAt{*footer, offset};
 }
 
-bool crc_is_right(Bytes file, const FooterAt& at) noexcept {
-  const std::size_t start = static_cast<std::size_t>(at.footer.summary_start);
-  const std::size_t end = at.offset + kFooterRecordSize - sizeof at.footer.summary_crc;
-  return at.footer.summary_crc == 0 ||
-         at.footer.summary_crc == crc32(file.subspan(start, end - start));
+bool crc_is_right(Bytes summary_and_footer, const Footer& footer) noexcept {
+  const std::size_t end = summary_and_footer.size() - kMagic.size() - sizeof footer.summary_crc;
+  return footer.summary_crc == 0 || footer.summary_crc == crc32(summary_and_footer.first(end));
 }
 
 bool chunks_lie_in(const std::vector<ChunkIndex>& chunks, std::uint64_t data_end) noexcept {
@@ -72,12 +70,25 @@ bool chunks_lie_in(const std::vector<ChunkIndex>& chunks, std::uint64_t data_end
 
 }  // namespace
 
-tl::expected<Summary, SummaryError> read_summary(Bytes file) {
-  const auto at = find_footer(file);
+tl::expected<Footer, SummaryError> read_footer(Bytes tail, std::uint64_t begin) noexcept {
+  const auto at = find_footer(tail, begin);
   if (!at) return unexpected(at.error());
-  if (!crc_is_right(file, *at)) return unexpected(SummaryError::BadCrc);
+  return at->footer;
+}
+
+tl::expected<Summary, SummaryError> read_summary(Bytes file) {
+  if (!starts_with_magic(file)) return unexpected(SummaryError::NoMagic);
+  return read_summary(file, 0);
+}
+
+tl::expected<Summary, SummaryError> read_summary(Bytes tail, std::uint64_t begin) {
+  const auto at = find_footer(tail, begin);
+  if (!at) return unexpected(at.error());
+  if (at->footer.summary_start < begin) return unexpected(SummaryError::NoFooter);
+  const auto start = static_cast<std::size_t>(at->footer.summary_start - begin);
+  if (!crc_is_right(tail.subspan(start), at->footer)) return unexpected(SummaryError::BadCrc);
   Summary summary;
-  RecordReader records{file.first(at->offset), static_cast<std::size_t>(at->footer.summary_start)};
+  RecordReader records{tail.first(at->offset), start};
 
   while (const auto record = records.next()) {
     if (!keep(summary, *record)) return unexpected(SummaryError::BadRecord);

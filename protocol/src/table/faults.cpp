@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "abbe/protocol/printable.hpp"
+
 namespace abbe::protocol {
 
 namespace {
@@ -35,8 +37,8 @@ void Faults::add_kind(std::string_view kind_name, std::size_t line, std::size_t 
   }
 
   auto text = file_ + ":" + std::to_string(line) + ":" + std::to_string(column) + ": ";
-  if (!key.empty()) text += std::string(key) + ": ";
-  text += what;
+  if (!key.empty()) text += printable_line(key) + ": ";
+  text += printable_line(what);
 
   for (auto& fault : first) {
     if (fault.line != line || fault.text != text) continue;

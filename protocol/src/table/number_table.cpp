@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 
+#include "abbe/protocol/printable.hpp"
 #include "table/recognition.hpp"
 #include "table/text.hpp"
 
@@ -43,6 +44,15 @@ std::string quoted(std::string_view text) {
   return '"' + std::string(text) + '"';
 }
 
+/// What the content of an invalid cell or column name is besides: an error value of a spreadsheet,
+/// or text with a character that looks like another one or like none. Empty if neither.
+std::string remark(std::string_view text) {
+  if (is_spreadsheet_error(text))
+    return ", an error value of a spreadsheet: correct the formula, or delete the row";
+  const auto strange = strange_character(text);
+  return strange.empty() ? strange : ", contains " + strange;
+}
+
 /// Says what a cell with the content `text` should hold instead.
 std::string expected(std::string_view text, const std::vector<std::string_view>& words) {
   constexpr std::size_t kFew = 6;
@@ -68,7 +78,7 @@ std::vector<std::size_t> map_header(const TableForm& form, const std::vector<Cel
     const auto column = static_cast<std::size_t>(found - known.begin());
     if (found == known.end())
       faults.add(line, header[i].column, header[i].text,
-                 "unknown column" + suggestion(header[i].text, known));
+                 "unknown column" + suggestion(header[i].text, known) + remark(header[i].text));
     else if (seen[column])
       faults.add(line, header[i].column, header[i].text, "column occurs twice");
     else
@@ -139,11 +149,12 @@ class RowReader {
     if (fill_cell(cell.text, column, row)) return;
     const auto& words = form_[column].words;
     if (!words.empty())
-      return faults_.add_kind("word", number, cell.column, form_[column].name,
-                              quoted(cell.text) + ": " + expected(cell.text, words));
+      return faults_.add_kind(
+          "word", number, cell.column, form_[column].name,
+          quoted(cell.text) + ": " + expected(cell.text, words) + remark(cell.text));
     const auto fault = parse_cell(cell.text, row[column]);
     faults_.add_kind(fault, number, cell.column, form_[column].name,
-                     quoted(cell.text) + ": " + std::string(fault));
+                     quoted(cell.text) + ": " + std::string(fault) + remark(cell.text));
   }
 
   const TableForm& form_;

@@ -14,6 +14,10 @@ struct Signature {
 constexpr std::string_view kUtf16 = "the file is UTF-16: save it as \"CSV UTF-8\"";
 constexpr std::array kSignatures{
     Signature{"\xFF\xFE", kUtf16}, Signature{"\xFE\xFF", kUtf16},
+    Signature{
+        "\xEF\xBB\xBF\xEF\xBB\xBF",
+        "two byte order marks (U+FEFF) at the beginning: delete them, or save the file as UTF-8 "
+        "without a byte order mark"},
     Signature{"PK\x03\x04", "a spreadsheet file (.xlsx, .ods), not CSV: save it as \"CSV UTF-8\""},
     Signature{"\xD0\xCF\x11\xE0", "a spreadsheet file (.xls), not CSV: save it as \"CSV UTF-8\""}};
 

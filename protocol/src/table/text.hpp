@@ -2,12 +2,12 @@
 /// The text of a CSV file: its lines and their cells.
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstddef>
 #include <string_view>
-#include <system_error>
 #include <vector>
+
+#include "abbe/protocol/decimal.hpp"
+#include "table/spreadsheet_error.hpp"
 
 namespace abbe::protocol {
 
@@ -16,6 +16,12 @@ namespace abbe::protocol {
   const auto first = text.find_first_not_of(kBlank);
   if (first == std::string_view::npos) return text.substr(text.size());
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+/// True if the line is a comment: it begins with #, and its first cell is not an error value of a
+/// spreadsheet, such as #N/A.
+[[nodiscard]] inline bool is_comment(std::string_view content) {
+  return content.starts_with('#') && !begins_with_spreadsheet_error(content);
 }
 
 /// Iterates over the lines of a text and counts them; skips comments and blank lines.
@@ -34,7 +40,7 @@ class Lines {
       at_ += line.size() + 1;
       ++number_;
       const auto content = trimmed(line);
-      if (!content.empty() && content.front() != '#') return true;
+      if (!content.empty() && !is_comment(content)) return true;
     }
     return false;
   }
@@ -86,14 +92,7 @@ class Cells {
 
 /// Sets `value`. Returns what is wrong with the cell; empty if it is valid.
 [[nodiscard]] inline std::string_view parse_cell(std::string_view text, double& value) {
-  if (text.empty()) return "empty";
-  // Spreadsheets write "+"; std::from_chars does not accept it.
-  if (text.front() == '+') text.remove_prefix(1);
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (fault == std::errc::result_out_of_range) return "out of range";
-  if (fault != std::errc{} || end != text.data() + text.size()) return "not a number";
-  if (!std::isfinite(value)) return "must be finite";
-  return {};
+  return parse_decimal(text, value);
 }
 
 }  // namespace abbe::protocol

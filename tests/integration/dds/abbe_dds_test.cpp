@@ -67,7 +67,7 @@ TEST_F(AbbeDds, WithoutAnInterfaceOfItsProfileItEndsWithFour) {
 
 TEST_F(AbbeDds, AsAServiceItRefusesAConfigurationThatMakesItAChild) {
   write_config("child");
-  EXPECT_EQ(exit_code({"--config", config}), 3);
+  EXPECT_EQ(exit_code({"--config", config}), 5);
 }
 
 TEST_F(AbbeDds, AsAServiceItFindsSocketDomainAndProfileInTheConfiguration) {
@@ -104,9 +104,10 @@ TEST_F(AbbeDds, WatchTakesItsDomainFromTheConfigurationAndReportsSilence) {
   Process watch({"/bin/sh", "-c", "exec \"$@\" 2>&1", "sh", ABBE_WATCH_PROGRAM, "-c", config,
                  "--timeout", "6"});
   EXPECT_EQ(watch.wait_for_end(), 0);
-  EXPECT_NE(watch.transcript().find("nothing received for 5 s in DDS domain " + domain_.text() +
-                                    "; waiting for the topics abbe/v1/ModelState"),
-            std::string::npos)
+  EXPECT_NE(
+      watch.transcript().find("nothing received for 5 s in DDS domain " + domain_.text() +
+                              "; waiting for the topics abbe/v1/Identity, abbe/v1/ModelState"),
+      std::string::npos)
       << watch.transcript();
 }
 

@@ -1,9 +1,11 @@
 // Replaces abbed: publishes the sample messages over a DdsLink until it is killed, and supervises
 // abbe-dds as abbed does.
 //   dds_feeder SOCKET MACHINE [ABBE_DDS ARGUMENT...]
-// Prints "child PID" at every start of abbe-dds. The first component of its vectors is the time at
+// Prints "child PID" at every start of abbe-dds, and "twin TEXT" or "twin none" when abbe-dds
+// reports one. The first component of its vectors is the time at
 // which they were made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in
-// its environment the state is STALE until SIGUSR1.
+// its environment the state is STALE until SIGUSR1. ABBE_FEEDER_MACHINE_ID: its identity instead of
+// that of the sample messages.
 #include <signal.h>
 
 #include <cstdio>
@@ -31,6 +33,12 @@ v1::ModelState state(std::uint64_t sequence) {
   return state;
 }
 
+v1::Identity identity(std::uint64_t sequence) {
+  auto identity = test::identity(sequence);
+  if (const char* const id = std::getenv("ABBE_FEEDER_MACHINE_ID")) identity.machine_id(id);
+  return identity;
+}
+
 class Feeder {
  public:
   Feeder(DdsLink link, std::string machine) : link_(std::move(link)), machine_(std::move(machine)) {
@@ -41,7 +49,12 @@ class Feeder {
   void cycle(DdsLink::WallTime now) {
     link_.poll();
     link_.beat(now);
+    report_twin();
     if (now >= next_state_) {
+      auto which = identity(++sequence_);
+      which.twin(!link_.twin().empty());
+      which.twin_seen(link_.twin());
+      send(Topic::Identity, which);
       send(Topic::ModelState, state(++sequence_));
       next_state_ = now + std::chrono::seconds{1};
     }
@@ -50,6 +63,13 @@ class Feeder {
   }
 
  private:
+  void report_twin() {
+    if (link_.twin() == twin_) return;
+    twin_ = link_.twin();
+    std::printf("twin %s\n", twin_.empty() ? "none" : twin_.c_str());
+    std::fflush(stdout);
+    next_state_ = {};
+  }
   v1::Compensation vector(DdsLink::WallTime now) {
     auto vector = test::compensation(++sequence_);  // 1 ms old
     const std::int64_t made_ns = now.time_since_epoch().count() - vector.age_ns();
@@ -64,7 +84,7 @@ class Feeder {
   }
 
   DdsLink link_;
-  std::string machine_;
+  std::string machine_, twin_;
   std::vector<std::byte> payload_;
   std::uint64_t sequence_ = 0;
   DdsLink::WallTime next_state_{};

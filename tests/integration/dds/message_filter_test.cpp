@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <tuple>
 #include <vector>
 
 namespace abbe::dds {
@@ -68,9 +70,10 @@ TEST_P(MessageFilter, DoesNotChangeOtherWritersAndOtherParameters) {
 
 INSTANTIATE_TEST_SUITE_P(BothByteOrders, MessageFilter, testing::Bool());
 
-TEST(MessageFilterInput, RefusesAnnouncementsInFragments) {
+TEST(MessageFilterInput, SkipsAnnouncementsInFragments) {
   Bytes message = announcement(kPublications, {kTypeObject}, true, 0x16);
-  EXPECT_EQ(filter_message(message), 0u);
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[20], 0x7f);
 }
 
 Bytes with_statistics(std::uint16_t length, std::size_t bytes) {
@@ -154,18 +157,176 @@ TEST(MessageFilterInput, LeavesAWithdrawalWithoutAListAlone) {
   EXPECT_EQ(message, untouched);
 }
 
-/// With AddressSanitizer: every truncation, and every wrong length.
-TEST(MessageFilterInput, NeverReadsBeyondTheMessage) {
-  const Bytes whole = announcement(kPublications, {kTopicName, kTypeObject, kTypeInformation});
-  for (std::size_t cut = 0; cut <= whole.size(); ++cut) {
-    Bytes message(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
-    static_cast<void>(filter_message(message));
-    for (std::size_t at = 20; at < cut; ++at) {
-      Bytes lying = Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
-      lying[at] = 0xff;
-      static_cast<void>(filter_message(lying));
+/// A submessage of a user's writer, entity 00000102.
+Bytes users_data(std::uint8_t flags, const Bytes& rest, std::uint8_t kind = 0x15) {
+  Bytes message = data_message(kSomebodys, flags, 16, rest, kind);
+  message[34] = 1, message[35] = 2;  // its writer id: 00 00 01 02
+  return message;
+}
+constexpr std::size_t kKindAt = 20, kBodyAt = 24;
+const Bytes kDisposed{0x71, 0, 4, 0, 0, 0, 0, 1, 1, 0, 0, 0};
+
+/// A reliable reader waits for each sequence number, so a sample must not only be taken away.
+TEST(MessageFilterOfSamples, ReplacesADisposedInstanceByAGapOfItsNumber) {
+  for (const std::uint8_t status : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}}) {
+    Bytes inline_qos = kDisposed;
+    inline_qos[7] = status;
+    Bytes key = inline_qos;
+    key.insert(key.end(), {0, 1, 0, 0, 2, 0, 0, 0, 'm', 0, 0, 0});
+    for (auto message : {users_data(3, inline_qos), users_data(11, key)}) {
+      const Bytes before = message;
+      EXPECT_EQ(filter_message(message), message.size());
+      EXPECT_EQ(message[kKindAt], 0x08);
+      EXPECT_TRUE(std::equal(&before[kBodyAt + 4], &before[kBodyAt + 20], &message[kBodyAt]));
+      const Bytes list{0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0};  // from number 2 on: no bits
+      EXPECT_TRUE(std::equal(list.begin(), list.end(), &message[kBodyAt + 16]));
     }
   }
+}
+
+TEST(MessageFilterOfSamples, ReplacesASampleThatIsNotPlainCdr) {
+  for (const auto& [first, second, passes] :
+       {std::tuple{0, 0, true}, {0, 1, true}, {0, 3, false}, {0, 7, false}, {7, 1, false}}) {
+    Bytes message = users_data(
+        5, {static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(second), 0, 0, 1, 2, 3, 4});
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], passes ? 0x15 : 0x08) << first << " " << second;
+  }
+}
+
+TEST(MessageFilterOfSamples, AGapOfALargeNumberInTheOtherByteOrderIsRight) {
+  Bytes message = users_data(2, {0, 0x71, 0, 4, 0, 0, 0, 1, 0, 1, 0, 0});
+  const Bytes number{0, 0, 0, 7, 0xff, 0xff, 0xff, 0xff};
+  std::copy(number.begin(), number.end(), &message[kBodyAt + 12]);
+  EXPECT_EQ(filter_message(message), message.size());
+  const Bytes gap{0, 0, 0, 7, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_TRUE(std::equal(gap.begin(), gap.end(), &message[kBodyAt + 8]));
+}
+
+TEST(MessageFilterOfSamples, SkipsASampleWithoutContentThatIsTooShortForAGap) {
+  Bytes message = users_data(1, {});
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[kKindAt], 0x7f);
+}
+
+TEST(MessageFilterOfSamples, PassesASampleWithContentAndBlanksItsKeyHash) {
+  Bytes rest{0x70, 0, 16, 0};
+  rest.resize(20, 9);
+  rest.insert(rest.end(), {1, 0, 0, 0, 0, 1, 0, 0, 1, 2, 3, 4});
+  const Bytes before = users_data(7, rest);
+  Bytes message = before;
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[kBodyAt + 20], 0xff);
+  EXPECT_EQ(message[kBodyAt + 21], 0xbf);
+  EXPECT_TRUE(std::equal(before.begin() + kBodyAt + 22, before.end(), &message[kBodyAt + 22]));
+}
+
+TEST(MessageFilterOfSamples, SkipsFragmentsOfUsersAndPassesThoseOfDdsSecurity) {
+  const Bytes fragment{1, 0, 0, 0, 1, 0, 64, 0, 128, 0, 0, 0, 7, 7, 7, 7};
+  Bytes message = users_data(1, fragment, 0x16);
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[kKindAt], 0x7f);
+
+  message = data_message(0, 1, 28, fragment, 0x16);
+  const Bytes writer{0, 2, 1, 0xc3};
+  std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
+  const Bytes whole = message;
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message, whole);
+  message[kBodyAt + 20] = 0;  // fragments are counted from 1
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[kKindAt], 0x7f);
+}
+
+Bytes gap_message(std::uint32_t start, std::uint32_t base) {
+  Bytes message = users_data(1, Bytes(12), 0x08);
+  Bytes body{0, 0, 0, 0, 0, 0, 1, 2};
+  for (const auto number : {0u, start, 0u, base, 0u})
+    for (int i = 0; i < 4; ++i) body.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
+  message.resize(kBodyAt);
+  message.insert(message.end(), body.begin(), body.end());
+  message[kKindAt + 2] = static_cast<std::uint8_t>(body.size());
+  return message;
+}
+
+/// Fast DDS marks each number of it, and would neither end nor keep its memory.
+TEST(MessageFilterOfSamples, SkipsAGapThatIsLongerThanAnyHistory) {
+  for (const auto& [start, base, passes] : {std::tuple{5u, 6u, true},
+                                            {5u, 5u + 1024u, true},
+                                            {5u, 5u + 1025u, false},
+                                            {1u, 0xffff'fff0u, false},
+                                            {6u, 6u, false},
+                                            {7u, 6u, false}}) {
+    Bytes message = gap_message(start, base);
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], passes ? 0x08 : 0x7f) << start << " to " << base;
+  }
+}
+
+/// Fast DDS asserts that it can add to a sequence number.
+TEST(MessageFilterOfSamples, SkipsSequenceNumbersNearTheLargest) {
+  Bytes data = users_data(5, {0, 1, 0, 0, 1, 2, 3, 4});
+  const Bytes largest{0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0};
+  std::copy(largest.begin(), largest.end(), &data[kBodyAt + 12]);
+  EXPECT_EQ(filter_message(data), 0u);
+
+  for (const std::uint8_t kind : {std::uint8_t{0x06}, std::uint8_t{0x07}, std::uint8_t{0x08}}) {
+    Bytes message = gap_message(5, 6);
+    message[kKindAt] = kind;
+    const Bytes before = message;
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message, before);
+    const std::size_t at = kind == 0x06 ? 8 : 16;
+    std::copy(largest.begin(), largest.end(), &message[kBodyAt + at]);
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], 0x7f) << int{kind};
+  }
+}
+
+/// A sample dated in the future would keep the later ones of all publishers out of the history.
+TEST(MessageFilterOfSamples, TakesTimeStampsAway) {
+  Bytes message{'R', 'T', 'P', 'S', 2,    3, 1, 15, 0,    0,    0,    0,    0, 0, 0, 0,
+                0,   0,   0,   0,   0x09, 1, 8, 0,  0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0};
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[kKindAt + 1], 3);
+}
+
+/// A change would break the signature. Without DDS Security the prefix means nothing.
+TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured) {
+  Bytes message = users_data(3, kDisposed);
+  const Bytes prefix{0x33, 1, 4, 0, 0, 0, 0, 0};
+  message.insert(message.begin() + kKindAt, prefix.begin(), prefix.end());
+  const Bytes before = message;
+  EXPECT_EQ(filter_message(message, true), message.size());
+  EXPECT_EQ(message, before);
+  EXPECT_EQ(filter_message(message, false), message.size());
+  EXPECT_EQ(message[kKindAt + prefix.size()], 0x08);
+}
+
+TEST(MessageFilterOfSamples, SkipsAShortLivelinessMessage) {
+  for (const std::size_t bytes : {16u, 20u}) {
+    Bytes message = data_message(0, 5, 16, Bytes(bytes));
+    const Bytes writer{0, 2, 0, 0xc2};
+    std::copy(writer.begin(), writer.end(), &message[kBodyAt + 8]);
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kKindAt], bytes < 20 ? 0x7f : 0x15);
+  }
+}
+
+/// With AddressSanitizer: every truncation, and every wrong length.
+TEST(MessageFilterInput, NeverReadsBeyondTheMessage) {
+  const Bytes list = announcement(kPublications, {kTopicName, kTypeObject, kTypeInformation});
+  for (const Bytes& whole :
+       {list, users_data(3, kDisposed), users_data(1, Bytes(16), 0x16), gap_message(5, 6)})
+    for (std::size_t cut = 0; cut <= whole.size(); ++cut) {
+      Bytes message(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
+      static_cast<void>(filter_message(message));
+      for (std::size_t at = 20; at < cut; ++at) {
+        Bytes lying = Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
+        lying[at] = 0xff;
+        static_cast<void>(filter_message(lying));
+      }
+    }
 }
 
 }  // namespace

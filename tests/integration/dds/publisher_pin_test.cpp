@@ -8,26 +8,38 @@ namespace {
 using namespace std::chrono_literals;
 using Verdict = PublisherPin::Verdict;
 
-constexpr ParticipantId kFirst{1}, kSecond{2}, kThird{3};
+constexpr ParticipantId kFirst{1}, kSecond{2}, kThird{3}, kOther{200};
 
-/// Participants that send every 10 ms, as abbe does.
+const std::string kMill = "7c1d5a52-8f0d-4c0e-8d0d-2f6b3f1f0c11",
+                  kOtherMill = "b6f4f9a0-51c5-4b0e-9a53-0a6a0f6b7a22";
+
+/// Participants that send every 10 ms, as abbe does; kOther states another machine than the rest.
 struct PublisherPinTest : testing::Test {
   PublisherPin pin;
   PublisherPin::Instant now{1000s};
 
-  /// The verdict on the last sample of the last one.
+  static std::string machine_of(const ParticipantId& id) {
+    return id == kOther ? kOtherMill : kMill;
+  }
+
+  /// The verdict on the last sample of the last one. Each states its machine first.
   Verdict send(std::initializer_list<ParticipantId> who, std::chrono::milliseconds duration) {
     Verdict last{};
+    for (const auto& id : who)
+      if (!pin.stated_by(id)) last = pin.identified(id, machine_of(id), false, now);
     for (const auto end = now + duration; now < end; now += 10ms)
       for (const auto& id : who) last = pin.heard(id, now);
     return last;
   }
 };
 
-TEST_F(PublisherPinTest, TheFirstPublisherIsPinned) {
-  EXPECT_EQ(pin.heard(kFirst, now), Verdict::NewlyPinned);
+TEST_F(PublisherPinTest, TheFirstPublisherThatStatesItsMachineIsPinned) {
+  EXPECT_EQ(pin.heard(kSecond, now), Verdict::Waiting);
+  EXPECT_EQ(pin.heard(kFirst, now), Verdict::Waiting);
+  EXPECT_EQ(pin.identified(kFirst, kMill, false, now), Verdict::NewlyPinned);
   EXPECT_EQ(pin.heard(kFirst, now + 10ms), Verdict::Pinned);
   EXPECT_EQ(pin.pinned(), kFirst);
+  EXPECT_EQ(pin.machine_id(), kMill);
 }
 
 TEST_F(PublisherPinTest, ASecondPublisherBesideItIsIgnored) {
@@ -48,6 +60,44 @@ TEST_F(PublisherPinTest, ASuccessorIsPinnedOnceTheFirstWasSilentFor300Ms) {
   EXPECT_FALSE(pin.remembers(kFirst));
 }
 
+TEST_F(PublisherPinTest, AnotherMachineOfTheSameNameIsNeverPinned) {
+  send({kFirst}, 500ms);
+  EXPECT_EQ(send({kFirst, kOther}, 1s), Verdict::OtherMachine);
+  EXPECT_EQ(send({kOther}, 1h), Verdict::OtherMachine);
+  EXPECT_EQ(pin.pinned(), kFirst);
+  send({kSecond}, 50ms);  // the first machine is back
+  EXPECT_EQ(pin.pinned(), kSecond);
+}
+
+TEST_F(PublisherPinTest, ASubscriberWithAMachineIdPinsThisMachineOnly) {
+  pin = PublisherPin(kOtherMill);
+  EXPECT_EQ(send({kFirst}, 60s), Verdict::OtherMachine);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+  EXPECT_EQ(send({kFirst, kOther}, 1s), Verdict::Pinned);
+}
+
+TEST_F(PublisherPinTest, OfTwinsNoneIsPinnedUnlessTheMachineIdIsGiven) {
+  EXPECT_EQ(pin.identified(kFirst, kMill, true, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kOther, kOtherMill, true, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+  PublisherPin given(kOtherMill);
+  EXPECT_EQ(given.identified(kFirst, kMill, true, now), Verdict::OtherMachine);
+  EXPECT_EQ(given.identified(kOther, kOtherMill, true, now), Verdict::NewlyPinned);
+}
+
+TEST_F(PublisherPinTest, ATwinThatAppearsLaterDoesNotReleaseTheFirst) {
+  send({kFirst}, 500ms);
+  EXPECT_EQ(pin.identified(kFirst, kMill, true, now), Verdict::Pinned);
+}
+
+TEST_F(PublisherPinTest, AParticipantThatStatesAnotherMachineIsNotUsedAnyMore) {
+  send({kFirst}, 500ms);
+  EXPECT_EQ(pin.identified(kFirst, kOtherMill, false, now), Verdict::OtherMachine);
+  EXPECT_EQ(pin.heard(kFirst, now + 10s), Verdict::OtherMachine);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+}
+
+/// A copied disk: two machines with one identity.
 TEST_F(PublisherPinTest, AnIgnoredPublisherIsNotTheSuccessorOfAFirstThatRestarts) {
   send({kFirst}, 500ms);
   send({kFirst, kSecond}, 1s);
@@ -57,11 +107,10 @@ TEST_F(PublisherPinTest, AnIgnoredPublisherIsNotTheSuccessorOfAFirstThatRestarts
   EXPECT_EQ(send({kThird, kSecond}, 20s), Verdict::Foreign);
 }
 
-TEST_F(PublisherPinTest, AnIgnoredPublisherIsAcceptedAfterTenSecondsOfSilence) {
+TEST_F(PublisherPinTest, AnIgnoredPublisherIsNotPinnedAfterTheEndOfTheFirst) {
   send({kFirst, kSecond}, 1s);
-  EXPECT_EQ(send({kSecond}, 9900ms), Verdict::Foreign);
-  send({kSecond}, 100ms);
-  EXPECT_EQ(pin.pinned(), kSecond);
+  EXPECT_EQ(send({kSecond}, 1h), Verdict::Foreign);
+  EXPECT_EQ(pin.pinned(), kFirst);
 }
 
 /// The subscriber was stopped: the time before its first sample is no silence of the publisher.

@@ -25,6 +25,17 @@ inline v1::ModelState active_state(std::uint64_t sequence) {
   return s;
 }
 
+inline constexpr const char* kMachineId = "7c1d5a52-8f0d-4c0e-8d0d-2f6b3f1f0c11";
+
+inline v1::Identity identity(std::uint64_t sequence) {
+  v1::Identity m;
+  m.machine(kMachine);
+  m.sequence_number(sequence);
+  m.machine_id(kMachineId);
+  m.model_id(kModelId);
+  return m;
+}
+
 inline v1::ErrorModel error_model() {
   v1::ErrorModel m;
   m.machine(kMachine);

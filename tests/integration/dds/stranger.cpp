@@ -2,6 +2,9 @@
 //   dds_stranger DOMAIN fake [KEYS]   publishes ModelState ACTIVE, Compensation and ErrorGrid of
 //                                     999 um under the name of the tests' machine; KEYS: with keys
 //                                     of another authority
+//   dds_stranger DOMAIN twin [KEYS]   the same as another machine of this name: its Identity has
+//                                     another machine_id
+//   dds_stranger DOMAIN dispose       publishes and disposes instances of ErrorGrid
 //   dds_stranger DOMAIN types         announces types with a sequence of structs, on a topic of
 //                                     abbe and on a topic of its own
 //   dds_stranger DOMAIN garbage       sends malformed RTPS to the ports of the domain's first
@@ -54,7 +57,7 @@ void write(abbe::dds::Writers& writers, daemon::Topic topic, const T& message) {
   if (daemon::encode(message, payload)) writers.write(topic, payload);
 }
 
-int publish_fakes(abbe::dds::ParticipantOptions options) {
+int publish_fakes(abbe::dds::ParticipantOptions options, bool as_twin) {
   auto participant = abbe::dds::Participant::create(options);
   if (!participant) return refused(participant.error());
   auto writers = abbe::dds::Writers::create(*participant);
@@ -63,6 +66,9 @@ int publish_fakes(abbe::dds::ParticipantOptions options) {
 
   for (std::uint64_t n = 1'000'000;; ++n) {
     if (n % 10 == 0) {
+      auto identity = test::identity(n);
+      if (as_twin) identity.machine_id("b6f4f9a0-51c5-4b0e-9a53-0a6a0f6b7a22");
+      write(*writers, daemon::Topic::Identity, identity);
       write(*writers, daemon::Topic::ModelState, test::active_state(n));
       for (auto slice : test::grid_slices()) {
         for (auto& node : slice.nodes()) node.error_m({kFake_m, kFake_m, kFake_m});
@@ -74,6 +80,25 @@ int publish_fakes(abbe::dds::ParticipantOptions options) {
     write(*writers, daemon::Topic::Compensation, vector);
     writers->assert_liveliness();
     std::this_thread::sleep_for(10ms);
+  }
+}
+
+int dispose_instances(const abbe::dds::ParticipantOptions& options) {
+  auto participant = abbe::dds::Participant::create(options);
+  if (!participant) return refused(participant.error());
+  auto writers = abbe::dds::Writers::create(*participant);
+  if (!writers) return refused(writers.error());
+  report_start();
+
+  for (std::uint32_t n = 0;; ++n) {
+    for (auto slice : test::grid_slices()) {
+      std::vector<std::byte> payload;
+      slice.slice(slice.slice() + 2 * n % 100);
+      if (!daemon::encode(slice, payload)) return 5;
+      writers->write(daemon::Topic::ErrorGrid, payload);
+      writers->dispose(daemon::Topic::ErrorGrid, payload);
+    }
+    std::this_thread::sleep_for(20ms);
   }
 }
 
@@ -176,9 +201,11 @@ int main(int argc, char** argv) {
   const std::string what = argv[2];
   if (what == "types") return publish_types(domain);
   if (what == "garbage") return send_garbage(domain);
-  if (what != "fake") return 2;
-  return publish_fakes({.domain = domain,
-                        .profiles = ABBE_LOOPBACK_PROFILE,
-                        .security = argc > 3 ? argv[3] : "",
-                        .role = daemon::DdsRole::Daemon});
+  const abbe::dds::ParticipantOptions options{.domain = domain,
+                                              .profiles = ABBE_LOOPBACK_PROFILE,
+                                              .security = argc > 3 ? argv[3] : "",
+                                              .role = daemon::DdsRole::Daemon};
+  if (what == "dispose") return dispose_instances(options);
+  if (what != "fake" && what != "twin") return 2;
+  return publish_fakes(options, what == "twin");
 }

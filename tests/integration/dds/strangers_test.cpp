@@ -187,6 +187,7 @@ class StrangersWithoutSecurity : public Strangers {
 
   Process fast{fast_subscriber()};
   Process cyclone{cyclone_subscriber()};
+  Process linuxcnc{{ABBE_LINUXCNC_SUBSCRIBER, domain_.text(), kMachine}};
   Process watcher{watch({})};
 };
 
@@ -215,6 +216,44 @@ TEST_F(StrangersWithoutSecurity, AForeignPublisherDoesNotReplaceARestartedOne) {
   }
 
   EXPECT_TRUE(watcher.wait_for("vmc-3  publisher is now ", killed)) << watcher.transcript();
+  expect_no_fake();
+}
+
+/// As before identities were pinned: it would have been used 10 s after the end of the first.
+TEST_F(StrangersWithoutSecurity, AMachineOfTheSameNameIsNotUsedAfterTheFirstEnds) {
+  Process twin(stranger("twin"));
+  for (Process* subscriber : {&fast, &cyclone})
+    EXPECT_TRUE(subscriber->wait_for("vmc-3: another machine of this name"))
+        << subscriber->transcript();
+  EXPECT_TRUE(watcher.wait_for("vmc-3  another machine of this name, machine_id b6f4f9a0"))
+      << watcher.transcript();
+
+  const auto ended = Clock::now();
+  feeder_.reset();
+  for (Process* subscriber : {&fast, &cyclone})
+    ASSERT_TRUE(subscriber->wait_for("vmc-3: not alive", ended)) << subscriber->transcript();
+  EXPECT_FALSE(cyclone.wait_for("vmc-3: publisher is", ended, 13s));  // 10 s and a margin
+  EXPECT_FALSE(fast.wait_for("vmc-3: publisher is", ended, 0s));
+  EXPECT_TRUE(linuxcnc.wait_for("not usable: ", ended)) << linuxcnc.transcript();
+  EXPECT_FALSE(linuxcnc.wait_for("usable ", ended, 0s)) << linuxcnc.transcript();
+  expect_no_fake();
+
+  const auto back = Clock::now();
+  start_feeder();
+  for (Process* subscriber : {&fast, &cyclone})
+    EXPECT_TRUE(subscriber->wait_for("vmc-3: apply V", back)) << subscriber->transcript();
+  EXPECT_TRUE(linuxcnc.wait_for("usable ", back)) << linuxcnc.transcript();
+  expect_no_fake();
+}
+
+/// A copied disk: the same machine_id from two participants.
+TEST_F(StrangersWithoutSecurity, ACopyOfTheIdentityIsNotUsedAfterTheFirstEnds) {
+  Process fake(stranger("fake"));
+  expect_foreign_publisher_reported();
+  const auto ended = Clock::now();
+  feeder_.reset();
+  EXPECT_FALSE(cyclone.wait_for("vmc-3: publisher is", ended, 13s));
+  EXPECT_FALSE(fast.wait_for("vmc-3: publisher is", ended, 0s));
   expect_no_fake();
 }
 
@@ -256,6 +295,10 @@ TEST_F(UninvitedWithoutSecurity, AnnouncedTypesEndNothingAndMakeNoGap) {
 
 TEST_F(UninvitedWithoutSecurity, GarbageEndsNothingAndMakesNoGap) {
   expect_nothing_ends_and_no_gap_of_half_a_second("garbage");
+}
+
+TEST_F(UninvitedWithoutSecurity, DisposedInstancesEndNothingAndMakeNoGap) {
+  expect_nothing_ends_and_no_gap_of_half_a_second("dispose");
 }
 
 /// The watcher has model and grid of vmc-3 and waits for its state; the foreign state is ACTIVE

@@ -180,8 +180,8 @@ TEST_F(MtconnectAgent, KnowsEveryDataItemAndReconnectsToARestartedAdapter) {
   ASSERT_TRUE(agent_shows("avail", "AVAILABLE")) << agent_->err();
   const std::string probe = get("/probe");
   for (const char* name : {"avail", "model_state", "model_id", "model_hash", "model_date",
-                           "u_volume", "u_type", "process_state", "process_id", "process_kind",
-                           "message", "devices", "system", "calibration"}) {
+                           "u_volume", "u_type", "simulated", "process_state", "process_id",
+                           "process_kind", "message", "devices", "system", "calibration"}) {
     EXPECT_THAT(probe, HasSubstr(fmt::format("name=\"{}\"", name)));
     EXPECT_FALSE(observations(name).empty()) << name;
   }

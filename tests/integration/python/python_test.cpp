@@ -271,9 +271,9 @@ for point in points:
 print("reflectors", len(control.tracker_reflectors()) > 0)
 print("home:", control.tracker_home())
 print("orders", [order["order"] for order in control.tracker()["orders"]])
-control.stop_machine()
 print("release awaited", control.machine()["release_awaited"])
 for name, request in (("find", lambda: control.tracker_find(-1)), ("release", control.release_machine),
+                      ("stop", control.stop_machine),
                       ("reference", lambda: list(control.reference())),
                       ("here", lambda: control.reference_here(["X"], 1e-5))):
     try:
@@ -289,6 +289,7 @@ for name, request in (("find", lambda: control.tracker_find(-1)), ("release", co
   EXPECT_THAT(requests->out(),
               AllOf(HasSubstr("standstill [0, 0, -100] True"), HasSubstr("reflectors True"),
                     HasSubstr("home: "), HasSubstr("'home'"), HasSubstr("release awaited False"),
+                    HasSubstr("stop refused machine: there is no measuring machine"),
                     ContainsRegex("find (refused|bad_input|usage|io) ")));
 }
 

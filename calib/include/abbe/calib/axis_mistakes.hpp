@@ -39,7 +39,9 @@ struct OutsideTravel {
                                                         double tolerance_m = 1e-9);
 
 /// Names the mistakes whose correction puts all points inside the travel: "; all are inside with Y
-/// reversed, or with X and Y swapped". Empty if no correction does.
+/// reversed, or with X and Y swapped". Empty if no correction does, or if no point is farther
+/// outside than 5 % of the shortest travel. A unit is named only if the points, in this unit, extend
+/// over at least half of the travel of an axis.
 [[nodiscard]] std::string corrections_inside_travel(std::span<const Vector3> points_m,
                                                     const MachineNodes& travel);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "axis_steps.hpp"
+#include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "machine_order.hpp"
 #include "message_bounds.hpp"
@@ -14,53 +15,55 @@ namespace abbe::daemon {
 
 namespace {
 
-void read_channel(Section& section, std::string_view key, std::optional<std::uint8_t>& out) {
+void read_channel(ClassifiedSection& section, Key key, std::optional<std::uint8_t>& out) {
   std::uint8_t channel = 0;
   if (section.get_integer(key, channel, 0, kLastChannel)) out = channel;
 }
 
-void read_touch_channels(Section& card, drivers::CounterCardWiring& out) {
-  read_channel(card, "latch_channel", out.latch_channel);
-  read_channel(card, "edge_channel", out.edge_channel);
-  read_debounce(card, "latch_debounce_code", out.latch_debounce);
-  read_debounce(card, "edge_debounce_code", out.edge_debounce);
-  card.get("latch_verified", out.latch_verified);
+void read_touch_channels(ClassifiedSection& card, drivers::CounterCardWiring& out) {
+  read_channel(card, if_given(measurement("latch_channel")), out.latch_channel);
+  read_channel(card, if_given(measurement("edge_channel")), out.edge_channel);
+  read_debounce(card, operation("latch_debounce_code"), out.latch_debounce);
+  read_debounce(card, operation("edge_debounce_code"), out.edge_debounce);
+  card.get(operation("latch_verified"), out.latch_verified);
 }
 
-void read_scan(Section& card, CounterCardConfig& out) {
+void read_scan(ClassifiedSection& card, CounterCardConfig& out) {
   int bits = 32;
-  card.get("scan_rate_hz", out.card.wiring.scan_rate_hz, kPlain, kPositive);
-  if (card.get_integer("width_bits", bits, 32, 48) && bits != 32 && bits != 48)
+  card.get(operation("scan_rate_hz"), out.card.wiring.scan_rate_hz, kPlain, kPositive);
+  if (card.get_integer(reading("width_bits"), bits, 32, 48) && bits != 32 && bits != 48)
     card.fault("width_bits", "must be 32 or 48");
   out.card.wiring.width =
       bits == 48 ? drivers::quad08::CountWidth::Bits48 : drivers::quad08::CountWidth::Bits32;
-  card.get_integer("sample_every", out.sample_every, 1, 1'000'000);
-  card.get("max_constant_delay_us", out.card.max_constant_delay, kMicro, kNotNegative);
-  card.get("axes_compensated", out.axes_compensated);
+  card.get_integer(operation("sample_every"), out.sample_every, 1, 1'000'000);
+  card.get(reading("max_constant_delay_us"), out.card.max_constant_delay, kMicro, kNotNegative);
+  card.get(reading("axes_compensated"), out.axes_compensated);
 }
 
-drivers::CounterAxis read_counted_axis(Section& section, const MachineConfig& machine) {
+drivers::CounterAxis read_counted_axis(ClassifiedSection& section, const MachineConfig& machine) {
   drivers::CounterAxis axis;
-  const bool named = section.get("axis", axis.name, Need::Required);
+  const bool named = section.get(stated("axis"), axis.name, Need::Required);
   const AxisConfig* known = machine.find_axis(axis.name);
   if (named && known == nullptr && !machine.axes.empty())
     section.fault("axis", "no such axis in [axes]");
   const bool linear = known == nullptr || known->kind == AxisKind::Linear;
-  section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
-  section.get(linear ? "step_nm" : "step_nrad", axis.scale, kNano, kNotNegative, Need::Required);
+  section.get_integer(reading("channel"), axis.channel, 0, kLastChannel, Need::Required);
+  section.get(reading(linear ? "step_nm" : "step_nrad"), axis.scale, kNano, kNotNegative,
+              Need::Required);
   check_step(section, axis.scale, linear);
-  section.get(linear ? "offset_mm" : "offset_rad", axis.offset, linear ? kMilli : kPlain, kAny);
-  section.get("latch_on_index", axis.latch_on_index);
-  read_debounce(section, "debounce_code", axis.debounce);
+  section.get(reading(linear ? "offset_mm" : "offset_rad"), axis.offset, linear ? kMilli : kPlain,
+              kAny);
+  section.get(reading("latch_on_index"), axis.latch_on_index);
+  read_debounce(section, operation("debounce_code"), axis.debounce);
   bool invert = false;
-  if (section.get("invert", invert) && invert) axis.scale = -axis.scale;
+  if (section.get(reading("invert"), invert) && invert) axis.scale = -axis.scale;
   section.close();
 
   return axis;
 }
 
 /// Adds a fault for each axis of the card that another device reads already.
-void refuse_claimed_axes(Section& table, const drivers::CounterCardWiring& wiring,
+void refuse_claimed_axes(ClassifiedSection& table, const drivers::CounterCardWiring& wiring,
                          const Config& config) {
   for (const auto& axis : wiring.axes)
     for (const AxisReadings& other : axis_readings(config))
@@ -69,19 +72,19 @@ void refuse_claimed_axes(Section& table, const drivers::CounterCardWiring& wirin
                                         other.key));
 }
 
-void read_counter_card(Section& root, Config& out, StreamNames& names) {
-  Section table = root.child("counter_card");
+void read_counter_card(ClassifiedSection& root, Config& out, StreamNames& names) {
+  ClassifiedSection table = root.child("counter_card");
   if (!table.present()) return;
   CounterCardConfig config;
   UsbCardConfig& card = config.card;
-  get_bounded(table, "name", card.name, bound_of<v1::AxisSample>("device"));
-  table.get("serial_number", card.serial_number);
+  get_bounded(table, operation("name"), card.name, bound_of<v1::AxisSample>("device"));
+  table.get(operation("serial_number"), card.serial_number);
   read_card_address(table, card);
   read_card_clock(table, card.wiring);
   read_touch_channels(table, card.wiring);
   read_scan(table, config);
-  table.get_word<bool>("zero", config.zero_is_here, {{"unknown", false}, {"here", true}});
-  for (auto& section : table.children("axes"))
+  table.get_word<bool>(reading("zero"), config.zero_is_here, {{"unknown", false}, {"here", true}});
+  for (auto& section : table.children("axes", "axis"))
     card.wiring.axes.push_back(read_counted_axis(section, out.machine));
   put_in_order_of_the_machine(out.machine, &drivers::CounterAxis::name, table, "axes", "channel",
                               card.wiring.axes);
@@ -105,7 +108,7 @@ std::vector<std::string> counter_card_summary(const Config& config) {
   return {card_text(counter->card, config.machine)};
 }
 
-std::string counter_card_reading_text(const Config& config) {
+std::string former_counter_card_text(const Config& config) {
   const auto& counter = config.of<CounterCardConfig>();
   if (!counter) return {};
   std::string text = counter->axes_compensated ? "|compensated" : "|raw";
@@ -146,7 +149,7 @@ const ConfigKind CounterCardConfig::kKind{.key = "counter_card",
                                           .read = &read_counter_card,
                                           .doubt = &doubt_counter_card,
                                           .summary = &counter_card_summary,
-                                          .reading_text = &counter_card_reading_text,
+                                          .former_text = &former_counter_card_text,
                                           .axes = &counter_card_axes,
                                           .time_of_axis_samples = &time_of_counter_card_samples,
                                           .counted = &axes_counted_by_card};

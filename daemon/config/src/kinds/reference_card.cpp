@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "usb_card.hpp"
@@ -13,10 +14,10 @@ namespace abbe::daemon {
 
 namespace {
 
-drivers::CounterAxis read_latched_axis(Section& section, const CountedAxes& live,
+drivers::CounterAxis read_latched_axis(ClassifiedSection& section, const CountedAxes& live,
                                        AxisMarks& marks) {
   drivers::CounterAxis axis{.latch_on_index = true};
-  const bool named = section.get("axis", axis.name, Need::Required);
+  const bool named = section.get(stated("axis"), axis.name, Need::Required);
   const auto counted = std::ranges::find(live.axes(), axis.name, &drivers::CounterAxis::name);
   if (named && counted == live.axes().end())
     section.fault("axis", fmt::format("is not counted by [{}]", live.key));
@@ -28,24 +29,24 @@ drivers::CounterAxis read_latched_axis(Section& section, const CountedAxes& live
                                         live.key, axis.name));
   }
 
-  section.get_integer("channel", axis.channel, 0, kLastChannel, Need::Required);
-  read_debounce(section, "debounce_code", axis.debounce);
+  section.get_integer(reading("channel"), axis.channel, 0, kLastChannel, Need::Required);
+  read_debounce(section, operation("debounce_code"), axis.debounce);
   marks.axis = axis.name;
 
   return axis;
 }
 
-void read_marks(Section& section, bool linear, double step, std::string_view counted_by,
+void read_marks(ClassifiedSection& section, bool linear, double step, std::string_view counted_by,
                 AxisMarks& out) {
   double length = 0.0;
-  section.get(linear ? "signal_period_um" : "signal_period_urad", out.signal_period, kMicro,
+  section.get(reading(linear ? "signal_period_um" : "signal_period_urad"), out.signal_period,
+              kMicro, kPositive, Need::Required);
+  section.get(reading(linear ? "length_mm" : "length_rad"), length, linear ? kMilli : kPlain,
               kPositive, Need::Required);
-  section.get(linear ? "length_mm" : "length_rad", length, linear ? kMilli : kPlain, kPositive,
-              Need::Required);
-  section.get_integer("increment", out.code.increment, 2, 1'000'000);
-  section.get(linear ? "zero_mark_mm" : "zero_mark_rad", out.zero_mark, linear ? kMilli : kPlain,
-              kAny);
-  section.get("reversed", out.reversed);
+  section.get_integer(reading("increment"), out.code.increment, 2, 1'000'000);
+  section.get(reading(linear ? "zero_mark_mm" : "zero_mark_rad"), out.zero_mark,
+              linear ? kMilli : kPlain, kAny);
+  section.get(reading("reversed"), out.reversed);
   out.code.rotary = !linear;
   out.code.length = std::llround(length / out.signal_period);
   const double counts = out.signal_period / std::abs(step);
@@ -58,9 +59,9 @@ void read_marks(Section& section, bool linear, double step, std::string_view cou
     section.fault("", possible.error().text);
 }
 
-void read_latched_axes(Section& table, const CountedAxes& live, const MachineConfig& machine,
-                       ReferenceConfig& out) {
-  for (auto& section : table.children("axes")) {
+void read_latched_axes(ClassifiedSection& table, const CountedAxes& live,
+                       const MachineConfig& machine, ReferenceConfig& out) {
+  for (auto& section : table.children("axes", "axis")) {
     AxisMarks marks;
     out.card.wiring.axes.push_back(read_latched_axis(section, live, marks));
     const AxisConfig* known = machine.find_axis(marks.axis);
@@ -80,21 +81,21 @@ bool same_card(const UsbCardConfig& a, const UsbCardConfig& b) {
   return a.host == b.host && a.port == b.port && a.bus_id == b.bus_id;
 }
 
-void read_reference(Section& root, Config& out, StreamNames& names) {
-  Section table = root.child("reference");
+void read_reference(ClassifiedSection& root, Config& out, StreamNames& names) {
+  ClassifiedSection table = root.child("reference");
   if (!table.present()) return;
   ReferenceConfig config;
   UsbCardConfig& card = config.card;
   card.wiring.scan_rate_hz = 2000.0;
-  get_bounded(table, "name", card.name, bound_of<v1::AxisSample>("device"));
-  table.get("serial_number", card.serial_number);
+  get_bounded(table, operation("name"), card.name, bound_of<v1::AxisSample>("device"));
+  table.get(operation("serial_number"), card.serial_number);
   read_card_address(table, card);
   read_card_clock(table, card.wiring);
-  table.get("scan_rate_hz", card.wiring.scan_rate_hz, kPlain, kPositive);
-  table.get("max_constant_delay_us", card.max_constant_delay, kMicro, kNotNegative);
-  table.get("latch_verified", card.wiring.latch_verified);
-  table.get("u_alignment_us", config.marks.u_alignment, kMicro, kPositive);
-  table.get("tolerance_um", config.marks.tolerance_m, kMicro, kPositive);
+  table.get(operation("scan_rate_hz"), card.wiring.scan_rate_hz, kPlain, kPositive);
+  table.get(operation("max_constant_delay_us"), card.max_constant_delay, kMicro, kNotNegative);
+  table.get(operation("latch_verified"), card.wiring.latch_verified);
+  table.get(operation("u_alignment_us"), config.marks.u_alignment, kMicro, kPositive);
+  table.get(operation("tolerance_um"), config.marks.tolerance_m, kMicro, kPositive);
 
   if (const auto live = counted_axes(out); !live) {
     table.fault("", fmt::format("needs {}, which counts the same axes continuously",
@@ -121,7 +122,7 @@ std::vector<std::string> reference_summary(const Config& config) {
   return {card_text(reference->card, config.machine)};
 }
 
-std::string reference_reading_text(const Config& config) {
+std::string former_reference_text(const Config& config) {
   const auto& reference = config.of<ReferenceConfig>();
   if (!reference) return {};
   std::string text;
@@ -142,7 +143,7 @@ const ReferenceMarks* marks_of_reference(const Config& config) {
 const ConfigKind ReferenceConfig::kKind{.key = "reference",
                                         .read = &read_reference,
                                         .summary = &reference_summary,
-                                        .reading_text = &reference_reading_text,
+                                        .former_text = &former_reference_text,
                                         .marks = &marks_of_reference};
 
 }  // namespace abbe::daemon

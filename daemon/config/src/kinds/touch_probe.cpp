@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 
@@ -12,25 +13,25 @@ namespace abbe::daemon {
 
 namespace {
 
-void read_delay(Section& probe, drivers::ProbeDelay& out) {
-  probe.get_integer("id", out.id, 0, 1'000'000'000);
-  probe.get("delay_us", out.delay, kMicro, kNotNegative);
-  probe.get("jitter_us", out.u_jitter, kMicro, kNotNegative);
-  probe.get("u_delay_us", out.u_delay, kMicro, kNotNegative);
+void read_delay(ClassifiedSection& probe, drivers::ProbeDelay& out) {
+  probe.get_integer(operation("id"), out.id, 0, 1'000'000'000);
+  probe.get(measurement("delay_us"), out.delay, kMicro, kNotNegative);
+  probe.get(operation("jitter_us"), out.u_jitter, kMicro, kNotNegative);
+  probe.get(operation("u_delay_us"), out.u_delay, kMicro, kNotNegative);
 }
 
-void read_approach(Section& probe, drivers::ProbeApproach& out) {
-  probe.get("min_speed_mm_s", out.min_speed_m_s, kMilli, kNotNegative);
-  probe.get("max_speed_mm_s", out.max_speed_m_s, kMilli, kPositive);
-  probe.get("max_speed_change", out.max_speed_change, kPlain, kPositive);
-  probe.get("speed_window_ms", out.speed_window, kMilli, kPositive);
+void read_approach(ClassifiedSection& probe, drivers::ProbeApproach& out) {
+  probe.get(operation("min_speed_mm_s"), out.min_speed_m_s, kMilli, kNotNegative);
+  probe.get(operation("max_speed_mm_s"), out.max_speed_m_s, kMilli, kPositive);
+  probe.get(operation("max_speed_change"), out.max_speed_change, kPlain, kPositive);
+  probe.get(operation("speed_window_ms"), out.speed_window, kMilli, kPositive);
 }
 
-void read_switching(Section& probe, drivers::ProbeSwitching& out) {
-  probe.get("confirm_ms", out.confirm, kMilli, kPositive);
-  probe.get("chatter_ms", out.chatter, kMilli, kNotNegative);
-  probe.get("rearm_ms", out.rearm_quiet, kMilli, kNotNegative);
-  probe.get("rearm_retract_um", out.rearm_retract_m, kMicro, kNotNegative);
+void read_switching(ClassifiedSection& probe, drivers::ProbeSwitching& out) {
+  probe.get(operation("confirm_ms"), out.confirm, kMilli, kPositive);
+  probe.get(operation("chatter_ms"), out.chatter, kMilli, kNotNegative);
+  probe.get(operation("rearm_ms"), out.rearm_quiet, kMilli, kNotNegative);
+  probe.get(operation("rearm_retract_um"), out.rearm_retract_m, kMicro, kNotNegative);
 }
 
 /// True if the probe is wired to a channel of the counter card; otherwise its touches have no time.
@@ -38,16 +39,16 @@ bool is_wired(const std::optional<CountedAxes>& counted) {
   return counted && (counted->card.wiring.latch_channel || counted->card.wiring.edge_channel);
 }
 
-void read_probe(Section& root, Config& out, StreamNames& names) {
-  Section probe = root.child("probe");
+void read_probe(ClassifiedSection& root, Config& out, StreamNames& names) {
+  ClassifiedSection probe = root.child("probe");
   if (!probe.present()) return;
   ProbeConfig config;
-  get_bounded(probe, "name", config.name, bound_of<v1::ProbeTrigger>("device"));
+  get_bounded(probe, operation("name"), config.name, bound_of<v1::ProbeTrigger>("device"));
   read_delay(probe, config.delay);
   read_approach(probe, config.approach);
   read_switching(probe, config.switching);
-  probe.get("window_before_ms", config.window_before, kMilli, kNotNegative);
-  probe.get("window_after_ms", config.window_after, kMilli, kNotNegative);
+  probe.get(operation("window_before_ms"), config.window_before, kMilli, kNotNegative);
+  probe.get(operation("window_after_ms"), config.window_after, kMilli, kNotNegative);
   const auto counted = counted_axes(out);
 
   if (!is_wired(counted)) {

@@ -7,6 +7,7 @@
 #include "abbe/calib/otf/nest_visits.hpp"
 #include "abbe/config/unmeasured_air.hpp"
 #include "abbe/drivers/tracker/order.hpp"
+#include "classified_section.hpp"
 #include "config_kind.hpp"
 #include "message_bounds.hpp"
 #include "plausible.hpp"
@@ -15,15 +16,15 @@ namespace abbe::daemon {
 
 namespace {
 
-void read_noise(Section& tracker, MachineConfig& machine) {
-  tracker.get("sigma_range_um", machine.sigma_range_m, kMicro, kPositive);
-  tracker.get("sigma_angle_urad", machine.sigma_angle_rad, kMicro, kPositive);
-  tracker.get("u_range_offset_um", machine.u_range_offset_m, kMicro, kNotNegative);
+void read_noise(ClassifiedSection& tracker, MachineConfig& machine) {
+  tracker.get(operation("sigma_range_um"), machine.sigma_range_m, kMicro, kPositive);
+  tracker.get(operation("sigma_angle_urad"), machine.sigma_angle_rad, kMicro, kPositive);
+  tracker.get(operation("u_range_offset_um"), machine.u_range_offset_m, kMicro, kNotNegative);
 }
 
-void read_placement(Section& tracker, MachineConfig& machine) {
+void read_placement(ClassifiedSection& tracker, MachineConfig& machine) {
   TrackerVertical vertical = TrackerVertical::PlusZ;
-  if (tracker.get_word<TrackerVertical>("vertical", vertical,
+  if (tracker.get_word<TrackerVertical>(operation("vertical"), vertical,
                                         {{"+X", TrackerVertical::PlusX},
                                          {"-X", TrackerVertical::MinusX},
                                          {"+Y", TrackerVertical::PlusY},
@@ -33,33 +34,33 @@ void read_placement(Section& tracker, MachineConfig& machine) {
     machine.tracker_vertical = vertical;
   std::vector<double> position_m;
 
-  if (!tracker.get("position_mm", position_m, kMilli)) return;
+  if (!tracker.get(operation("position_mm"), position_m, kMilli)) return;
   if (position_m.size() == 3)
     machine.tracker_position_m = {position_m[0], position_m[1], position_m[2]};
   else
     tracker.fault("position_mm", "must be three numbers, x, y, z in machine coordinates");
 }
 
-calib::otf::Nest read_nest(Section& section) {
+calib::otf::Nest read_nest(ClassifiedSection& section) {
   constexpr Bounds kRadius_mm{0.5, 200.0};
   calib::otf::Nest nest;
   std::vector<double> position_m;
-  section.get("name", nest.name, Need::Required);
-  if (section.get("position_mm", position_m, kMilli, Need::Required)) {
+  section.get(operation("name"), nest.name, Need::Required);
+  if (section.get(operation("position_mm"), position_m, kMilli, Need::Required)) {
     if (position_m.size() == 3)
       nest.position_tracker_m = {position_m[0], position_m[1], position_m[2]};
     else
       section.fault("position_mm", "must be three numbers, x, y, z in the tracker frame");
   }
-  section.get("radius_mm", nest.radius_m, kMilli, kRadius_mm);
+  section.get(operation("radius_mm"), nest.radius_m, kMilli, kRadius_mm);
   section.close();
   return nest;
 }
 
-void read_nests(Section& tracker, calib::otf::NestOptions& out) {
+void read_nests(ClassifiedSection& tracker, calib::otf::NestOptions& out) {
   constexpr Bounds kRepeatability_um{0.1, 100.0};
-  tracker.get("nest_repeatability_um", out.u_repeatability_m, kMicro, kRepeatability_um);
-  for (auto& section : tracker.children("nest")) {
+  tracker.get(operation("nest_repeatability_um"), out.u_repeatability_m, kMicro, kRepeatability_um);
+  for (auto& section : tracker.children("nest", "name")) {
     out.nests.push_back(read_nest(section));
     if (out.nests.back().name.empty()) continue;
     if (const auto valid = calib::otf::find_nest_visits({}, out, {}); !valid)
@@ -69,9 +70,9 @@ void read_nests(Section& tracker, calib::otf::NestOptions& out) {
 
 /// Reads point_rate_hz. The measurement period of emScon is a whole number of milliseconds; a rate
 /// with another period is a fault, because the controller would change it silently.
-void read_point_rate(Section& tracker, TrackerConfig& out) {
+void read_point_rate(ClassifiedSection& tracker, TrackerConfig& out) {
   constexpr double kRounded = 5e-3;  // relative; accepts 333 for 333.3
-  if (!tracker.get("point_rate_hz", out.point_rate_hz, kPlain, {1.0, 1000.0})) return;
+  if (!tracker.get(operation("point_rate_hz"), out.point_rate_hz, kPlain, {1.0, 1000.0})) return;
   const double period_ms = std::round(1e3 / out.point_rate_hz);
   if (std::abs(out.point_rate_hz * period_ms / 1e3 - 1.0) > kRounded)
     tracker.fault("point_rate_hz",
@@ -83,15 +84,15 @@ void read_point_rate(Section& tracker, TrackerConfig& out) {
 
 /// Adds a fault for each key that applies only to the other mode: ignoring it silently would hide a
 /// mistake.
-void read_tracker_mode(Section& tracker, TrackerConfig& out) {
+void read_tracker_mode(ClassifiedSection& tracker, TrackerConfig& out) {
   constexpr int kLongest_ms = 60'000;  // emScon
-  tracker.get_word<TrackerModeConfig>("mode", out.mode,
+  tracker.get_word<TrackerModeConfig>(operation("mode"), out.mode,
                                       {{"continuous", TrackerModeConfig::Continuous},
                                        {"stationary", TrackerModeConfig::Stationary}});
 
   if (out.mode == TrackerModeConfig::Stationary) {
     int time_ms = static_cast<int>(out.stationary_time / std::chrono::milliseconds{1});
-    tracker.get_integer("stationary_time_ms", time_ms, 1, kLongest_ms);
+    tracker.get_integer(operation("stationary_time_ms"), time_ms, 1, kLongest_ms);
     out.stationary_time = std::chrono::milliseconds{time_ms};
     if (tracker.has("point_rate_hz"))
       tracker.fault("point_rate_hz", "has no meaning with mode = \"stationary\"");
@@ -102,19 +103,21 @@ void read_tracker_mode(Section& tracker, TrackerConfig& out) {
   }
 }
 
-void read_tracker_timeouts(Section& tracker, TrackerConfig& out) {
-  tracker.get("max_constant_delay_us", out.max_constant_delay, kMicro, kNotNegative);
-  tracker.get("connect_timeout_s", out.connect_timeout, kPlain, kPositive);
-  tracker.get("command_timeout_s", out.command_timeout, kPlain, kPositive);
-  tracker.get("initialize_timeout_s", out.initialize_timeout, kPlain, kPositive);
-  tracker.get("silence_timeout_s", out.silence_timeout, kPlain, kPositive);
+void read_tracker_timeouts(ClassifiedSection& tracker, Role points, TrackerConfig& out) {
+  tracker.get(Key{"max_constant_delay_us", points}, out.max_constant_delay, kMicro, kNotNegative);
+  tracker.get(operation("connect_timeout_s"), out.connect_timeout, kPlain, kPositive);
+  tracker.get(operation("command_timeout_s"), out.command_timeout, kPlain, {0.01, 600.0});
+  tracker.get(operation("initialize_timeout_s"), out.initialize_timeout, kPlain, kPositive);
+  tracker.get(operation("silence_timeout_s"), out.silence_timeout, kPlain, kPositive);
 }
 
-void read_search(Section& tracker, TrackerConfig& out) {
+void read_search(ClassifiedSection& tracker, TrackerConfig& out) {
   constexpr Bounds kRadius_mm{0.1, 10e3}, kTimeout_s{0.1, 600.0};
   TrackerSearchConfig search;
-  const bool radius = tracker.get("search_radius_mm", search.radius_m, kMilli, kRadius_mm);
-  const bool timeout = tracker.get("search_timeout_s", search.timeout, kPlain, kTimeout_s);
+  const bool radius =
+      tracker.get(operation("search_radius_mm"), search.radius_m, kMilli, kRadius_mm);
+  const bool timeout =
+      tracker.get(operation("search_timeout_s"), search.timeout, kPlain, kTimeout_s);
   if (radius && timeout) out.search = search;
 
   const auto misses = [&](std::string_view given, std::string_view missing) {
@@ -129,13 +132,13 @@ void read_search(Section& tracker, TrackerConfig& out) {
 }
 
 /// The reflector, and how the tracker finds it.
-void read_beam(Section& tracker, TrackerConfig& out) {
-  tracker.get_maybe_empty("reflector", out.reflector);
+void read_beam(ClassifiedSection& tracker, Role points, TrackerConfig& out) {
+  tracker.get_maybe_empty(Key{"reflector", points}, out.reflector);
   if (out.reflector.size() > drivers::kLongestReflectorName)
     tracker.fault("reflector",
                   fmt::format("must be at most {} bytes long, the limit of the controllers",
                               drivers::kLongestReflectorName));
-  tracker.get("home_after_initialize", out.home_after_initialize);
+  tracker.get(operation("home_after_initialize"), out.home_after_initialize);
   read_search(tracker, out);
 }
 
@@ -148,25 +151,26 @@ double default_u_scale(WeatherConfig weather, const toml::node* air) {
   return corrected ? 0.0 : u_of_unmeasured_air();
 }
 
-void read_tracker(Section& root, Config& out, StreamNames& names) {
-  Section tracker = root.child("tracker");
+void read_tracker(ClassifiedSection& root, Config& out, StreamNames& names) {
+  ClassifiedSection tracker = root.child("tracker");
   read_noise(tracker, out.machine);
   read_placement(tracker, out.machine);
   read_nests(tracker, out.otf.nests);
   TrackerConfig config;
-  const bool has_host = get_host(tracker, "host", config.host);
-  get_bounded(tracker, "name", config.name, bound_of<v1::TrackerPoint>("device"));
-  tracker.get_integer("port", config.port, 1, 65535);
+  const Role points = tracker.has("host") ? Role::Measurement : Role::Operation;
+  const bool has_host = get_host(tracker, operation("host"), config.host);
+  get_bounded(tracker, operation("name"), config.name, bound_of<v1::TrackerPoint>("device"));
+  tracker.get_integer(operation("port"), config.port, 1, 65535);
   read_tracker_mode(tracker, config);
-  tracker.get_word<WeatherConfig>("weather", config.weather,
+  tracker.get_word<WeatherConfig>(Key{"weather", points}, config.weather,
                                   {{"none", WeatherConfig::None},
                                    {"read", WeatherConfig::Read},
                                    {"compute", WeatherConfig::Compute}});
 
-  if (!tracker.get("u_scale_ppm", config.u_scale, kMicro, kNotNegative))
-    config.u_scale = default_u_scale(config.weather, root.node("air"));
-  read_tracker_timeouts(tracker, config);
-  read_beam(tracker, config);
+  if (!tracker.get(operation("u_scale_ppm"), config.u_scale, kMicro, kNotNegative))
+    config.u_scale = default_u_scale(config.weather, root.node(stated("air")));
+  read_tracker_timeouts(tracker, points, config);
+  read_beam(tracker, points, config);
   if (!has_host && tracker.has("port") && !tracker.has("host"))
     tracker.fault("host", "missing, but a port is given");
   tracker.close();
@@ -188,6 +192,7 @@ std::optional<TrackerSource> points_of_tracker(const Config& config) {
   const auto& tracker = config.of<TrackerConfig>();
   if (!tracker) return std::nullopt;
   TrackerSource source{.key = TrackerConfig::kKind.key,
+                       .device = tracker->name,
                        .point_rate_hz = tracker->point_rate_hz,
                        .u_scale = tracker->u_scale};
   if (tracker->mode == TrackerModeConfig::Stationary)

@@ -33,15 +33,17 @@ ModelStatistics model_statistics(const calib::evemu::Statistics& s) {
 
 ModelDocument evemu_document(const calib::evemu::Solution& solution, const Config& config,
                              std::vector<InputFile> inputs, protocol::UtcTime created) {
-  return {solution.model,
-          "evemu",
-          std::string{calib::evemu::name(solution.estimator)},
-          config.machine.name,
-          machine_hash(config),
-          created,
-          model_statistics(solution.statistics),
-          std::move(inputs),
-          solution.artefact ? solution.artefact->expansion : std::nullopt};
+  ModelDocument document{solution.model,
+                         "evemu",
+                         std::string{calib::evemu::name(solution.estimator)},
+                         config.machine.name,
+                         machine_hash(config),
+                         created,
+                         model_statistics(solution.statistics),
+                         std::move(inputs),
+                         solution.artefact ? solution.artefact->expansion : std::nullopt};
+  document.configuration = config.meaning;
+  return document;
 }
 
 ModelDocument evemu_document(const EvemuCandidate& candidate, const Config& config,

@@ -112,6 +112,7 @@ ModelDocument mfb_document(const MfbCandidate& candidate, mfb::Estimator estimat
   ModelDocument document{
       candidate.found.model, "mfb",   std::string{mfb::name(estimator)}, config.machine.name,
       machine_hash(config),  created, bar_statistics(candidate),         std::move(inputs)};
+  document.configuration = config.meaning;
   document.bar = bar_figures(candidate.found);
   document.run = mfb_figures(candidate);
   return document;

@@ -137,6 +137,7 @@ ModelDocument otf_document(const calib::otf::Solution& solution, calib::otf::Mod
                          created,
                          model_statistics(solution),
                          std::move(inputs)};
+  document.configuration = config.meaning;
   document.mode = calib::otf::name(mode);
   std::copy_if(solution.backlash.begin(), solution.backlash.end(),
                std::back_inserter(document.backlash), [](const auto& b) { return b.determined; });

@@ -60,6 +60,11 @@ class Device {
 
   /// Any thread, not real-time.
   [[nodiscard]] virtual DeviceStatus status() const = 0;
+
+  /// Device thread, not real-time: called at once after an exception of wait(), before the pause of
+  /// the thread. A device that moves a machine stops it here. True: a motion is not known to have
+  /// ended, so the thread calls wait() again without its pause. May throw; that counts as true.
+  [[nodiscard]] virtual bool stop_after_failure() { return false; }
 };
 
 }  // namespace abbe::drivers

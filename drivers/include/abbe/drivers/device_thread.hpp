@@ -1,8 +1,9 @@
 #pragma once
 /// The real-time loop of all drivers. It calls wait() (not real-time) and receive() (real time)
 /// alternately until stop(). Before the first cycle the thread locks memory, touches its stack, and
-/// sets scheduling and affinity. An exception thrown by wait() ends the loop. The loop starts again
-/// after a pause, which doubles with each further exception.
+/// sets scheduling and affinity. An exception thrown by wait() ends the loop. Then the device stops
+/// what it moves, at once. The loop starts again after a pause, which doubles with each further
+/// exception; while a motion may go on, there is no pause.
 
 #include <chrono>
 #include <cstdint>

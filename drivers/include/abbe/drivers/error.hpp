@@ -8,7 +8,7 @@
 namespace abbe::drivers {
 
 enum class ErrorCode {
-  BadConfiguration,  ///< an option outside its range, an address that cannot be parsed
+  BadConfiguration,  ///< an option or value outside its range, an unreadable address
   SystemRefused,     ///< the operating system refused: permission, limit, missing interface
   Unreachable,       ///< no device answers at that address, or the connection is lost
   Timeout,           ///< a connection or an answer did not come in time

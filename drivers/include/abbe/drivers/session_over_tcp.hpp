@@ -9,7 +9,8 @@
 /// messages and kMostRead bytes.
 /// `Driver` derives from this class and defines: std::span<const std::byte> encode(const Send&),
 /// which records the bytes and whose result is valid until its next call; void connected(), called
-/// before the session gets Connected; void disconnected(); RawRing& raw().
+/// before the session gets Connected; void disconnected(), called before the socket is closed;
+/// RawRing& raw().
 
 #include <algorithm>
 #include <array>
@@ -44,7 +45,9 @@ class SessionOverTcp {
   using Message = typename Words::Message;
 
   SessionOverTcp(TcpPeer peer, const TimeSource& time, typename Words::Session session)
-      : peer_(std::move(peer)), time_(time), session_(std::move(session)) {}
+      : peer_(std::move(peer)), time_(time), session_(std::move(session)) {
+    tcp_.look_up(peer_.host, peer_.port);
+  }
   ~SessionOverTcp() = default;
 
   /// Passes the messages posted by receive() to the session, in order. Once the connection is
@@ -61,6 +64,9 @@ class SessionOverTcp {
                                     "holds; the rest was discarded");
     }
   }
+
+  /// Discards the messages posted by receive(), after one of them caused an internal error.
+  void discard_posted_messages() noexcept { inbox_count_ = 0; }
 
   /// Passes an input to the session and carries out the resulting action. If the action fails at
   /// once, the failure is the next input.
@@ -90,6 +96,7 @@ class SessionOverTcp {
         take_ready(time_.wall(std::clamp(until_due, std::chrono::nanoseconds{0}, at_most))));
   }
 
+  [[nodiscard]] int descriptor() const noexcept { return tcp_.descriptor(); }
   [[nodiscard]] const typename Words::Session& session() const { return session_; }
   [[nodiscard]] typename Words::Session& session() { return session_; }
 
@@ -156,7 +163,7 @@ class SessionOverTcp {
 
   [[nodiscard]] bool act(const typename Words::Action& action, Input& next) {
     if (std::holds_alternative<typename Words::Open>(action)) {
-      const auto opened = tcp_.open(peer_.host, peer_.port);
+      const auto opened = tcp_.open();
       if (!opened) next = typename Words::ConnectionLost{opened.error().text};
       return !opened;
     }
@@ -194,10 +201,10 @@ class SessionOverTcp {
   }
 
   void close() {
+    driver().disconnected();  // first: the descriptor is not used again after close()
     tcp_.close();
     inbox_count_ = 0;
     filled_ = 0;
-    driver().disconnected();
     board_.set_connected(false);
   }
 

@@ -1,16 +1,18 @@
 #pragma once
-/// A TCP connection that blocks only in wait() and for name resolution in open(). One thread opens,
-/// reads and writes it; not real-time. Error texts do not contain the peer's name; the driver adds
+/// A TCP connection that blocks only in wait(). One thread opens, reads and writes it; not
+/// real-time. Error texts do not contain the peer's name; the driver adds
 /// it. TCP_NODELAY is set: commands are small and must be sent at once.
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "abbe/drivers/error.hpp"
+#include "abbe/drivers/host_addresses.hpp"
 
 namespace abbe::drivers {
 
@@ -21,14 +23,19 @@ class TcpClient {
   TcpClient& operator=(const TcpClient&) = delete;
   ~TcpClient() { close(); }
 
-  /// Begins to connect; wait() returns Established when the connection exists. Resolves the host
-  /// name, which may block. If the name has several addresses, each call tries the next one. Error
+  /// Names the peer and waits at most 1 s for its address: see HostAddresses. Call it once, before
+  /// the thread of the device starts.
+  void look_up(const std::string& host, std::uint16_t port);
+  /// Begins to connect; wait() returns Established when the connection exists. Does not wait for a
+  /// name service. If the name has several addresses, each call tries the next one. Error
   /// Unreachable or SystemRefused.
-  [[nodiscard]] Result<void> open(const std::string& host, std::uint16_t port);
+  [[nodiscard]] Result<void> open();
   void close() noexcept;
 
   [[nodiscard]] bool closed() const noexcept { return fd_ < 0; }
   [[nodiscard]] bool established() const noexcept { return fd_ >= 0 && !opening_; }
+  /// -1: closed. For EmergencyStop.
+  [[nodiscard]] int descriptor() const noexcept { return fd_; }
 
   enum class Ready { Nothing, Established, Readable };
   /// Waits for at most `wall` of the operating system's time, also when closed. Sends bytes that
@@ -50,7 +57,7 @@ class TcpClient {
 
   int fd_ = -1;
   bool opening_ = false;
-  unsigned tries_ = 0;
+  std::unique_ptr<HostAddresses> host_;
   std::vector<std::byte> unsent_;
 };
 

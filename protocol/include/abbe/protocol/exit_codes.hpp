@@ -15,6 +15,8 @@ enum class ExitCode : int {
   BadInput = 3,
   Io = 4,
   Refused = 5,
+  StopNotConfirmed = 6,
+  StopNotSent = 7,
   Internal = 70,      ///< EX_SOFTWARE of sysexits.h: an internal error
   Interrupted = 130,  ///< 128 + SIGINT, as a shell reports it
 };

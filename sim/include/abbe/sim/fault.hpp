@@ -35,6 +35,15 @@ enum class FaultKind {
   ModbusGarbage,    ///< bytes instead of answers
   WrongMap,         ///< every register is one address higher
   SensorsGone,      ///< the probe is unplugged, the sensor wires are broken
+  // One temperature input (`input`, 0: all) of an environment device; see BrokenInput.
+  SensorValue,       ///< reads `value` C: a power-on value, a short circuit
+  SensorStuck,       ///< keeps its reading
+  SensorSwapped,     ///< reads the sensor of the other input of its pair (1 and 2, 3 and 4, ...)
+  SensorFahrenheit,  ///< reads degrees Fahrenheit
+  SensorByteOrder,   ///< the bytes of its register are exchanged
+  SensorSpikes,      ///< every fifth second the reading is `value` K higher
+  SensorDrift,       ///< drifts by `value` K per hour
+  SensorOtherSlave,  ///< reads the values of another module: the input four places further
   // Counter cards; they also have Mute, Stall and Disconnect.
   Unplug,       ///< removed from the bus; back after `duration_s` with all counters at zero
   CardRestart,  ///< power off and on
@@ -60,6 +69,7 @@ struct Fault {
   double value = 0.0;
   /// encoder faults: CANopen node; environment faults: number of the device; 0 = all
   std::uint8_t node = 0;
+  std::uint8_t input = 0;  ///< of an environment device, from 1; 0 = all
 };
 
 enum class FaultTarget { Tracker, Encoder, Environment, CounterCard, MeasuringMachine };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "abbe/sim/environment_model.hpp"
+#include "abbe/sim/fault.hpp"
 
 namespace abbe::sim {
 
@@ -35,10 +36,23 @@ struct ModbusIdentity {
   std::uint8_t unit = 1;  ///< of CometT7510 and Zt2005C8 on a serial line
 };
 
+/// A temperature input of Zt2005C8 that is broken since the instant `since`, counted as
+/// `since_start` below.
+struct BrokenInput {
+  FaultKind kind = FaultKind::SensorValue;  ///< one of the kinds SensorValue to SensorOtherSlave
+  std::uint8_t input = 0;                   ///< from 1; 0: all
+  double value = 0.0;
+  std::chrono::nanoseconds since{};
+};
+/// What input number `input` (from 0) sends, in C.
+[[nodiscard]] double reading_of_input(const EnvironmentModel& environment, std::size_t input,
+                                      std::chrono::nanoseconds since_start,
+                                      const std::vector<BrokenInput>& broken);
+
 /// `sensors_gone`: simulates an unplugged probe and broken sensor wires.
-[[nodiscard]] std::vector<SimulatedRegister> registers_of(const ModbusIdentity& identity,
-                                                          const EnvironmentModel& environment,
-                                                          std::chrono::nanoseconds since_start,
-                                                          bool sensors_gone);
+[[nodiscard]] std::vector<SimulatedRegister> registers_of(
+    const ModbusIdentity& identity, const EnvironmentModel& environment,
+    std::chrono::nanoseconds since_start, bool sensors_gone,
+    const std::vector<BrokenInput>& broken = {});
 
 }  // namespace abbe::sim

@@ -17,6 +17,8 @@ enum class ErrorCode {
   BadInput,          ///< a file, message or configuration is invalid
   Io,                ///< a call to the operating system failed: file, socket, process
   Refused,           ///< the request is valid, but a check or the present state forbids it
+  StopNotConfirmed,  ///< AbortE was sent to a measuring machine, but not answered, or refused
+  StopNotSent,       ///< there is no connection to the measuring machine: AbortE was not sent
 };
 
 struct Error {
@@ -47,6 +49,10 @@ using Result = tl::expected<T, Error>;
       return number(protocol::ExitCode::Io);
     case ErrorCode::Refused:
       return number(protocol::ExitCode::Refused);
+    case ErrorCode::StopNotConfirmed:
+      return number(protocol::ExitCode::StopNotConfirmed);
+    case ErrorCode::StopNotSent:
+      return number(protocol::ExitCode::StopNotSent);
   }
 
   return number(protocol::ExitCode::Io);

@@ -2,6 +2,7 @@
 /// Structured log lines. Under systemd they go to the journal in its native protocol, with their
 /// fields; elsewhere to stderr, as text with the same content. Not for real-time threads.
 
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -40,8 +41,8 @@ class JournalSink {
     const std::filesystem::path& socket = "/run/systemd/journal/socket");
 
 /// Writes lines "abbed: MESSAGE [ABBE_DEVICE=tracker ...]". A control character, which a device may
-/// have sent, is written as '?'.
-[[nodiscard]] std::unique_ptr<JournalSink> text_journal(int fd);
+/// have sent, is written as an escape: "\u{1B}". `stream` must outlive the sink.
+[[nodiscard]] std::unique_ptr<JournalSink> text_journal(std::FILE* stream);
 
 /// The journal if this process's stderr is connected to it (JOURNAL_STREAM, systemd.exec(5)), else
 /// stderr.

@@ -20,6 +20,8 @@ struct Verification {
   std::vector<std::size_t> lines;  ///< line numbers of the points in their file; may be empty
   /// why some points are missing or may be wrong; empty: all are complete
   std::string cut_short{};
+  /// What stands against the model, such as the verdict of a refused one.
+  std::vector<std::string> cautions{};
   /// Positions of the planes in which the vectors are drawn, one coordinate per axis; default: the
   /// middle of the grid.
   std::optional<calib::Vector3> planes_m;

@@ -7,7 +7,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "abbe/config/motion_box.hpp"
 #include "abbe/config/reference_marks.hpp"
 #include "abbe/config/usb_card.hpp"
 #include "abbe/protocol/samples.hpp"
@@ -27,6 +29,7 @@ struct TrackerSource {
   };
 
   std::string_view key;  ///< of its table
+  std::string device;    ///< its name
   double point_rate_hz = 0.0;
   /// Duration of a measurement of a stationary reflector; the device then delivers one mean value
   /// for each. nullopt: the device delivers points during motion.
@@ -49,6 +52,14 @@ struct TouchSource {
 };
 [[nodiscard]] std::optional<TouchSource> touch_source(const Config& config);
 
+/// The device that moves and touches points under its own control.
+struct MotionSource {
+  std::string_view key;             ///< of its table
+  std::string device;               ///< its name
+  std::optional<MotionBox> volume;  ///< nullopt: its table sets none
+};
+[[nodiscard]] std::optional<MotionSource> motion_source(const Config& config);
+
 /// The card whose counters read the axes. When the card is set up its counters start at 0, so the
 /// axis readings have an unknown offset until the axes are referenced; see Datum.
 struct CountedAxes {
@@ -68,6 +79,14 @@ struct CountedAxes {
 /// `periods` times the time between two axis samples. nullopt: no device has a fixed sample rate.
 [[nodiscard]] std::optional<std::chrono::nanoseconds> time_of_axis_samples(const Config& config,
                                                                            double periods);
+
+/// A device that measures quantities of the environment in rounds.
+struct EnvironmentSource {
+  std::string device;  ///< its name
+  protocol::EnvironmentMask measured = 0;
+  std::chrono::nanoseconds period{};  ///< of the rounds
+};
+[[nodiscard]] std::vector<EnvironmentSource> environment_sources(const Config& config);
 
 /// The quantities of all devices that measure the environment. The weather station of a tracker is
 /// not one of them.

@@ -20,6 +20,7 @@
 #include "abbe/calib/environment/refractive_index.hpp"
 #include "abbe/calib/otf/run.hpp"
 #include "abbe/config/device_configs.hpp"
+#include "abbe/config/meaning.hpp"
 #include "abbe/drivers/axis_kind.hpp"
 #include "abbe/drivers/real_time_mode.hpp"
 
@@ -94,6 +95,32 @@ struct AirConfig {
   std::optional<double> assumed_index;
 };
 
+/// [[sensors.limit]]: what the readings of one sensor are checked against, in K, Pa or as a ratio.
+/// nullopt: the default of the kind of sensor (sensor_options.hpp of pipeline).
+struct SensorLimitConfig {
+  /// one of Config::temperatures, "air_temperature", "air_pressure" or "relative_humidity"
+  std::string name;
+  std::optional<double> lowest, highest;
+  std::optional<double> most_per_s;
+  std::optional<double> tolerance;
+  std::string twin;  ///< the temperature at the same place; empty: none
+  double most_twin_difference_K = 1.0;
+};
+
+/// [sensors]: checks of the readings of all environment sensors.
+struct SensorsConfig {
+  bool check = true;
+  /// for this time the last good value is used instead of readings that are refused
+  std::chrono::nanoseconds hold{std::chrono::seconds{60}};
+  /// after this time without a reading the history of a sensor is discarded
+  std::chrono::nanoseconds forget{std::chrono::minutes{10}};
+  /// largest difference of a first reading from the median of scales and air
+  double start_spread_K = 15.0;
+  /// limit of the rate at which the temperature that corrects a scale follows the sensor
+  double correction_K_per_s = 1.0 / 60.0;
+  std::vector<SensorLimitConfig> limits;
+};
+
 using drivers::RealTimeMode;
 
 /// [daemon]
@@ -139,7 +166,9 @@ struct ModelRetention {
   std::chrono::hours keep{0};   ///< [models] keep_days; models that were added later are kept
 };
 
-enum class Supervise { Child, Systemd, Off };
+/// Who runs abbe-dds. ByStart: systemd if abbed runs as abbed.service, else abbed itself; use_dds_unit()
+/// decides it.
+enum class Supervise { ByStart, Child, Systemd, Off };
 
 /// [dds]
 struct DdsConfig {
@@ -148,12 +177,16 @@ struct DdsConfig {
   double compensation_hz = 100.0;  ///< maximum rate; 0: with every hub cycle that has new data
   /// A subscriber must not apply a compensation vector older than this.
   std::chrono::nanoseconds validity{std::chrono::milliseconds{500}};
-  Supervise supervise = Supervise::Child;
+  Supervise supervise = Supervise::ByStart;
+  /// With Systemd: the user as which abbe-dds runs, which alone may connect; empty: that of abbed.
+  std::string user = "abbe-dds";
   int priority = 20;  ///< SCHED_FIFO of abbe-dds, below hub and devices; 0: not SCHED_FIFO
   std::filesystem::path profile;  ///< XML profiles; empty: the built-in ones
   /// Folder of keys made by `abbe dds keys`; empty: the profile decides.
   std::filesystem::path security;
-  std::filesystem::path socket;  ///< default: runtime_dir/dds.sock
+  /// Default: runtime_dir/dds.sock; with Systemd dds.sock in the folder "RUNTIME_DIR-dds", which
+  /// abbe-dds may enter.
+  std::filesystem::path socket;
 };
 
 /// [gate]: the conditions that a model must satisfy before it may become active.
@@ -244,6 +277,7 @@ struct Config {
   std::vector<std::string> temperatures;
   std::vector<ThermalConfig> thermal;
   AirConfig air;
+  SensorsConfig sensors;
   DaemonConfig daemon;
   RecordingConfig recording;
   ModelRetention models;
@@ -253,6 +287,8 @@ struct Config {
   DriftConfig drift;
   EvemuConfig evemu;
   ControlConfig control;
+  /// Of the tables above, made while they were read.
+  Meaning meaning;
 
   /// The devices of a kind, as in DeviceConfigs: an optional, or a vector.
   template <class Kind>
@@ -272,6 +308,10 @@ struct Config {
   [[nodiscard]] bool axes_compensated() const;
 };
 
+/// Decides [dds] supervise, if the configuration does not, and the socket that follows from it.
+/// `unit`: abbed runs as abbed.service, beside abbe-dds.service.
+void use_dds_unit(Config& config, bool unit);
+
 /// Reads and checks a whole file. Io if the file cannot be read, else BadInput with one line per
 /// fault in Error::details, at most 1000, each "file:line:column: key: what is wrong". A file with
 /// a fault is not used at all.
@@ -286,10 +326,23 @@ struct Config {
 [[nodiscard]] Result<Config> parse_recorded_config(std::string_view text,
                                                    const std::filesystem::path& file);
 
-/// SHA-256 in hex over the part of the configuration that a model depends on: the machine (name,
-/// chain, axes, target, basis, nodes) and the meaning of a scale reading (node and axis, step,
-/// offset, correction by the control). A stored model is ACTIVE only if its hash equals that of the
-/// present configuration. Noise values and transport settings are not included.
+/// What [[environment]] contributes to Config::meaning: the sensors whose values correct a reading.
+/// The others are only recorded: adding or changing one must not end a model.
+[[nodiscard]] Meaning environment_meaning(const Config& config);
+
+/// SHA-256 in hex over Meaning::readings: the machine and all that gives an axis reading its
+/// meaning. A stored model is ACTIVE only if its hash equals that of the present configuration.
+/// Noise values and transport settings are not included.
 [[nodiscard]] std::string machine_hash(const Config& config);
+
+/// The hash of model files without a list of the configuration, from earlier versions. It covers
+/// the machine (name, chain, axes, target, nodes) and of the readings: correction by the control,
+/// axis, node or channel, step, offset, reference marks, expansion of the scale.
+[[nodiscard]] std::string former_machine_hash(const Config& config);
+/// The entries that the former hash did not cover.
+[[nodiscard]] MeaningEntries not_in_former_hash(MeaningEntries readings);
+
+/// Replaces [target] offset_mm, for a run whose target is known otherwise.
+void set_target_offset(Config& config, const std::array<double, 3>& offset_m);
 
 }  // namespace abbe::daemon

@@ -93,6 +93,8 @@ class Section {
   [[nodiscard]] const toml::node* find(std::string_view key, Need need);
   void fault_at(toml::source_position at, std::string_view key, std::string_view what);
   [[nodiscard]] std::string full(std::string_view key) const;
+  /// Adds a fault if a text contains a control character, which a terminal would execute.
+  void check_characters(std::string_view key, std::string_view value);
   bool take_integer(std::string_view key, std::int64_t& out, std::int64_t min, std::int64_t max,
                     Need need);
   bool take_word(std::string_view key, std::size_t& out, const std::vector<std::string_view>& words,

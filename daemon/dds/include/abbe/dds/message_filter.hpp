@@ -1,13 +1,26 @@
 #pragma once
 /// Removes from received RTPS messages what would crash Fast DDS. Any computer of the network can
-/// send two things that end every process with Debian's Fast DDS 2.9.1, with and without DDS
-/// Security:
+/// send things that end a process with Debian's Fast DDS 2.9.1. With and without DDS Security:
 /// - An announced TypeObject with a sequence of structs that Fast DDS does not know (Fast-DDS issue
 ///   3296). The topics of abbe need no type parameters: in endpoint announcements the filter
 ///   replaces the ids of type parameters by an unused id, which every implementation skips.
 /// - A statistics submessage (80h, specific to Fast DDS) with a length other than the one that Fast
 ///   DDS asserts. The filter cuts such a submessage off at the end of a message, as Fast DDS does
 ///   itself. No valid sender puts one elsewhere; a message with one elsewhere is dropped.
+///
+/// Without DDS Security, from any matched writer:
+/// - A sample without content: an instance is disposed or unregistered. Fast DDS aborts if it cannot
+///   find its key. abbe's subscribers do not need such samples; the filter replaces them by a GAP,
+///   so that a reliable reader does not wait for them. Key hashes are blanked: Fast DDS then reads
+///   the key from the content.
+///   So are samples of another encapsulation than plain CDR.
+/// - Fragments of samples, which Fast DDS checks insufficiently. A message of abbe fits into one
+///   datagram, so the filter skips those of users' writers.
+/// - A GAP of more numbers than any history covers, which Fast DDS marks one by one.
+/// - Sequence numbers that Fast DDS cannot add to without an assertion.
+/// - Time stamps: a sample dated in the future would keep later ones out of the history. The filter
+///   takes all of them away; the readers have the time of reception.
+/// - A message of liveliness that is too short.
 ///
 /// The filter also drops messages with wrong lengths: a message passes only if its submessages
 /// follow each other as the standard requires, and its endpoint announcements have their parameters
@@ -27,11 +40,14 @@ namespace abbe::dds {
 
 /// Changes an RTPS message [DDSI-RTPS 2.5, 8.3.4, 9.4.5.4 and 9.4.2.11] in place. Returns how many
 /// of its bytes may be passed to Fast DDS; 0: drop the message. Never reads beyond the message.
-[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message) noexcept;
+/// `secured`: the participant uses DDS Security. Then samples and time stamps behind a signature's
+/// prefix are not changed: Fast DDS drops what a stranger puts there.
+[[nodiscard]] std::size_t filter_message(std::span<std::uint8_t> message,
+                                         bool secured = false) noexcept;
 
 /// Wraps `low_level`: a transport that passes received messages through the filter to Fast DDS.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>
 with_message_filter(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level);
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> low_level, bool secured);
 
 }  // namespace abbe::dds

@@ -19,6 +19,8 @@ namespace abbe::dds {
 struct Decision {
   bool apply = false;
   std::string reason;  ///< "ACTIVE" if applied
+  /// Of a vector that may be applied: from now on; then it is older than its validity.
+  std::chrono::nanoseconds valid_for{0};
 };
 
 class ReceivedModel {

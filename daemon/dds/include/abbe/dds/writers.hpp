@@ -28,6 +28,9 @@ class Writers final : public daemon::DdsOutlet {
 
   void dispose(daemon::Topic topic, std::span<const std::byte> payload) override;
 
+  /// The last payload of Identity that was written; empty: none.
+  [[nodiscard]] std::span<const std::byte> identity() const noexcept { return identity_; }
+
   /// Asserts the liveliness of the ModelState writer.
   void assert_liveliness() override;
 
@@ -46,6 +49,7 @@ class Writers final : public daemon::DdsOutlet {
   std::array<eprosima::fastdds::dds::DataWriter*, daemon::kTopicCount> writers_{};
   std::vector<eprosima::fastdds::dds::DataWriter*> announced_;
   Payload buffer_;
+  std::vector<std::byte> identity_;
 };
 
 }  // namespace abbe::dds

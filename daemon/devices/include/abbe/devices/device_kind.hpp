@@ -5,6 +5,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -33,9 +34,15 @@ class MachineMotion {
   virtual ~MachineMotion() = default;
 
   virtual void measure(std::span<const drivers::ProbePoint> points) = 0;
-  virtual void stop() = 0;
+  /// May be called from any thread; takes no lock.
+  virtual std::uint64_t stop() = 0;
+  /// May be called from any thread.
+  [[nodiscard]] virtual drivers::IppStop last_stop() const = 0;
   /// May be called from any thread; takes no lock. Stops the motion and ends the session.
   virtual void end() = 0;
+  /// As end(), and waits until the motion is stopped or it is known that this cannot be confirmed.
+  /// Ends the device thread. The last call.
+  virtual drivers::IppStop finish() = 0;
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const = 0;
   [[nodiscard]] virtual Result<void> release() = 0;
   [[nodiscard]] virtual std::optional<TipPlace> tip_place() const = 0;

@@ -1,7 +1,7 @@
 #pragma once
 /// All configured devices with their rings and threads, as one sample source for the hub. Each
-/// device runs its own thread. All functions except end_machine() must be called from the hub's
-/// thread.
+/// device runs its own thread. All functions except end_machine(), stop_machine() and machine_stop()
+/// must be called from the hub's thread.
 
 #include <array>
 #include <chrono>
@@ -42,11 +42,15 @@ class DeviceSet final : public SampleSource {
   /// True if a device moves and probes under its own control (a measuring machine).
   [[nodiscard]] bool moves() const;
   void measure(std::span<const drivers::ProbePoint> points) override;
-  void stop_machine() override;
+  [[nodiscard]] Result<std::uint64_t> stop_machine() override;
+  [[nodiscard]] drivers::IppStop machine_stop() const override;
   /// Stops a motion of the measuring machine and ends its session, also if this object is never
   /// destroyed. The machine then needs no release (see release_machine()). May be called from any
   /// thread; takes no lock.
   void end_machine();
+  /// As end_machine(), and waits until the machine is stopped or it is known that this cannot be
+  /// confirmed. No other function may be called afterwards. nullopt: no measuring machine.
+  std::optional<drivers::IppStop> finish_machine();
   [[nodiscard]] std::optional<std::string> release_awaited() const override;
   [[nodiscard]] Result<void> release_machine() override;
   [[nodiscard]] std::optional<TipPlace> tip_place() const override;

@@ -12,6 +12,7 @@ namespace abbe::daemon {
 /// What a file states about its origin, where the format has comments.
 struct ExportOrigin {
   std::string model_hash, machine, volume, tool, direction;
+  std::vector<std::string> use{};  ///< statements_of_use(): verdict, who forced the export and why
 };
 
 struct WriteOptions {

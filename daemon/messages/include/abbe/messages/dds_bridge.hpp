@@ -23,6 +23,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "abbe/base/error.hpp"
 #include "abbe/messages/topics.hpp"
@@ -94,6 +95,10 @@ class DdsFeed {
   /// Waits at most kRetryPeriod for bytes, passes every complete frame to the bridge, then calls
   /// bridge.cycle().
   void cycle();
+
+  /// Tells abbed which other publisher claims to be this machine; empty: none. Call it in every
+  /// cycle.
+  void report_twin(const std::string& seen);
 
   [[nodiscard]] bool connected() const noexcept;
 

@@ -17,10 +17,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "abbe/base/account_names.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/messages/cdr.hpp"
 #include "abbe/messages/dds_process.hpp"
@@ -38,12 +40,15 @@ struct DdsLinkCounters {
       0;  ///< connections of other processes or users, closed at once
 };
 
-/// Which process may connect: the supervised abbe-dds; without supervision, any process of the user
-/// that abbed runs as.
+/// Which process may connect, as the kernel reports it (SO_PEERCRED): the supervised abbe-dds; without
+/// supervision, any process of `user`.
 struct DdsLinkPeer {
   /// The supervised process; null without supervision. Must outlive the link, which records in it
   /// the times of beats and answers.
   DdsProcess* process = nullptr;
+  /// The user as which systemd runs abbe-dds; its group may open the socket. nullopt: the user of
+  /// abbed.
+  std::optional<Account> user = {};
 };
 
 class DdsLink {
@@ -53,7 +58,8 @@ class DdsLink {
   using WallTime = std::chrono::steady_clock::time_point;
   static constexpr std::chrono::milliseconds kBeatPeriod{100};
 
-  /// Creates the socket file (mode 0660) and listens. A socket file without a listener is
+  /// Creates the socket file (mode 0660, of the group of `peer.user`) and listens. Error Refused if
+  /// the group cannot be set. A socket file without a listener is
   /// replaced. Error Io if another process listens there or the folder is missing; Error Usage if
   /// the path is longer than a socket address allows (107 bytes).
   [[nodiscard]] static Result<DdsLink> listen(const std::filesystem::path& socket,
@@ -80,6 +86,9 @@ class DdsLink {
   /// hangs or is not connected.
   [[nodiscard]] bool answers() const noexcept;
   static constexpr std::chrono::seconds kUnanswered{1};
+  /// Another publisher in the domain that claims to be this machine, as abbe-dds sees it; empty:
+  /// there is none.
+  [[nodiscard]] const std::string& twin() const noexcept;
   /// One of the literals "connected", "does not answer", "waiting" (not connected).
   [[nodiscard]] const char* state() const noexcept;
   [[nodiscard]] const DdsLinkCounters& counters() const noexcept;

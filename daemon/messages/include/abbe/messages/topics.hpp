@@ -22,8 +22,9 @@ enum class Topic : std::uint8_t {
   ModelState = 4,
   Health = 5,
   CalibrationEvent = 6,
+  Identity = 7,
 };
-inline constexpr std::size_t kTopicCount = 7;
+inline constexpr std::size_t kTopicCount = 8;
 
 /// Encapsulation header of a payload: representation identifier and options.
 inline constexpr std::size_t kCdrHeaderBytes = 4;

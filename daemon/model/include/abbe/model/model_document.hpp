@@ -16,6 +16,7 @@
 #include "abbe/calib/otf/backlash.hpp"
 #include "abbe/calib/volumetric_model.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/model/model_verdict.hpp"
 #include "abbe/model/run_figures.hpp"
 #include "abbe/protocol/time.hpp"
 
@@ -111,7 +112,18 @@ struct ModelDocument {
   std::optional<RunFigures> run{};
   /// Version of abbe that identified the model; empty: this one. Not in the hash.
   std::string software{};
+  /// Decision on the model; nullopt: not judged, as in files of earlier versions. Not in the hash.
+  std::optional<ModelVerdict> verdict{};
+  /// Of the configuration; machine_hash is the hash of its readings. nullopt: a file of an earlier
+  /// version, whose machine_hash is a former_machine_hash(). Not in the hash of the model.
+  std::optional<Meaning> configuration{};
 };
+/// Whether the devices that gave the data of the model were simulated; nullopt: not known, as in
+/// files of earlier versions.
+[[nodiscard]] std::optional<bool> made_on_simulated_devices(const ModelDocument& document);
+/// For people: what is stated of the devices.
+[[nodiscard]] std::string_view devices_in_words(std::optional<bool> simulated);
+
 /// Text for the verdict on a model whose recording has this gap.
 [[nodiscard]] std::string cannot_be_checked(std::string_view recording_gap);
 

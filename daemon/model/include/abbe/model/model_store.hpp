@@ -24,14 +24,6 @@
 
 namespace abbe::daemon {
 
-/// User, reason and time of a change. Kept permanently.
-struct StoreActor {
-  std::string who;
-  std::string why;
-  protocol::UtcTime when{};
-  bool operator==(const StoreActor&) const = default;
-};
-
 /// Drifted: a run found that the machine has changed since the model, which was active. Removed: the
 /// file of the model was removed because the store keeps a limited number of models.
 enum class StoreAction { Added, Activated, Forced, RolledBack, Drifted, Removed };
@@ -42,18 +34,24 @@ struct StoreEvent {
   StoreActor actor;
   bool accepted = false;             ///< Added: verdict of the gate
   std::vector<std::string> reasons;  ///< Added: reasons of a refusal
+  /// Activated, Forced: machine_hash() of the configuration for which the actor accepted a model of
+  /// an earlier version (ConfigurationFit::OlderHash); empty: none was accepted.
+  std::string accepted_configuration{};
   bool operator==(const StoreEvent&) const = default;
 };
 
 struct StoreEntry {
   std::string id;
   bool active = false;
-  bool accepted = false;  ///< verdict of the gate when it was added
+  /// False: neither the store nor the file has a verdict.
+  bool judged = false;
+  bool accepted = false;  ///< verdict of the gate when it was added, else that of the file
   std::vector<std::string> reasons;
   protocol::UtcTime added{};
   std::string method, machine;      ///< empty if the file cannot be read
   std::vector<std::string> inputs;  ///< names of the files that the model was made of
   std::string fault;                ///< why the file cannot be read; empty: readable
+  std::optional<bool> simulated{};  ///< made_on_simulated_devices()
 };
 
 /// Identifies a version of state.json or of a model, which are always replaced, never modified. All
@@ -81,7 +79,8 @@ class ModelStore {
   void set_lock_timeout(std::chrono::nanoseconds time_out) noexcept { lock_patience_ = time_out; }
 
   /// Renames a state.json that is damaged or not a regular file to state.json.damaged-DATE. After
-  /// that no model is active and the stored models have no verdict. Takes the lock of the store.
+  /// that no model is active and the stored models have the verdict of their files. Takes the lock
+  /// of the store.
   [[nodiscard]] Result<void> rename_damaged_state(protocol::UtcTime now);
   /// The newest name of a state.json.damaged-DATE; empty: there is none.
   [[nodiscard]] std::string damaged_state() const;
@@ -90,16 +89,17 @@ class ModelStore {
   /// own PID are also removed: they were left by an earlier process with the same PID.
   void remove_leftovers() const;
 
-  /// Stores a model with the verdict of the gate; returns its id. If a model with this id exists
-  /// already, only the Added event is stored, unless the last Added event of this model is equal
-  /// (verdict, reasons and actor).
+  /// Stores a model with the verdict of the gate, which is written into its file if it has none;
+  /// returns its id. If a model with this id and verdict exists already, only the Added event is
+  /// stored, unless the last Added event of this model is equal (verdict, reasons and actor).
   [[nodiscard]] Result<std::string> add(const ModelDocument& document, bool accepted,
                                         std::vector<std::string> reasons, const StoreActor& actor);
 
   /// Makes a model active. Refused if the gate did not accept the model, unless `force`; an Error
-  /// if the model file is missing or damaged.
+  /// if the model file is missing or damaged. The verdict is that of the store; where its state was
+  /// lost, that of the file. `accepted_configuration`: StoreEvent.
   [[nodiscard]] Result<void> activate(const std::string& id, const StoreActor& actor,
-                                      bool force = false);
+                                      bool force = false, std::string accepted_configuration = {});
 
   /// Records that a run found drift against model `id`; `actor.why` states what changed. No effect
   /// if another model is active, or if the same event is recorded already.
@@ -115,13 +115,14 @@ class ModelStore {
   [[nodiscard]] Result<std::vector<std::string>> remove_old(const ModelRetention& retention,
                                                             const StoreActor& actor);
 
-  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< newest first
+  [[nodiscard]] Result<std::vector<StoreEntry>> list() const;     ///< added last first
   [[nodiscard]] Result<std::vector<StoreEvent>> history() const;  ///< oldest first
   /// The id of the active model; nullopt if no model is active. Reads state.json at every call,
   /// because other processes may change it.
   [[nodiscard]] Result<std::optional<std::string>> active_id() const;
-  /// The event that made the active model active; `accepted` is the verdict of the gate on that
-  /// model. Reads state.json at every call. nullopt: no model is active.
+  /// The event that made the active model active; `accepted` and `reasons` are the verdict of the
+  /// gate on that model, `accepted_configuration` the last one that the store has for it. Reads
+  /// state.json at every call. nullopt: no model is active.
   [[nodiscard]] Result<std::optional<StoreEvent>> activation() const;
   /// What has drifted since the last activation, as add_drift() recorded it last; empty: nothing.
   [[nodiscard]] Result<std::string> drift() const;

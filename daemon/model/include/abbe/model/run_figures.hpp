@@ -79,8 +79,9 @@ struct RunFigures {
 
   std::string held_out;  ///< what was excluded from the fit: "legs", "positions", "points"
   double held_out_before_m = 0.0, held_out_after_m = 0.0;  ///< rms
-  std::vector<std::string> notes;                          ///< of the verdict
-  std::vector<Interval> residuals;                         ///< of a run along a path, else empty
+  /// Of the verdict, in models of earlier versions; see ModelVerdict::notes.
+  std::vector<std::string> notes;
+  std::vector<Interval> residuals;  ///< of a run along a path, else empty
   /// Where was measured, polylines of scale readings: the driven path of each run, the balls of each
   /// position of an array, the bar in each of its positions.
   std::vector<std::vector<calib::Vector3>> places_m{};

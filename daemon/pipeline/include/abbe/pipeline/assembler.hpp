@@ -43,15 +43,19 @@ class Assembler {
   void take(const Batch& batch);
   /// Appends the complete snapshots to `out`, oldest first.
   void emit(std::vector<protocol::Snapshot>& out);
+  /// For a replay of a further file: the state of the sensors at its start.
+  [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
+    return environment_.go_on(sensor_state);
+  }
   /// Appends the snapshots of all pending points and touches, at the end of a recording.
   void finish(std::vector<protocol::Snapshot>& out);
 
  private:
   void take(const protocol::AxisSample& sample);
   [[nodiscard]] bool ready(protocol::HostTime t) const;
-  [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point) const;
-  [[nodiscard]] protocol::Snapshot assemble(const protocol::ProbeTrigger& touch) const;
-  [[nodiscard]] protocol::Snapshot begin(const protocol::SampleHead& head) const;
+  [[nodiscard]] protocol::Snapshot assemble(const protocol::TrackerPoint& point);
+  [[nodiscard]] protocol::Snapshot assemble(const protocol::ProbeTrigger& touch);
+  [[nodiscard]] protocol::Snapshot begin(const protocol::SampleHead& head);
   void interpolate(protocol::Snapshot& snapshot) const;
   void emit_first_point(std::vector<protocol::Snapshot>& out);
   void emit_first_touch(std::vector<protocol::Snapshot>& out);
@@ -63,6 +67,8 @@ class Assembler {
   std::deque<protocol::AxisSample> axes_;
   EnvironmentMerge environment_;
   protocol::HostTime newest_{};
+  /// A later time is wrong: it neither makes other streams late nor is waited for.
+  protocol::HostTime latest_ = protocol::HostTime::max();
 };
 
 }  // namespace abbe::daemon

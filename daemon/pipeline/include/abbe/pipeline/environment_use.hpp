@@ -15,6 +15,7 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/sensor_checks.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -33,6 +34,7 @@ struct EnvironmentUseOptions {
   AirConfig air;
   double tracker_u_scale = 0.0;               ///< TrackerSource::u_scale
   std::optional<std::string> unmeasured_air;  ///< unmeasured_air_text()
+  SensorCheckOptions sensors;                 ///< empty: readings are used as they are
 };
 
 [[nodiscard]] EnvironmentUseOptions environment_use(const Config& config);
@@ -73,6 +75,8 @@ class MeanEffect {
 /// device that measures it (there is at most one), else from the tracker. If a device has sent
 /// nothing for longer than max_age, its values are NaN. Air values that a tracker assumes without
 /// measuring are not merged.
+/// Every reading is checked (SensorChecks), in the order of the instants of the samples. The
+/// temperature of a scale is the applied one: it follows the readings at a limited rate.
 class EnvironmentMerge {
  public:
   /// A sample of an environment device is used only for instants at least `lag` later than its own.
@@ -82,19 +86,33 @@ class EnvironmentMerge {
 
   void take(const Batch& batch);
   /// The merged values that apply at `t`; nullopt before the first sample.
-  [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t) const;
+  [[nodiscard]] std::optional<protocol::EnvironmentSample> at(protocol::HostTime t);
   /// Removes samples that at() needs only for instants before `oldest`.
   void forget(protocol::HostTime oldest);
   [[nodiscard]] protocol::HostTime newest() const noexcept { return newest_; }
 
+  /// The sensors whose readings are not used, after the samples that were checked until now.
+  [[nodiscard]] std::vector<SensorFinding> findings() const { return checks_.findings(); }
+  [[nodiscard]] std::vector<SensorDoubts> doubts() const { return checks_.doubts(); }
+  /// For a replay of a further file: continues from the state at its start.
+  [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
+    return checks_.go_on(sensor_state);
+  }
+
  private:
-  using Samples = std::deque<protocol::EnvironmentSample>;  // in order of time
+  using Samples = std::deque<CheckedEnvironment>;  // in order of time
+
+  void check_until(protocol::HostTime t);
+  void merge_device(const CheckedEnvironment& from, protocol::HostTime t,
+                    protocol::EnvironmentSample& to) const;
 
   protocol::EnvironmentMask measured_;
   std::chrono::nanoseconds max_age_;
   std::chrono::nanoseconds lag_;
+  SensorChecks checks_;
   Samples weather_;
   std::vector<Samples> devices_;
+  std::vector<FromEnvironment> unchecked_;  ///< in order of time, of equal times by device
   protocol::HostTime newest_{};
 };
 

@@ -6,6 +6,8 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "abbe/drivers/time_source.hpp"
 #include "abbe/pipeline/assembler.hpp"
@@ -33,6 +35,14 @@ class LiveView {
   /// missing after kAxesTimeout.
   bool take(const Batch& batch);
   [[nodiscard]] const protocol::Snapshot& view() const noexcept { return view_; }
+  /// The sensors whose readings are not used.
+  [[nodiscard]] std::vector<SensorFinding> sensor_findings() const {
+    return environment_.findings();
+  }
+  [[nodiscard]] std::vector<SensorDoubts> sensor_doubts() const { return environment_.doubts(); }
+  /// Why the correction of each axis for the temperature of its scale is missing; empty: it is not.
+  /// Same order as Snapshot::position.
+  [[nodiscard]] std::vector<std::string> missing_scales() const;
   /// Instant of the latest axis sample, even if axes are missing in that sample.
   [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {
     return previous_ ? std::optional{previous_->head.time} : std::nullopt;

@@ -6,8 +6,8 @@
 ///      referenced is marked missing
 ///   3. observers see the samples (live view, publisher, recorder)
 ///   4. samples are assembled to snapshots: axes are interpolated to the instant of each tracker
-///      point and touch, axis readings are corrected for the temperature of the scales, ranges for
-///      the refractive index of the air
+///      point and touch, readings of the environment sensors are checked, axis readings are
+///      corrected for the temperature of the scales, ranges for the refractive index of the air
 ///   5. observers see the snapshots (calibration session, verification)
 ///
 /// The order of the steps is defined in this class only. Deterministic: reads no clock, so that a
@@ -51,6 +51,11 @@ class Pipeline {
 
   /// The observer must outlive the pipeline.
   void add(PipelineObserver& observer) { observers_.push_back(&observer); }
+
+  /// For a replay of a further file: the state of the sensors at its start.
+  [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
+    return assembler_.go_on(sensor_state);
+  }
 
   /// Steps 1 to 5. Changes the readings in `batch` (step 2).
   void cycle(Batch& batch);

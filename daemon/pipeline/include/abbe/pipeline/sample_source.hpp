@@ -1,10 +1,11 @@
 #pragma once
 /// Source of the hub's samples: the devices, or a substitute in a test. To be used from the hub's
-/// thread only.
+/// thread only, where a function does not say otherwise.
 
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -40,8 +41,16 @@ class SampleSource {
   /// Starts to touch the points with the measuring machine; the touches arrive in drain(). No
   /// effect without a measuring machine.
   virtual void measure(std::span<const drivers::ProbePoint>) {}
-  /// Stops a motion of the measuring machine (AbortE) and discards all requested points.
-  virtual void stop_machine() {}
+  /// Stops a motion of the measuring machine (AbortE) and discards all requested points. Returns
+  /// the number of the request; machine_stop() has its outcome. May be called from any thread; takes
+  /// no lock. Refused without a measuring machine.
+  [[nodiscard]] virtual Result<std::uint64_t> stop_machine() {
+    return fail(ErrorCode::Refused, "machine: there is no measuring machine, " +
+                                        tables_with(Capability::Motion) + ", in the configuration");
+  }
+  /// The latest request to stop that the machine's driver has received, and its outcome. May be
+  /// called from any thread.
+  [[nodiscard]] virtual drivers::IppStop machine_stop() const { return {}; }
   /// Why the measuring machine does not move until the operator releases it; nullopt: the machine
   /// awaits no release.
   [[nodiscard]] virtual std::optional<std::string> release_awaited() const { return std::nullopt; }

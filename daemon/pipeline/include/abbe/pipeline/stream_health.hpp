@@ -1,6 +1,8 @@
 #pragma once
 /// Status of a stream, for the status command, the journal and the Health topic. Pure data.
 
+#include <optional>
+
 #include "abbe/drivers/device.hpp"
 #include "abbe/drivers/latency_histogram.hpp"
 
@@ -16,6 +18,8 @@ struct StreamHealth {
   /// Durations of Device::receive() since the thread started, also of calls without data. They do
   /// not contain the time from arrival to the return of wait(). Empty if it is not a device.
   drivers::LatencyHistogram::Counts latency{};
+  /// Recorder: age of the oldest message that is not yet written to the file, s.
+  std::optional<double> behind_s = {};
 };
 
 }  // namespace abbe::daemon

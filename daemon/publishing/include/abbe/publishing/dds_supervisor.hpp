@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/base/error.hpp"
 #include "abbe/messages/dds_process.hpp"
 
@@ -36,7 +37,7 @@ class DdsSupervisor {
     std::chrono::milliseconds first_delay{100};
     std::chrono::milliseconds longest_delay{5000};
     /// Destructor: time from SIGTERM to SIGKILL.
-    std::chrono::milliseconds stop_patience{3000};
+    std::chrono::milliseconds stop_patience = kLongestDdsEnd;
     /// State shared with the hub, which records the answers of the child in it; must outlive the
     /// supervisor. null: a hanging child is not detected.
     DdsProcess* process = nullptr;

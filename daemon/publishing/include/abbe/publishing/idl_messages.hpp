@@ -28,7 +28,16 @@ struct PublishedModel {
   std::string hash = {};  ///< model_hash() of the document
   /// The largest U(V), k = 2, of calib::iso::volume_error(); nullopt: it cannot be computed.
   std::optional<double> largest_U_m = {};
+  bool simulated = false;  ///< its data came from simulated devices
   calib::VolumetricModel model;
+};
+
+/// Which machine publishes, beside its name.
+struct PublishedIdentity {
+  std::string machine_id;  ///< UUID
+  std::string twin_seen;   ///< another publisher that claims to be this machine; empty: none
+  bool devices_simulated = false;  ///< [daemon] simulated
+  friend bool operator==(const PublishedIdentity&, const PublishedIdentity&) = default;
 };
 
 /// Machine, sequence number and time of a message.
@@ -49,6 +58,8 @@ struct Stamp {
 [[nodiscard]] v1::ModelState state_message(v1::ModelStatus, std::string_view reason,
                                            const PublishedModel*, std::chrono::nanoseconds validity,
                                            const Stamp&);
+[[nodiscard]] v1::Identity identity_message(const PublishedIdentity&, const PublishedModel* active,
+                                            const Stamp&);
 /// The volumetric error V at the axis position of the live view, for the given tool. V is zero and
 /// `inside` is false if there is no model, if the model is not valid for this tool, or if the axis
 /// positions are not known. In the last case this message also has STALE instead of ACTIVE. Of a

@@ -2,7 +2,8 @@
 /// Sends the daemon's data to abbe-dds, each topic with its own timing:
 /// - live topics (Snapshot, Compensation) at their configured rates;
 /// - ErrorModel and ErrorGrid when the model changes;
-/// - ModelState when it changes and every second, because the age in it changes;
+/// - ModelState when it changes and every second, because the age in it changes, and Identity
+///   before it, so that a subscriber knows whose state it is;
 /// - Health every second and when it changes.
 ///
 /// abbe-dds repeats durable topics for late joiners. Periods are CLOCK_MONOTONIC time, also with
@@ -32,6 +33,7 @@ struct PublisherOptions {
   /// Validity of a compensation vector, in host time.
   std::chrono::nanoseconds validity = std::chrono::milliseconds{500};
   std::string security_warning;  ///< warning that DDS Security is off; empty: it is on
+  PublishedIdentity identity = {};
 };
 
 /// The present state of the active model.
@@ -41,6 +43,8 @@ struct ActiveModelState {
   const PublishedModel* model = nullptr;
   const ModelPublication* publication = nullptr;  ///< of `model`
   std::uint64_t revision = 0;                     ///< changes whenever another model becomes active
+  /// Why the gate refused the model that a person activated nevertheless; empty: it accepted it.
+  std::string refused{};
 };
 
 class Publisher {
@@ -56,6 +60,8 @@ class Publisher {
   void snapshot(const protocol::Snapshot& view, protocol::HostTime now, WallTime wall);
   void compensation(const protocol::Snapshot& view, const ActiveModelState& active,
                     protocol::HostTime now, WallTime wall);
+  /// Published with the next model(), which takes twin_seen from the link.
+  void set_identity(PublishedIdentity identity) { options_.identity = std::move(identity); }
   /// Call it in every cycle. Sends the model if another model has become active, and the state if
   /// it changed or is due.
   void model(const ActiveModelState& active, protocol::HostTime now, WallTime wall);
@@ -65,6 +71,7 @@ class Publisher {
   /// Why the last message that was not sent could not be encoded; empty: all were encoded.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
   [[nodiscard]] const DdsLink& link() const noexcept { return link_; }
+  [[nodiscard]] const PublishedIdentity& identity() const noexcept { return options_.identity; }
   [[nodiscard]] const std::string& security_warning() const noexcept {
     return options_.security_warning;
   }
@@ -94,6 +101,7 @@ class Publisher {
   WallTime next_state_{};
   v1::ModelStatus sent_status_ = v1::ModelStatus::MODEL_NONE;
   std::string sent_reason_;
+  PublishedIdentity sent_identity_;
   std::uint64_t sent_revision_ = 0;
 };
 

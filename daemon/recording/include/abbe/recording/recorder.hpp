@@ -43,6 +43,7 @@
 #include "abbe/base/error.hpp"
 #include "abbe/messages/cdr.hpp"
 #include "abbe/messages/recording_info.hpp"
+#include "abbe/pipeline/sensor_options.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -59,6 +60,7 @@ struct RecorderOptions {
       std::chrono::seconds{5};       ///< after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
   std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
+  SensorCheckOptions sensors;        ///< of the live run: a further file begins with their state
 };
 
 struct RecorderStatus {
@@ -139,6 +141,10 @@ class Recorder {
   /// Reports an internal error or a lack of memory: the open chunk is lost, the file is closed, and
   /// recording continues in the next file after retry_period.
   void fail(const std::string& what);
+
+  /// Since when the oldest message of the open chunk waits; nullopt: no chunk is open, all messages
+  /// are written or lost.
+  [[nodiscard]] std::optional<WallTime> open_chunk_since() const;
 
   /// The hash of everything written to the present file so far.
   [[nodiscard]] RecordingDigest digest() const;

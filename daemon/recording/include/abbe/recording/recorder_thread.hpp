@@ -6,6 +6,7 @@
 /// hub's thread, which hands over batches without a lock and never waits for the recorder.
 /// dropped() may be called from any thread.
 
+#include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -50,6 +51,10 @@ class RecorderThread : public PipelineObserver {
   /// The last status that the recorder reported, at most two of its cycles (40 ms) old. The
   /// reference is valid until the next call.
   [[nodiscard]] const RecorderStatus& status() const;
+  /// Age of the oldest message that was handed over and is not yet written to the file; 0: all are.
+  /// In normal operation at most RecorderOptions::chunk_period and a cycle of the recorder. Wall
+  /// time, to 50 ms. Messages that were dropped or lost do not count.
+  [[nodiscard]] std::chrono::nanoseconds behind(Recorder::WallTime now) const;
   /// Number of messages that were dropped because more than most_waiting_bytes would have waited.
   [[nodiscard]] std::uint64_t dropped() const noexcept;
 

@@ -4,10 +4,12 @@
 /// replay`. Damaged parts are skipped and listed in losses(). All messages of undamaged chunks are
 /// delivered, and all whole messages of a chunk that is truncated by the end of the file.
 ///
-/// The file is mapped into memory: views stay valid as long as the reader exists, and the file must
-/// not be shortened during that time (a Recorder shortens its own file only after a failed write).
-/// Checksums are checked when the file is opened. Const functions may be used by several threads,
-/// each with its own cursor.
+/// Reads every file that MCAP allows, also one that another program wrote again: with or without
+/// indexes, summary, repeated channels, chunks. Not compressed chunks.
+///
+/// The file is read piece by piece. If it becomes shorter meanwhile, cursors end early and intact()
+/// is an Error. Checksums are checked when the file is opened. Const functions may be used by
+/// several threads, each with its own cursor.
 
 #include <cstdint>
 #include <filesystem>
@@ -52,7 +54,7 @@ struct RecordedMessage {
   /// The instant that the message describes; for a message repeated from the previous file, the
   /// beginning of this file.
   protocol::HostTime published;
-  std::span<const std::byte> payload;  ///< CDR with its encapsulation header
+  std::span<const std::byte> payload;  ///< CDR with its encapsulation header, see Cursor::next()
 };
 
 /// Callbacks for the messages of a recording, by type. Messages without a callback are not decoded.
@@ -103,6 +105,9 @@ class RecordingReader {
   /// Times at which the hub took the first and the last message; nullopt if there are no messages.
   [[nodiscard]] std::optional<std::pair<protocol::HostTime, protocol::HostTime>> time_range()
       const noexcept;
+  /// Error (Io) if the file became shorter, changed, or could not be read since it was opened. Then
+  /// what was read is incomplete. Check it after the last message.
+  [[nodiscard]] Result<void> intact() const;
   /// SHA-256 of the whole file in hex; reads all of it.
   [[nodiscard]] std::string sha256() const;
 
@@ -124,6 +129,8 @@ class RecordingReader {
 /// chunks near the current time.
 class RecordingReader::Cursor {
  public:
+  /// nullopt after the last message, or if the file cannot be read any more: see intact(). The
+  /// payload is valid until the next call.
   [[nodiscard]] std::optional<RecordedMessage> next();
   /// Fraction of the messages already delivered, 0 to 1.
   [[nodiscard]] double progress() const noexcept;

@@ -67,6 +67,7 @@ struct ReplayReport {
   std::vector<ReplayedDatum> datums;        ///< from raw bytes only
   std::vector<std::string> live_model_ids;  ///< from the calibration events in the recording
   std::uint64_t snapshots = 0;
+  std::uint64_t samples = 0;            ///< of all devices, recorded or decoded from bytes
   std::uint64_t undecodable = 0;        ///< messages that could not be decoded
   std::chrono::nanoseconds recorded{};  ///< from the first to the last message
 };

@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "abbe/report/model_report.hpp"
 
@@ -14,8 +15,19 @@ namespace abbe::daemon {
 
 /// The details are those of `as_found`. BadInput with all entries that are missing or invalid, also
 /// dates that contradict each other or the models; entries say which measurement it is about.
-/// DataInsufficient as model_report().
+/// Refused if a model must not be used (model_use.hpp) and its `forced` is empty; the certificate of
+/// a forced one states this first. DataInsufficient as model_report().
 [[nodiscard]] Result<std::string> calibration_certificate(
     const ReportSubject& as_found, const std::optional<ReportSubject>& as_left = {});
+
+/// Dates of the details that no calendar has, that contradict each other, the measurements or the
+/// identification of the models, or that are in the future; and contradictory_times() of both.
+/// `as_left` may be null.
+[[nodiscard]] std::vector<std::string> contradictory_dates(const ReportSubject& as_found,
+                                                           const ReportSubject* as_left);
+
+/// Times of the model alone that contradict each other or the present. No details can correct them:
+/// a certificate is refused, a report has them among its notes.
+[[nodiscard]] std::vector<std::string> contradictory_times(const ReportSubject& subject);
 
 }  // namespace abbe::daemon

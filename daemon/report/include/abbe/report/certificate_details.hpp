@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/base/utc_text.hpp"
+
 namespace abbe::daemon {
 
 struct Contact {
@@ -37,9 +39,12 @@ struct CertificateDetails {
   /// are absent, those that the run recorded are stated.
   std::optional<double> temperature_C, u_temperature_K, humidity_percent, feed_mm_per_min;
   std::vector<EquipmentDetails> equipment;
+  /// When the certificate is made: later dates of issue and identification are refused. nullopt: not
+  /// known.
+  std::optional<protocol::UtcTime> now{};
 };
 
-/// True for an existing day as in ISO 8601, "2026-11-26".
+/// True for an existing day as in ISO 8601, "2026-11-26", in the years 1 to 9999.
 [[nodiscard]] bool is_date(std::string_view text);
 /// True for two capital letters.
 [[nodiscard]] bool is_country_code(std::string_view text);

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "abbe/model/model_store.hpp"
+#include "abbe/model/model_use.hpp"
+#include "abbe/model/stored_model.hpp"
 #include "abbe/report/certificate_details.hpp"
 #include "abbe/report/certified_values.hpp"
 
@@ -16,10 +17,17 @@ namespace abbe::daemon {
 /// A model and what the store knows of it.
 struct ReportSubject {
   ModelDocument document;
-  std::optional<StoreEntry> entry{};  ///< nullopt: a file, not in a store; no verdict is known
+  std::optional<StoreEntry> entry{};  ///< nullopt: a file, not in a store
   std::vector<StoreEvent> events{};   ///< of this model, oldest first
   CertificateDetails details{};
+  std::optional<std::string> machine_hash{};  ///< ModelInUse::machine_hash
+  /// Who had a certificate of the model made although it must not be used, and why.
+  std::optional<StoreActor> forced{};
+  /// Of the machine, when the model was identified; empty: the store is not in a data folder of abbed.
+  std::string machine_id{};
+  std::string identity_doubt{};  ///< ModelInUse::identity_doubt
 };
+[[nodiscard]] ModelInUse in_use(const ReportSubject& subject, ModelPurpose purpose);
 
 /// A model of the store with its verdict and its events.
 [[nodiscard]] Result<ReportSubject> report_subject(const ModelStore& store, const std::string& id);

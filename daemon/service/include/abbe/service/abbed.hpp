@@ -4,11 +4,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/base/error.hpp"
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/time_source.hpp"
 
 namespace abbe::daemon {
@@ -17,6 +20,8 @@ namespace abbe::daemon {
 struct AbbedOptions {
   std::string configuration_text;  ///< text of the configuration file; stored in the recording
   std::string dds_program;  ///< path of abbe-dds; started as a child if dds.supervise is Child
+  WallClock clock{};        ///< of all dates
+  bool dds_unit = false;    ///< systemd runs abbe-dds, unless the configuration decides
 };
 
 class Abbed {
@@ -26,8 +31,12 @@ class Abbed {
   [[nodiscard]] static Result<std::unique_ptr<Abbed>> start(Config config, AbbedOptions options);
   Abbed(const Abbed&) = delete;
   Abbed& operator=(const Abbed&) = delete;
-  /// Stops the parts in reverse order and closes the recording.
+  /// As end(), and closes the recording.
   ~Abbed();
+
+  /// Stops the measuring machine, then the other parts. Returns whether the machine is stopped;
+  /// nullopt: there is none. The last call.
+  std::optional<drivers::IppStop> end();
 
   /// Call at least every 50 ms from the thread that called start(). Supervises abbe-dds, removes
   /// old recordings in the background and logs which recordings of a killed daemon were closed.
@@ -35,6 +44,9 @@ class Abbed {
   /// True if the hub began a cycle within the last second. If false, the caller must not notify
   /// systemd's watchdog, which then restarts abbed.
   [[nodiscard]] bool alive() const;
+  /// Stops a measuring machine that moves; it then awaits a release. Takes no lock. Call it when the
+  /// hub is not alive: the hub can no longer stop the machine when its operator is gone.
+  void stop_machine();
   /// Warnings of the start, one log line each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 

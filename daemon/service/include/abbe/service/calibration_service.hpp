@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/methods/calibration_request.hpp"
 #include "abbe/methods/calibration_session.hpp"
 #include "abbe/recording/recorder_thread.hpp"
@@ -46,12 +47,12 @@ class CalibrationService {
  public:
   /// `recorder` may be null: then nothing is recorded, and a model names no recording.
   CalibrationService(const Config& config, ModelAuthority& authority, RecorderThread* recorder,
-                     protocol::UtcOffset utc);
+                     WallClock clock = {});
   /// Stops a running identification, and tries once more to store a model that is not stored yet.
   /// Takes kStopTimeout at most. A background task that is still running then continues without
   /// access to this object; see background_tasks_running(). A lost model is reported on stderr.
   ~CalibrationService();
-  static constexpr std::chrono::seconds kStopTimeout{4};
+  static constexpr std::chrono::seconds kStopTimeout = kLongestWorkEnd;
   /// The part of kStopTimeout for which the last attempt to store a model waits for the lock of the
   /// store.
   static constexpr std::chrono::seconds kLastTry{1};
@@ -85,6 +86,8 @@ class CalibrationService {
                                   protocol::HostTime now);
 
   [[nodiscard]] SessionStatus status() const;
+  /// The source of dates. Any thread.
+  [[nodiscard]] const WallClock& clock() const noexcept { return clock_; }
   /// The request of the present or last session as JSON; null before the first.
   [[nodiscard]] const std::shared_ptr<const std::string>& request_text() const noexcept {
     return request_text_;
@@ -117,7 +120,7 @@ class CalibrationService {
   std::shared_ptr<const Config> shared_config_;  // copy, for the threads of identifications
   ModelAuthority& authority_;
   RecorderThread* recorder_;
-  protocol::UtcOffset utc_;
+  WallClock clock_;
   CalibrationSession session_;
   LiveTablesWatch live_tables_;
   std::string who_;

@@ -24,6 +24,17 @@
 ///     {"do": "tracker", "order": "reflector set", "reflector": NAME or ID}
 ///     {"do": "tracker_reflectors"}
 ///
+/// "machine" with "stop" returns "stop", the number of the request. "machine" and "status" (as
+/// "machine_stop") contain the latest one: {"number", "outcome", "text"}; so does "touches", once a
+/// cancelled job has ended. "outcome" is "pending", "stopped" (AbortE was answered, or no motion was
+/// under way), "not confirmed" (refused, not answered, connection lost) or "not sent" (no
+/// connection). Repeat "machine" until the outcome of that number, or of a later one, is not
+/// "pending". After the last two the machine may be moving; AbortE is then the first command on the
+/// next connection.
+///
+/// "touch" is refused as a whole if a place is not finite or outside the volume, or if a normal is
+/// not a unit vector.
+///
 /// "calibrate" returns "session", the number of the session; "status" contains it as "id" of
 /// "session" and of the "ended_sessions". "touches" must be repeated at least every 2 s, else the
 /// touching is stopped. "tracker" and "tracker_reflectors" return "order", the number of the order;

@@ -18,7 +18,7 @@ enum class Role {
 };
 
 /// Refused unless `peer` has the role; the error names the role, the group that has it, and what to
-/// do. Reads the group database. Any thread.
+/// do. Does not wait for a name service: see AccountNames. Any thread.
 [[nodiscard]] Result<void> check_role(const ControlPeer& peer, Role role, std::string_view request,
                                       const ControlConfig& control);
 

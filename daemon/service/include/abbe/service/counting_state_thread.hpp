@@ -12,13 +12,14 @@
 #include <string>
 #include <thread>
 
+#include "abbe/base/end_limits.hpp"
 #include "abbe/pipeline/counting_state.hpp"
 
 namespace abbe::daemon {
 
 class CountingStateThread {
  public:
-  static constexpr std::chrono::seconds kEndTimeout{3};
+  static constexpr std::chrono::seconds kEndTimeout = kLongestCountingEnd;
 
   /// `look` returns the state to write and runs on the new thread; nullopt leaves the file
   /// unchanged. `report` is called once for each new fault of the file, also on the new thread. If

@@ -28,6 +28,7 @@
 #include "abbe/publishing/publisher.hpp"
 #include "abbe/recording/recorder_thread.hpp"
 #include "abbe/service/calibration_service.hpp"
+#include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
 #include "abbe/service/store_changes.hpp"
@@ -52,6 +53,9 @@ struct HubParts {
   VerificationService* verification = nullptr;
   TrackerService* tracker = nullptr;
   StoreChanges* store_changes = nullptr;
+  /// The user of abbe-dds, which reads the network: it has no role on the control socket.
+  std::optional<uid_t> network_user = {};
+  IdentityWatch* identity = nullptr;
 };
 
 class Hub : private PipelineObserver {
@@ -97,6 +101,7 @@ class Hub : private PipelineObserver {
   void on_snapshots(std::span<const protocol::Snapshot> snapshots,
                     protocol::HostTime taken) override;
   void publish(bool fresh, protocol::HostTime now);
+  void follow_identity(WallTime wall);
   void collect_health(protocol::HostTime now);
   void touch(std::size_t points_left, WallTime wall);
 
@@ -107,6 +112,7 @@ class Hub : private PipelineObserver {
   Batch batch_;
   WallTime cycle_began_{};
   std::vector<StreamHealth> health_;
+  std::string missing_scale_;  ///< why an axis is missing whose scale has no temperature
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};

@@ -21,6 +21,7 @@
 
 #include "abbe/config/config.hpp"
 #include "abbe/publishing/publisher.hpp"
+#include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_keeper.hpp"
 
 namespace abbe::daemon {
@@ -32,7 +33,7 @@ class ModelAuthority {
   /// permission, damage) is reported in fault(), and follow_store() reads it again: acquisition
   /// does not wait for it.
   [[nodiscard]] static ModelAuthority open(const std::filesystem::path& store_folder,
-                                           const Config& config, protocol::UtcOffset utc,
+                                           const Config& config, WallClock clock,
                                            protocol::HostTime now);
 
   /// A copy of the keeper, with which another thread stores a model. The hub's thread then calls
@@ -73,10 +74,11 @@ class ModelAuthority {
                                              std::chrono::nanoseconds patience) const;
   [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
   /// The model with which the gate compares a new one: the active model, or null if the active
-  /// model was made for another machine configuration.
-  [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const noexcept {
-    return active_.made_for_this_machine ? active_.model : nullptr;
-  }
+  /// model was made for another machine configuration, or the identity of the machine does not allow
+  /// to use it.
+  [[nodiscard]] std::shared_ptr<const PublishedModel> comparison_model() const;
+  /// Restricts comparison_model(). `identity` must exist at every later call; null: no restriction.
+  void set_identity(const IdentityWatch* identity) noexcept { identity_ = identity; }
 
  private:
   ModelAuthority(ModelKeeper keeper, bool axes_compensated);
@@ -96,6 +98,7 @@ class ModelAuthority {
 
   ModelKeeper keeper_;
   bool axes_compensated_;
+  const IdentityWatch* identity_ = nullptr;
   std::optional<StoreStamp> seen_;    // stamp of the store when `active_` was read
   bool read_again_ = false;           // read the store even if its stamp is unchanged
   std::optional<StoreStamp> failed_;  // stamp of the store when the last reading failed

@@ -12,8 +12,10 @@
 #include <string_view>
 #include <vector>
 
+#include "abbe/base/wall_clock.hpp"
 #include "abbe/calib/gate.hpp"
 #include "abbe/config/config.hpp"
+#include "abbe/model/configuration_fit.hpp"
 #include "abbe/model/model_store.hpp"
 #include "abbe/publishing/idl_messages.hpp"
 #include "abbe/publishing/model_publication.hpp"
@@ -27,8 +29,11 @@ struct ActiveModel {
   StoreEvent activation;  ///< default-constructed: no model has been activated
   std::shared_ptr<const PublishedModel> model;
   ModelPublication publication;  ///< of `model`
-  bool made_for_this_machine = false;
-  std::string recording_gap;  ///< ModelDocument::recording_gap
+  /// Why the readings do not have the meaning that they had when the model was made; empty: they
+  /// have, or a person accepted it.
+  std::string unfit{};
+  std::string measured_otherwise{};  ///< changed_measurements()
+  std::string recording_gap;         ///< ModelDocument::recording_gap
   std::string drift;  ///< ModelStore::drift(); empty: no drift was found since the activation
   std::string fault;
 };
@@ -55,12 +60,11 @@ struct KeptBeside {
 class ModelKeeper {
  public:
   /// Does not access the disk.
-  ModelKeeper(const std::filesystem::path& store_folder, const Config& config,
-              protocol::UtcOffset utc);
+  ModelKeeper(const std::filesystem::path& store_folder, const Config& config, WallClock clock);
 
   /// For the start of the daemon: removes files that killed processes left in the store, and
   /// renames a damaged state file. Ignores errors; read_active() returns them.
-  void tidy_store(protocol::HostTime now);
+  void tidy_store();
 
   /// As ModelStore::set_lock_timeout().
   void set_lock_timeout(std::chrono::nanoseconds patience) noexcept {
@@ -101,8 +105,8 @@ class ModelKeeper {
 
   ModelStore store_;
   std::string machine_;
-  std::string machine_hash_;
-  protocol::UtcOffset utc_;
+  std::shared_ptr<const PresentConfiguration> configuration_;
+  WallClock clock_;
 };
 
 }  // namespace abbe::daemon

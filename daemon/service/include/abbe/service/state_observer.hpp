@@ -1,6 +1,6 @@
 #pragma once
 /// Compares successive states of the daemon's parts and gives one journal entry for each change.
-/// Parts: devices, recorder, model store, DDS link, session, model, abbe-dds and the hub. Reads no
+/// Parts: devices, stops of a measuring machine, recorder, model store, DDS link, session, model, abbe-dds and the hub. Reads no
 /// clock and writes nothing. The rate is limited: each part may have kBurst entries at once, then
 /// one entry per kRefill, with the number of changes that were not logged.
 
@@ -32,12 +32,21 @@ struct ObservedModel {
   std::string reason;
 };
 
+/// The latest request to stop the measuring machine.
+struct ObservedStop {
+  std::uint64_t number = 0;
+  std::string outcome;  ///< "stopped"
+  std::string text;
+  bool confirmed = false;
+};
+
 struct Observed {
   bool hub_answers = true;  ///< false: streams, session and model are not known
   std::vector<StreamHealth> streams;
   SessionStatus session;
   ObservedModel model;
-  std::optional<ObservedParticipant> participant;
+  std::optional<ObservedStop> stop = {};  ///< once its outcome is known
+  std::optional<ObservedParticipant> participant = {};
 };
 
 struct ObservedPart;  ///< state of one part at one time

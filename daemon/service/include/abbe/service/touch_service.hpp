@@ -10,6 +10,7 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,14 +18,9 @@
 #include "abbe/base/error.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/sample_source.hpp"
+#include "abbe/service/motion_volume.hpp"
 
 namespace abbe::daemon {
-
-/// One touch: the places that the tip passes on its way, in order, and then the point to touch.
-struct TouchRequest {
-  std::vector<drivers::ProbePoint> way;  ///< `touch` is false
-  drivers::ProbePoint point;
-};
 
 /// A checked job of touches.
 struct TouchJob {
@@ -35,8 +31,10 @@ struct TouchJob {
   std::vector<drivers::ProbePoint> leave;    ///< retract path after the last touch
   std::vector<protocol::ProbeTrigger> made;  ///< empty, with capacity for the results
 };
-/// Makes a job. Error Usage if `touches` is empty or exceeds the limits of TouchJob. Any thread.
-[[nodiscard]] Result<TouchJob> touch_job(std::vector<TouchRequest> touches,
+/// Makes a job. Error Usage if `touches` is empty or exceeds the limits of TouchJob, Refused if a
+/// place fails check_places(): then no part of the job is sent to the machine. Any thread.
+[[nodiscard]] Result<TouchJob> touch_job(const MotionVolume& volume,
+                                         std::vector<TouchRequest> touches,
                                          std::vector<drivers::ProbePoint> leave = {});
 
 class TouchService {
@@ -51,6 +49,8 @@ class TouchService {
     std::size_t asked = 0;
     std::vector<protocol::ProbeTrigger> touches;  ///< with a position, in the order asked
     std::string reason;  ///< why it ended before the last touch; empty: it did not
+    /// Whether the machine stopped, if the job was cancelled and has ended.
+    drivers::IppStop stop = {};
   };
 
   /// `configured`: the configuration has a measuring machine.
@@ -62,7 +62,8 @@ class TouchService {
   /// Starts a job. Refused without a machine, while another job runs, and while the machine is not
   /// ready. Afterwards `job` holds the memory of the previous job, which the caller destroys.
   [[nodiscard]] Result<void> start(TouchJob&& job);
-  /// Stops the present motion. The job counts as running until the machine has stopped.
+  /// Stops the present motion. The job counts as running until the machine has stopped, or until it
+  /// is known that this cannot be confirmed; the reason and `stop` of the status report which.
   [[nodiscard]] Result<void> cancel();
   /// Call in every cycle. `points_left`: SampleSource::points_left() before the batch was drained.
   /// `seen`: the last fault that the machine reported. Acts as cancel() if look() was not called
@@ -72,6 +73,8 @@ class TouchService {
   /// The status, for the client that started the job. Resets the time of kLongestUnwatched.
   [[nodiscard]] const Status& look();
   [[nodiscard]] const Status& status() const noexcept { return status_; }
+  /// True once the motion is being stopped: cycle() then ignores `seen`.
+  [[nodiscard]] bool awaits_stop() const noexcept { return stopping_; }
 
  private:
   void ask_next();
@@ -79,6 +82,7 @@ class TouchService {
   void stop(std::string reason);
   void stopping(const Batch& batch, std::size_t points_left);
   void end(std::string reason);
+  [[nodiscard]] std::string stop_text() const;
   [[nodiscard]] std::string tip_text() const;
   [[nodiscard]] std::string release_text() const;
 
@@ -89,6 +93,7 @@ class TouchService {
   std::vector<drivers::ProbePoint> leave_;
   bool leaving_ = false;
   bool stopping_ = false;
+  std::uint64_t stop_number_ = 0;   ///< of stop_machine()
   bool refused_ = false;            ///< the machine refused the present touch
   std::optional<WallTime> looked_;  ///< time of the last look(); nullopt: since the last cycle
   Status status_;

@@ -2,6 +2,7 @@
 /// measured.csv: error motions that a device measured directly, with the columns
 /// `name,position_mm,value,unit,run,direction[,x_mm,y_mm,z_mm]`. Faults as in input_files.hpp.
 
+#include <cstddef>
 #include <filesystem>
 #include <vector>
 
@@ -20,6 +21,7 @@ namespace abbe::daemon {
 struct MeasuredFile {
   InputFile source;
   std::vector<calib::direct::MeasuredError> errors;
+  std::vector<std::vector<std::size_t>> lines;  ///< of the readings of each error in the file
 };
 [[nodiscard]] Result<MeasuredFile> read_measured_csv(const std::filesystem::path& file);
 

@@ -48,6 +48,7 @@ struct BarPlanFile {
 struct BarPointsFile {
   InputFile source;
   std::vector<calib::mfb::PassTouches> passes;  ///< one per measurement of the plan
+  std::vector<std::vector<std::size_t>> lines;  ///< of each touch in the file, as in `passes`
   /// A line with file, line and column for each measurement whose rows run against its `pass`. A bar
   /// that lies turned may look like that, so that it is no fault of the file yet.
   std::vector<std::string> against_pass;

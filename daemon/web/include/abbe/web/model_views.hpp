@@ -12,9 +12,11 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "abbe/base/error.hpp"
 #include "abbe/report/certified_values.hpp"
+#include "abbe/report/model_report.hpp"
 
 namespace abbe::web {
 
@@ -30,7 +32,9 @@ class ModelViews {
   /// Of a request for a view, while another one is made.
   static constexpr std::chrono::seconds kPatience{10};
 
-  explicit ModelViews(std::filesystem::path store) : store_(std::move(store)) {}
+  /// `machine_hash`: of the configured machine, for which another machine's model is STALE.
+  explicit ModelViews(std::filesystem::path store, std::optional<std::string> machine_hash = {})
+      : store_(std::move(store)), machine_hash_(std::move(machine_hash)) {}
 
   /// Views that wait for others to be made end with an Error.
   void stop() noexcept { stopping_ = true; }
@@ -48,8 +52,8 @@ class ModelViews {
   [[nodiscard]] daemon::Result<std::string> trend();
   /// The report of the model as an HTML page without JavaScript.
   [[nodiscard]] daemon::Result<std::string> report(const std::string& id);
-  /// The bytes of model.json.
-  [[nodiscard]] daemon::Result<std::string> model_file(const std::string& id) const;
+  /// model.json with the verdict of the store, which may be later than that in its file.
+  [[nodiscard]] daemon::Result<std::string> model_file(const std::string& id);
 
  private:
   /// A text, and the stamp of the files that it was made of.
@@ -64,7 +68,10 @@ class ModelViews {
   [[nodiscard]] std::optional<std::string> find_kept(const std::string& key,
                                                      const std::string& stamp);
 
+  [[nodiscard]] daemon::Result<daemon::ReportSubject> subject(const std::string& id) const;
+
   std::filesystem::path store_;
+  std::optional<std::string> machine_hash_;
   std::atomic<bool> stopping_{false};
   // One at a time, because each takes much of a processor.
   std::mutex making_model_, making_history_, making_trend_;

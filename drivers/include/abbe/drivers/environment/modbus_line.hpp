@@ -7,12 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <variant>
 
 #include "abbe/drivers/error.hpp"
+#include "abbe/drivers/host_addresses.hpp"
 #include "abbe/protocol/modbus/read.hpp"
 
 struct _modbus;  // NOLINT(bugprone-reserved-identifier): libmodbus' own name of modbus_t
@@ -22,7 +24,7 @@ namespace abbe::drivers {
 namespace modbus = protocol::modbus;
 
 struct ModbusTcp {
-  std::string host;  ///< address or name; a name is resolved at every opening, which may block
+  std::string host;  ///< address or name
   std::uint16_t port = modbus::kTcpPort;
 };
 
@@ -69,7 +71,8 @@ class ModbusLine {
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
 
-  /// Blocks for at most `wall`, plus the time of name resolution. Error Unreachable (refused, no
+  /// Always with the same address. Blocks for at most `wall`; the first call also waits at most 1 s
+  /// for the address of a host name: see HostAddresses. Error Unreachable (refused, no
   /// route, no such path, serial line in use) or Timeout.
   [[nodiscard]] Result<void> open(const ModbusAddress& address, std::chrono::nanoseconds wall);
   [[nodiscard]] bool is_open() const noexcept { return context_ != nullptr; }
@@ -85,7 +88,8 @@ class ModbusLine {
   struct Free {
     void operator()(_modbus* context) const noexcept;
   };
-  SerialLock lock_;  ///< declared first: released after the line is closed
+  std::optional<HostAddresses> host_;  ///< of ModbusTcp
+  SerialLock lock_;                    ///< declared first: released after the line is closed
   std::unique_ptr<_modbus, Free> context_;
 };
 

@@ -9,12 +9,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "abbe/drivers/device.hpp"
+#include "abbe/drivers/emergency_stop.hpp"
 #include "abbe/drivers/ippdme/receiver.hpp"
 #include "abbe/drivers/ippdme/session.hpp"
 #include "abbe/drivers/mailbox.hpp"
@@ -31,17 +33,26 @@ struct IppMachine {
   friend bool operator==(const IppMachine&, const IppMachine&) = default;
 };
 
+struct IppStored {
+  bool done = false;
+  std::string fault;  ///< why the latest attempt failed; empty: none failed, or `done`
+};
+
 struct IppDeviceOptions {
   std::string name = "cmm";
   std::string host = "127.0.0.1";
   std::uint16_t port = ippdme::kPort;
   IppSessionOptions session;  ///< `peer` is made from name, host and port
   IppReceiverOptions receiver;
-  /// Called on the device thread at every change of the state: before the first command of a motion
-  /// is sent, when the machine has stopped, when a hold begins or ends. A hold: the machine awaits
-  /// a release by an operator. Store the value, and pass it in session.held and session.moving
-  /// after a restart.
+  /// Called on the device thread at every change of the state: before the first command of a motion,
+  /// when the machine has stopped, when a hold begins or ends. A hold: the machine awaits a release
+  /// by an operator. It must not wait: AbortE is sent by the same thread. Let another thread store
+  /// the value, and pass it in session.held and session.moving after a restart.
   std::function<void(const IppMachine&)> machine_changed;
+  /// Whether the latest value of machine_changed is stored. Called on the device thread; must not
+  /// wait. A motion is sent only after its state is stored; one whose state cannot be stored is not
+  /// sent. Empty: each value counts as stored at once.
+  std::function<IppStored()> machine_stored;
   std::size_t touch_capacity = 256;
   std::size_t position_capacity = 256;  ///< 25 s at 10 positions per second
   std::size_t raw_capacity_blocks = 256;
@@ -68,13 +79,20 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// connection.
   [[nodiscard]] static Result<std::unique_ptr<IppDevice>> create(const IppDeviceOptions& options,
                                                                  const TimeSource& time);
-  /// Stops a motion in progress, waits for the answer to AbortE (at most command_timeout), and ends
-  /// the session without waiting for the answer to EndSession.
+  /// As finish().
   ~IppDevice() override;
+
+  /// Stops a motion in progress, waits for the answer to AbortE (at most command_timeout; if the
+  /// connection is lost, connect_timeout before for another one), and ends the session without
+  /// waiting for the answer to EndSession. Returns whether the motion is stopped. Call it after the
+  /// device thread has ended. A second call returns the same.
+  IppStop finish();
 
   void wait(std::chrono::nanoseconds at_most) override;
   void receive() ABBE_RT override;
   [[nodiscard]] DeviceStatus status() const override;
+  /// Sends AbortE for a motion in progress, on a new connection if the present one is lost.
+  [[nodiscard]] bool stop_after_failure() override;
 
   /// Any thread. Moves the machine to the point and touches there. Points are measured in the order
   /// of the calls; each touch gives one ProbeTrigger, numbered from 1 in that order. Points that
@@ -82,11 +100,15 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   /// are discarded; each case is a fault.
   void measure(const ProbePoint& point) { measure(std::span{&point, 1}); }
   /// As measure() of one point, for a path. If the connection is lost, all remaining points are
-  /// discarded: driving only a part of the path could lead to a collision.
+  /// discarded: driving only a part of the path could lead to a collision. A path with a point that
+  /// I++ DME cannot express is discarded as a whole: see check().
   void measure(std::span<const ProbePoint> points);
-  /// Any thread. Stops a motion in progress (AbortE) and discards all points. The session then
-  /// awaits release(), whether or not the machine was moving.
-  void abort();
+  /// Any thread; takes no lock. Stops a motion in progress (AbortE) and discards all points. The
+  /// session then awaits release(), whether or not the machine was moving. Returns the number of
+  /// the request; last_stop() tells its outcome.
+  std::uint64_t abort();
+  /// Any thread. The latest request that the session has received, and its outcome.
+  [[nodiscard]] IppStop last_stop() const;
   /// Any thread. Call after an operator has inspected the machine: clears the errors and restarts
   /// the session. No effect unless releasable().
   void release();
@@ -120,15 +142,22 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
 
   IppDevice(const IppDeviceOptions& options, TcpPeer peer, const TimeSource& time);
 
+  using Request = std::variant<IppPath, IppAbortRequested, IppReleaseRequested, IppStopRequested>;
+
   [[nodiscard]] std::span<const std::byte> encode(const IppSend& command);
   void connected();
-  void disconnected() {}
+  void disconnected() { emergency_stop_.set_socket(-1); }
   void read_requests();
-  void request_points(const std::vector<ProbePoint>& points);
+  [[nodiscard]] static bool is_stop(const Request& request);
+  void read_stops(const std::vector<Request>& requests);
   void await_standstill();
   void count_points();
   void report_machine();
   void show_session();
+  void show_stop();
+  void show_condition();
+  void begin_stored_motion();
+  [[nodiscard]] IppStored stored() const;
 
   void take(const protocol::AxisSample& sample) ABBE_RT;
   void take(const protocol::ProbeTrigger& touch) ABBE_RT;
@@ -143,8 +172,6 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   RawRing raw_;
   IppReceiver receiver_;
 
-  using Request = std::variant<std::vector<ProbePoint>, IppAbortRequested, IppReleaseRequested,
-                               IppStopRequested>;
   Mailbox<Request> requests_;  ///< written by the hub without a lock
   std::size_t taken_ = 0;      ///< points that the device thread took from requests_
   std::atomic<std::size_t> asked_{0};
@@ -152,7 +179,16 @@ class IppDevice final : public Device, private SessionOverTcp<IppDevice, IppWord
   // relaxed: independent values
   std::atomic<bool> held_{false};
   std::atomic<bool> releasable_{false};
-  IppMachine machine_;  ///< last value passed to machine_changed
+  EmergencyStop emergency_stop_{"E0002 AbortE()\r\n", "E0002 %"};
+  IppMachine machine_;                               ///< last value passed to machine_changed
+  std::string condition_;                            ///< last value shown
+  std::optional<protocol::HostTime> unsaved_since_;  ///< machine_ is not stored since then
+  std::atomic<std::uint64_t> stops_asked_{0};
+  bool ended_ = false;  ///< finish() has returned
+  IppStop stop_;        ///< last value shown
+  FaultText stop_text_;
+  /// number * kOutcomes + outcome: one value, because both change together
+  std::atomic<std::uint64_t> stop_shown_{0};
 };
 
 }  // namespace abbe::drivers

@@ -5,13 +5,17 @@
 ///
 ///   Disconnected -> Connecting -> Opening (StartSession, GetDMEVersion)
 ///     -> Configuring (IsHomed [Home], SetTool, OnPtMeasReport, OnMoveReportE)
-///     -> Ready <-> Measuring
+///     -> Ready -> Storing -> Measuring -> Ready
+///
+///   Storing: the owner stores that a motion is under way; the motion is sent after IppMotionStored.
+///   Home, which is sent in Configuring, is stored in the same way.
 ///
 ///   any with an unfinished motion -> Aborting (AbortE) -> AwaitingRelease   (for every cause)
 ///   any -> AwaitingRelease                     (after an error of severity 2 or more)
 ///   AwaitingRelease -> Clearing (ClearAllErrors) -> Opening, or -> Connecting
 ///                                              (only by IppReleaseRequested)
-///   any -> Stopping -> Disconnected
+///   any -> Stopping -> Disconnected   (lost with an unfinished motion: first one more connection
+///                                      for AbortE)
 ///   any without a motion -> Faulted -> Connecting   (after a pause)
 ///
 /// A connection with an unfinished motion is closed only after AbortE was answered or
@@ -25,13 +29,15 @@
 /// sent in the first session and after a release, but not if only the connection was lost.
 ///
 /// While no point is measured, the position is requested once per poll period; this request also
-/// checks that the server still answers. Points are accepted in Ready and Measuring. In any other
-/// state they are discarded, which is a fault.
+/// checks that the server still answers. Points are accepted in Ready, Storing and Measuring. In any
+/// other state they are discarded, which is a fault.
 
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -50,6 +56,7 @@ enum class IppState {
   Opening,
   Configuring,
   Ready,
+  Storing,
   Measuring,
   Aborting,
   AwaitingRelease,
@@ -71,6 +78,29 @@ struct ProbePoint {
   bool touch = true;
 };
 
+/// Targets that are driven to in this order.
+using IppPath = std::vector<ProbePoint>;
+/// Error BadConfiguration for the first target that I++ DME cannot express: a position or a normal that is
+/// not finite or too large. The text names target, coordinate and value.
+[[nodiscard]] Result<void> check(std::span<const ProbePoint> path);
+
+/// Outcome of a request to stop the machine.
+enum class IppStopOutcome : std::uint8_t {
+  None,          ///< no request yet
+  Pending,       ///< AbortE is on its way
+  Stopped,       ///< AbortE was answered, or no motion was under way
+  NotConfirmed,  ///< AbortE was sent, but refused or not answered: the machine may be moving
+  NotSent,       ///< there is no connection: the machine may be moving
+};
+/// Text for messages: "stopped", "not confirmed", ...
+[[nodiscard]] const char* name_of(IppStopOutcome) noexcept;
+
+struct IppStop {
+  std::uint64_t number = 0;  ///< of the latest request that the session has received
+  IppStopOutcome outcome = IppStopOutcome::None;
+  std::string text;  ///< the reason of the outcome, a sentence
+};
+
 struct IppSessionOptions {
   std::string peer = "measuring machine";  ///< name in messages: "cmm 10.0.0.9:1294"
   bool home = false;    ///< true: Home is sent if the machine is not homed; false: that is a fault
@@ -83,6 +113,8 @@ struct IppSessionOptions {
   std::chrono::nanoseconds connect_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds command_timeout = std::chrono::seconds{3};
   std::chrono::nanoseconds motion_timeout = std::chrono::seconds{120};  ///< Home, GoTo, PtMeas
+  /// Longest time in Storing: a motion that could not be stored by then is not sent.
+  std::chrono::nanoseconds store_timeout = std::chrono::seconds{30};
   /// Pause before connecting again; it doubles with each attempt up to longest_pause.
   std::chrono::nanoseconds first_pause = std::chrono::milliseconds{250};
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds{500};
@@ -97,11 +129,22 @@ struct IppConnectionLost {
 };
 struct IppStopRequested {};  ///< ends the session
 /// Input: stop a motion, discard all points, and await a release whether or not the machine moved.
-struct IppAbortRequested {};
+struct IppAbortRequested {
+  /// Of the request; returned with the outcome. Requests of several threads may arrive out of order:
+  /// the outcome has the highest number.
+  std::uint64_t number = 0;
+  std::string_view reason = "stopped by request";  ///< of the hold; a literal
+};
 struct IppReleaseRequested {};  ///< an operator has inspected the machine
-using IppInput = std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested,
-                              IppAbortRequested, IppReleaseRequested, ProbePoint, IppAck,
-                              IppComplete, IppData, IppError, IppProtocolError>;
+struct IppMotionStored {};      ///< in Storing: the motion may be sent
+/// Input in Storing: the motion must not be sent.
+struct IppMotionNotStored {
+  std::string why;
+};
+using IppInput =
+    std::variant<IppTick, IppConnected, IppConnectionLost, IppStopRequested, IppAbortRequested,
+                 IppReleaseRequested, IppMotionStored, IppMotionNotStored, IppPath, IppAck,
+                 IppComplete, IppData, IppError, IppProtocolError>;
 
 struct IppNothing {};
 struct IppOpen {};   ///< open a connection; the input IppConnected or IppConnectionLost follows
@@ -130,9 +173,23 @@ class IppSession {
   [[nodiscard]] const std::string& hold_reason() const noexcept { return hold_reason_; }
   /// True if a motion was sent, on this connection or an earlier one, and its end was not reported.
   [[nodiscard]] bool moving() const noexcept { return moving_; }
+  /// True if moving(), or if a motion is sent as soon as this is stored.
+  [[nodiscard]] bool may_move() const noexcept { return moving_ || state_ == IppState::Storing; }
+  /// True while AbortE is awaited, or a connection or session in which the ending session sends it.
+  [[nodiscard]] bool stopping_motion() const noexcept {
+    const bool before_abort = state_ == IppState::Connecting || state_ == IppState::Opening;
+    return state_ == IppState::Aborting || (stopped_ && moving_ && before_abort);
+  }
+  /// The owner ends without waiting any longer: an outstanding request to stop has failed.
+  void give_up_stop();
+  /// The latest request to stop and its outcome.
+  [[nodiscard]] const IppStop& stop() const noexcept { return stop_; }
+  /// Why the machine may be moving although nothing can be done about it now; empty if it cannot.
+  [[nodiscard]] std::string danger() const;
   /// Number of requested points that are neither finished nor discarded.
   [[nodiscard]] std::size_t points_left() const noexcept {
-    const bool one = state_ == IppState::Measuring || state_ == IppState::Aborting;
+    const bool one = state_ == IppState::Measuring || state_ == IppState::Aborting ||
+                     (state_ == IppState::Storing && prepared_.state == IppState::Measuring);
     return points_.size() + (one ? 1 : 0);
   }
   struct Fault {
@@ -166,6 +223,7 @@ class IppSession {
     // while a command is pending.
     Connect,
     Connection,  ///< no connection by then: a fault
+    Store,       ///< the motion is not stored by then: it is not sent
     Poll,        ///< requests the position
     Watch,       ///< checks during a hold that the server still answers
   };
@@ -177,7 +235,9 @@ class IppSession {
   [[nodiscard]] IppAction take(const IppStopRequested&);
   [[nodiscard]] IppAction take(const IppAbortRequested&);
   [[nodiscard]] IppAction take(const IppReleaseRequested&);
-  [[nodiscard]] IppAction take(const ProbePoint& point);
+  [[nodiscard]] IppAction take(const IppMotionStored&);
+  [[nodiscard]] IppAction take(const IppMotionNotStored& failed);
+  [[nodiscard]] IppAction take(const IppPath& path);
   [[nodiscard]] IppAction take(const IppAck& ack);
   [[nodiscard]] IppAction take(const IppComplete& complete);
   [[nodiscard]] IppAction take(const IppData& data);
@@ -188,6 +248,7 @@ class IppSession {
   [[nodiscard]] bool foreign(ippdme::Tag tag) const noexcept;
   [[nodiscard]] IppAction unexpected_response(std::string_view what, ippdme::Tag tag);
   [[nodiscard]] IppAction send(const Step& step);
+  [[nodiscard]] IppAction begin_motion(Step step);
   /// Cancels all deadlines and sets this one.
   void wait_only_for(Due due, protocol::HostTime at);
   void end_pending();
@@ -204,10 +265,14 @@ class IppSession {
   [[nodiscard]] IppAction hold(const std::string& what);
   [[nodiscard]] IppAction await_release();
   [[nodiscard]] IppAction stop_motion(bool close_then);
+  [[nodiscard]] IppAction stop_motion_by_request(std::string_view reason);
+  [[nodiscard]] IppAction connect_to_abort();
+  [[nodiscard]] IppAction stop_without_connection(std::string_view reason);
   [[nodiscard]] IppAction stopped_moving();
   [[nodiscard]] IppAction abort_unanswered();
   [[nodiscard]] IppAction abort_refused(const IppError& error);
   void hold_for(const std::string& reason);
+  void settle(IppStopOutcome outcome, std::string text);
   [[nodiscard]] IppAction began_session();
   void without_move_reports();
   void note(const std::string& what);
@@ -221,6 +286,7 @@ class IppSession {
   std::chrono::nanoseconds pause_;
   std::uint32_t tag_ = 0;
   std::optional<Pending> pending_;
+  Step prepared_{};  ///< in Storing: the motion that is sent next
   std::deque<ProbePoint> points_;
   bool stopped_ = false;
   bool open_ = false;        ///< the connection is established
@@ -234,8 +300,10 @@ class IppSession {
   std::string hold_reason_;
   std::string last_note_;       ///< latest fault without the peer and the reason of a hold
   std::string stop_reason_;     ///< last_note_ when AbortE was sent
+  std::string asked_reason_;    ///< of a request to stop that found no connection; empty: none
   bool session_first_ = false;  ///< start a session before AbortE: the server requires one
   bool may_home_;
+  IppStop stop_;
   Fault fault_;
 };
 

@@ -99,6 +99,7 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   void restore_settings();
   void report_clock();
   void report_cause();
+  void report_times();
 
   void take(const TrackerBurst& burst) ABBE_RT;
   void take(const protocol::EnvironmentSample& sample) ABBE_RT { environment_.try_push(sample); }
@@ -119,6 +120,8 @@ class TrackerDevice final : public Device, private SessionOverTcp<TrackerDevice,
   bool clock_reported_ = false;
   std::string cause_reported_;
   std::uint64_t gaps_seen_ = 0;
+  std::uint64_t times_refused_seen_ = 0;
+  std::uint64_t time_jumps_seen_ = 0;
   bool began_ = false;  ///< there is a new connection for which the receiver is not yet reset
   std::array<std::byte, emscon::kMaxRequestSize> command_{};
 };

@@ -23,6 +23,7 @@
 #include <variant>
 
 #include "abbe/drivers/clock_model.hpp"
+#include "abbe/drivers/device_time_check.hpp"
 #include "abbe/protocol/emscon/framer.hpp"
 #include "abbe/protocol/emscon/results.hpp"
 #include "abbe/protocol/rt.hpp"
@@ -69,7 +70,8 @@ struct TrackerCounters {
   std::uint64_t points = 0;
   std::uint64_t gaps = 0;  ///< gaps in the point stream that were not caused by a lost beam
   std::uint64_t beam_losses = 0;
-  std::uint64_t time_disorder = 0;    ///< points not later than the one before
+  std::uint64_t time_disorder = 0;    ///< points whose time does not fit; not used
+  std::uint64_t time_jumps = 0;       ///< new time bases of the tracker's clock
   std::uint64_t points_refused = 0;   ///< points before StartMeasurement was accepted
   std::uint64_t protocol_errors = 0;  ///< protocol errors
 };
@@ -95,10 +97,7 @@ class TrackerReceiver {
   [[nodiscard]] double skew_beyond_limit() const ABBE_RT { return clock_.skew_beyond_limit(); }
 
  private:
-  struct LastPoint {
-    protocol::DeviceTime device_time{};
-    bool known = false;
-  };
+  using TimeVerdict = DeviceTimeCheck::Verdict;
 
   void connection_began() ABBE_RT;
   [[nodiscard]] std::optional<TrackerMessage> understand(std::span<const std::byte> packet) ABBE_RT;
@@ -117,8 +116,14 @@ class TrackerReceiver {
                                               std::span<const std::byte> bytes) ABBE_RT;
   [[nodiscard]] TrackerMessage burst(std::size_t count) ABBE_RT;
 
+  [[nodiscard]] bool is_ahead(protocol::DeviceTime t) const ABBE_RT;
+  [[nodiscard]] std::size_t judge_times(const emscon::MultiResult& result,
+                                        std::size_t first) ABBE_RT;
+  void begin_time_base() ABBE_RT;
+  void convert(const emscon::MultiResult& result, std::size_t first, std::size_t end) ABBE_RT;
   void convert(const emscon::MultiPoint& from, emscon::Status status,
                protocol::TrackerPoint& to) ABBE_RT;
+  void refuse_time(protocol::TrackerPoint& point) ABBE_RT;
   void follow(protocol::TrackerPoint& point) ABBE_RT;
   void mark_hole(std::chrono::nanoseconds since_last, protocol::TrackerPoint& point) ABBE_RT;
   void mark_pending(protocol::SampleHead& head) ABBE_RT;
@@ -133,7 +138,10 @@ class TrackerReceiver {
   bool silenced_ = false;  ///< a protocol error occurred on this connection
   bool beam_lost_ = false;
   protocol::SampleFlags pending_flags_ = 0;  ///< for the next point
-  LastPoint last_;
+  bool points_came_ = false;                 ///< on this connection
+  DeviceTimeCheck times_;
+  std::optional<protocol::DeviceTime> last_;  ///< of the last point with a time that fits
+  std::array<TimeVerdict, emscon::kMaxMultiPoints> verdicts_{};
   emscon::Environment environment_{};
   bool environment_known_ = false;
   std::optional<protocol::EnvironmentSample> weather_due_;  ///< returned after its burst

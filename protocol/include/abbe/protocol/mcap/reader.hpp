@@ -124,6 +124,22 @@ struct Summary {
 };
 
 [[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes file);
+/// The same from the end of a file. `tail`: the bytes from the offset `begin` to the end of the
+/// file, at least from summary_start on, which read_footer() returns. The views are into `tail`.
+[[nodiscard]] tl::expected<Summary, SummaryError> read_summary(Bytes tail, std::uint64_t begin);
+/// The footer; for `tail` the last kLeastTail bytes of the file are enough.
+[[nodiscard]] tl::expected<Footer, SummaryError> read_footer(Bytes tail,
+                                                             std::uint64_t begin) noexcept;
+inline constexpr std::size_t kLeastTail = kFooterRecordSize + kMagic.size();
+
+/// The head of a record: its content of `length` bytes follows.
+struct RecordHead {
+  Opcode opcode = Opcode::Header;
+  std::uint64_t length = 0;
+};
+/// The head at the beginning of `bytes`; nullopt if there are fewer than kRecordHeadSize bytes, or
+/// opcode 0, which is no record.
+[[nodiscard]] std::optional<RecordHead> read_head(Bytes bytes) noexcept;
 
 /// The record at the offset of an index; nullopt if no record with opcode `expected` starts there.
 [[nodiscard]] std::optional<Record> record_at(Bytes file, std::uint64_t offset,

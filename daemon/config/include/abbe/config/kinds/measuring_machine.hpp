@@ -4,7 +4,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
+
+#include "abbe/config/motion_box.hpp"
 
 namespace abbe::daemon {
 
@@ -24,6 +27,8 @@ struct CmmConfig {
   bool axes_compensated = true;
   std::chrono::nanoseconds command_timeout{std::chrono::seconds{3}};
   std::chrono::nanoseconds motion_timeout{std::chrono::seconds{120}};
+  /// Where the tip may be sent; nullopt: the travel of X, Y and Z.
+  std::optional<MotionBox> volume;
 };
 
 /// True if the axis readings are the positions of the measuring machine, because no other device

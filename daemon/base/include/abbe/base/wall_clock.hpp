@@ -1,0 +1,36 @@
+#pragma once
+/// The source of all dates: models, activations, drift, what was measured when. A date is read when
+/// it is needed, never computed from the clock at the start of the process, because the wall clock
+/// may be set in between. Copies have the same start. Thread-safe.
+
+#include <functional>
+#include <utility>
+
+#include "abbe/base/clock_steps.hpp"
+#include "abbe/protocol/time.hpp"
+
+namespace abbe::daemon {
+
+class WallClock {
+ public:
+  /// Any thread may call it.
+  using Read = std::function<ClockReading()>;
+  explicit WallClock(Read read) : read_(std::move(read)), start_(read_()) {}
+  WallClock() : WallClock(read_clocks) {}
+
+  [[nodiscard]] ClockReading read() const { return read_(); }
+  [[nodiscard]] protocol::UtcTime now() const { return protocol::UtcTime{read_().utc}; }
+  /// Dates of samples by the wall clock as it is now; `host_now`: the present host time. It differs
+  /// from the offset in recordings and messages, which is that of the start, if the clock was set or
+  /// the computer suspended.
+  [[nodiscard]] protocol::UtcOffset offset(protocol::HostTime host_now) const {
+    return {now().time_since_epoch() - host_now.time_since_epoch()};
+  }
+  [[nodiscard]] ClockChange since_start() const { return change_between(start_, read_()); }
+
+ private:
+  Read read_;
+  ClockReading start_;
+};
+
+}  // namespace abbe::daemon

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <array>
+
+namespace abbe::daemon {
+
+/// Where the tip of a machine may be sent, in the coordinates of the machine, X, Y, Z.
+struct MotionBox {
+  std::array<double, 3> min_m{};
+  std::array<double, 3> max_m{};
+};
+
+}  // namespace abbe::daemon

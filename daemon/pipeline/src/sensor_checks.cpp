@@ -1,0 +1,202 @@
+#include "abbe/pipeline/sensor_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sensor_text.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using calib::SensorDoubt;
+using protocol::EnvironmentMask;
+using protocol::EnvironmentSample;
+using std::chrono::nanoseconds;
+
+/// Largest time between the readings of twins that are compared: two devices with slow periods. A
+/// machine changes by 0.3 K meanwhile at most.
+constexpr std::chrono::minutes kComparableFor{1};
+
+nanoseconds since_epoch(protocol::HostTime t) {
+  return t.time_since_epoch();
+}
+
+}  // namespace
+
+SensorChecks::SensorChecks(SensorCheckOptions options) : start_spread_K_(options.start_spread_K) {
+  for (CheckedSensor& sensor : options.sensors) sensors_.push_back({.options = std::move(sensor)});
+}
+
+SensorChecks::Sensor* SensorChecks::at_place(std::size_t place) {
+  const auto found = std::ranges::find_if(
+      sensors_, [&](const Sensor& sensor) { return sensor.options.place == place; });
+  return found == sensors_.end() ? nullptr : &*found;
+}
+
+/// Keeps the reading and what was expected when the doubt began, so that texts do not change while
+/// it lasts.
+void SensorChecks::note(Sensor& sensor, SensorDoubt doubt, double reading, double lowest,
+                        double highest) {
+  if (sensor.doubt == doubt && doubt != SensorDoubt::Unconfirmed) return;
+  const bool begins = sensor.doubt == SensorDoubt::None || sensor.doubt == SensorDoubt::Unconfirmed;
+  if (begins && doubt != SensorDoubt::None && doubt != SensorDoubt::Unconfirmed) {
+    ++sensor.doubts;
+    sensor.latest = sensor.at;
+  }
+  sensor.doubt = doubt;
+  sensor.reading = reading;
+  sensor.lowest = lowest;
+  sensor.highest = highest;
+}
+
+/// Compares the first reading with the other scales and the air, and with the last value before a
+/// gap. A reading that is too far away
+/// leaves the sensor without a history, so that the next one that agrees is compared again.
+void SensorChecks::compare_with_others(Sensor& sensor, double reading,
+                                       calib::CheckedReading& verdict) {
+  std::vector<double> others;
+  if (std::isfinite(sensor.held.value)) others.push_back(sensor.held.value);
+  for (const Sensor& other : sensors_)
+    if (&other != &sensor && other.options.near_others && std::isfinite(other.usable))
+      others.push_back(other.usable);
+  if (!calib::far_from_others(reading, others, start_spread_K_)) return;
+  const double median = calib::median_of(others);
+  verdict = {SensorDoubt::Others, median - start_spread_K_, median + start_spread_K_};
+  sensor.track.has_history = false;
+  sensor.track.agreed = sensor.options.limits.agreeing - 1;
+}
+
+void SensorChecks::judge_alone(Sensor& sensor, double reading) {
+  const bool is_first = !sensor.track.has_history;
+  auto verdict = calib::check_reading(sensor.track, sensor.options.limits, reading, sensor.at);
+  if (verdict.usable() && is_first && sensor.options.near_others)
+    compare_with_others(sensor, reading, verdict);
+  sensor.usable = verdict.usable() ? reading : kNone;
+  if (verdict.usable() && sensor.doubt == SensorDoubt::Twin) return;  // judged by judge_by_twin()
+  note(sensor, verdict.doubt, reading, verdict.lowest, verdict.highest);
+}
+
+/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong.
+void SensorChecks::judge_by_twin(Sensor& sensor) {
+  Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr;
+  if (twin == nullptr) return;
+  Sensor& first = sensor.options.place < twin->options.place ? sensor : *twin;
+  const double most = sensor.options.most_twin_difference;
+  const auto apart = sensor.at > twin->at ? sensor.at - twin->at : twin->at - sensor.at;
+  const bool comparable =
+      std::isfinite(sensor.usable) && std::isfinite(twin->usable) && apart <= kComparableFor;
+  // In one sample the pair is compared once.
+  const bool compared = sensor.at == twin->at && &sensor != &first;
+  if (!compared && comparable)
+    (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
+  if (!comparable) first.twin_differs = 0;
+
+  // Until both are in use one comparison is enough: nothing wrong must be used first.
+  const bool in_use = std::isfinite(sensor.held.value) && std::isfinite(twin->held.value);
+  const int confirmed = in_use ? 2 : 1;
+  for (auto [one, other] : {std::pair{&sensor, twin}, std::pair{twin, &sensor}}) {
+    if (first.twin_differs >= confirmed) {
+      note(*one, SensorDoubt::Twin, one->usable, other->usable - most, other->usable + most);
+    } else if (one->doubt == SensorDoubt::Twin) {
+      note(*one, SensorDoubt::None, one->usable, kNone, kNone);
+    }
+  }
+}
+
+/// The value that is used, and where the applied value is now.
+void SensorChecks::use(Sensor& sensor) {
+  const double before = sensor.used;
+  const auto usable =
+      sensor.doubt == SensorDoubt::None ? std::optional{sensor.usable} : std::nullopt;
+  const double applied =
+      calib::followed_value(sensor.applied, before, sensor.at, sensor.options.correction_per_s);
+  // A device that reports that it has no value is believed at once.
+  const auto hold = sensor.doubt == SensorDoubt::NoValue ? nanoseconds{0} : sensor.options.hold;
+  sensor.used = calib::held_value(sensor.held, usable, sensor.at, hold);
+  sensor.applied = {std::isnan(before) ? sensor.used : applied, sensor.at};
+  sensor.judged = true;
+  if (sensor.doubts > 0 && sensor.latest == sensor.at) sensor.latest_text = text_of(sensor);
+}
+
+CheckedEnvironment SensorChecks::checked(const EnvironmentSample& sample, EnvironmentMask mask) {
+  CheckedEnvironment out{.sample = sample};
+  const nanoseconds at = since_epoch(sample.head.time);
+  std::vector<Sensor*> fresh;
+  for (Sensor& sensor : sensors_) {
+    if ((mask & mask_of_place(sensor.options.place)) == 0) continue;
+    if (sensor.judged && at <= sensor.at) continue;
+    sensor.at = at;
+    judge_alone(sensor, value_at(sample, sensor.options.place));
+    fresh.push_back(&sensor);
+  }
+  for (Sensor* const sensor : fresh) judge_by_twin(*sensor);
+  for (Sensor* const sensor : fresh) use(*sensor);
+
+  for (const Sensor& sensor : sensors_) {
+    const std::size_t place = sensor.options.place;
+    if ((mask & mask_of_place(place)) == 0) continue;
+    value_at(out.sample, place) = sensor.used;
+    if (place >= kFirstTemperaturePlace)
+      out.applied[place - kFirstTemperaturePlace] = sensor.applied;
+  }
+  return out;
+}
+
+EnvironmentMask SensorChecks::mask_of(std::string_view device) const {
+  EnvironmentMask mask = 0;
+  for (const Sensor& sensor : sensors_)
+    if (sensor.options.device == device) mask |= mask_of_place(sensor.options.place);
+  return mask;
+}
+
+double SensorChecks::applied(const CheckedEnvironment& checked, std::size_t channel,
+                             protocol::HostTime t) const {
+  const auto found = std::ranges::find_if(sensors_, [&](const Sensor& sensor) {
+    return sensor.options.place == kFirstTemperaturePlace + channel;
+  });
+  const double target = checked.sample.temperature_K[channel];
+  if (found == sensors_.end()) return target;
+  return calib::followed_value(checked.applied[channel], target, since_epoch(t),
+                               found->options.correction_per_s);
+}
+
+std::string SensorChecks::text_of(const Sensor& sensor) const {
+  DoubtedReading doubted{.doubt = sensor.doubt,
+                         .held = std::isfinite(sensor.used),
+                         .reading = sensor.reading,
+                         .lowest = sensor.lowest,
+                         .highest = sensor.highest,
+                         .used = sensor.used};
+  if (sensor.options.twin)
+    for (const Sensor& other : sensors_)
+      if (other.options.place == *sensor.options.twin) doubted.twin = other.options.name;
+  return daemon::text_of(sensor.options, doubted);
+}
+
+std::vector<SensorFinding> SensorChecks::findings() const {
+  std::vector<SensorFinding> out;
+  for (const Sensor& sensor : sensors_) {
+    if (!sensor.judged || sensor.doubt == SensorDoubt::None) continue;
+    out.push_back({.sensor = sensor.options.name,
+                   .device = sensor.options.device,
+                   .axes = sensor.options.axes,
+                   .doubt = sensor.doubt,
+                   .held = std::isfinite(sensor.used),
+                   .text = text_of(sensor)});
+  }
+  return out;
+}
+
+std::vector<SensorDoubts> SensorChecks::doubts() const {
+  std::vector<SensorDoubts> out;
+  for (const Sensor& sensor : sensors_)
+    if (sensor.doubts > 0)
+      out.push_back({.device = sensor.options.device,
+                     .count = sensor.doubts,
+                     .latest = protocol::HostTime{sensor.latest},
+                     .latest_text = sensor.latest_text});
+  return out;
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,100 @@
+// The state of SensorChecks as an attachment of a recording.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "abbe/base/bounded_json.hpp"
+#include "abbe/base/json_text.hpp"
+#include "abbe/messages/attachment_content.hpp"
+#include "abbe/pipeline/sensor_checks.hpp"
+
+namespace abbe::daemon {
+namespace {
+
+using nlohmann::json;
+using std::chrono::nanoseconds;
+
+/// JSON has no NaN. A number has all its digits.
+json json_of(double value) {
+  return std::isnan(value) ? json{} : json(value);
+}
+double double_of(const json& value) {
+  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
+}
+
+json json_of(const calib::SensorTrack& track) {
+  return {{"has_history", track.has_history},
+          {"reference", json_of(track.reference)},
+          {"at_ns", track.at.count()},
+          {"agreed", track.agreed},
+          {"doubted_since_ns", track.doubted_since ? json(track.doubted_since->count()) : json{}},
+          {"slack", json_of(track.slack)}};
+}
+
+nanoseconds time_of(const json& ns) {
+  return nanoseconds{ns.get<std::int64_t>()};
+}
+
+calib::SensorTrack track_of(const json& j) {
+  calib::SensorTrack track{.has_history = j.at("has_history").get<bool>(),
+                           .reference = double_of(j.at("reference")),
+                           .at = time_of(j.at("at_ns")),
+                           .agreed = j.at("agreed").get<int>(),
+                           .slack = double_of(j.at("slack"))};
+  if (!j.at("doubted_since_ns").is_null()) track.doubted_since = time_of(j.at("doubted_since_ns"));
+  return track;
+}
+
+}  // namespace
+
+RecordingAttachment SensorChecks::to_attachment() const {
+  json all = json::array();
+  for (const Sensor& s : sensors_)
+    all.push_back({{"sensor", s.options.name},
+                   {"track", json_of(s.track)},
+                   {"held", json_of(s.held.value)},
+                   {"held_at_ns", s.held.at.count()},
+                   {"applied", json_of(s.applied.value)},
+                   {"applied_at_ns", s.applied.at.count()},
+                   {"usable", json_of(s.usable)},
+                   {"used", json_of(s.used)},
+                   {"twin_differs", s.twin_differs},
+                   {"at_ns", s.at.count()},
+                   {"judged", s.judged},
+                   {"doubt", static_cast<int>(s.doubt)}});
+  return {.name = std::string{kSensorStateName},
+          .media_type = "application/json",
+          .content = json_text(all)};
+}
+
+Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
+  try {
+    const auto parsed = content_of(attachment);
+    if (!parsed) return tl::unexpected(parsed.error());
+    for (const json& j : *parsed) {
+      for (Sensor& s : sensors_) {
+        if (s.options.name != j.at("sensor").get<std::string>()) continue;
+        s.track = track_of(j.at("track"));
+        s.held = {double_of(j.at("held")), time_of(j.at("held_at_ns"))};
+        s.applied = {double_of(j.at("applied")), time_of(j.at("applied_at_ns"))};
+        s.usable = double_of(j.at("usable"));
+        s.used = double_of(j.at("used"));
+        s.twin_differs = j.at("twin_differs").get<int>();
+        s.at = time_of(j.at("at_ns"));
+        s.judged = j.at("judged").get<bool>();
+        s.doubt = static_cast<calib::SensorDoubt>(j.at("doubt").get<int>());
+      }
+    }
+    return {};
+  } catch (const json::exception& e) {
+    return fail(ErrorCode::BadInput,
+                fmt::format("attachment {}: {}", attachment.name, cause_of(e)));
+  }
+}
+
+}  // namespace abbe::daemon

@@ -1,0 +1,23 @@
+#pragma once
+/// Texts about a sensor whose readings are not used.
+
+#include <string>
+
+#include "abbe/calib/environment/sensor_check.hpp"
+#include "abbe/pipeline/sensor_options.hpp"
+
+namespace abbe::daemon {
+
+/// What is wrong with a sensor. Values in SI; NaN: none.
+struct DoubtedReading {
+  calib::SensorDoubt doubt = calib::SensorDoubt::None;
+  bool held = false;
+  double reading = 0.0, lowest = 0.0, highest = 0.0;
+  double used = 0.0;      ///< if held
+  std::string twin = {};  ///< name
+};
+
+/// "scale_x is not available (X is missing): it reads 85.00 C, expected 20.80 to 21.80 C; check ..."
+[[nodiscard]] std::string text_of(const CheckedSensor& sensor, const DoubtedReading& doubted);
+
+}  // namespace abbe::daemon

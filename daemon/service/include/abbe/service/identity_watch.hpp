@@ -1,0 +1,57 @@
+#pragma once
+/// The identity of the machine as the hub uses it: read at the start, and again every second on an
+/// ordinary thread, because `abbe machine identity` changes its file. While it is not confirmed, or
+/// the active model is that of the machine before `new`, no model is ACTIVE. Used by the hub's
+/// thread.
+
+#include <chrono>
+#include <filesystem>
+#include <future>
+#include <string>
+#include <vector>
+
+#include "abbe/model/machine_identity.hpp"
+#include "abbe/pipeline/stream_health.hpp"
+#include "abbe/publishing/publisher.hpp"
+
+namespace abbe::daemon {
+
+class IdentityWatch {
+ public:
+  using WallTime = std::chrono::steady_clock::time_point;
+  static constexpr std::chrono::seconds kPeriod{1};
+
+  struct Known {
+    std::string machine_id;             ///< empty: it could neither be read nor made
+    std::string doubt;                  ///< why no model may be ACTIVE; empty: it is confirmed
+    std::string fault;                  ///< why it could not be read or made
+    std::vector<std::string> others{};  ///< models_of_other_machine()
+  };
+
+  /// Reads or makes the identity. Waits for the disk.
+  [[nodiscard]] static IdentityWatch open(const std::filesystem::path& data_dir,
+                                          const ComputerMarks& here, protocol::UtcTime now);
+
+  /// Call it in every cycle; never waits.
+  void follow(WallTime now);
+
+  [[nodiscard]] const Known& known() const noexcept { return known_; }
+  /// Why model `id` may not be used, neither to correct nor to judge a run; empty: it may.
+  [[nodiscard]] std::string objection_to(const std::string& id) const;
+  /// Changes ACTIVE and DRIFT to STALE where the identity does not allow them.
+  void restrict(ActiveModelState& state) const;
+  /// Health of stream "identity". `twin`: what abbe-dds reports; empty: none.
+  [[nodiscard]] StreamHealth health(const std::string& twin) const;
+
+ private:
+  IdentityWatch(std::filesystem::path data_dir, ComputerMarks here)
+      : data_dir_(std::move(data_dir)), here_(std::move(here)) {}
+
+  std::filesystem::path data_dir_;
+  ComputerMarks here_;
+  Known known_;
+  WallTime next_{};
+  std::future<Known> reading_;
+};
+
+}  // namespace abbe::daemon

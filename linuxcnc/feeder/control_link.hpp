@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+#pragma once
+/// The feeder's side of the shared memory of abbe_correction (hand_over.h). One feeder may write:
+/// the memory has its process id. Used by one thread, except sent().
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "hand_over.h"
+
+namespace abbe::linuxcnc {
+
+class ControlLink {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Attaches to the memory with this key. nullopt, with the reason in `error`: LinuxCNC does not
+  /// run with abbe_correction, or another feeder writes. A feeder that was killed, or does not
+  /// write for 0.3 s, is replaced.
+  [[nodiscard]] static std::optional<ControlLink> attach(int key, std::string& error);
+  ~ControlLink();
+  ControlLink(ControlLink&& other) noexcept;
+  ControlLink& operator=(ControlLink&&) = delete;
+
+  /// The values of the latest servo cycle; those of the call before while they are being written.
+  [[nodiscard]] const abbe_control& read();
+  void write(const abbe_wanted& wanted);
+
+  /// Why the feeder has to end: LinuxCNC has ended or no longer cycles, or another feeder has
+  /// replaced this one. Empty: it has not. For the thread that calls read().
+  [[nodiscard]] std::string ended(Clock::time_point now);
+  /// True: LinuxCNC has unloaded abbe_correction.
+  [[nodiscard]] bool closed() const;
+
+  /// Any thread: what was written last; nullopt while it is being written.
+  [[nodiscard]] std::optional<abbe_wanted> sent() const;
+
+ private:
+  explicit ControlLink(abbe_hand_over* memory) : memory_(memory) {}
+  abbe_hand_over* memory_;
+  abbe_control control_{};
+  std::uint64_t seen_cycle_ = 0;
+  Clock::time_point cycled_at_ = Clock::now();
+};
+
+}  // namespace abbe::linuxcnc

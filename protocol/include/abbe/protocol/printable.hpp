@@ -1,0 +1,27 @@
+#pragma once
+/// Text of unknown origin (cells, file names, configuration, devices, network) in a form that a
+/// person can read and that a terminal cannot take for a command. Pure; thread-safe.
+
+#include <string>
+#include <string_view>
+
+namespace abbe::protocol {
+
+/// `text` with every character that is not visible as an escape: a control character or an
+/// invisible one (no-break space, zero width space, byte order mark, direction marks) as "\u{200B}",
+/// a byte that is not UTF-8 as "\xFC". A newline remains. Applying the function twice changes
+/// nothing more.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// As printable(), but a newline is written as "\u{A}": for one line of a log.
+[[nodiscard]] std::string printable_line(std::string_view text);
+
+/// `text` with every control character but a newline as an escape. Other characters remain, visible
+/// or not: for text that is also used as data, such as the name of a file.
+[[nodiscard]] std::string without_control_characters(std::string_view text);
+
+/// The first character of `text` that is not printable ASCII, and what to do about it:
+/// "U+2212 (minus sign): write \"-\"". Empty if there is none.
+[[nodiscard]] std::string strange_character(std::string_view text);
+
+}  // namespace abbe::protocol

@@ -13,6 +13,15 @@ namespace {
 
 // Fixed memory: a signal handler reads it.
 std::array<std::atomic<EmergencyStop*>, kMostEmergencyStops> registered_stops{};
+// Calls of send_emergency_stops() that run. Sequentially consistent, as the registered objects and
+// their sockets are: either the call sees that the object or socket is gone, or await_senders()
+// sees the call.
+std::atomic<int> senders{0};
+
+void await_senders() noexcept {
+  constexpr timespec kPause{.tv_sec = 0, .tv_nsec = 100'000};
+  while (senders.load() > 0) ::nanosleep(&kPause, nullptr);
+}
 
 std::int64_t monotonic_ms() noexcept {
   timespec now{};
@@ -31,16 +40,20 @@ EmergencyStop::EmergencyStop(std::string_view command, std::string_view confirma
     : command_(command), confirmation_(confirmation) {
   for (auto& place : registered_stops) {
     EmergencyStop* empty = nullptr;
-    // release: pairs with the acquire in send_emergency_stops()
-    if (place.compare_exchange_strong(empty, this, std::memory_order_release)) return;
+    if (place.compare_exchange_strong(empty, this)) return;
   }
 }
 
 EmergencyStop::~EmergencyStop() {
   for (auto& place : registered_stops) {
     EmergencyStop* self = this;
-    place.compare_exchange_strong(self, nullptr, std::memory_order_release);
+    place.compare_exchange_strong(self, nullptr);
   }
+  await_senders();
+}
+
+void EmergencyStop::set_socket(int fd) noexcept {
+  if (socket_.exchange(fd) != fd) await_senders();
 }
 
 /// Reads until the confirmation was seen. It may arrive in pieces, so the end of what was read
@@ -71,12 +84,13 @@ EmergencyStops send_emergency_stops(std::chrono::milliseconds within) noexcept {
   };
   std::array<Sent, kMostEmergencyStops> sent{};
   EmergencyStops done;
+  senders.fetch_add(1);
 
   // First all commands, then all confirmations: no machine waits for another one.
   for (const auto& place : registered_stops) {
-    const EmergencyStop* const stop = place.load(std::memory_order_acquire);
+    const EmergencyStop* const stop = place.load();
     if (stop == nullptr || !stop->moving_.load(std::memory_order_acquire)) continue;
-    const int fd = stop->socket_.load(std::memory_order_acquire);
+    const int fd = stop->socket_.load();
     if (fd >= 0 && send_whole(fd, stop->command_))
       sent[static_cast<std::size_t>(done.sent++)] = {stop, fd};
     else
@@ -87,6 +101,7 @@ EmergencyStops send_emergency_stops(std::chrono::milliseconds within) noexcept {
     const auto& [to, fd] = sent[static_cast<std::size_t>(i)];
     if (to->confirmed(fd, within)) ++done.confirmed;
   }
+  senders.fetch_sub(1);
   return done;
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <future>
 #include <string>
 #include <thread>
 
@@ -78,6 +79,20 @@ TEST(EmergencyStop, DoesNotWaitForSpaceInASocket) {
   stop.set_socket(wire.ends[0]);
   stop.set_moving(true);
   EXPECT_EQ(send_emergency_stops(0ms).not_sent, 1);
+}
+
+TEST(EmergencyStop, KeepsTheSocketFromBeingClosedWhileItIsUsed) {
+  const Wire wire;
+  EmergencyStop stop{"STOP\r\n", "done"};
+  stop.set_socket(wire.ends[0]);
+  stop.set_moving(true);
+  auto sender = std::async(std::launch::async, [] { return send_emergency_stops(10s); });
+  while (wire.heard().empty()) std::this_thread::yield();
+  auto closing = std::async(std::launch::async, [&stop] { stop.set_socket(-1); });
+  EXPECT_EQ(closing.wait_for(20ms), std::future_status::timeout);
+  wire.answer("done\r\n");
+  closing.get();
+  EXPECT_EQ(sender.get().confirmed, 1);
 }
 
 TEST(EmergencyStop, ForgetsAConnectionThatIsDestroyed) {

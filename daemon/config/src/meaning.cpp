@@ -22,7 +22,7 @@ std::string_view place_of(std::string_view key) {
   return dot == std::string_view::npos ? std::string_view{} : key.substr(0, dot);
 }
 
-/// "[encoder] X step_nm" of "encoder.X.step_nm".
+/// "[TABLE] X step_nm" of "TABLE.X.step_nm".
 std::string key_text(std::string_view key) {
   const auto table = table_in(key);
   std::string rest{key.substr(std::min(key.size(), table.size() + 1))};

@@ -18,14 +18,14 @@ class EmergencyStop {
   /// `command`, `confirmation`: literals. At most kMostEmergencyStops objects are registered; a
   /// further one has no effect.
   EmergencyStop(std::string_view command, std::string_view confirmation) noexcept;
+  /// Returns when no thread uses this object any more.
   ~EmergencyStop();
   EmergencyStop(const EmergencyStop&) = delete;
   EmergencyStop& operator=(const EmergencyStop&) = delete;
 
   /// The socket of the connection, a descriptor; -1: there is none. Call it with -1 before the
-  /// socket is closed.
-  // release: pairs with the acquire in send_emergency_stops()
-  void set_socket(int fd) noexcept { socket_.store(fd, std::memory_order_release); }
+  /// socket is closed: it then returns when no thread uses the descriptor any more.
+  void set_socket(int fd) noexcept;
   /// Whether a motion was sent whose end is not known. Set it before the motion is sent.
   void set_moving(bool moving) noexcept { moving_.store(moving, std::memory_order_release); }
 

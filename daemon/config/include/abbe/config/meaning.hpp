@@ -48,9 +48,9 @@ void take_entries(MeaningEntries& entries, const MeaningEntries& other,
 
 /// How two lists differ.
 struct MeaningDifference {
-  /// "[encoder] was configured, is not": tables and elements that only one of the lists has.
+  /// "[TABLE] was configured, is not": tables and elements that only one of the lists has.
   std::vector<std::string> tables;
-  std::vector<std::string> changed;  ///< "[encoder] X step_nm was 10, is 11"
+  std::vector<std::string> changed;  ///< "[TABLE] X step_nm was 10, is 11"
   /// Entries that only the present list has, of tables and elements that both lists have. An earlier
   /// version of abbe did not have them.
   MeaningEntries added;
@@ -58,7 +58,7 @@ struct MeaningDifference {
 [[nodiscard]] MeaningDifference difference(const MeaningEntries& before,
                                            const MeaningEntries& present);
 
-/// The keys of `entries` by table: "[daemon] simulated, speed; [encoder] tpdo".
+/// The keys of `entries` by table: "[daemon] simulated, speed; [TABLE] tpdo".
 [[nodiscard]] std::string keys_text(const MeaningEntries& entries);
 
 /// `parts` joined by "; ", at most `most` of them, followed by the number of the others.

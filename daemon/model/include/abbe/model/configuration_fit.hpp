@@ -37,7 +37,7 @@ struct ConfigurationFit {
                                     const PresentConfiguration& present,
                                     const std::string& accepted_configuration);
 
-/// What was measured otherwise when the model was made: "[tracker] reflector was A, is B". Empty:
+/// What was measured otherwise when the model was made: "[TABLE] KEY was A, is B". Empty:
 /// nothing, or not known. A device that is not configured any more is not named.
 [[nodiscard]] std::string changed_measurements(const ModelDocument& document,
                                                const PresentConfiguration& present);

@@ -29,9 +29,11 @@ std::string duration_text(nanoseconds duration) {
 }  // namespace
 
 ClockReading read_clocks() {
+  // Before CLOCK_BOOTTIME, so that no suspended time is negative.
+  const nanoseconds running = read_clock(CLOCK_MONOTONIC);
   return {.utc = read_clock(CLOCK_REALTIME),
           .since_boot = read_clock(CLOCK_BOOTTIME),
-          .running = read_clock(CLOCK_MONOTONIC)};
+          .running = running};
 }
 
 ClockChange change_between(const ClockReading& start, const ClockReading& now) {

@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
+#include <sstream>
 #include <string>
 
+#include "abbe/base/option_values.hpp"
 #include "abbe_command.hpp"
 #include "recording_fixture.hpp"
 
@@ -49,6 +52,19 @@ TEST_F(OptionValues, EveryProgramChecksThem) {
       if (text.find("app.parse(") == std::string::npos) continue;
       EXPECT_THAT(text, HasSubstr("check_option_values(app)")) << entry.path();
     }
+}
+
+TEST(OptionMessages, EscapeWhatIsNotPrintable) {
+  CLI::App app{"", "abbed"};
+  check_option_values(app);
+  std::ostringstream text;
+  try {
+    app.parse(std::vector<std::string>{"--x\x1b[31m"});
+    FAIL() << "accepted";
+  } catch (const CLI::ParseError& error) {
+    EXPECT_NE(app.exit(error, text, text), 0);
+  }
+  EXPECT_THAT(text.str(), HasSubstr("--x\\u{1B}[31m\nsee `abbed --help`\n"));
 }
 
 }  // namespace

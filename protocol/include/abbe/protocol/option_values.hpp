@@ -1,20 +1,25 @@
 #pragma once
-/// Checks the values of command line options, the same in every program. CLI11 reads whole numbers
-/// as C does (010 is 8, 0x10 is 16), accepts inf and nan, and takes an empty value for an absent
-/// option.
+/// Checks the values of command line options and escapes messages about them, the same in every program. CLI11 reads whole numbers
+/// as C does (010 is 8, 0x10 is 16), accepts inf and nan, takes an empty value for an absent
+/// option, and prints the bytes of a wrong argument as they are.
 
 #include <string>
 
 #include "abbe/protocol/decimal.hpp"
+#include "abbe/protocol/printable.hpp"
 
 namespace abbe::protocol {
 
 /// Adds the checks to all options of `app` and of its subcommands: a value must not be empty, and a
-/// number must be decimal. The type of an option says whether it is a number. Call it after the
-/// last option was added, before parse(). `App`: CLI::App; a template, so that this module does not
+/// number must be decimal. The type of an option says whether it is a number. A message about a wrong
+/// command line escapes what is not printable. Call it after the last option was added, before
+/// parse(). `App`: CLI::App; a template, so that this module does not
 /// depend on CLI11.
 template <class App>
 void check_option_values(App& app) {
+  app.failure_message([](const auto* wrong, const auto& error) {
+    return printable(error.what()) + "\nsee `" + wrong->get_name() + " --help`\n";
+  });
   for (auto* option : app.get_options()) {
     if (option->get_items_expected_max() == 0) continue;  // a flag
     const std::string type = option->get_type_name();

@@ -498,7 +498,8 @@ TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
   EXPECT_THAT(ran.out, HasSubstr("NOT the same as live"));
   const auto other =
       abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
-  EXPECT_EQ(other.exit, 0) << other.err;
+  EXPECT_EQ(other.exit, 1) << other.err;
+  EXPECT_THAT(other.out, AllOf(Not(HasSubstr("as live")), HasSubstr("no snapshot in")));
 }
 
 }  // namespace

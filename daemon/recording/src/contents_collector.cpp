@@ -101,8 +101,10 @@ void ContentsCollector::add_message(const mcap::Message& message, ReadableChunk&
 }
 
 Contents ContentsCollector::finish(std::optional<std::uint64_t> counted) {
-  for (std::size_t channel = 0; channel < used_.size(); ++channel)
-    if (used_[channel] && !contents.topics.contains(static_cast<std::uint16_t>(channel)))
+  std::bitset<kChannels> not_described = used_;
+  for (const auto& topic : contents.topics) not_described.reset(topic.first);
+  for (std::size_t channel = 0; not_described.any(); not_described.reset(channel++))
+    if (not_described.test(channel))
       lost(0, 0, fmt::format("channel {} is not described: its messages are skipped", channel));
   if (contents.losses.empty() && counted && *counted != contents.messages)
     lost(0, 0,

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <bitset>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "recording_contents.hpp"
 
@@ -29,10 +29,12 @@ class ContentsCollector {
   [[nodiscard]] Contents finish(std::optional<std::uint64_t> counted);
 
  private:
+  static constexpr std::size_t kChannels = std::size_t{1} << 16;  ///< an ID has 16 bits
+
   void add_message(const protocol::mcap::Message& message, ReadableChunk& chunk);
 
   std::size_t chunk_number_ = 0;
-  std::vector<bool> used_ = std::vector<bool>(1u << 16);  ///< channels with a message
+  std::bitset<kChannels> used_;  ///< channels with a message
 };
 
 }  // namespace abbe::daemon::recording

@@ -1,11 +1,13 @@
 /// A replay uses the values of sensors that the live run used, also from a further file.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "abbe/pipeline/pipeline.hpp"
-#include "abbe/pipeline/sensor_options.hpp"
+#include "abbe/pipeline/recording_rules.hpp"
 #include "abbe/replay/replay.hpp"
 #include "config_tables.hpp"
 #include "recording_fixture.hpp"
@@ -82,7 +84,7 @@ void record(const std::filesystem::path& folder, int seconds, int cut, bool with
   options.sensors = sensor_check_options(recorded());
   auto info = example_info();
   info.configuration = kRecordedConfig;
-  if (with_rule) info.versions.emplace_back(kSensorRule, "1");
+  if (with_rule) std::ranges::move(recording_rules(), std::back_inserter(info.versions));
   auto recorder = std::move(*Recorder::open(options, info, {}));
   for (int s = 0; s < seconds; ++s) {
     const auto batch = batch_of(s);

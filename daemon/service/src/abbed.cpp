@@ -15,6 +15,7 @@
 #include <ctime>
 #include <exception>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -34,6 +35,7 @@
 #include "abbe/drivers/cpu_latency.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/messages/dds_security.hpp"
+#include "abbe/pipeline/recording_rules.hpp"
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
@@ -200,11 +202,8 @@ struct Abbed::State {
                        .utc_offset = utc,
                        .speed = config.daemon.speed,
                        .configuration = options.configuration_text,
-                       .versions = {{"abbe", ABBE_VERSION},
-                                    {kAxisSamplesRule, "1"},
-                                    {kDatumRule, "2"},
-                                    {kRotaryTravelRule, "1"},
-                                    {kSensorRule, "1"}}};
+                       .versions = {{"abbe", ABBE_VERSION}}};
+    std::ranges::move(recording_rules(), std::back_inserter(info.versions));
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);

@@ -143,6 +143,15 @@ CheckedEnvironment SensorChecks::checked(const EnvironmentSample& sample, Enviro
   return out;
 }
 
+void SensorChecks::note_future(EnvironmentMask mask, protocol::HostTime taken, nanoseconds ahead) {
+  for (Sensor& sensor : sensors_) {
+    if ((mask & mask_of_place(sensor.options.place)) == 0) continue;
+    ++sensor.doubts;
+    sensor.latest = since_epoch(taken);
+    sensor.latest_text = future_text(sensor.options, ahead);
+  }
+}
+
 EnvironmentMask SensorChecks::mask_of(std::string_view device) const {
   EnvironmentMask mask = 0;
   for (const Sensor& sensor : sensors_)

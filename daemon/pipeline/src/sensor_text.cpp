@@ -108,4 +108,11 @@ std::string text_of(const CheckedSensor& sensor, const DoubtedReading& doubted) 
                      remedy_of(doubted.doubt));
 }
 
+std::string future_text(const CheckedSensor& sensor, std::chrono::nanoseconds ahead) {
+  return fmt::format(
+      "{}: a reading dated {:.1f} s in the future is not used; check the clock of {} and the load "
+      "of the computer",
+      sensor.name, std::chrono::duration<double>(ahead).count(), sensor.device);
+}
+
 }  // namespace abbe::daemon

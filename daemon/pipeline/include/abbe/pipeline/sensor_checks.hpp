@@ -5,6 +5,7 @@
 /// Not for the RT path; not thread-safe.
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -55,6 +56,11 @@ class SensorChecks {
   /// that is not later than the previous one of a sensor gets the present value of the sensor.
   [[nodiscard]] CheckedEnvironment checked(const protocol::EnvironmentSample& sample,
                                            protocol::EnvironmentMask mask);
+
+  /// A sample with the readings in `mask`, taken at `taken`, is dated `ahead` after that: it is not
+  /// used, and counts as a doubt of its sensors.
+  void note_future(protocol::EnvironmentMask mask, protocol::HostTime taken,
+                   std::chrono::nanoseconds ahead);
 
   /// The quantities that the device `device` measures.
   [[nodiscard]] protocol::EnvironmentMask mask_of(std::string_view device) const;

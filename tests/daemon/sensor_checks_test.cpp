@@ -153,6 +153,28 @@ TEST_F(SensorChecksTest, CompareTwinsAtTheFirstReadingToo) {
   EXPECT_EQ(checks_->findings()[0].doubt, SensorDoubt::Twin);
 }
 
+TEST_F(SensorChecksTest, KeepTheDoubtOfATwinWhileTheOtherIsSilent) {
+  start(kTwin);
+  settle();
+  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  ASSERT_THAT(checks_->findings(), SizeIs(2));
+  for (int s = 0; s < 5; ++s) (void)read(21.9, std::nan(""));
+  ASSERT_THAT(checks_->findings(), SizeIs(2));
+  EXPECT_EQ(checks_->findings()[0].doubt, SensorDoubt::Twin);
+  EXPECT_EQ(checks_->findings()[1].doubt, SensorDoubt::NoValue);
+  (void)read(21.9, 21.7);
+  EXPECT_THAT(checks_->findings(), IsEmpty()) << "they agree again";
+}
+
+TEST_F(SensorChecksTest, KeepTheDoubtOfATwinThatWasSilentItself) {
+  start(kTwin);
+  settle();
+  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  (void)read(std::nan(""), std::nan(""));
+  (void)read(21.9, std::nan(""));
+  EXPECT_EQ(checks_->findings().at(0).doubt, SensorDoubt::Twin);
+}
+
 TEST_F(SensorChecksTest, TakeLimitsFromTheConfiguration) {
   start(R"([[sensors.limit]]
 name = "coolant"

@@ -77,7 +77,8 @@ void SensorChecks::judge_alone(Sensor& sensor, double reading) {
   note(sensor, verdict.doubt, reading, verdict.lowest, verdict.highest);
 }
 
-/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong.
+/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong. Only a
+/// comparison that agrees ends the doubt, not the silence of one of them.
 void SensorChecks::judge_by_twin(Sensor& sensor) {
   Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr;
   if (twin == nullptr) return;
@@ -86,17 +87,22 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   const auto apart = sensor.at > twin->at ? sensor.at - twin->at : twin->at - sensor.at;
   const bool comparable =
       std::isfinite(sensor.usable) && std::isfinite(twin->usable) && apart <= kComparableFor;
-  // In one sample the pair is compared once.
-  const bool compared = sensor.at == twin->at && &sensor != &first;
-  if (!compared && comparable)
-    (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
-  if (!comparable) first.twin_differs = 0;
-
   // Until both are in use one comparison is enough: nothing wrong must be used first.
   const bool in_use = std::isfinite(sensor.held.value) && std::isfinite(twin->held.value);
   const int confirmed = in_use ? 2 : 1;
+
+  // In one sample the pair is compared once.
+  const bool compared = sensor.at == twin->at && &sensor != &first;
+  if (comparable && !compared) {
+    (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
+    first.twins_doubted = first.twin_differs >= confirmed;
+  } else if (!comparable) {
+    first.twin_differs = 0;
+  }
+
   for (auto [one, other] : {std::pair{&sensor, twin}, std::pair{twin, &sensor}}) {
-    if (first.twin_differs >= confirmed) {
+    if (!std::isfinite(one->usable)) continue;  // in doubt for another reason
+    if (first.twins_doubted) {
       note(*one, SensorDoubt::Twin, one->usable, other->usable - most, other->usable + most);
     } else if (one->doubt == SensorDoubt::Twin) {
       note(*one, SensorDoubt::None, one->usable, kNone, kNone);

@@ -64,6 +64,7 @@ RecordingAttachment SensorChecks::to_attachment() const {
                    {"usable", json_of(s.usable)},
                    {"used", json_of(s.used)},
                    {"twin_differs", s.twin_differs},
+                   {"twins_doubted", s.twins_doubted},
                    {"at_ns", s.at.count()},
                    {"judged", s.judged},
                    {"doubt", static_cast<int>(s.doubt)}});
@@ -85,6 +86,7 @@ Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
         s.usable = double_of(j.at("usable"));
         s.used = double_of(j.at("used"));
         s.twin_differs = j.at("twin_differs").get<int>();
+        s.twins_doubted = j.at("twins_doubted").get<bool>();
         s.at = time_of(j.at("at_ns"));
         s.judged = j.at("judged").get<bool>();
         s.doubt = static_cast<calib::SensorDoubt>(j.at("doubt").get<int>());

@@ -86,7 +86,9 @@ class SensorChecks {
     calib::FollowedValue applied = {};
     double usable = kNone;          ///< the last reading, if nothing was wrong with it alone
     double used = kNone;            ///< output
-    int twin_differs = 0;           ///< comparisons in a row, kept by the first of both
+    // Kept by the first sensor of a pair:
+    int twin_differs = 0;        ///< comparisons in a row
+    bool twins_doubted = false;  ///< since the last comparison
     std::chrono::nanoseconds at{};  ///< of the last sample
     bool judged = false;
     calib::SensorDoubt doubt = calib::SensorDoubt::None;

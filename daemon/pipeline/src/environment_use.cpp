@@ -133,8 +133,7 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
 
   if (const auto* weather = latest_at(weather_, t);
       weather != nullptr && weather->sample.measured != 0) {
-    // The tracker's controller sends its weather values only when they change, so their age is not
-    // checked.
+    // The tracker's controller sends its weather with its points only, so its age is not checked.
     merge(weather->sample, static_cast<EnvironmentMask>(weather->sample.measured & ~measured_),
           false, merged);
     any = true;

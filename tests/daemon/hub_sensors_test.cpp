@@ -54,11 +54,14 @@ class HubSensors : public test::HubBench<Rtd> {
       protocol::AxisSample axes;
       axes.head.time = time_.now() + 100ms;
       axes.axis_count = 3;
+      axes.missing_mask = without_reading_;
       axes.position = {0.1, 0.1, -0.1};
       devices_.next.axes.push_back(axes);
       cycle(100ms);
     }
   }
+  std::uint8_t without_reading_ = 0;
+
   std::string health_of_rtd() {
     std::string fault = "(nothing)";
     for (const auto& m : messages<v1::Health>(far_->take(), Topic::Health))
@@ -89,6 +92,14 @@ TEST_F(HubSensors, WithoutAValueGiveTheReasonToStatusHealthAndModel) {
   const auto status = ask({{"do", "status"}});
   EXPECT_TRUE(status["position_m"][0].is_null());
   EXPECT_THAT(status["streams"][0]["condition"].get<std::string>(), StartsWith(text));
+}
+
+TEST_F(HubSensors, AreNotTheReasonIfAReadingOfAnotherAxisIsMissing) {
+  for (int i = 0; i < 4; ++i) second(21.0);
+  without_reading_ = 0b010;
+  for (int i = 0; i < 3; ++i) second(std::nan(""));
+  EXPECT_EQ(hub_->model_state().reason, "no recent axis positions");
+  EXPECT_THAT(reason_of_x(), StartsWith("scale_x is not available"));
 }
 
 TEST_F(HubSensors, ThatJumpAreHeldAndNamed) {

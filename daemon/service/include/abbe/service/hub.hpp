@@ -112,7 +112,7 @@ class Hub : private PipelineObserver {
   Batch batch_;
   WallTime cycle_began_{};
   std::vector<StreamHealth> health_;
-  std::string missing_scale_;  ///< why an axis is missing whose scale has no temperature
+  std::string missing_scales_;  ///< LiveView::why_scales_alone_are_missing()
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};

@@ -112,6 +112,22 @@ TEST_F(HubSensors, ThatJumpAreHeldAndNamed) {
   EXPECT_EQ(hub_->model_state().status, v1::ModelStatus::MODEL_ACTIVE);
 }
 
+TEST_F(HubSensors, AreUsedAgainWhenAPersonAcceptsThem) {
+  const auto accept = [&](const std::string& sensor, const std::string& why) {
+    return ask({{"do", "sensors"}, {"accept", true}, {"sensor", sensor}, {"why", why}});
+  };
+  for (int i = 0; i < 4; ++i) second(21.0);
+  EXPECT_THAT(accept("scale_x", "warm-up").dump(), HasSubstr("there is nothing to accept"));
+  for (int i = 0; i < 300; ++i) second(24.0);
+  EXPECT_THAT(reason_of_x(), HasSubstr("if it is right: abbe sensors accept scale_x --why"));
+  EXPECT_THAT(accept("scale_x", "").dump(), HasSubstr("give the reason"));
+  EXPECT_THAT(accept("scale_q", "warm-up").dump(), HasSubstr("known are scale_x"));
+  EXPECT_TRUE(accept("scale_x", "compared with a thermometer")["ok"]);
+  for (int i = 0; i < 3; ++i) second(24.0);
+  EXPECT_THAT(reason_of_x(), IsEmpty());
+  EXPECT_THAT(health_of_rtd(), IsEmpty());
+}
+
 TEST_F(HubSensors, AreAFaultWithItsTextAlsoForOneReading) {
   for (int i = 0; i < 4; ++i) second(21.0);
   second(30.0);

@@ -42,10 +42,13 @@ Config recorded() {
   return config ? *config : Config{};
 }
 
-/// The sensor warms up, jumps for 40 s, is right again and 0.4 K higher.
+/// The sensor warms up, jumps for 40 s, is right again and 0.4 K higher. It jumps for good, and is
+/// accepted after second 98, shortly before a new file begins.
+constexpr int kAccepted = 98;
 double reading_K(int second) {
   const double C = 21.0 + 0.002 * second;
   if (second >= 30 && second < 70) return 24.5 + 273.15;
+  if (second >= 95) return C + 4.0 + 273.15;
   return (second >= 80 ? C + 0.4 : C) + 273.15;
 }
 
@@ -77,6 +80,11 @@ Batch batch_of(int s) {
   return batch;
 }
 
+SensorAcceptance acceptance() {
+  return {.sensor = "scale_x", .from = HostTime{1000s} + kAccepted * 1s + 900ms, .who = "anna",
+          .why = "compared with a thermometer"};
+}
+
 class Snapshots : public PipelineObserver {
  public:
   void on_snapshots(std::span<const protocol::Snapshot> snapshots, HostTime) override {
@@ -92,6 +100,7 @@ Temperatures live(int seconds) {
   for (int s = 0; s < seconds; ++s) {
     auto batch = batch_of(s);
     pipeline.cycle(batch);
+    if (s == kAccepted) pipeline.accept(acceptance());
   }
   pipeline.finish({});
   return snapshots.seen;
@@ -112,6 +121,7 @@ void record(const std::filesystem::path& folder, int seconds, int cut, bool with
     recorder.record(batch.measured_environment[1].sample, "rtd2", batch.taken);
     for (const auto& axes : batch.axes) recorder.record(axes, "encoder", batch.taken);
     recorder.record(batch.points[0], "tracker", batch.taken);
+    if (s == kAccepted) recorder.attach(to_attachment(acceptance()), acceptance().from);
     if ((s + 1) % cut == 0) recorder.flush();
   }
   ASSERT_TRUE(recorder.close());
@@ -135,8 +145,9 @@ TEST(SensorReplay, GivesTheValuesOfTheLiveRunFromEveryFile) {
   record(folder.path(), kSeconds, kCut);
   const auto all = live(kSeconds);
   std::size_t compared = 0, held = 0;
-  for (const std::string name : {"run.mcap", "run-2.mcap", "run-3.mcap", "run-4.mcap"}) {
-    const auto again = replayed(folder.path() / name);
+  for (const auto& file : std::filesystem::directory_iterator(folder.path())) {
+    const auto name = file.path().filename().string();
+    const auto again = replayed(file.path());
     ASSERT_FALSE(again.empty()) << name;
     for (const auto& [t, temperature_K] : again) {
       EXPECT_EQ(std::isnan(temperature_K), std::isnan(all.at(t))) << name;
@@ -147,6 +158,7 @@ TEST(SensorReplay, GivesTheValuesOfTheLiveRunFromEveryFile) {
   }
   EXPECT_GT(compared, 80u);
   EXPECT_GT(held, 30u) << "the jump lies in these files";
+  EXPECT_GT(all.rbegin()->second, reading_K(90) + 0.1) << "it follows the accepted sensor";
 }
 
 TEST(SensorReplay, OfAnEarlierVersionUsesTheReadingsAsTheyAre) {

@@ -1,5 +1,8 @@
 #include "abbe/pipeline/sensor_checks.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -70,8 +73,9 @@ void SensorChecks::compare_with_others(Sensor& sensor, double reading,
 void SensorChecks::judge_alone(Sensor& sensor, double reading) {
   const bool is_first = !sensor.track.has_history;
   auto verdict = calib::check_reading(sensor.track, sensor.options.limits, reading, sensor.at);
-  if (verdict.usable() && is_first && sensor.options.near_others)
+  if (verdict.usable() && is_first && sensor.options.near_others && !sensor.accepted)
     compare_with_others(sensor, reading, verdict);
+  if (verdict.usable()) sensor.accepted = false;
   sensor.usable = verdict.usable() ? reading : kNone;
   if (verdict.usable() && sensor.doubt == SensorDoubt::Twin) return;  // judged by judge_by_twin()
   note(sensor, verdict.doubt, reading, verdict.lowest, verdict.highest);
@@ -147,6 +151,74 @@ CheckedEnvironment SensorChecks::checked(const EnvironmentSample& sample, Enviro
       out.applied[place - kFirstTemperaturePlace] = sensor.applied;
   }
   return out;
+}
+
+const SensorChecks::Sensor* SensorChecks::named(std::string_view name) const {
+  const auto found = std::ranges::find_if(
+      sensors_, [&](const Sensor& sensor) { return sensor.options.name == name; });
+  return found == sensors_.end() ? nullptr : &*found;
+}
+
+Result<void> SensorChecks::check_acceptance(std::string_view name) const {
+  const Sensor* const sensor = named(name);
+  if (sensor == nullptr) {
+    std::vector<std::string_view> names;
+    for (const Sensor& known : sensors_) names.push_back(known.options.name);
+    return fail(ErrorCode::Usage, fmt::format("no sensor \"{}\" is checked; known are {}", name,
+                                              fmt::join(names, ", ")));
+  }
+  const auto refused = [&](std::string_view why) {
+    return fail(ErrorCode::Refused, fmt::format("{}: {}", name, why));
+  };
+  switch (sensor->doubt) {
+    case SensorDoubt::Jump:
+    case SensorDoubt::Others:
+      return {};
+    case SensorDoubt::None:
+      return refused("its readings are used: there is nothing to accept");
+    case SensorDoubt::Unconfirmed:
+      return refused("it is used when two readings agree: there is nothing to accept");
+    case SensorDoubt::NoValue:
+    case SensorDoubt::OutOfRange:
+    case SensorDoubt::PowerOnValue:
+      return refused("its reading itself cannot be right: see `abbe status`");
+    case SensorDoubt::Twin:
+      break;
+  }
+  const auto twin = std::ranges::find_if(sensors_, [&](const Sensor& other) {
+    return other.options.place == sensor->options.twin;
+  });
+  if (twin == sensors_.end() || twin->doubt != SensorDoubt::Twin) return {};  // silent
+  return refused(fmt::format("it and its twin {} still differ: repair the wrong one, or remove "
+                             "`twin` from [[sensors.limit]]",
+                             twin->options.name));
+}
+
+void SensorChecks::accept(std::string_view name) {
+  const Sensor* const found = named(name);
+  if (found == nullptr) return;
+  Sensor& sensor = sensors_[static_cast<std::size_t>(found - sensors_.data())];
+  if (Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr) {
+    Sensor& first = sensor.options.place < twin->options.place ? sensor : *twin;
+    first.twin_differs = 0;
+    first.twins_doubted = false;
+  }
+  sensor.track = {};
+  sensor.held = {};
+  sensor.usable = kNone;
+  sensor.accepted = true;
+  if (sensor.doubt != SensorDoubt::None)
+    note(sensor, SensorDoubt::Unconfirmed, sensor.reading, kNone, kNone);
+}
+
+void SensorChecks::shift(nanoseconds by) {
+  for (Sensor& sensor : sensors_) {
+    sensor.track.at += by;
+    if (sensor.track.doubted_since) *sensor.track.doubted_since += by;
+    sensor.held.at += by;
+    sensor.applied.at += by;
+    sensor.at += by;
+  }
 }
 
 void SensorChecks::note_future(EnvironmentMask mask, protocol::HostTime taken, nanoseconds ahead) {

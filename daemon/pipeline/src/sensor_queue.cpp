@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <tuple>
+#include <utility>
 
 namespace abbe::daemon {
 
@@ -32,6 +33,18 @@ void SensorQueue::insert(const Waiting& waiting, HostTime taken) {
 void SensorQueue::add(std::size_t device, const EnvironmentSample& sample, EnvironmentMask mask,
                       HostTime taken) {
   insert({.due = sample.head.time + lag_, .device = device, .mask = mask, .sample = sample}, taken);
+}
+
+void SensorQueue::accept(SensorAcceptance acceptance) {
+  const auto after = std::ranges::upper_bound(acceptances_, acceptance.from, {},
+                                              &SensorAcceptance::from);
+  acceptances_.insert(after, std::move(acceptance));
+}
+
+void SensorQueue::accept_before(HostTime due) {
+  auto next = acceptances_.begin();
+  for (; next != acceptances_.end() && next->from < due; ++next) checks_.accept(next->sensor);
+  acceptances_.erase(acceptances_.begin(), next);
 }
 
 void SensorQueue::add_weather(std::size_t device, const EnvironmentSample& sample,

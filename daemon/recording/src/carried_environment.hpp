@@ -33,8 +33,14 @@ class CarriedEnvironment {
     return queue_.checks().go_on(state);
   }
 
+  void accept(SensorAcceptance acceptance) { queue_.accept(std::move(acceptance)); }
+
   /// A file begins behind the cycle `at`.
-  void begin_file(protocol::HostTime at) { check_until(at - watermark_); }
+  void begin_file(protocol::HostTime at) { check_until(state_until_ = at - watermark_); }
+  /// After begin_file(): whether the state contains the acceptance.
+  [[nodiscard]] bool contains(const SensorAcceptance& acceptance) const noexcept {
+    return acceptance.from < state_until_;
+  }
   /// After begin_file().
   [[nodiscard]] bool checks_sensors() const noexcept { return checks_sensors_; }
   [[nodiscard]] RecordingAttachment state() const { return queue_.checks().to_attachment(); }
@@ -59,6 +65,7 @@ class CarriedEnvironment {
   std::vector<std::string> names_;  ///< by SensorQueue::Waiting::device
   std::map<std::string, protocol::EnvironmentSample> checked_;  ///< the last one, by device
   protocol::HostTime state_at_{};
+  protocol::HostTime state_until_{};
 };
 
 }  // namespace abbe::daemon::recording

@@ -163,12 +163,23 @@ void Recorder::record(const v1::CalibrationEvent& event, Taken taken) {
                         event.state() != name(SessionState::Idle);
 }
 
+/// The state with which the live run began, or the acceptance of a sensor. One that cannot be read
+/// is recorded, and not used.
+void Recorder::State::follow_sensors(const RecordingAttachment& attachment) {
+  if (attachment.name == kSensorStateName) (void)environment_to_carry.go_on(attachment);
+  if (attachment.name != kSensorAcceptedName) return;
+  if (auto acceptance = sensor_acceptance_from(attachment))
+    environment_to_carry.accept(std::move(*acceptance));
+}
+
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   State& s = *state_;
   if (is_calibration_request(attachment.name)) {
     s.calibrating = true;
     s.asked = State::AtRequest{s.part, s.status.lost + s.status.refused};
   }
+
+  s.follow_sensors(attachment);
 
   if (s.status.state == RecorderStatus::State::Recording) s.end_cycle();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});

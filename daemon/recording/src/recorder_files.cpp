@@ -56,8 +56,12 @@ void Recorder::State::forget_finished_requests() {
 void Recorder::State::carry_sensors_on() {
   environment_to_carry.begin_file(cycle);
   if (!environment_to_carry.checks_sensors()) return;
-  std::erase_if(attachments,
-                [](const TimedAttachment& a) { return a.attachment.name == kSensorStateName; });
+  std::erase_if(attachments, [&](const TimedAttachment& a) {
+    if (a.attachment.name == kSensorStateName) return true;
+    if (a.attachment.name != kSensorAcceptedName) return false;
+    const auto acceptance = sensor_acceptance_from(a.attachment);
+    return !acceptance || environment_to_carry.contains(*acceptance);
+  });
   attachments.push_back({environment_to_carry.state(), utc_ns(environment_to_carry.state_at())});
 }
 

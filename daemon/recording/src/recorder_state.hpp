@@ -55,6 +55,7 @@ struct Recorder::State {
   [[nodiscard]] IoResult end_file();
   void forget_finished_requests();
   void carry_sensors_on();
+  void follow_sensors(const RecordingAttachment& attachment);
   [[nodiscard]] std::string gap_of_run() const;
   [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
   void put(Stream stream, Dates dates, std::span<const std::byte> payload);

@@ -136,6 +136,10 @@ Hub::Hub(HubParts parts)
                 parts.reference != nullptr ? &parts.reference->datum() : nullptr),
       live_(assembler_options(parts.config), parts.time),
       touches_by_(device_names(parts.config).touches) {
+  if (parts_.sensor_state) {
+    (void)pipeline_.go_on(*parts_.sensor_state);
+    (void)live_.go_on(*parts_.sensor_state);
+  }
   if (parts_.reference != nullptr) pipeline_.add(*parts_.reference);
   pipeline_.add(*this);  // before the recorder, because subscribers wait for the live view
   if (parts_.recorder != nullptr) pipeline_.add(*parts_.recorder);
@@ -170,9 +174,18 @@ void Hub::cycle(WallTime wall) {
   touch(points_left, wall);
   if (parts_.tracker != nullptr) parts_.tracker->cycle(now);
 
+  accept_sensors();
   pipeline_.cycle(batch_);
   if (parts_.reference != nullptr) parts_.reference->take(parts_.devices.card_progress());
   run_calls();
+}
+
+void Hub::accept_sensors() {
+  if (parts_.sensors == nullptr) return;
+  for (SensorAcceptance& acceptance : parts_.sensors->take()) {
+    live_.accept(acceptance);
+    pipeline_.accept(std::move(acceptance));
+  }
 }
 
 void Hub::on_samples(const Batch& batch) {

@@ -11,6 +11,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/config/config.hpp"
@@ -94,8 +95,10 @@ class EnvironmentMerge {
 
   /// The sensors whose readings are not used, after the samples that were checked until now.
   [[nodiscard]] std::vector<SensorFinding> findings() const { return queue_.checks().findings(); }
+  [[nodiscard]] const SensorChecks& sensors() const noexcept { return queue_.checks(); }
+  void accept(SensorAcceptance acceptance) { queue_.accept(std::move(acceptance)); }
   [[nodiscard]] std::vector<SensorDoubts> doubts() const { return queue_.checks().doubts(); }
-  /// For a replay of a further file: continues from the state at its start.
+  /// Continues from the state at the start of a further file, or from that of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return queue_.checks().go_on(sensor_state);
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/drivers/time_source.hpp"
@@ -39,6 +40,12 @@ class LiveView {
   /// The sensors whose readings are not used.
   [[nodiscard]] std::vector<SensorFinding> sensor_findings() const {
     return environment_.findings();
+  }
+  [[nodiscard]] const SensorChecks& sensors() const noexcept { return environment_.sensors(); }
+  void accept(SensorAcceptance acceptance) { environment_.accept(std::move(acceptance)); }
+  /// Continues from the state of an earlier run.
+  [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
+    return environment_.go_on(sensor_state);
   }
   [[nodiscard]] std::vector<SensorDoubts> sensor_doubts() const { return environment_.doubts(); }
   /// Why the correction of each axis for the temperature of its scale is missing; empty: it is not.

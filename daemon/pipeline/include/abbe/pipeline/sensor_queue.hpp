@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "abbe/pipeline/sensor_acceptance.hpp"
 #include "abbe/pipeline/sensor_checks.hpp"
 #include "abbe/protocol/samples.hpp"
 
@@ -41,13 +42,19 @@ class SensorQueue {
   void add_weather(std::size_t device, const protocol::EnvironmentSample& sample,
                    protocol::EnvironmentMask mask, protocol::HostTime taken);
 
+  /// Applies to the samples that are due after its instant.
+  void accept(SensorAcceptance acceptance);
+
   /// Checks the samples that are due at `t`. use(const Waiting&, const CheckedEnvironment&).
   template <class Use>
   void check_until(protocol::HostTime t, Use use) {
     std::size_t done = 0;
-    for (; done < waiting_.size() && waiting_[done].due <= t; ++done)
+    for (; done < waiting_.size() && waiting_[done].due <= t; ++done) {
+      accept_before(waiting_[done].due);
       use(waiting_[done], checks_.checked(waiting_[done].sample, waiting_[done].mask));
+    }
     waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(done));
+    accept_before(t);
   }
 
   /// Not checked yet, in the order in which they will be.
@@ -57,10 +64,12 @@ class SensorQueue {
 
  private:
   void insert(const Waiting& waiting, protocol::HostTime taken);
+  void accept_before(protocol::HostTime due);
 
   SensorChecks checks_;
   std::chrono::nanoseconds lag_;
   std::vector<Waiting> waiting_;
+  std::vector<SensorAcceptance> acceptances_;  ///< not applied yet, by time
 };
 
 }  // namespace abbe::daemon

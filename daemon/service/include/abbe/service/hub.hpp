@@ -31,6 +31,7 @@
 #include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
+#include "abbe/service/sensor_service.hpp"
 #include "abbe/service/store_changes.hpp"
 #include "abbe/service/touch_service.hpp"
 #include "abbe/service/tracker_service.hpp"
@@ -56,6 +57,9 @@ struct HubParts {
   /// The user of abbe-dds, which reads the network: it has no role on the control socket.
   std::optional<uid_t> network_user = {};
   IdentityWatch* identity = nullptr;
+  SensorService* sensors = nullptr;
+  /// State of the checks of the sensors in the earlier run; it can be read.
+  std::optional<RecordingAttachment> sensor_state = {};
 };
 
 class Hub : private PipelineObserver {
@@ -103,6 +107,7 @@ class Hub : private PipelineObserver {
   void publish(bool fresh, protocol::HostTime now);
   void follow_identity(WallTime wall);
   void collect_health(protocol::HostTime now);
+  void accept_sensors();
   void touch(std::size_t points_left, WallTime wall);
 
   HubParts parts_;

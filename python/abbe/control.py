@@ -114,6 +114,14 @@ class Control:
             request["u"] = u
         self.ask(request)
 
+    def accept_sensor(self, name: str, why: str) -> None:
+        """States that a sensor in doubt is right; it is used when its next two readings agree.
+
+        why: the reason, which is recorded. Refused for a sensor that is in use or has no usable
+        reading, and while a calibration takes readings.
+        """
+        self.ask({"do": "sensors", "accept": True, "sensor": name, "why": why})
+
     def cancel_reference(self) -> None:
         """Ends the search for the reference marks."""
         self.ask({"do": "reference", "cancel": True})

@@ -70,6 +70,8 @@ TEST_F(CliHelp, TheHelpOfEveryCommandHasAnExample) {
                                     "plan otf",
                                     "plan mfb",
                                     "reference",
+                                    "sensors",
+                                    "sensors accept",
                                     "machine",
                                     "machine where",
                                     "machine stop",

@@ -51,6 +51,15 @@ std::string fault_text_of(const std::string& text) {
   return all;
 }
 
+TEST(SensorConfiguration, HoldsAValueUntilTheNextReadingOfEveryDevice) {
+  const std::string slow = kScales + "period_s = 90\n";
+  EXPECT_THAT(fault_text_of(slow),
+              HasSubstr("sensors.hold_s: 60 s is shorter than period_s = 90 of \"rtd\": a value "
+                        "would not be held until the next reading; give at least 90, or 0"));
+  for (const std::string fits : {"hold_s = 90\n", "hold_s = 0\n", "check = false\n"})
+    EXPECT_EQ(fault_text_of(slow + "[sensors]\n" + fits), "") << fits;
+}
+
 TEST(SensorConfiguration, IsReadInSiUnits) {
   const auto sensors = config_of(kScales + kAir + R"([sensors]
 hold_s = 30

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -14,6 +16,7 @@
 #include "abbe/methods/evemu/artefact_thermometer.hpp"
 #include "abbe/methods/otf/inputs.hpp"
 #include "abbe/pipeline/assembler.hpp"
+#include "abbe/pipeline/recording_rules.hpp"
 #include "abbe/replay/replay.hpp"
 #include "abbe/sim/ball_array.hpp"
 #include "abbe/sim/touching.hpp"
@@ -412,6 +415,7 @@ void record_run(const fs::path& folder, const std::string& configuration,
                 const CalibrationRequest& request, const Batch& batch) {
   RecordingInfo info = example_info();
   info.configuration = configuration;
+  std::ranges::move(recording_rules(), std::back_inserter(info.versions));
   auto recorder = Recorder::open(example_options(folder), info, Recorder::WallTime{});
   ASSERT_TRUE(recorder) << recorder.error().text;
   recorder->attach(to_attachment(request), request.from);

@@ -69,7 +69,8 @@ class HubBench : public ::testing::Test {
                           .calibration = *calibration_,
                           .publisher = &*publisher_,
                           .recorder = recorder_.get(),
-                          .verification = verification_ ? &*verification_ : nullptr});
+                          .verification = verification_ ? &*verification_ : nullptr,
+                          .sensors = &sensors_});
   }
 
   virtual void cycle(std::chrono::nanoseconds later = std::chrono::milliseconds{1}) {
@@ -103,6 +104,7 @@ class HubBench : public ::testing::Test {
   std::optional<Publisher> publisher_;
   std::optional<FarEnd> far_;
   std::optional<VerificationService> verification_;
+  SensorService sensors_{nullptr};
   std::optional<Hub> hub_;
 };
 

@@ -54,11 +54,14 @@ class HubSensors : public test::HubBench<Rtd> {
       protocol::AxisSample axes;
       axes.head.time = time_.now() + 100ms;
       axes.axis_count = 3;
+      axes.missing_mask = without_reading_;
       axes.position = {0.1, 0.1, -0.1};
       devices_.next.axes.push_back(axes);
       cycle(100ms);
     }
   }
+  std::uint8_t without_reading_ = 0;
+
   std::string health_of_rtd() {
     std::string fault = "(nothing)";
     for (const auto& m : messages<v1::Health>(far_->take(), Topic::Health))
@@ -91,6 +94,14 @@ TEST_F(HubSensors, WithoutAValueGiveTheReasonToStatusHealthAndModel) {
   EXPECT_THAT(status["streams"][0]["condition"].get<std::string>(), StartsWith(text));
 }
 
+TEST_F(HubSensors, AreNotTheReasonIfAReadingOfAnotherAxisIsMissing) {
+  for (int i = 0; i < 4; ++i) second(21.0);
+  without_reading_ = 0b010;
+  for (int i = 0; i < 3; ++i) second(std::nan(""));
+  EXPECT_EQ(hub_->model_state().reason, "no recent axis positions");
+  EXPECT_THAT(reason_of_x(), StartsWith("scale_x is not available"));
+}
+
 TEST_F(HubSensors, ThatJumpAreHeldAndNamed) {
   for (int i = 0; i < 4; ++i) second(21.0);
   for (int i = 0; i < 3; ++i) second(85.0);
@@ -99,6 +110,22 @@ TEST_F(HubSensors, ThatJumpAreHeldAndNamed) {
                          "missing): it reads 85.00 C, expected 0.00 to 50.00 C"));
   EXPECT_THAT(reason_of_x(), IsEmpty());
   EXPECT_EQ(hub_->model_state().status, v1::ModelStatus::MODEL_ACTIVE);
+}
+
+TEST_F(HubSensors, AreUsedAgainWhenAPersonAcceptsThem) {
+  const auto accept = [&](const std::string& sensor, const std::string& why) {
+    return ask({{"do", "sensors"}, {"accept", true}, {"sensor", sensor}, {"why", why}});
+  };
+  for (int i = 0; i < 4; ++i) second(21.0);
+  EXPECT_THAT(accept("scale_x", "warm-up").dump(), HasSubstr("there is nothing to accept"));
+  for (int i = 0; i < 300; ++i) second(24.0);
+  EXPECT_THAT(reason_of_x(), HasSubstr("if it is right: abbe sensors accept scale_x --why"));
+  EXPECT_THAT(accept("scale_x", "").dump(), HasSubstr("give the reason"));
+  EXPECT_THAT(accept("scale_q", "warm-up").dump(), HasSubstr("known are scale_x"));
+  EXPECT_TRUE(accept("scale_x", "compared with a thermometer")["ok"]);
+  for (int i = 0; i < 3; ++i) second(24.0);
+  EXPECT_THAT(reason_of_x(), IsEmpty());
+  EXPECT_THAT(health_of_rtd(), IsEmpty());
 }
 
 TEST_F(HubSensors, AreAFaultWithItsTextAlsoForOneReading) {

@@ -1,11 +1,14 @@
 // What a reader still finds in a recording that was cut, overwritten, or whose recorder was killed.
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <span>
 
@@ -53,6 +56,42 @@ class DamagedRecording : public ::testing::Test {
   std::vector<std::size_t> chunk_starts_;
   std::vector<std::size_t> chunk_ends_;
 };
+
+/// `whole` up to its second chunk, a chunk of 300 MiB (a hole: it needs no space on the disk), the
+/// rest of `whole` up to `end`.
+std::filesystem::path with_a_large_chunk(const std::filesystem::path& folder, const FileBytes& whole,
+                                         std::size_t second_chunk, std::size_t end) {
+  constexpr std::uint64_t kLarge = std::uint64_t{300} << 20;
+  const auto file = folder / "large.mcap";
+  write_file(file, whole, second_chunk);
+  std::fstream out(file, std::ios::binary | std::ios::in | std::ios::out);
+  std::array<char, 9> head{6};  // opcode and length
+  for (std::size_t i = 0; i < 8; ++i) head[1 + i] = static_cast<char>(kLarge >> (8 * i) & 0xff);
+  out.seekp(0, std::ios::end);
+  out.write(head.data(), head.size());
+  out.seekp(static_cast<std::streamoff>(kLarge), std::ios::cur);
+  out.write(&whole[second_chunk], static_cast<std::streamsize>(end - second_chunk));
+  out.close();
+  if (end == second_chunk)  // it is cut off in the hole
+    std::filesystem::resize_file(file, second_chunk + head.size() + kLarge - 1);
+  return file;
+}
+
+TEST_F(DamagedRecording, ALargeChunkIsALossAndWhatFollowsIsRead) {
+  const auto reader = RecordingReader::open(
+      with_a_large_chunk(folder_.path(), whole_, chunk_starts_[1], chunk_ends_.back()));
+  ASSERT_TRUE(reader) << reader.error().text;
+  EXPECT_EQ(reader->message_count(), kDamagedChunks * kPerDamagedChunk);
+  EXPECT_THAT(reader->damage(), testing::HasSubstr("is larger than the 256 MiB"));
+}
+
+TEST_F(DamagedRecording, ALargeChunkThatIsCutOffIsDamage) {
+  const auto reader = RecordingReader::open(
+      with_a_large_chunk(folder_.path(), whole_, chunk_starts_[1], chunk_starts_[1]));
+  ASSERT_TRUE(reader) << reader.error().text;
+  EXPECT_EQ(reader->message_count(), kPerDamagedChunk);
+  EXPECT_THAT(reader->damage(), testing::HasSubstr("is larger than the 256 MiB"));
+}
 
 TEST_F(DamagedRecording, CutAnywhereKeepsEveryFinishedChunk) {
   ASSERT_EQ(chunk_ends_.size(), kDamagedChunks);

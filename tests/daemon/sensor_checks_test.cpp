@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "abbe/pipeline/environment_use.hpp"
+#include "abbe/pipeline/sensor_state_file.hpp"
 #include "config_tables.hpp"
 #include "warm_scales.hpp"
 
@@ -153,6 +154,28 @@ TEST_F(SensorChecksTest, CompareTwinsAtTheFirstReadingToo) {
   EXPECT_EQ(checks_->findings()[0].doubt, SensorDoubt::Twin);
 }
 
+TEST_F(SensorChecksTest, KeepTheDoubtOfATwinWhileTheOtherIsSilent) {
+  start(kTwin);
+  settle();
+  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  ASSERT_THAT(checks_->findings(), SizeIs(2));
+  for (int s = 0; s < 5; ++s) (void)read(21.9, std::nan(""));
+  ASSERT_THAT(checks_->findings(), SizeIs(2));
+  EXPECT_EQ(checks_->findings()[0].doubt, SensorDoubt::Twin);
+  EXPECT_EQ(checks_->findings()[1].doubt, SensorDoubt::NoValue);
+  (void)read(21.9, 21.7);
+  EXPECT_THAT(checks_->findings(), IsEmpty()) << "they agree again";
+}
+
+TEST_F(SensorChecksTest, KeepTheDoubtOfATwinThatWasSilentItself) {
+  start(kTwin);
+  settle();
+  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  (void)read(std::nan(""), std::nan(""));
+  (void)read(21.9, std::nan(""));
+  EXPECT_EQ(checks_->findings().at(0).doubt, SensorDoubt::Twin);
+}
+
 TEST_F(SensorChecksTest, TakeLimitsFromTheConfiguration) {
   start(R"([[sensors.limit]]
 name = "coolant"
@@ -186,6 +209,64 @@ TEST_F(SensorChecksTest, GoOnFromAStateLikeTheChecksThatMadeIt) {
     if (!std::isnan(live.sample.temperature_K[0]))
       EXPECT_EQ(checks_->applied(live, 0, now_ + 700ms), further.applied(again, 0, now_ + 700ms));
   }
+}
+
+TEST_F(SensorChecksTest, BeginAnewWhenAPersonAcceptsASensor) {
+  start();
+  settle();
+  for (int s = 0; s < 600; ++s) (void)read(24.0);
+  EXPECT_EQ(checks_->findings().at(0).doubt, SensorDoubt::Jump);
+  ASSERT_TRUE(checks_->check_acceptance("scale_x"));
+  checks_->accept("scale_x");
+  EXPECT_TRUE(std::isnan(used_C(24.0)));
+  EXPECT_NEAR(used_C(24.0), 24.0, 1e-9);
+  EXPECT_THAT(checks_->findings(), IsEmpty());
+  EXPECT_EQ(checks_->check_acceptance("scale_x").error().code, ErrorCode::Refused) << "in use";
+  EXPECT_EQ(checks_->check_acceptance("scale_q").error().code, ErrorCode::Usage);
+}
+
+TEST_F(SensorChecksTest, AcceptOneOfATwinOnlyIfTheOtherIsSilent) {
+  start(kTwin);
+  settle();
+  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  EXPECT_THAT(checks_->check_acceptance("scale_x").error().text, HasSubstr("still differ"));
+  (void)read(21.9, std::nan(""));
+  ASSERT_TRUE(checks_->check_acceptance("scale_x"));
+  checks_->accept("scale_x");
+  (void)read(21.9, std::nan(""));
+  EXPECT_NEAR(used_C(21.9, std::nan("")), 21.9, 1e-9);
+}
+
+TEST_F(SensorChecksTest, KnowTheirDoubtsAfterARestart) {
+  using std::chrono::hours;
+  start();
+  settle();
+  for (int s = 0; s < 300; ++s) (void)read(24.0);
+  const std::string before = checks_->findings().at(0).text;
+  const auto text = sensor_state_text(*checks_, {.host = now_, .utc = hours{9}});
+  const auto options = sensor_check_options(config_with_sensors());
+  const auto restarted_after = [&](std::chrono::nanoseconds off) {
+    now_ = HostTime{30s};  // of a computer that was started again
+    const auto left = left_sensor_state(text, options, {.host = now_, .utc = hours{9} + off});
+    EXPECT_TRUE(left) << left.error().text;
+    start();
+    EXPECT_TRUE(checks_->go_on(*left));
+  };
+  restarted_after(20s);
+  EXPECT_EQ(checks_->findings().at(0).text, before);
+  for (int s = 0; s < 5; ++s) EXPECT_TRUE(std::isnan(used_C(24.0))) << s;
+  restarted_after(-1h);
+  EXPECT_TRUE(std::isnan(used_C(24.0))) << "the clock was set back";
+  restarted_after(1h);
+  (void)read(24.0);
+  EXPECT_NEAR(used_C(24.0), 24.0, 1e-9) << "as after an hour without a reading";
+}
+
+TEST_F(SensorChecksTest, RefuseALeftStateThatIsDamaged) {
+  start();
+  auto text = sensor_state_text(*checks_, {});
+  text[text.find("scale_x")] = 'S';
+  EXPECT_FALSE(left_sensor_state(text, sensor_check_options(config_with_sensors()), {}));
 }
 
 TEST_F(SensorChecksTest, RefuseAStateThatCannotBeRead) {

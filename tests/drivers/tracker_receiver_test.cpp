@@ -391,6 +391,18 @@ TEST_F(TrackerReceiverTest, WeatherIsSiAndComesOnlyWhenItChanges) {
   EXPECT_EQ(weather_[1].head.time, points_[4].head.time);
 }
 
+TEST_F(TrackerReceiverTest, WeatherThatDoesNotChangeIsRepeatedEveryTenSeconds) {
+  emscon::MultiHead head;
+  head.environment = {21.5, 990.0, 40.0};
+  for (int i = 0; i <= 24; ++i) packet_at(now_ + i * 1s, 2, head);
+  EXPECT_EQ(weather_.size(), 3u);
+  EXPECT_EQ(weather_.back().air_pressure_Pa, 99'000.0);
+  now_ += 25s;
+  begin_connection();
+  packet_at(now_ + 1s, 2, head);
+  EXPECT_EQ(weather_.size(), 4u);
+}
+
 TEST_F(TrackerReceiverTest, AStationaryResultIsTimedByItsMiddle) {
   emscon::SingleResult single;
   single.value = {100, 200, 300};

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "allocation_count.hpp"
+
 namespace {
 
 using abbe::calib::ErrorLattice;
@@ -130,6 +132,19 @@ TEST(Wanted, EveryRefusalHasAReasonAndIsZero) {
     EXPECT_FALSE(refusal.valid);
     EXPECT_EQ(refusal.reason, reason);
     for (const double c : refusal.correction) EXPECT_EQ(c, 0.0);
+  }
+}
+
+/// The loop of the feeder has a realtime priority.
+TEST(Wanted, ARefusalOfTheToolDoesNotAllocate) {
+  const Usable with_model = usable();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double z_mm : {150.0, 1.0 / 3.0, 1e22, 1e300, nan}) {
+    const abbe_control c = with_tool(2, z_mm);
+    const abbe::tests::AllocationCount allocations;
+    const auto refused = abbe::linuxcnc::wanted(with_model, 0.02, c, {});
+    EXPECT_EQ(allocations.value(), 0u) << z_mm;
+    EXPECT_FALSE(refused.valid);
   }
 }
 

@@ -179,4 +179,16 @@ Result<void> replace_file(const std::filesystem::path& file, std::string_view te
   return {};
 }
 
+void remove_half_written(const std::filesystem::path& file) {
+  std::error_code failed;
+  const std::string prefix = file.filename().string() + ".";
+  for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end;
+       !failed && entry != end; entry.increment(failed)) {
+    const auto name = entry->path().filename().string();
+    std::error_code ignored;
+    if (name.starts_with(prefix) && name.ends_with(".new"))
+      std::filesystem::remove(entry->path(), ignored);
+  }
+}
+
 }  // namespace abbe::daemon

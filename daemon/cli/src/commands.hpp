@@ -21,6 +21,7 @@ void add_calibrate_otf(CLI::App& parent, int& exit);
 void add_calibrate_evemu(CLI::App& parent, int& exit);
 void add_calibrate_mfb(CLI::App& parent, int& exit);
 void add_reference(CLI::App& parent, int& exit);
+void add_sensors(CLI::App& parent, int& exit);
 void add_machine(CLI::App& parent, int& exit);
 void add_machine_identity(CLI::App& machine, int& exit);
 void add_tracker(CLI::App& parent, int& exit);

@@ -34,6 +34,8 @@ constexpr std::array kExamples{
         "           --stylus=-100,0,-150 --stylus=0,100,-150 --stylus=0,-100,-150 -o plan.toml\n"
         "         abbe plan mfb -c machine.toml --bar bar.toml --check plan.toml"},
     Example{"reference", "--here --axis X"},
+    Example{"sensors", "accept scale_x --why \"compared with a thermometer\""},
+    Example{"sensors accept", "scale_x --why \"compared with a thermometer\""},
     Example{"machine", "where"},
     Example{"machine where", ""},
     Example{"machine stop", ""},

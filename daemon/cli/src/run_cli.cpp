@@ -85,6 +85,7 @@ void add_commands(CLI::App& app, int& exit) {
   add_plan_otf(*plan, exit);
   add_plan_mfb(*plan, exit);
   add_reference(app, exit);
+  add_sensors(app, exit);
   add_machine(app, exit);
   add_tracker(app, exit);
   add_replay(app, exit);

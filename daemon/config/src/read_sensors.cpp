@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
 #include <set>
 #include <string>
@@ -81,11 +82,33 @@ SensorLimitConfig read_limit(Section& section, const Config& config) {
 
 }  // namespace
 
+namespace {
+
+/// A refused reading is bridged by the last good value only if that is held until the next reading.
+void check_hold(Section& sensors, const Config& config) {
+  const auto seconds = [](std::chrono::nanoseconds t) {
+    return std::chrono::duration<double>(t).count();
+  };
+  const auto hold = config.sensors.hold;
+  if (!config.sensors.check || hold <= std::chrono::nanoseconds{0}) return;
+  for (const EnvironmentSource& device : environment_sources(config))
+    if (device.period > hold)
+      sensors.fault("hold_s",
+                    fmt::format("{} s is shorter than period_s = {} of \"{}\": a value would not be "
+                                "held until the next reading; give at least {}, or 0: no value is "
+                                "held",
+                                seconds(hold), seconds(device.period), device.device,
+                                seconds(device.period)));
+}
+
+}  // namespace
+
 void read_sensors(ClassifiedSection& root, Config& out) {
   Section sensors = root.operation_table("sensors");
   SensorsConfig& config = out.sensors;
   sensors.get("check", config.check);
   sensors.get("hold_s", config.hold, kPlain, {0.0, 3600.0});
+  check_hold(sensors, out);
   sensors.get("forget_s", config.forget, kPlain, {1.0, 86'400.0});
   sensors.get("start_spread_K", config.start_spread_K, kPlain, kPositive);
   // The air of a hall changes by some K per hour: a slower correction would never follow it.

@@ -19,7 +19,7 @@ constexpr std::size_t kLongestMessage = 65536;  // a UDP datagram
 constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09,
                        kAckNack = 0x06, kHeartbeat = 0x07, kGap = 0x08, kNackFrag = 0x12,
                        kHeartbeatFrag = 0x13, kSecurePrefix = 0x31, kSecureMessagePrefix = 0x33,
-                       kStatistics = 0x80;
+                       kSecureMessagePostfix = 0x34, kStatistics = 0x80;
 constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08,
                        kNoTimestamp = 0x02;
 /// Replaces the kind of a submessage that must not be read. The kind is not assigned, so a receiver
@@ -349,7 +349,9 @@ struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
 
 std::size_t filter_message(std::span<std::uint8_t> message, bool secured) noexcept {
   if (message.size() < kHeaderBytes) return 0;
-  bool is_signed = false;
+  // A signature covers the one submessage behind its prefix, or all between the prefix and the
+  // postfix of a message. What follows has none.
+  bool in_signed_message = false, next_is_signed = false;
   for (std::size_t at = kHeaderBytes; at + kSubmessageHeaderBytes <= message.size();) {
     std::uint8_t &kind = message[at], &flags = message[at + 1];
     std::size_t length = Reader(message, (flags & kLittleEndian) != 0).u16(at + 2);
@@ -363,7 +365,10 @@ std::size_t filter_message(std::span<std::uint8_t> message, bool secured) noexce
     if (!last && length % 4 != 0) return 0;
 
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
-    is_signed |= secured && (kind == kSecurePrefix || kind == kSecureMessagePrefix);
+    const bool is_signed = in_signed_message || next_is_signed;
+    next_is_signed = secured && kind == kSecurePrefix;
+    if (kind == kSecureMessagePrefix) in_signed_message = secured;
+    if (kind == kSecureMessagePostfix) in_signed_message = false;
     if (!check({kind, flags, message.subspan(at, length), is_signed})) return 0;
     at += length;
   }

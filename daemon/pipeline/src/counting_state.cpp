@@ -119,19 +119,6 @@ std::string rename_damaged(const std::filesystem::path& file) {
                 : fmt::format("it is kept as {}", renamed.string());
 }
 
-/// Removes the temporary files of runs that were killed while writing.
-void remove_half_written(const std::filesystem::path& file) {
-  std::error_code failed;
-  const std::string prefix = file.filename().string() + ".";
-  for (std::filesystem::directory_iterator entry{file.parent_path(), failed}, end;
-       !failed && entry != end; entry.increment(failed)) {
-    const auto name = entry->path().filename().string();
-    std::error_code ignored;
-    if (name.starts_with(prefix) && name.ends_with(".new"))
-      std::filesystem::remove(entry->path(), ignored);
-  }
-}
-
 constexpr std::string_view kNotReferenced = "the axes of the counter card are not referenced";
 
 }  // namespace

@@ -49,13 +49,6 @@ void insert_by_time(std::deque<CheckedEnvironment>& in_order, const CheckedEnvir
       std::upper_bound(in_order.begin(), in_order.end(), checked.sample.head.time, later), checked);
 }
 
-void insert_by_time(std::vector<FromEnvironment>& in_order, const FromEnvironment& from) {
-  const auto later = [](const FromEnvironment& a, const FromEnvironment& b) {
-    return std::pair{a.sample.head.time, a.device} < std::pair{b.sample.head.time, b.device};
-  };
-  in_order.insert(std::upper_bound(in_order.begin(), in_order.end(), from, later), from);
-}
-
 /// The latest sample whose time is not after `t`; null if there is none.
 const CheckedEnvironment* latest_at(const std::deque<CheckedEnvironment>& samples, HostTime t) {
   const auto later = [](HostTime at, const CheckedEnvironment& checked) {
@@ -93,44 +86,46 @@ EnvironmentUseOptions environment_use(const Config& config) {
 }
 
 EnvironmentMerge::EnvironmentMerge(const EnvironmentUseOptions& options, nanoseconds lag)
-    : measured_(options.measured), max_age_(options.max_age), lag_(lag), checks_(options.sensors) {}
+    : measured_(options.measured),
+      max_age_(options.max_age),
+      lag_(lag),
+      queue_(options.sensors, lag) {}
 
 void EnvironmentMerge::take(const Batch& batch) {
+  const auto advance_to = [&](HostTime t) {
+    if (batch.taken == HostTime{} || t - batch.taken <= kMostAhead) newest_ = std::max(newest_, t);
+  };
   for (const auto& sample : batch.environment) {
-    insert_by_time(weather_, checks_.checked(sample, static_cast<EnvironmentMask>(sample.measured &
-                                                                                  ~measured_)));
-    newest_ = std::max(newest_, sample.head.time);
+    queue_.add_weather(0, sample, static_cast<EnvironmentMask>(sample.measured & ~measured_),
+                       batch.taken);
+    advance_to(sample.head.time);
   }
-  for (const auto& from : batch.measured_environment) {
-    insert_by_time(unchecked_, from);
-    newest_ = std::max(newest_, from.sample.head.time);
+  for (const auto& [device, sample] : batch.measured_environment) {
+    queue_.add(device, sample, sample.measured, batch.taken);
+    advance_to(sample.head.time);
   }
-  for (const auto& sample : batch.axes) newest_ = std::max(newest_, sample.head.time);
-  check_until(newest_ - lag_);
+  for (const auto& sample : batch.axes) advance_to(sample.head.time);
+  check_until(batch.taken != HostTime{} ? batch.taken : newest_);
 }
 
-/// Checks the samples of the devices up to `t` in the order of their instants: the order of arrival
-/// then has no effect on sensors that are compared with each other.
 void EnvironmentMerge::check_until(HostTime t) {
-  std::size_t checked = 0;
-  for (; checked < unchecked_.size() && unchecked_[checked].sample.head.time <= t; ++checked) {
-    const auto& [device, sample] = unchecked_[checked];
-    if (device >= devices_.size()) devices_.resize(device + 1);
-    insert_by_time(devices_[device], checks_.checked(sample, sample.measured));
-  }
-  unchecked_.erase(unchecked_.begin(), unchecked_.begin() + static_cast<std::ptrdiff_t>(checked));
+  queue_.check_until(t, [&](const SensorQueue::Waiting& read, const CheckedEnvironment& checked) {
+    if (read.weather) return insert_by_time(weather_, checked);
+    if (read.device >= devices_.size()) devices_.resize(read.device + 1);
+    insert_by_time(devices_[read.device], checked);
+  });
 }
 
 void EnvironmentMerge::merge_device(const CheckedEnvironment& from, HostTime t,
                                     EnvironmentSample& to) const {
   EnvironmentSample applied = from.sample;
   for (std::size_t i = 0; i < protocol::kMaxTemperatures; ++i)
-    applied.temperature_K[i] = checks_.applied(from, i, t);
+    applied.temperature_K[i] = queue_.checks().applied(from, i, t);
   merge(applied, applied.measured, t - applied.head.time > max_age_, to);
 }
 
 std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
-  check_until(t - lag_);
+  check_until(t);
   EnvironmentSample merged;
   merged.measured = 0;
   merged.air_temperature_K = merged.air_pressure_Pa = merged.relative_humidity = kNotAvailable;
@@ -138,8 +133,7 @@ std::optional<EnvironmentSample> EnvironmentMerge::at(HostTime t) {
 
   if (const auto* weather = latest_at(weather_, t);
       weather != nullptr && weather->sample.measured != 0) {
-    // The tracker's controller sends its weather values only when they change, so their age is not
-    // checked.
+    // The tracker's controller sends its weather with its points only, so its age is not checked.
     merge(weather->sample, static_cast<EnvironmentMask>(weather->sample.measured & ~measured_),
           false, merged);
     any = true;

@@ -1,5 +1,7 @@
 #include "abbe/pipeline/live_view.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -66,7 +68,7 @@ void LiveView::take(const protocol::AxisSample& sample) {
   view_.head = sample.head;
   const auto axes = drivers::latest_axes(previous_ ? &*previous_ : nullptr, sample, interpolation_);
   view_.axis_count = axes.axis_count;
-  view_.missing_mask = axes.missing_mask;
+  view_.missing_mask = without_reading_ = axes.missing_mask;
   view_.position = axes.position;
   view_.velocity = axes.velocity;
   view_.u_position = axes.u_position;
@@ -91,6 +93,21 @@ std::vector<std::string> LiveView::missing_scales() const {
   return reasons;
 }
 
+std::string LiveView::why_scales_alone_are_missing() const {
+  constexpr unsigned kXYZ = (1u << kLinearAxes) - 1u;
+  const auto flags = view_.head.flags;
+  if ((without_reading_ & kXYZ) != 0 || has(flags, SampleFlag::BusOff) ||
+      has(flags, SampleFlag::DeviceError))
+    return {};
+  const auto reasons = missing_scales();
+  std::string all;
+  for (const ThermalAxis& thermal : use_.thermal)
+    if (thermal.axis < std::min(kLinearAxes, reasons.size()) && !reasons[thermal.axis].empty())
+      all += fmt::format("{}{}: {}", all.empty() ? "" : "; ", thermal.config.axis,
+                         reasons[thermal.axis]);
+  return all;
+}
+
 /// Removes a tracker point and a touch that are older than kCurrentFor. The published message has a
 /// single instant, that of the axes: after the tracker has lost its beam or connection, its last
 /// point would otherwise appear to be as new as the axes.
@@ -112,6 +129,7 @@ bool LiveView::forget_what_is_not_current(protocol::HostTime now) {
 bool LiveView::mark_axes_missing(protocol::HostTime now) {
   if (!previous_ || now - previous_->head.time <= axes_patience_) return false;
   const auto all = static_cast<std::uint8_t>((1u << view_.axis_count) - 1u);
+  without_reading_ = all;
   if (view_.missing_mask == all) return false;
   view_.missing_mask = all;
   view_.head.flags |= SampleFlag::AxisMissing;

@@ -1,5 +1,8 @@
 #include "abbe/pipeline/sensor_checks.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -70,14 +73,16 @@ void SensorChecks::compare_with_others(Sensor& sensor, double reading,
 void SensorChecks::judge_alone(Sensor& sensor, double reading) {
   const bool is_first = !sensor.track.has_history;
   auto verdict = calib::check_reading(sensor.track, sensor.options.limits, reading, sensor.at);
-  if (verdict.usable() && is_first && sensor.options.near_others)
+  if (verdict.usable() && is_first && sensor.options.near_others && !sensor.accepted)
     compare_with_others(sensor, reading, verdict);
+  if (verdict.usable()) sensor.accepted = false;
   sensor.usable = verdict.usable() ? reading : kNone;
   if (verdict.usable() && sensor.doubt == SensorDoubt::Twin) return;  // judged by judge_by_twin()
   note(sensor, verdict.doubt, reading, verdict.lowest, verdict.highest);
 }
 
-/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong.
+/// Both sensors of a pair are in doubt while they differ: nothing shows which one is wrong. Only a
+/// comparison that agrees ends the doubt, not the silence of one of them.
 void SensorChecks::judge_by_twin(Sensor& sensor) {
   Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr;
   if (twin == nullptr) return;
@@ -86,17 +91,22 @@ void SensorChecks::judge_by_twin(Sensor& sensor) {
   const auto apart = sensor.at > twin->at ? sensor.at - twin->at : twin->at - sensor.at;
   const bool comparable =
       std::isfinite(sensor.usable) && std::isfinite(twin->usable) && apart <= kComparableFor;
-  // In one sample the pair is compared once.
-  const bool compared = sensor.at == twin->at && &sensor != &first;
-  if (!compared && comparable)
-    (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
-  if (!comparable) first.twin_differs = 0;
-
   // Until both are in use one comparison is enough: nothing wrong must be used first.
   const bool in_use = std::isfinite(sensor.held.value) && std::isfinite(twin->held.value);
   const int confirmed = in_use ? 2 : 1;
+
+  // In one sample the pair is compared once.
+  const bool compared = sensor.at == twin->at && &sensor != &first;
+  if (comparable && !compared) {
+    (void)calib::twins_differ(first.twin_differs, sensor.usable, twin->usable, most);
+    first.twins_doubted = first.twin_differs >= confirmed;
+  } else if (!comparable) {
+    first.twin_differs = 0;
+  }
+
   for (auto [one, other] : {std::pair{&sensor, twin}, std::pair{twin, &sensor}}) {
-    if (first.twin_differs >= confirmed) {
+    if (!std::isfinite(one->usable)) continue;  // in doubt for another reason
+    if (first.twins_doubted) {
       note(*one, SensorDoubt::Twin, one->usable, other->usable - most, other->usable + most);
     } else if (one->doubt == SensorDoubt::Twin) {
       note(*one, SensorDoubt::None, one->usable, kNone, kNone);
@@ -141,6 +151,83 @@ CheckedEnvironment SensorChecks::checked(const EnvironmentSample& sample, Enviro
       out.applied[place - kFirstTemperaturePlace] = sensor.applied;
   }
   return out;
+}
+
+const SensorChecks::Sensor* SensorChecks::named(std::string_view name) const {
+  const auto found = std::ranges::find_if(
+      sensors_, [&](const Sensor& sensor) { return sensor.options.name == name; });
+  return found == sensors_.end() ? nullptr : &*found;
+}
+
+Result<void> SensorChecks::check_acceptance(std::string_view name) const {
+  const Sensor* const sensor = named(name);
+  if (sensor == nullptr) {
+    std::vector<std::string_view> names;
+    for (const Sensor& known : sensors_) names.push_back(known.options.name);
+    return fail(ErrorCode::Usage, fmt::format("no sensor \"{}\" is checked; known are {}", name,
+                                              fmt::join(names, ", ")));
+  }
+  const auto refused = [&](std::string_view why) {
+    return fail(ErrorCode::Refused, fmt::format("{}: {}", name, why));
+  };
+  switch (sensor->doubt) {
+    case SensorDoubt::Jump:
+    case SensorDoubt::Others:
+      return {};
+    case SensorDoubt::None:
+      return refused("its readings are used: there is nothing to accept");
+    case SensorDoubt::Unconfirmed:
+      return refused("it is used when two readings agree: there is nothing to accept");
+    case SensorDoubt::NoValue:
+    case SensorDoubt::OutOfRange:
+    case SensorDoubt::PowerOnValue:
+      return refused("its reading itself cannot be right: see `abbe status`");
+    case SensorDoubt::Twin:
+      break;
+  }
+  const auto twin = std::ranges::find_if(sensors_, [&](const Sensor& other) {
+    return other.options.place == sensor->options.twin;
+  });
+  if (twin == sensors_.end() || twin->doubt != SensorDoubt::Twin) return {};  // silent
+  return refused(fmt::format("it and its twin {} still differ: repair the wrong one, or remove "
+                             "`twin` from [[sensors.limit]]",
+                             twin->options.name));
+}
+
+void SensorChecks::accept(std::string_view name) {
+  const Sensor* const found = named(name);
+  if (found == nullptr) return;
+  Sensor& sensor = sensors_[static_cast<std::size_t>(found - sensors_.data())];
+  if (Sensor* const twin = sensor.options.twin ? at_place(*sensor.options.twin) : nullptr) {
+    Sensor& first = sensor.options.place < twin->options.place ? sensor : *twin;
+    first.twin_differs = 0;
+    first.twins_doubted = false;
+  }
+  sensor.track = {};
+  sensor.held = {};
+  sensor.usable = kNone;
+  sensor.accepted = true;
+  if (sensor.doubt != SensorDoubt::None)
+    note(sensor, SensorDoubt::Unconfirmed, sensor.reading, kNone, kNone);
+}
+
+void SensorChecks::shift(nanoseconds by) {
+  for (Sensor& sensor : sensors_) {
+    sensor.track.at += by;
+    if (sensor.track.doubted_since) *sensor.track.doubted_since += by;
+    sensor.held.at += by;
+    sensor.applied.at += by;
+    sensor.at += by;
+  }
+}
+
+void SensorChecks::note_future(EnvironmentMask mask, protocol::HostTime taken, nanoseconds ahead) {
+  for (Sensor& sensor : sensors_) {
+    if ((mask & mask_of_place(sensor.options.place)) == 0) continue;
+    ++sensor.doubts;
+    sensor.latest = since_epoch(taken);
+    sensor.latest_text = future_text(sensor.options, ahead);
+  }
 }
 
 EnvironmentMask SensorChecks::mask_of(std::string_view device) const {

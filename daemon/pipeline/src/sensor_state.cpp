@@ -27,6 +27,12 @@ double double_of(const json& value) {
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
 
+/// A number of another version: the next reading is judged without it.
+calib::SensorDoubt doubt_of(int number) {
+  const bool known = number >= 0 && number <= static_cast<int>(calib::SensorDoubt::Others);
+  return known ? static_cast<calib::SensorDoubt>(number) : calib::SensorDoubt::None;
+}
+
 json json_of(const calib::SensorTrack& track) {
   return {{"has_history", track.has_history},
           {"reference", json_of(track.reference)},
@@ -56,6 +62,7 @@ RecordingAttachment SensorChecks::to_attachment() const {
   json all = json::array();
   for (const Sensor& s : sensors_)
     all.push_back({{"sensor", s.options.name},
+                   {"device", s.options.device},
                    {"track", json_of(s.track)},
                    {"held", json_of(s.held.value)},
                    {"held_at_ns", s.held.at.count()},
@@ -64,9 +71,14 @@ RecordingAttachment SensorChecks::to_attachment() const {
                    {"usable", json_of(s.usable)},
                    {"used", json_of(s.used)},
                    {"twin_differs", s.twin_differs},
+                   {"twins_doubted", s.twins_doubted},
                    {"at_ns", s.at.count()},
                    {"judged", s.judged},
-                   {"doubt", static_cast<int>(s.doubt)}});
+                   {"accepted", s.accepted},
+                   {"doubt", static_cast<int>(s.doubt)},
+                   {"reading", json_of(s.reading)},
+                   {"lowest", json_of(s.lowest)},
+                   {"highest", json_of(s.highest)}});
   return {.name = std::string{kSensorStateName},
           .media_type = "application/json",
           .content = json_text(all)};
@@ -78,16 +90,23 @@ Result<void> SensorChecks::go_on(const RecordingAttachment& attachment) {
     if (!parsed) return tl::unexpected(parsed.error());
     for (const json& j : *parsed) {
       for (Sensor& s : sensors_) {
-        if (s.options.name != j.at("sensor").get<std::string>()) continue;
+        if (s.options.name != j.at("sensor").get<std::string>() ||
+            s.options.device != j.at("device").get<std::string>())
+          continue;
         s.track = track_of(j.at("track"));
         s.held = {double_of(j.at("held")), time_of(j.at("held_at_ns"))};
         s.applied = {double_of(j.at("applied")), time_of(j.at("applied_at_ns"))};
         s.usable = double_of(j.at("usable"));
         s.used = double_of(j.at("used"));
         s.twin_differs = j.at("twin_differs").get<int>();
+        s.twins_doubted = j.at("twins_doubted").get<bool>();
         s.at = time_of(j.at("at_ns"));
         s.judged = j.at("judged").get<bool>();
-        s.doubt = static_cast<calib::SensorDoubt>(j.at("doubt").get<int>());
+        s.accepted = j.at("accepted").get<bool>();
+        s.doubt = doubt_of(j.at("doubt").get<int>());
+        s.reading = double_of(j.at("reading"));
+        s.lowest = double_of(j.at("lowest"));
+        s.highest = double_of(j.at("highest"));
       }
     }
     return {};

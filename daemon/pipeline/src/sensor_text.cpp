@@ -67,7 +67,7 @@ std::string cause_of_doubt(const CheckedSensor& sensor, const DoubtedReading& d)
   return {};
 }
 
-std::string_view remedy_of(SensorDoubt doubt) {
+std::string remedy_of(const CheckedSensor& sensor, SensorDoubt doubt) {
   switch (doubt) {
     case SensorDoubt::None:
       return {};
@@ -83,7 +83,10 @@ std::string_view remedy_of(SensorDoubt doubt) {
       return "check both";
     case SensorDoubt::Jump:
     case SensorDoubt::Others:
-      return "check the sensor, its cable and its address; if it is right, restart abbed";
+      return fmt::format(
+          "check the sensor, its cable and its address; if it is right: abbe sensors accept {} "
+          "--why REASON",
+          sensor.name);
   }
   return {};
 }
@@ -105,7 +108,14 @@ std::string consequence(const CheckedSensor& sensor, const DoubtedReading& d) {
 
 std::string text_of(const CheckedSensor& sensor, const DoubtedReading& doubted) {
   return fmt::format("{}: {}; {}", consequence(sensor, doubted), cause_of_doubt(sensor, doubted),
-                     remedy_of(doubted.doubt));
+                     remedy_of(sensor, doubted.doubt));
+}
+
+std::string future_text(const CheckedSensor& sensor, std::chrono::nanoseconds ahead) {
+  return fmt::format(
+      "{}: a reading dated {:.1f} s in the future is not used; check the clock of {} and the load "
+      "of the computer",
+      sensor.name, std::chrono::duration<double>(ahead).count(), sensor.device);
 }
 
 }  // namespace abbe::daemon

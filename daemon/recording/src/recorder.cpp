@@ -30,6 +30,7 @@ std::string_view name(RecorderStatus::State state) noexcept {
 // --- messages
 
 bool Recorder::State::add(Stream stream, Dates dates, std::span<const std::byte> data) {
+  cycle = std::max(cycle, dates.taken);
   if (status.state != RecorderStatus::State::Recording) {
     ++status.lost;
     return false;
@@ -56,18 +57,18 @@ void Recorder::State::put(Stream stream, Dates dates, std::span<const std::byte>
                           utc_ns(dates.taken), utc_ns(dates.described), data});
 }
 
-/// Repeats the last environment sample of each device in a new file, because some devices send only
-/// changes. The message is dated at the beginning of the file; its content keeps the time of
-/// measurement.
+/// Repeats environment samples in a new file: those that its instants need, and because some devices
+/// send only changes. The messages are dated at the beginning of the file; their content keeps the
+/// time of measurement.
 void Recorder::State::add_carried_environment(protocol::HostTime begin) {
   v1::EnvironmentSample message;
   std::vector<std::byte> bytes;
-  for (const auto& [device, sample] : latest_environment) {
+  environment_to_carry.for_each([&](std::string_view device, const auto& sample) {
     recording::fill(message, sample, device);
-    if (!encode(message, bytes)) continue;
+    if (!encode(message, bytes)) return;
     put(Stream::Environment, {begin, begin}, bytes);
     ++carried_in_chunk;
-  }
+  });
 }
 
 template <class Message>
@@ -138,18 +139,7 @@ void Recorder::record(const protocol::EnvironmentSample& sample, std::string_vie
   recording::fill(state_->environment, sample, device);
   state_->add_marked(Stream::Environment, State::dates_of(sample.head.time, taken), device,
                      state_->environment);
-  state_->keep_environment(sample, device);
-  state_->sensors_at = sample.head.time;
-  (void)state_->sensors.checked(sample, state_->sensors.mask_of(device));
-}
-
-void Recorder::State::keep_environment(const protocol::EnvironmentSample& sample,
-                                       std::string_view device) {
-  auto latest = latest_environment.find(device);
-  if (latest == latest_environment.end()) latest = latest_environment.emplace(device, sample).first;
-  latest->second = sample;
-  latest->second.head.lost_before = 0;  // the original message has reported the loss
-  latest->second.head.flags &= ~static_cast<protocol::SampleFlags>(protocol::SampleFlag::GapBefore);
+  state_->environment_to_carry.take(sample, device, taken.value_or(sample.head.time));
 }
 
 void Recorder::record(protocol::RawBytes bytes, Taken taken) {
@@ -173,12 +163,23 @@ void Recorder::record(const v1::CalibrationEvent& event, Taken taken) {
                         event.state() != name(SessionState::Idle);
 }
 
+/// The state with which the live run began, or the acceptance of a sensor. One that cannot be read
+/// is recorded, and not used.
+void Recorder::State::follow_sensors(const RecordingAttachment& attachment) {
+  if (attachment.name == kSensorStateName) (void)environment_to_carry.go_on(attachment);
+  if (attachment.name != kSensorAcceptedName) return;
+  if (auto acceptance = sensor_acceptance_from(attachment))
+    environment_to_carry.accept(std::move(*acceptance));
+}
+
 void Recorder::attach(RecordingAttachment attachment, protocol::HostTime time) {
   State& s = *state_;
   if (is_calibration_request(attachment.name)) {
     s.calibrating = true;
     s.asked = State::AtRequest{s.part, s.status.lost + s.status.refused};
   }
+
+  s.follow_sensors(attachment);
 
   if (s.status.state == RecorderStatus::State::Recording) s.end_cycle();
   s.attachments.push_back({std::move(attachment), s.utc_ns(time)});

@@ -54,9 +54,15 @@ void Recorder::State::forget_finished_requests() {
 /// A further file begins with the state of the sensor checks, so that its replay uses the values
 /// that the live run used.
 void Recorder::State::carry_sensors_on() {
-  std::erase_if(attachments,
-                [](const TimedAttachment& a) { return a.attachment.name == kSensorStateName; });
-  attachments.push_back({sensors.to_attachment(), utc_ns(sensors_at)});
+  environment_to_carry.begin_file(cycle);
+  if (!environment_to_carry.checks_sensors()) return;
+  std::erase_if(attachments, [&](const TimedAttachment& a) {
+    if (a.attachment.name == kSensorStateName) return true;
+    if (a.attachment.name != kSensorAcceptedName) return false;
+    const auto acceptance = sensor_acceptance_from(a.attachment);
+    return !acceptance || environment_to_carry.contains(*acceptance);
+  });
+  attachments.push_back({environment_to_carry.state(), utc_ns(environment_to_carry.state_at())});
 }
 
 IoResult Recorder::State::begin_file() {
@@ -79,7 +85,7 @@ IoResult Recorder::State::begin_file() {
   forget_finished_requests();
   if (part > 0 && axes_known)
     recording::carry_datum_on(attachments, *axes_known, utc_ns(axes_known->at));
-  if (part > 0 && !options.sensors.sensors.empty()) carry_sensors_on();
+  if (part > 0) carry_sensors_on();
   auto fresh = RecordingFile::create(path(part + 1, ".mcap.part"));
   if (!fresh) return tl::unexpected(fresh.error());
   mcap::SummaryBuilder fresh_summary;

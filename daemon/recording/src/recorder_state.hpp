@@ -7,18 +7,16 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "abbe/pipeline/datum.hpp"
-#include "abbe/pipeline/sensor_checks.hpp"
 #include "abbe/protocol/mcap/writer.hpp"
 #include "abbe/protocol/raw_bytes_cdr.hpp"
 #include "abbe/recording/recorder.hpp"
 #include "carried_datum.hpp"
+#include "carried_environment.hpp"
 #include "file_front.hpp"
 #include "loss_ledger.hpp"
 #include "recording_file.hpp"
@@ -44,7 +42,7 @@ struct Recorder::State {
       : options(std::move(o)),
         info(std::move(i)),
         chunk(options.chunk_bytes),
-        sensors(options.sensors) {}
+        environment_to_carry(options.sensors, options.weather_station, options.watermark) {}
 
   [[nodiscard]] std::uint64_t utc_ns(protocol::HostTime time) const {
     return static_cast<std::uint64_t>(
@@ -57,6 +55,7 @@ struct Recorder::State {
   [[nodiscard]] IoResult end_file();
   void forget_finished_requests();
   void carry_sensors_on();
+  void follow_sensors(const RecordingAttachment& attachment);
   [[nodiscard]] std::string gap_of_run() const;
   [[nodiscard]] bool add(Stream stream, Dates dates, std::span<const std::byte> payload);
   void put(Stream stream, Dates dates, std::span<const std::byte> payload);
@@ -65,7 +64,6 @@ struct Recorder::State {
   template <class Message>
   void add_marked(Stream stream, Dates dates, std::string_view device, Message& message);
   void add_carried_environment(protocol::HostTime begin);
-  void keep_environment(const protocol::EnvironmentSample& sample, std::string_view device);
   void account(Stream stream, std::string_view device, std::uint32_t lost_before, bool added);
   void write_chunk();
   void end_cycle();
@@ -98,15 +96,14 @@ struct Recorder::State {
   protocol::mcap::ChunkBuilder chunk;
   protocol::mcap::SummaryBuilder summary;
   std::array<std::uint32_t, recording::kStreamCount> sequences{};
-  std::map<std::string, protocol::EnvironmentSample, std::less<>>
-      latest_environment;           ///< by device
-  bool environment_carried = true;  ///< false: the present file must begin with latest_environment
+  /// false: the present file must begin with the samples of environment_to_carry
+  bool environment_carried = true;
   /// number of repeated environment messages in the open chunk. They are also in an earlier file,
   /// and do not count as lost with the chunk.
   std::uint64_t carried_in_chunk = 0;
   std::optional<DatumState> axes_known;  ///< from the last axis sample
-  SensorChecks sensors;                  ///< after the last environment sample
-  protocol::HostTime sensors_at{};       ///< of that sample
+  recording::CarriedEnvironment environment_to_carry;
+  protocol::HostTime cycle{};  ///< of the last message
   RecorderStatus status;
   recording::LossLedger lost;  ///< messages lost, not yet reported in a later message
   /// messages of the open chunk, plus the losses they report: all are lost if the chunk cannot be

@@ -14,8 +14,8 @@ namespace mcap = protocol::mcap;
 using mcap::Opcode;
 using ChunkState = mcap::ScannedChunk::State;
 
-/// Largest summary and largest truncated chunk that are read; those of abbe have at most some MB.
-/// A larger one is damaged bytes that look like one.
+/// Largest summary, record and truncated chunk that are read; those of abbe have at most some MB. A
+/// larger one is a loss: damaged bytes that look like one, or made by another program.
 constexpr std::uint64_t kLargestRead = std::uint64_t{256} << 20;
 /// Records outside of chunks are kept in pieces of about this size.
 constexpr std::uint64_t kLooseBytes = std::uint64_t{1} << 20;
@@ -38,6 +38,16 @@ std::optional<PlacedRecord> record_in(ByteWindow& file, std::uint64_t offset) {
   return record;
 }
 
+/// False: the record is a loss.
+bool can_be_read(const PlacedRecord& record, ContentsCollector& collector) {
+  if (record.length <= kLargestRead) return true;
+  collector.lost(record.offset, record.end() - record.offset,
+                 fmt::format("a record of {} bytes at byte {} is larger than the {} MiB that are "
+                             "read at most: skipped",
+                             record.length, record.offset, kLargestRead >> 20));
+  return false;
+}
+
 /// The chunk of a whole Chunk record, with its content.
 mcap::ScannedChunk scanned_chunk(ByteWindow& file, const PlacedRecord& record,
                                  mcap::Bytes& content) {
@@ -49,6 +59,7 @@ mcap::ScannedChunk scanned_chunk(ByteWindow& file, const PlacedRecord& record,
 }
 
 void add_whole_chunk(ByteWindow& file, const PlacedRecord& record, ContentsCollector& collector) {
+  if (!can_be_read(record, collector)) return;
   mcap::Bytes content;
   const auto chunk = scanned_chunk(file, record, content);
   collector.add_chunk(chunk, content, record.offset, record.end() - record.offset);
@@ -61,6 +72,7 @@ std::optional<mcap::Bytes> indexed(ByteWindow& file, Opcode opcode, std::uint64_
                                    std::uint64_t length) {
   const auto record = offset < file.file_size() ? record_in(file, offset) : std::nullopt;
   if (!record || record->opcode != opcode || record->end() - offset != length) return std::nullopt;
+  if (record->length > kLargestRead) return std::nullopt;
   return file.at(record->content(), record->length);
 }
 
@@ -71,7 +83,7 @@ void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
     if (const auto content = indexed(file, Opcode::Metadata, index.offset, index.length))
       collector.add_metadata(*content, index.offset);
     else
-      collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged", index.name));
+      collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged or too large", index.name));
   }
 
   for (const auto& index : summary.attachments) {
@@ -79,7 +91,7 @@ void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
       collector.add_attachment(*content, index.offset);
     else
       collector.lost(index.offset, index.length,
-                     fmt::format("attachment {} is damaged", index.name));
+                     fmt::format("attachment {} is damaged or too large", index.name));
   }
 
   for (const auto& index : summary.chunks) {
@@ -129,6 +141,10 @@ class LooseRecords {
 
 void collect_record(ByteWindow& file, const PlacedRecord& record, LooseRecords& loose,
                     ContentsCollector& collector) {
+  const bool is_used = record.opcode == Opcode::Chunk || record.opcode == Opcode::Channel ||
+                       record.opcode == Opcode::Message || record.opcode == Opcode::Metadata ||
+                       record.opcode == Opcode::Attachment;
+  if (is_used && !can_be_read(record, collector)) return;
   switch (record.opcode) {
     case Opcode::Chunk:
       loose.finish();  // the contents are in file order
@@ -154,7 +170,10 @@ bool collect_cut_chunk(ByteWindow& file, std::uint64_t offset, ContentsCollector
   const auto head = file.at(offset, mcap::kRecordHeadSize);
   const auto record = head ? mcap::read_head(*head) : std::nullopt;
   if (!record || record->opcode != Opcode::Chunk) return false;
-  const auto content = file.at(offset + mcap::kRecordHeadSize, kLargestRead);
+  const PlacedRecord cut{Opcode::Chunk, offset,
+                         file.file_size() - offset - mcap::kRecordHeadSize};
+  if (!can_be_read(cut, collector)) return true;
+  const auto content = file.at(cut.content(), cut.length);
   const auto chunk = content ? mcap::decode_cut_chunk(*content) : mcap::Decoded<mcap::Chunk>{};
   if (!content || !chunk || !chunk->head.compression.empty()) return false;
   collector.add_chunk({ChunkState::Cut, 0, *chunk}, *content, offset, file.file_size() - offset);

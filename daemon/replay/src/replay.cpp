@@ -337,11 +337,17 @@ class Replay : private PipelineObserver {
   Replay(const Replay&) = delete;
   Replay& operator=(const Replay&) = delete;
 
-  /// A further file begins with the state of the sensors at the end of the previous one.
+  /// A file begins with the state of the sensors at the end of the previous one, or of an earlier
+  /// run.
   [[nodiscard]] Result<void> go_on() {
     for (const auto& attachment : recording_.attachments()) {
-      if (attachment.name != kSensorStateName) continue;
-      if (auto read = pipeline_.go_on(attachment); !read) return read;
+      if (attachment.name == kSensorStateName) {
+        if (auto read = pipeline_.go_on(attachment); !read) return read;
+      } else if (attachment.name == kSensorAcceptedName) {
+        auto acceptance = sensor_acceptance_from(attachment);
+        if (!acceptance) return tl::unexpected(acceptance.error());
+        pipeline_.accept(std::move(*acceptance));
+      }
     }
     return {};
   }

@@ -14,7 +14,9 @@
 #include <cstring>
 #include <ctime>
 #include <exception>
+#include <filesystem>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -34,6 +36,8 @@
 #include "abbe/drivers/cpu_latency.hpp"
 #include "abbe/drivers/real_time_memory.hpp"
 #include "abbe/messages/dds_security.hpp"
+#include "abbe/pipeline/recording_rules.hpp"
+#include "abbe/pipeline/sensor_state_file.hpp"
 #include "abbe/publishing/dds_supervisor.hpp"
 #include "abbe/recording/left_recordings.hpp"
 #include "abbe/recording/old_recordings.hpp"
@@ -55,6 +59,9 @@ namespace {
 using namespace std::chrono_literals;
 using WallTime = std::chrono::steady_clock::time_point;
 
+constexpr auto kSensorsWritten = 5s;
+/// The end of abbed waits for a hub that hangs no longer than this because of them.
+constexpr auto kSensorsTimeout = 100ms;
 constexpr auto kTidyPeriod = 1h;    // period of the search for old recordings
 constexpr auto kTidyFirst = 10min;  // time for a time server to correct the clock after boot
 constexpr auto kHubTimeout = 1s;    // thousands of cycles; without an answer for this long it hangs
@@ -113,6 +120,7 @@ struct Abbed::State {
   std::unique_ptr<RecorderThread> recorder;
   std::optional<CalibrationService> calibration;
   std::optional<ReferenceService> reference;
+  std::optional<SensorService> sensors;
   std::optional<VerificationService> verification;
   DdsProcess dds_process;
   std::optional<uid_t> network_user;  ///< of abbe-dds, if it has a user of its own
@@ -135,6 +143,9 @@ struct Abbed::State {
   const std::string boot = boot_id();
   LeftCounting left_counting;
   std::optional<CountingStateThread> counting_state;
+  std::future<Result<void>> writing_sensors;
+  std::string sensors_fault;  ///< as reported
+  WallTime next_sensors = WallTime::clock::now() + kSensorsWritten;
   std::future<Result<std::vector<std::filesystem::path>>> tidying;
   StoreUpkeep store_upkeep{config.daemon.models_dir(), config.models};
   // Owned by the background task, which the end of abbed does not wait for.
@@ -200,11 +211,8 @@ struct Abbed::State {
                        .utc_offset = utc,
                        .speed = config.daemon.speed,
                        .configuration = options.configuration_text,
-                       .versions = {{"abbe", ABBE_VERSION},
-                                    {kAxisSamplesRule, "1"},
-                                    {kDatumRule, "2"},
-                                    {kRotaryTravelRule, "1"},
-                                    {kSensorRule, "1"}}};
+                       .versions = {{"abbe", ABBE_VERSION}}};
+    std::ranges::move(recording_rules(), std::back_inserter(info.versions));
     auto opened = RecorderThread::start(recorder_options(config, recording), std::move(info));
     if (!opened) return tl::unexpected(opened.error());
     recorder = std::move(*opened);
@@ -348,7 +356,10 @@ struct Abbed::State {
       left = left_counting.state->counting;
     }
 
+    auto left_sensors = sensors_left();
+    if (left_sensors) recorder->attach(*left_sensors, time.now());
     reference.emplace(config, recorder.get(), std::move(left));
+    sensors.emplace(recorder.get());
     verification.emplace(config);
     touching.emplace(*devices, devices->moves());
     tracker.emplace(*devices, devices->longest_tracker_order());
@@ -366,7 +377,9 @@ struct Abbed::State {
                          .tracker = &*tracker,
                          .store_changes = &*store_changes,
                          .network_user = network_user,
-                         .identity = &*machine_identity});
+                         .identity = &*machine_identity,
+                         .sensors = &*sensors,
+                         .sensor_state = std::move(left_sensors)});
     running_since = WallTime::clock::now();
     hub_may_run.set_value();
 
@@ -389,6 +402,50 @@ struct Abbed::State {
     }
 
     return {};
+  }
+
+  [[nodiscard]] SensorStateClock sensor_clock() const {
+    return {.host = time.now(),
+            .utc = std::chrono::system_clock::now().time_since_epoch(),
+            .speed = config.daemon.speed};
+  }
+
+  /// The state of the sensors in the earlier run; nullopt: they begin anew.
+  std::optional<RecordingAttachment> sensors_left() {
+    const auto checked = sensor_check_options(config);
+    const auto file = sensor_state_file(config.daemon.data_dir);
+    std::error_code failed;
+    remove_half_written(file);
+    if (checked.sensors.empty() || !std::filesystem::exists(file, failed)) return std::nullopt;
+    const auto text = read_regular_file(file);
+    auto state = text ? left_sensor_state(*text, checked, sensor_clock())
+                      : Result<RecordingAttachment>{tl::unexpected(text.error())};
+    if (state) return std::move(*state);
+    warnings.push_back(fmt::format("{}: {}: doubts about sensors before the start are not known",
+                                   file.string(), state.error().text));
+    return std::nullopt;
+  }
+
+  /// Writes the state of the sensors every kSensorsWritten.
+  void follow_sensors(WallTime now) {
+    if (writing_sensors.valid()) {
+      if (writing_sensors.wait_for(0s) != std::future_status::ready) return;
+      const auto written = outcome_of(writing_sensors);
+      const std::string seen = written ? "" : written.error().text;
+      if (std::exchange(sensors_fault, seen) != seen && !seen.empty())
+        fmt::print(stderr, "abbed: {}: after a restart doubts about sensors would not be known\n",
+                   seen);
+    }
+    if (now < next_sensors) return;
+    next_sensors = now + kSensorsWritten;
+    const auto checks = hub->call([this] { return hub->live().sensors(); }, kSensorsTimeout);
+    if (!checks || checks->empty()) return;
+    writing_sensors =
+        run_abandonable([file = sensor_state_file(config.daemon.data_dir),
+                         text = sensor_state_text(*checks, sensor_clock())]() -> Result<void> {
+          if (auto made = create_folder(file.parent_path()); !made) return made;
+          return replace_file(file, text);
+        });
   }
 
   /// Counter state for a later run; nullopt if the card has no serial number that identifies it.
@@ -554,6 +611,7 @@ void Abbed::cycle() {
   const auto now = WallTime::clock::now();
   state_->supervise(now);
   state_->follow_clock();
+  state_->follow_sensors(now);
   state_->tidy_recordings(now);
   state_->store_upkeep.cycle(now);
   state_->report_left_recordings();

@@ -16,6 +16,8 @@ RecorderThreadOptions recorder_options(const Config& config, const std::string& 
   options.recorder.min_free_bytes = config.recording.min_free_bytes;
   options.recorder.max_file_bytes = config.recording.max_file_bytes;
   options.recorder.sensors = sensor_check_options(config);
+  options.recorder.weather_station = device_names(config).tracker;
+  options.recorder.watermark = config.daemon.watermark;
   options.raw = config.recording.raw;
 
   options.devices = device_names(config);

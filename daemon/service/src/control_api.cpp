@@ -229,6 +229,22 @@ Result<OnHub> reference(const HubParts&, const json&) {
   return with_reference([](ReferenceService& service, const HubParts&) { return service.start(); });
 }
 
+Result<OnHub> accept_sensor(const HubParts&, const json& request) {
+  SensorAcceptance acceptance{.sensor = remark_of(request.at("sensor").get<std::string>()),
+                              .who = who(request),
+                              .why = remark_of(request.value("why", std::string{}),
+                                               kLongestReason)};
+  return [acceptance = std::move(acceptance)](const Hub& hub) {
+    const HubParts& on = hub.parts();
+    if (on.sensors == nullptr)
+      return reply(Error{ErrorCode::Refused, "sensors accept: not in this daemon"});
+    SensorAcceptance now = acceptance;
+    now.from = on.time.now();
+    return reply_done(on.sensors->accept(hub.live(), std::move(now),
+                                         takes_readings(on.calibration.status().state)));
+  };
+}
+
 json point_json(const StandstillPoint& p) {
   const auto list = [](const calib::Vector3& v) { return json{v.x(), v.y(), v.z()}; };
   return {{"reading_m", list(p.mean.reading_m)},
@@ -326,6 +342,7 @@ constexpr std::array kVerbs{
     Verb{"reference", "here", Role::Change, reference_here},
     Verb{"reference", "cancel", Role::Change, cancel_reference},
     Verb{"reference", "", Role::Change, reference},
+    Verb{"sensors", "accept", Role::Change, accept_sensor},
     Verb{"activate", "", Role::Change, activate},
     Verb{"rollback", "", Role::Change, rollback},
     Verb{"change", "", Role::Look, change},

@@ -8,6 +8,7 @@
 
 #include "abbe/base/wake_up.hpp"
 #include "abbe/devices/device_kind.hpp"
+#include "abbe/service/recorder_lag.hpp"
 
 namespace abbe::daemon {
 namespace {
@@ -21,25 +22,6 @@ void sleep_until(std::chrono::steady_clock::time_point t) {
   const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC
   const timespec at{.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
   (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
-}
-
-/// The largest of 1, 2, 5, 10, 20, 50 ... that is not above `value`; 0 below 1. A text with it does
-/// not change every second.
-int round_down(double value) {
-  int step = 1;
-  for (const int factor : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000})
-    if (value >= factor) step = factor;
-  return value >= 1.0 ? step : 0;
-}
-
-/// Warning from twice the period in which chunks are written; empty: none.
-std::string text_of_lag(std::chrono::nanoseconds behind, std::chrono::nanoseconds chunk_period) {
-  if (behind < 2 * chunk_period) return {};
-  return fmt::format(
-      "the file is more than {} s behind the machine (chunk_period_ms = {}): what is not written "
-      "is lost if abbed ends; check the disk and the load of the computer",
-      round_down(std::chrono::duration<double>(behind).count()),
-      std::chrono::duration_cast<std::chrono::milliseconds>(chunk_period).count());
 }
 
 StreamHealth health_of(const RecorderThread& recorder, std::chrono::nanoseconds chunk_period,
@@ -154,6 +136,10 @@ Hub::Hub(HubParts parts)
                 parts.reference != nullptr ? &parts.reference->datum() : nullptr),
       live_(assembler_options(parts.config), parts.time),
       touches_by_(device_names(parts.config).touches) {
+  if (parts_.sensor_state) {
+    (void)pipeline_.go_on(*parts_.sensor_state);
+    (void)live_.go_on(*parts_.sensor_state);
+  }
   if (parts_.reference != nullptr) pipeline_.add(*parts_.reference);
   pipeline_.add(*this);  // before the recorder, because subscribers wait for the live view
   if (parts_.recorder != nullptr) pipeline_.add(*parts_.recorder);
@@ -170,11 +156,8 @@ Hub::WallTime Hub::last_cycle() const noexcept {
 
 ActiveModelState Hub::model_state() const {
   const auto patience = parts_.time.host(kAxesTimeout);
-  const auto known_at = live_.axes_known_at();
-  auto state = parts_.authority.model_state(parts_.time.now(), known_at, patience);
-  const bool known = known_at && parts_.time.now() - *known_at <= patience;
-  if (!known && state.model != nullptr && !missing_scale_.empty())
-    state.reason += ": " + missing_scale_;
+  auto state = parts_.authority.model_state(parts_.time.now(), live_.axes_known_at(), patience,
+                                            missing_scales_);
   if (parts_.identity != nullptr) parts_.identity->restrict(state);
   return state;
 }
@@ -191,9 +174,18 @@ void Hub::cycle(WallTime wall) {
   touch(points_left, wall);
   if (parts_.tracker != nullptr) parts_.tracker->cycle(now);
 
+  accept_sensors();
   pipeline_.cycle(batch_);
   if (parts_.reference != nullptr) parts_.reference->take(parts_.devices.card_progress());
   run_calls();
+}
+
+void Hub::accept_sensors() {
+  if (parts_.sensors == nullptr) return;
+  for (SensorAcceptance& acceptance : parts_.sensors->take()) {
+    live_.accept(acceptance);
+    pipeline_.accept(std::move(acceptance));
+  }
 }
 
 void Hub::on_samples(const Batch& batch) {
@@ -253,9 +245,7 @@ void Hub::collect_health(HostTime now) {
   health_ = parts_.devices.health(now);
   add_findings(live_.sensor_findings(), health_);
   add_doubts(live_.sensor_doubts(), health_);
-  missing_scale_ = {};
-  for (const auto& reason : live_.missing_scales())
-    if (missing_scale_.empty()) missing_scale_ = reason;
+  missing_scales_ = live_.why_scales_alone_are_missing();
   health_.push_back(health_of(parts_.authority, parts_.calibration));
   if (parts_.recorder != nullptr)
     health_.push_back(

@@ -164,15 +164,17 @@ ModelAuthority::Following ModelAuthority::conclude_look(Result<Look> look, HostT
 }
 
 ActiveModelState ModelAuthority::model_state(HostTime now, std::optional<HostTime> axes_known_at,
-                                             std::chrono::nanoseconds patience) const {
-  ActiveModelState s = state_by_store(now, axes_known_at, patience);
+                                             std::chrono::nanoseconds patience,
+                                             std::string_view why_not_known) const {
+  ActiveModelState s = state_by_store(now, axes_known_at, patience, why_not_known);
   if (!fault_.empty() && fault_ != s.reason)
     s.reason += fmt::format("; later activations are not known: {}", fault_);
   return s;
 }
 
 ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<HostTime> axes_known_at,
-                                                std::chrono::nanoseconds patience) const {
+                                                std::chrono::nanoseconds patience,
+                                                std::string_view why_not_known) const {
   ActiveModelState s{.model = active_model(), .revision = revision_};
   if (s.model != nullptr) s.publication = &active_.publication;
   if (s.model != nullptr) s.refused = refusal_of(active_.activation);
@@ -188,10 +190,9 @@ ActiveModelState ModelAuthority::state_by_store(HostTime now, std::optional<Host
     s.reason = "the control already corrects these axes: axes_compensated = true";
   } else if (!active_.unfit.empty()) {
     s.reason = active_.unfit;
-  } else if (!axes_known_at) {
-    s.reason = "no axis positions yet";
-  } else if (now - *axes_known_at > patience) {
-    s.reason = "no recent axis positions";
+  } else if (!axes_known_at || now - *axes_known_at > patience) {
+    s.reason = axes_known_at ? "no recent axis positions" : "no axis positions yet";
+    if (!why_not_known.empty()) s.reason += fmt::format(": {}", why_not_known);
   } else if (!active_.drift.empty()) {
     s.status = v1::ModelStatus::MODEL_DRIFT;
     s.reason = active_.drift;

@@ -21,6 +21,9 @@ constexpr double kPerPercent = 0.01;
 /// Points measured before a beam break may arrive after its report. The beam has returned at the
 /// first point after a gap of at least this duration, and of at least three point separations.
 constexpr std::chrono::milliseconds kShortestBreak{20};
+/// Period in which weather that does not change is passed on again: a check that refused it can judge
+/// it again.
+constexpr std::chrono::seconds kWeatherRepeated{10};
 
 SampleFlag flag_of(emscon::PointStatus status) ABBE_RT {
   switch (status) {
@@ -316,9 +319,12 @@ void TrackerReceiver::mark_pending(protocol::SampleHead& head) ABBE_RT {
 
 void TrackerReceiver::weather(const emscon::Environment& environment,
                               const protocol::SampleHead& head) ABBE_RT {
-  if (environment_known_ && same(environment, environment_)) return;
+  if (environment_known_ && same(environment, environment_) &&
+      arrival_ - environment_sent_ < kWeatherRepeated)
+    return;
   environment_ = environment;
   environment_known_ = true;
+  environment_sent_ = arrival_;
   protocol::EnvironmentSample sample;
   sample.head.time = head.time;
   sample.head.u_time = head.u_time;

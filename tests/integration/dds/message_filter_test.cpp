@@ -303,6 +303,22 @@ TEST(MessageFilterOfSamples, DoesNotChangeWhatIsSignedIfTheParticipantIsSecured)
   EXPECT_EQ(message[kKindAt + prefix.size()], 0x08);
 }
 
+/// A stranger can put the prefix of a signed submessage in front of his own.
+TEST(MessageFilterOfSamples, TakesOnlyTheNextSubmessageOrTheMessageUpToItsPostfixAsSigned) {
+  const Bytes sample = users_data(3, kDisposed);
+  const Bytes data(sample.begin() + kKindAt, sample.end());
+  for (const Bytes& around : {Bytes{0x31, 0x32}, Bytes{0x33, 0x34}}) {
+    Bytes message(sample.begin(), sample.begin() + kKindAt);
+    for (const auto kind : around) {
+      message.insert(message.end(), {kind, 1, 4, 0, 0, 0, 0, 0});
+      message.insert(message.end(), data.begin(), data.end());
+    }
+    EXPECT_EQ(filter_message(message, true), message.size());
+    EXPECT_EQ(message[kKindAt + 8], 0x15) << "signed";
+    EXPECT_EQ(message[kKindAt + 16 + data.size()], 0x08) << "not signed";
+  }
+}
+
 TEST(MessageFilterOfSamples, SkipsAShortLivelinessMessage) {
   for (const std::size_t bytes : {16u, 20u}) {
     Bytes message = data_message(0, 5, 16, Bytes(bytes));

@@ -23,6 +23,9 @@ namespace abbe::daemon {
 /// can read what root writes there.
 [[nodiscard]] Result<void> replace_file(const std::filesystem::path& file, std::string_view text);
 
+/// Removes the temporary files of replace_file(file, ...) of runs that were killed while writing.
+void remove_half_written(const std::filesystem::path& file);
+
 /// Owner and mode of a folder that root creates. LikeItsParent: those of the parent folder, so that
 /// the owner of the parent can use the new folder. OfTheCaller: owner and umask of the process.
 enum class NewFolder { LikeItsParent, OfTheCaller };

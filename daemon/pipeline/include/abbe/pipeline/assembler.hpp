@@ -16,6 +16,7 @@
 
 #include <chrono>
 #include <deque>
+#include <utility>
 #include <vector>
 
 #include "abbe/config/config.hpp"
@@ -43,7 +44,8 @@ class Assembler {
   void take(const Batch& batch);
   /// Appends the complete snapshots to `out`, oldest first.
   void emit(std::vector<protocol::Snapshot>& out);
-  /// For a replay of a further file: the state of the sensors at its start.
+  void accept(SensorAcceptance acceptance) { environment_.accept(std::move(acceptance)); }
+  /// The state of the sensors at the start: of a further file in a replay, or of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return environment_.go_on(sensor_state);
   }

@@ -11,11 +11,13 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/config/config.hpp"
 #include "abbe/pipeline/batch.hpp"
 #include "abbe/pipeline/sensor_checks.hpp"
+#include "abbe/pipeline/sensor_queue.hpp"
 #include "abbe/protocol/samples.hpp"
 
 namespace abbe::daemon {
@@ -75,8 +77,8 @@ class MeanEffect {
 /// device that measures it (there is at most one), else from the tracker. If a device has sent
 /// nothing for longer than max_age, its values are NaN. Air values that a tracker assumes without
 /// measuring are not merged.
-/// Every reading is checked (SensorChecks), in the order of the instants of the samples. The
-/// temperature of a scale is the applied one: it follows the readings at a limited rate.
+/// Every reading is checked (SensorChecks), in the order of SensorQueue. The temperature of a scale
+/// is the applied one: it follows the readings at a limited rate.
 class EnvironmentMerge {
  public:
   /// A sample of an environment device is used only for instants at least `lag` later than its own.
@@ -92,11 +94,13 @@ class EnvironmentMerge {
   [[nodiscard]] protocol::HostTime newest() const noexcept { return newest_; }
 
   /// The sensors whose readings are not used, after the samples that were checked until now.
-  [[nodiscard]] std::vector<SensorFinding> findings() const { return checks_.findings(); }
-  [[nodiscard]] std::vector<SensorDoubts> doubts() const { return checks_.doubts(); }
-  /// For a replay of a further file: continues from the state at its start.
+  [[nodiscard]] std::vector<SensorFinding> findings() const { return queue_.checks().findings(); }
+  [[nodiscard]] const SensorChecks& sensors() const noexcept { return queue_.checks(); }
+  void accept(SensorAcceptance acceptance) { queue_.accept(std::move(acceptance)); }
+  [[nodiscard]] std::vector<SensorDoubts> doubts() const { return queue_.checks().doubts(); }
+  /// Continues from the state at the start of a further file, or from that of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
-    return checks_.go_on(sensor_state);
+    return queue_.checks().go_on(sensor_state);
   }
 
  private:
@@ -109,10 +113,9 @@ class EnvironmentMerge {
   protocol::EnvironmentMask measured_;
   std::chrono::nanoseconds max_age_;
   std::chrono::nanoseconds lag_;
-  SensorChecks checks_;
+  SensorQueue queue_;
   Samples weather_;
   std::vector<Samples> devices_;
-  std::vector<FromEnvironment> unchecked_;  ///< in order of time, of equal times by device
   protocol::HostTime newest_{};
 };
 

@@ -5,8 +5,10 @@
 /// thread-safe.
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "abbe/drivers/time_source.hpp"
@@ -39,10 +41,19 @@ class LiveView {
   [[nodiscard]] std::vector<SensorFinding> sensor_findings() const {
     return environment_.findings();
   }
+  [[nodiscard]] const SensorChecks& sensors() const noexcept { return environment_.sensors(); }
+  void accept(SensorAcceptance acceptance) { environment_.accept(std::move(acceptance)); }
+  /// Continues from the state of an earlier run.
+  [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
+    return environment_.go_on(sensor_state);
+  }
   [[nodiscard]] std::vector<SensorDoubts> sensor_doubts() const { return environment_.doubts(); }
   /// Why the correction of each axis for the temperature of its scale is missing; empty: it is not.
   /// Same order as Snapshot::position.
   [[nodiscard]] std::vector<std::string> missing_scales() const;
+  /// The same reasons with the names of the axes, if X, Y and Z are missing for no other reason.
+  /// Empty: they are not missing, or a reading is.
+  [[nodiscard]] std::string why_scales_alone_are_missing() const;
   /// Instant of the latest axis sample, even if axes are missing in that sample.
   [[nodiscard]] std::optional<protocol::HostTime> axes_at() const noexcept {
     return previous_ ? std::optional{previous_->head.time} : std::nullopt;
@@ -62,6 +73,7 @@ class LiveView {
   EnvironmentMerge environment_;
   std::chrono::nanoseconds current_for_, axes_patience_;
   protocol::Snapshot view_{};
+  std::uint8_t without_reading_ = 0;  ///< missing_mask before the correction for temperature
   std::optional<protocol::AxisSample> previous_;
   std::optional<protocol::HostTime> axes_known_at_;
 };

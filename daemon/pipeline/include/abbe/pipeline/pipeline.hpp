@@ -14,6 +14,7 @@
 /// replay of the same batches gives the same snapshots. Not for the RT path; one thread.
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "abbe/pipeline/assembler.hpp"
@@ -52,7 +53,9 @@ class Pipeline {
   /// The observer must outlive the pipeline.
   void add(PipelineObserver& observer) { observers_.push_back(&observer); }
 
-  /// For a replay of a further file: the state of the sensors at its start.
+  /// Applies to the readings that are due after its instant.
+  void accept(SensorAcceptance acceptance) { assembler_.accept(std::move(acceptance)); }
+  /// The state of the sensors at the start: of a further file in a replay, or of an earlier run.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& sensor_state) {
     return assembler_.go_on(sensor_state);
   }

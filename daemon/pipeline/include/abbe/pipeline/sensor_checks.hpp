@@ -5,6 +5,7 @@
 /// Not for the RT path; not thread-safe.
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -51,10 +52,17 @@ class SensorChecks {
  public:
   explicit SensorChecks(SensorCheckOptions options);
 
+  [[nodiscard]] bool empty() const noexcept { return sensors_.empty(); }
+
   /// Replaces the readings of `sample` in `mask` by the values that are used; NaN: none. A sample
   /// that is not later than the previous one of a sensor gets the present value of the sensor.
   [[nodiscard]] CheckedEnvironment checked(const protocol::EnvironmentSample& sample,
                                            protocol::EnvironmentMask mask);
+
+  /// A sample with the readings in `mask`, taken at `taken`, is dated `ahead` after that: it is not
+  /// used, and counts as a doubt of its sensors.
+  void note_future(protocol::EnvironmentMask mask, protocol::HostTime taken,
+                   std::chrono::nanoseconds ahead);
 
   /// The quantities that the device `device` measures.
   [[nodiscard]] protocol::EnvironmentMask mask_of(std::string_view device) const;
@@ -67,10 +75,19 @@ class SensorChecks {
   [[nodiscard]] double applied(const CheckedEnvironment& checked, std::size_t channel,
                                protocol::HostTime t) const;
 
-  /// State at the start of a further file of a recording.
+  /// Whether a person may state now that `sensor` is right. Usage: there is no such sensor; Refused,
+  /// with the reason: it is in use, or something else must be repaired.
+  [[nodiscard]] Result<void> check_acceptance(std::string_view sensor) const;
+  /// Discards the history of the sensor: it is used when its next readings agree with each other,
+  /// wherever the other sensors are. Also ends the doubt about it and a twin that is silent.
+  void accept(std::string_view sensor);
+
+  /// State at the start of a further file of a recording, or of a further run.
   [[nodiscard]] RecordingAttachment to_attachment() const;
   /// Continues from the state. Error BadInput if the attachment cannot be read.
   [[nodiscard]] Result<void> go_on(const RecordingAttachment& attachment);
+  /// Adds `by` to all instants of the state.
+  void shift(std::chrono::nanoseconds by);
 
  private:
   struct Sensor {
@@ -80,9 +97,12 @@ class SensorChecks {
     calib::FollowedValue applied = {};
     double usable = kNone;          ///< the last reading, if nothing was wrong with it alone
     double used = kNone;            ///< output
-    int twin_differs = 0;           ///< comparisons in a row, kept by the first of both
+    // Kept by the first sensor of a pair:
+    int twin_differs = 0;        ///< comparisons in a row
+    bool twins_doubted = false;  ///< since the last comparison
     std::chrono::nanoseconds at{};  ///< of the last sample
     bool judged = false;
+    bool accepted = false;  ///< the first reading is not compared with other sensors
     calib::SensorDoubt doubt = calib::SensorDoubt::None;
     double reading = kNone, lowest = kNone, highest = kNone;  ///< when the doubt began
     std::uint64_t doubts = 0;
@@ -92,6 +112,7 @@ class SensorChecks {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
   [[nodiscard]] Sensor* at_place(std::size_t place);
+  [[nodiscard]] const Sensor* named(std::string_view name) const;
   void judge_alone(Sensor& sensor, double reading);
   void judge_by_twin(Sensor& sensor);
   void compare_with_others(Sensor& sensor, double reading, calib::CheckedReading& verdict);

@@ -25,9 +25,10 @@
 /// in one file. No message is lost in between. Requests for calibrations that have ended, and for
 /// searches for reference marks, are not repeated in the next file.
 ///
-/// Every further file can be replayed without the earlier ones: its first messages repeat the last
-/// EnvironmentSample of each device (log_time and publish_time: when the file began, content: when
-/// it was measured), and its attachments are the valid datums and the list of axes that are not
+/// Every further file can be replayed without the earlier ones: its first messages repeat the
+/// EnvironmentSamples that its instants need, at least the last one of each device (log_time and
+/// publish_time: when the file began, content: when it was measured). Its attachments are the state
+/// of the checks of the sensors before these, the valid datums and the list of axes that are not
 /// referenced (DatumState).
 ///
 /// Used by one thread. Not real-time: it allocates and makes blocking system calls.
@@ -60,7 +61,10 @@ struct RecorderOptions {
       std::chrono::seconds{5};       ///< after the disk was full or failed
   std::uint64_t min_free_bytes = 0;  ///< the disk counts as full if less than this is free
   std::uint64_t max_file_bytes = 0;  ///< approximate; 0: no limit
-  SensorCheckOptions sensors;        ///< of the live run: a further file begins with their state
+  /// Of the live run: a further file begins with the state of the sensors.
+  SensorCheckOptions sensors;
+  std::string weather_station;  ///< name of the tracker, whose own weather readings it sends
+  std::chrono::nanoseconds watermark = std::chrono::milliseconds{600};  ///< AssemblerOptions
 };
 
 struct RecorderStatus {

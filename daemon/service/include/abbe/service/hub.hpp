@@ -31,6 +31,7 @@
 #include "abbe/service/identity_watch.hpp"
 #include "abbe/service/model_authority.hpp"
 #include "abbe/service/reference_service.hpp"
+#include "abbe/service/sensor_service.hpp"
 #include "abbe/service/store_changes.hpp"
 #include "abbe/service/touch_service.hpp"
 #include "abbe/service/tracker_service.hpp"
@@ -56,6 +57,9 @@ struct HubParts {
   /// The user of abbe-dds, which reads the network: it has no role on the control socket.
   std::optional<uid_t> network_user = {};
   IdentityWatch* identity = nullptr;
+  SensorService* sensors = nullptr;
+  /// State of the checks of the sensors in the earlier run; it can be read.
+  std::optional<RecordingAttachment> sensor_state = {};
 };
 
 class Hub : private PipelineObserver {
@@ -103,6 +107,7 @@ class Hub : private PipelineObserver {
   void publish(bool fresh, protocol::HostTime now);
   void follow_identity(WallTime wall);
   void collect_health(protocol::HostTime now);
+  void accept_sensors();
   void touch(std::size_t points_left, WallTime wall);
 
   HubParts parts_;
@@ -112,7 +117,7 @@ class Hub : private PipelineObserver {
   Batch batch_;
   WallTime cycle_began_{};
   std::vector<StreamHealth> health_;
-  std::string missing_scale_;  ///< why an axis is missing whose scale has no temperature
+  std::string missing_scales_;  ///< LiveView::why_scales_alone_are_missing()
   WallTime next_health_{};
   std::atomic<std::int64_t> last_cycle_ns_{0};
   std::atomic<bool> stopping_{false};

@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "abbe/config/config.hpp"
 #include "abbe/publishing/publisher.hpp"
@@ -68,10 +69,11 @@ class ModelAuthority {
   }
 
   /// `axes_known_at`: the last time at which all axis positions were known. The model is STALE if
-  /// that is longer ago than `patience`.
+  /// that is longer ago than `patience`. `why_not_known` is then added to the reason, if not empty.
   [[nodiscard]] ActiveModelState model_state(protocol::HostTime now,
                                              std::optional<protocol::HostTime> axes_known_at,
-                                             std::chrono::nanoseconds patience) const;
+                                             std::chrono::nanoseconds patience,
+                                             std::string_view why_not_known = {}) const;
   [[nodiscard]] const PublishedModel* active_model() const noexcept { return active_.model.get(); }
   /// The model with which the gate compares a new one: the active model, or null if the active
   /// model was made for another machine configuration, or the identity of the machine does not allow
@@ -84,7 +86,8 @@ class ModelAuthority {
   ModelAuthority(ModelKeeper keeper, bool axes_compensated);
   [[nodiscard]] ActiveModelState state_by_store(protocol::HostTime now,
                                                 std::optional<protocol::HostTime> axes_known_at,
-                                                std::chrono::nanoseconds patience) const;
+                                                std::chrono::nanoseconds patience,
+                                                std::string_view why_not_known) const;
 
   /// Result of reading the store on an ordinary thread.
   struct Look {

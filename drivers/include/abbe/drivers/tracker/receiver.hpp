@@ -143,6 +143,7 @@ class TrackerReceiver {
   std::optional<protocol::DeviceTime> last_;  ///< of the last point with a time that fits
   std::array<TimeVerdict, emscon::kMaxMultiPoints> verdicts_{};
   emscon::Environment environment_{};
+  protocol::HostTime environment_sent_{};  ///< arrival of the packet it was passed on with
   bool environment_known_ = false;
   std::optional<protocol::EnvironmentSample> weather_due_;  ///< returned after its burst
   emscon::PacketFramer framer_;

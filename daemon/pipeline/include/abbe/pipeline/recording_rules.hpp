@@ -1,0 +1,21 @@
+#pragma once
+/// The rules by which this version of abbe makes and uses samples, for the version entries of a
+/// recording. A replay of a recording without one of them does what versions without the rule did.
+/// Everything that makes a recording of a live run adds them.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "abbe/pipeline/batch.hpp"
+#include "abbe/pipeline/datum.hpp"
+#include "abbe/pipeline/sensor_options.hpp"
+
+namespace abbe::daemon {
+
+/// Key and version of each rule, as in RecordingInfo::versions.
+[[nodiscard]] inline std::vector<std::pair<std::string, std::string>> recording_rules() {
+  return {{kAxisSamplesRule, "1"}, {kDatumRule, "2"}, {kRotaryTravelRule, "1"}, {kSensorRule, "1"}};
+}
+
+}  // namespace abbe::daemon

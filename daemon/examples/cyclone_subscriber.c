@@ -20,7 +20,8 @@
 #include "abbe_v1.h"
 #include "dds/dds.h"
 
-enum { MOST_MACHINES = 16, MOST_PUBLISHERS = 8, MOST_WRITERS = 32 };
+/* Strangers may make up machines and writers; they cannot take the place of a given machine. */
+enum { MOST_MACHINES = 256, MOST_PUBLISHERS = 8, MOST_WRITERS = 4096 };
 
 static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1000000);
 
@@ -98,10 +99,10 @@ static int64_t now_in_ns(void) {
   return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already, or another
-   machine was given. */
+/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already, another
+   machine was given, or it has no name. */
 static struct machine* find_machine(const char* name) {
-  if (given_name != NULL && strcmp(given_name, name) != 0) return NULL;
+  if (name[0] == '\0' || (given_name != NULL && strcmp(given_name, name) != 0)) return NULL;
   for (int i = 0; i < MOST_MACHINES; ++i) {
     struct machine* m = &machines[i];
     if (m->name[0] == '\0') {
@@ -154,9 +155,10 @@ static void print_state(const abbe_v1_ModelState* state) {
 
 /* True if `p`, which is not pinned, may be pinned now. It must be the same machine as before, not
    only have the same name: a publisher of another machine_id is never pinned. Of two machines that
-   know of each other (`twin`) none is the first. A publisher that sent beside the pinned one is
-   foreign, and never pinned. Another one replaces the pinned one if that has been silent for 300 ms
-   and the other has sent for 30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
+   know of each other (`twin`) none is the first, and of two publishers with one identity (a copied
+   disk) none is chosen. A publisher that sent beside the pinned one is foreign, and never pinned.
+   Another one replaces the pinned one if that has been silent for 300 ms and the other has sent for
+   30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
 static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns) {
   p->ignored_because = NULL;
   if (!p->identified) return false;
@@ -284,7 +286,8 @@ static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
 }
 
 /* Which machine a publisher is. The pinned publisher is released if abbed behind it has become
-   another machine. */
+   another machine, or if another publisher of its identity was beside it when it was chosen: its
+   first Identity may have been a second old. */
 static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
                      dds_instance_handle_t writer) {
   struct machine* m = find_machine(identity->machine);

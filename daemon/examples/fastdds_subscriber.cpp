@@ -8,8 +8,9 @@
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. Fast DDS calls the
-// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp and
-// message_filter (daemon/dds).
+// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp,
+// message_filter and sequence_window (daemon/dds). As a last defence against strangers limit the
+// memory of the process, for example with MemoryMax= of its systemd unit.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
@@ -166,6 +167,7 @@ class Listener : public DataReaderListener {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
     if (status.alive_count_change > 0) alive_.insert(writer);
+    if (alive_.size() > 4096) alive_.clear();  // each is in again with its next state, in a second
     if (status.alive_count_change >= 0) return;
     alive_.erase(writer);
     for (auto& [name, machine] : machines_) {
@@ -233,7 +235,7 @@ class Listener : public DataReaderListener {
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// No more than 256 machines: any participant may make up names.
+  /// The given machines; if none is, no more than 256: any participant may make up names.
   [[nodiscard]] bool has_place(const std::string& name) const {
     return machines_.size() < 256 || machines_.contains(name);
   }
@@ -244,6 +246,7 @@ class Listener : public DataReaderListener {
   }
 
   /// Prints at most every 10 s that the samples of a publisher of this machine are not used.
+    if (!machine_ids_.empty()) return machine_ids_.contains(name);
   /// (`abbe watch` also prints the network address of that publisher.)
   static void report_ignored_publisher(const std::string& name, Machine& machine,
                                        const ParticipantId& id, const char* what) {
@@ -333,8 +336,19 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
     transports.user_transports.push_back(
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
+/// Readers divide what they receive into so many instances.
+constexpr int kInstances = 1024;
+/// Most participants, and writers of a topic, that are kept, and most endpoints of each on average.
+constexpr std::size_t kMostParticipants = 512, kMostEndpointsEach = 16;
+
+/// Without limits a stranger that announces ever new participants and writers takes all memory.
+void limit_memory(DomainParticipantQos& qos) {
+  qos.allocation().participants.maximum = kMostParticipants;
+  qos.allocation().readers.maximum = qos.allocation().writers.maximum = kMostEndpointsEach;
+}
+
   for (auto& transport : transports.user_transports)
-    transport = abbe::dds::with_message_filter(transport, secured);
+    transport = abbe::dds::with_message_filter(transport, secured, window);
 }
 
 /// A generated type whose deserialize() does not throw: any participant of the domain may send bytes
@@ -342,6 +356,7 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
 /// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
 template <class GeneratedType>
+  const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
 class Checked final : public GeneratedType {
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     try {
@@ -350,8 +365,21 @@ class Checked final : public GeneratedType {
     }
     *static_cast<typename GeneratedType::type*>(data) = {};
     return true;
+/// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
+/// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines with
+/// the same one the later sample replaces one that was not taken yet.
   }
 };
+  bool getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) override {
+    InstanceHandle_t key;
+    if (!GeneratedType::getKey(data, &key, true)) return false;
+    const int index = (key.value[0] << 8 | key.value[1]) % kInstances;
+    *handle = InstanceHandle_t();
+    handle->value[0] = 1;  // zeros alone mean "none"
+    handle->value[14] = static_cast<std::uint8_t>(index >> 8);
+    handle->value[15] = static_cast<std::uint8_t>(index & 0xff);
+    return true;
+  }
 
 /// Prevents that Fast DDS announces a TypeObject, which Cyclone DDS does not accept and which may
 /// crash older versions of Fast DDS.
@@ -400,9 +428,8 @@ int main(int argc, char** argv) {
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
   DataReaderQos live;  // best effort, volatile, keep last 1
-  // One instance per machine, and those that strangers make up: where the table is full (10 by
-  // default), Fast DDS 2.9 may abort.
-  live.resource_limits().max_samples = live.resource_limits().max_instances = 1024;
+  limit_memory(participant_qos);
+  live.resource_limits().max_samples = live.resource_limits().max_instances = kInstances;
   live.resource_limits().max_samples_per_instance = 1;
   DataReaderQos durable = live;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
@@ -413,6 +440,7 @@ int main(int argc, char** argv) {
   durable.liveliness().lease_duration = eprosima::fastrtps::Duration_t(1, 0);
 
   const bool ok = read_topic(participant, subscriber,
+  live.reader_resource_limits().matched_publisher_allocation.maximum = kMostParticipants;
                              without_type_object(new Checked<abbe::v1::ModelStatePubSubType>),
                              "abbe/v1/ModelState", durable, &listener) &&
                   read_topic(participant, subscriber,

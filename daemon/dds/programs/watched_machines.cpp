@@ -22,6 +22,9 @@ using daemon::Topic;
 
 /// A subscriber of all machines keeps no more; a stranger may make up names.
 constexpr std::size_t kMostMachines = 256;
+/// Of all publishers together, for the same reason: grid nodes of 0.1 kB, samples not shown yet, and
+/// streams whose state is known.
+constexpr std::size_t kMostNodes = 1'000'000, kMostBytesNotShown = 64'000'000, kMostStreams = 4096;
 
 /// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher
 /// repeats ModelState once a second, even if nothing changes.
@@ -108,8 +111,11 @@ void WatchedMachines::keep_for_later(const Arrival& arrival, Publisher& publishe
   const auto* begin = reinterpret_cast<const char*>(key->bytes.data());
   std::string bytes(begin, key->bytes.size());
   if (publisher.not_shown.size() >= kMost) return;
-  publisher.not_shown[{arrival.topic, std::move(bytes)}] = {arrival.payload.begin(),
-                                                            arrival.payload.end()};
+  const auto sum = total([](const Publisher& p) { return p.not_shown_bytes; });
+  if (sum + arrival.payload.size() > kMostBytesNotShown) return;
+  auto& kept = publisher.not_shown[{arrival.topic, std::move(bytes)}];
+  publisher.not_shown_bytes += arrival.payload.size() - kept.size();
+  kept = {arrival.payload.begin(), arrival.payload.end()};
 }
 
 void WatchedMachines::show_kept(const std::string& name, Machine& machine, Publisher& publisher) {
@@ -118,6 +124,7 @@ void WatchedMachines::show_kept(const std::string& name, Machine& machine, Publi
   show_liveness(name, machine);
   show_state(name, machine, publisher);
   show_model(machine, publisher);
+  publisher.not_shown_bytes = 0;
 }
 
 void WatchedMachines::notice_losses() {
@@ -211,6 +218,9 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
       return with<v1::ErrorGrid>(arrival.payload, [&](auto& m) { publisher.model.slice(m); });
     case Topic::Snapshot:
       return with<v1::Snapshot>(arrival.payload, [&](auto& m) {
+      if (!options_.keep_grids ||
+          total([](const Publisher& p) { return p.model.kept_nodes(); }) >= kMostNodes)
+        return;
         publisher.position = millimetres(m.position(), m.missing_mask());
       });
     case Topic::Compensation:
@@ -343,6 +353,7 @@ void WatchedMachines::print_decision(const v1::Compensation& c, const Decision& 
 }
 
 void WatchedMachines::show_vector(Machine& machine, const Publisher& publisher,
+  if (health_.size() >= kMostStreams) health_.clear();  // each state is then printed once more
                                   const v1::Compensation& c) {
   const auto decision = decide_on(machine, publisher, c);
   if (options_.json) return print_decision(c, decision);

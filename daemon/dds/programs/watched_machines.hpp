@@ -19,9 +19,10 @@
 namespace abbe::dds {
 
 struct WatchOptions {
-  std::string machine;     ///< empty: all machines
-  std::string machine_id;  ///< of this machine; empty: the first one is pinned
-  bool json = false;       ///< one line with a JSON object per sample, instead of text
+  std::string machine;      ///< empty: all machines
+  std::string machine_id;   ///< of this machine; empty: the first one is pinned
+  bool json = false;        ///< one line with a JSON object per sample, instead of text
+  bool keep_grids = false;  ///< for applicable()
 };
 
 /// Keeps the received data of every machine, and prints what has changed.
@@ -56,6 +57,7 @@ class WatchedMachines {
     std::string position;
     /// The last samples of the durable topics, until the publisher is pinned, for --json.
     std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;
+    std::size_t not_shown_bytes = 0;
     Delay delay;
     std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
   };
@@ -98,6 +100,14 @@ class WatchedMachines {
 
   [[nodiscard]] bool alive(const Publisher* publisher) const;
   /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
+  /// Sum over the publishers of all machines: strangers may make up any.
+  template <class Value>
+  [[nodiscard]] std::size_t total(Value value) const {
+    std::size_t sum = 0;
+    for (const auto& [name, machine] : machines_)
+      for (const auto& [id, publisher] : machine.publishers) sum += value(publisher);
+    return sum;
+  }
   /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
   /// Shows a sample of the pinned publisher, after keep().

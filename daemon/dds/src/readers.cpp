@@ -69,8 +69,19 @@ class AliveWriters final : public fast::DataReaderListener {
     if (status.alive_count_change < 0) {
       alive_.erase(writer);
       Time::now(lost_at_[writer]);
+      forget_oldest_loss();
     }
     changed.set_trigger_value(true);
+  }
+
+  /// Strangers come and go without end.
+  void forget_oldest_loss() {
+    constexpr std::size_t kMostLosses = 1024;
+    if (lost_at_.size() <= kMostLosses) return;
+    const auto earlier = [](const auto& a, const auto& b) { return a.second < b.second; };
+    const auto oldest = std::ranges::min_element(lost_at_, earlier);
+    alive_.erase(oldest->first);  // if heard() added it: that sample had arrived before
+    lost_at_.erase(oldest);
   }
 
   mutable std::mutex mutex_;

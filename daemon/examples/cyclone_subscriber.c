@@ -56,6 +56,7 @@ struct machine {
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
+  int64_t pinned_ns; /* since when */
   int64_t ignored_reported_ns;
   abbe_v1_Compensation applied; /* the last vector, while it may be applied */
   int64_t applied_age_ns;       /* when it arrived */
@@ -153,6 +154,35 @@ static void print_state(const abbe_v1_ModelState* state) {
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
+/* True if the machine has seen another publisher of its machine_id, not only of its name. */
+static bool is_copied(const abbe_v1_Identity* identity) {
+  static const char same_id[] = "the same machine_id";
+  return identity->twin && strncmp(identity->twin_seen, same_id, sizeof same_id - 1) == 0;
+}
+
+/* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or
+   like `p` none. */
+static bool has_copy(const struct machine* m, const struct publisher* p, int64_t now_ns) {
+  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o) {
+    if (o == p || o == m->pinned || o->foreign || now_ns - o->last_ns >= 1500 * millisecond_ns)
+      continue;
+    if (o->last_ns != 0 && o->identified == p->identified &&
+        strcmp(o->identity.machine_id, p->identity.machine_id) == 0)
+      return true;
+  }
+  return false;
+}
+
+/* True if `p` has sent for 5 s without stating an identity, as an abbe-dds of an earlier version does,
+   and neither an identity was given nor another publisher states one. */
+static bool has_no_identity(const struct machine* m, const struct publisher* p, int64_t now_ns) {
+  bool others_have = false;
+  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)
+    others_have |= o->last_ns != 0 && o->identified;
+  return !p->identified && !m->has_machine_id && !others_have &&
+         now_ns - p->first_ns >= 5 * second_ns;
+}
+
 /* True if `p`, which is not pinned, may be pinned now. It must be the same machine as before, not
    only have the same name: a publisher of another machine_id is never pinned. Of two machines that
    know of each other (`twin`) none is the first, and of two publishers with one identity (a copied
@@ -161,9 +191,13 @@ static void print_state(const abbe_v1_ModelState* state) {
    30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
 static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns) {
   p->ignored_because = NULL;
-  if (!p->identified) return false;
-  if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
+  if (!p->identified && !has_no_identity(m, p, now_ns)) return false;
+  if (p->identified && p->identity.machine_id[0] == '\0')
+    p->ignored_because = "%s: without a machine_id, publisher %s is ignored\n";
+  else if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
     p->ignored_because = "%s: another machine of this name, publisher %s is ignored\n";
+  else if (is_copied(&p->identity) || (!p->foreign && has_copy(m, p, now_ns)))
+    p->ignored_because = "%s: one of several with one identity, publisher %s is ignored\n";
   else if (!m->has_machine_id && p->identity.twin)
     p->ignored_because = "%s: one of several machines of this name, publisher %s is ignored\n";
   else if (p->foreign)
@@ -183,9 +217,13 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
     if (!may_be_pinned(m, p, now_ns)) return false;
     if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
     m->pinned = p;
-    m->has_machine_id = true;
-    strcpy(m->machine_id, p->identity.machine_id);
-    print_participant("%s: publisher is %s\n", m->name, &p->participant);
+    m->pinned_ns = now_ns;
+    m->has_machine_id |= p->identified;
+    if (p->identified) strcpy(m->machine_id, p->identity.machine_id);
+    print_participant(p->identified ? "%s: publisher is %s\n"
+                                    : "%s: publisher is %s, an abbe-dds of an earlier version "
+                                      "without identity\n",
+                      m->name, &p->participant);
     if (p->state_from != 0) print_state(&p->state);
   }
 
@@ -295,7 +333,10 @@ static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
   if (p == NULL) return;
   p->identity = *identity;
   p->identified = true;
-  if (m->pinned == p && strcmp(m->machine_id, identity->machine_id) != 0) m->pinned = NULL;
+  if (m->pinned == p &&
+      (!m->has_machine_id || strcmp(m->machine_id, identity->machine_id) != 0 ||
+       (is_copied(identity) && now_in_ns() - m->pinned_ns < 1500 * millisecond_ns)))
+    m->pinned = NULL;
   if (!is_pinned(m, p)) report_ignored_publisher(m, p);
 }
 
@@ -454,14 +495,19 @@ int main(int argc, char** argv) {
   for (;;) {
     dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(5));
     discard_dead_states();
-    while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
-      if (info.valid_data) identify(identity, identities, info.publication_handle);
-    }
-    while (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
-      if (info.valid_data) keep(state, states, info.publication_handle);
-    }
-    while (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
-      if (info.valid_data) decide(vector, vectors, info.publication_handle);
+    /* The identities that have arrived by then come before each other sample. */
+    for (bool any = true; any;) {
+      any = false;
+      while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
+        if (info.valid_data) identify(identity, identities, info.publication_handle);
+      }
+      if (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
+        any = true;
+        if (info.valid_data) keep(state, states, info.publication_handle);
+      } else if (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
+        any = true;
+        if (info.valid_data) decide(vector, vectors, info.publication_handle);
+      }
     }
     withdraw();
   }

@@ -40,6 +40,7 @@ using namespace eprosima::fastdds::dds;
 using abbe::dds::ParticipantId;
 using abbe::dds::PublisherPin;
 using abbe::dds::text_of;
+using abbe::dds::twin_of;
 using abbe::v1::Compensation;
 using abbe::v1::Identity;
 using abbe::v1::ModelState;
@@ -166,8 +167,8 @@ class Listener : public DataReaderListener {
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
-    if (status.alive_count_change > 0) alive_.insert(writer);
     if (alive_.size() > 4096) alive_.clear();  // each is in again with its next state, in a second
+    if (status.alive_count_change > 0) alive_.insert(writer);
     if (status.alive_count_change >= 0) return;
     alive_.erase(writer);
     for (auto& [name, machine] : machines_) {
@@ -212,14 +213,18 @@ class Listener : public DataReaderListener {
             .first->second;
     const auto former = machine.pin.pinned();
     const auto now = SteadyClock::now();
-    const Verdict verdict = identity == nullptr ? machine.pin.heard(id, now)
-                                                : machine.pin.identified(id, identity->machine_id(),
-                                                                         identity->twin(), now);
+    const Verdict verdict =
+        identity == nullptr
+            ? machine.pin.heard(id, now)
+            : machine.pin.identified(id, identity->machine_id(),
+                                     twin_of(identity->twin(), identity->twin_seen()), now);
     const auto [found, is_new] = machine.publishers.try_emplace(id);
     if (is_new && former)
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();
     if (verdict == Verdict::NewlyPinned) {
-      std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
+      std::printf(
+          "%s: publisher is %s%s\n", name.c_str(), text_of(id).c_str(),
+          machine.pin.machine_id() ? "" : ", an abbe-dds of an earlier version without identity");
       if (found->second.state_from != Writer()) print_state(found->second.state);
     }
     if (verdict == Verdict::Foreign)
@@ -229,6 +234,10 @@ class Listener : public DataReaderListener {
     if (verdict == Verdict::Ambiguous)
       report_ignored_publisher(name, machine, id,
                                "one of several machines of this name, publisher");
+    if (verdict == Verdict::Copied)
+      report_ignored_publisher(name, machine, id, "one of several with one identity, publisher");
+    if (verdict == Verdict::Unidentified)
+      report_ignored_publisher(name, machine, id, "without a machine_id, publisher");
     std::erase_if(machine.publishers,
                   [&](const auto& p) { return !machine.pin.remembers(p.first); });
 
@@ -237,6 +246,7 @@ class Listener : public DataReaderListener {
 
   /// The given machines; if none is, no more than 256: any participant may make up names.
   [[nodiscard]] bool has_place(const std::string& name) const {
+    if (!machine_ids_.empty()) return machine_ids_.contains(name);
     return machines_.size() < 256 || machines_.contains(name);
   }
 
@@ -246,7 +256,6 @@ class Listener : public DataReaderListener {
   }
 
   /// Prints at most every 10 s that the samples of a publisher of this machine are not used.
-    if (!machine_ids_.empty()) return machine_ids_.contains(name);
   /// (`abbe watch` also prints the network address of that publisher.)
   static void report_ignored_publisher(const std::string& name, Machine& machine,
                                        const ParticipantId& id, const char* what) {
@@ -327,15 +336,6 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-/// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
-/// them (abbe/dds/message_filter.hpp).
-void filter_messages(DomainParticipantQos& qos, bool secured) {
-  auto& transports = qos.transport();
-  if (transports.user_transports.empty()) {
-    transports.use_builtin_transports = false;
-    transports.user_transports.push_back(
-        std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
-  }
 /// Readers divide what they receive into so many instances.
 constexpr int kInstances = 1024;
 /// Most participants, and writers of a topic, that are kept, and most endpoints of each on average.
@@ -347,6 +347,16 @@ void limit_memory(DomainParticipantQos& qos) {
   qos.allocation().readers.maximum = qos.allocation().writers.maximum = kMostEndpointsEach;
 }
 
+/// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
+/// them (abbe/dds/message_filter.hpp).
+void filter_messages(DomainParticipantQos& qos, bool secured) {
+  auto& transports = qos.transport();
+  if (transports.user_transports.empty()) {
+    transports.use_builtin_transports = false;
+    transports.user_transports.push_back(
+        std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+  }
+  const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
   for (auto& transport : transports.user_transports)
     transport = abbe::dds::with_message_filter(transport, secured, window);
 }
@@ -355,21 +365,11 @@ void limit_memory(DomainParticipantQos& qos) {
 /// that are no valid message, and an exception in a thread of Fast DDS ends the process. Such a
 /// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
-template <class GeneratedType>
-  const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
-class Checked final : public GeneratedType {
-  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
-    try {
-      if (GeneratedType::deserialize(payload, data)) return true;
-    } catch (const std::exception&) {
-    }
-    *static_cast<typename GeneratedType::type*>(data) = {};
-    return true;
 /// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
 /// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines with
 /// the same one the later sample replaces one that was not taken yet.
-  }
-};
+template <class GeneratedType>
+class Checked final : public GeneratedType {
   bool getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) override {
     InstanceHandle_t key;
     if (!GeneratedType::getKey(data, &key, true)) return false;
@@ -380,6 +380,15 @@ class Checked final : public GeneratedType {
     handle->value[15] = static_cast<std::uint8_t>(index & 0xff);
     return true;
   }
+  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
+    try {
+      if (GeneratedType::deserialize(payload, data)) return true;
+    } catch (const std::exception&) {
+    }
+    *static_cast<typename GeneratedType::type*>(data) = {};
+    return true;
+  }
+};
 
 /// Prevents that Fast DDS announces a TypeObject, which Cyclone DDS does not accept and which may
 /// crash older versions of Fast DDS.
@@ -419,6 +428,7 @@ int main(int argc, char** argv) {
   // Fast DDS tries so many ports. With its default of 100 the participants beyond the first hundred
   // of a computer receive nothing, and no error is reported.
   participant_qos.wire_protocol().builtin.mutation_tries = 400;
+  limit_memory(participant_qos);
   if (argc > 3) use_keys(argv[3], participant_qos);
   filter_messages(participant_qos, argc > 3);
   auto* participant = factory->create_participant(
@@ -428,9 +438,9 @@ int main(int argc, char** argv) {
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
   DataReaderQos live;  // best effort, volatile, keep last 1
-  limit_memory(participant_qos);
   live.resource_limits().max_samples = live.resource_limits().max_instances = kInstances;
   live.resource_limits().max_samples_per_instance = 1;
+  live.reader_resource_limits().matched_publisher_allocation.maximum = kMostParticipants;
   DataReaderQos durable = live;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
@@ -440,7 +450,6 @@ int main(int argc, char** argv) {
   durable.liveliness().lease_duration = eprosima::fastrtps::Duration_t(1, 0);
 
   const bool ok = read_topic(participant, subscriber,
-  live.reader_resource_limits().matched_publisher_allocation.maximum = kMostParticipants;
                              without_type_object(new Checked<abbe::v1::ModelStatePubSubType>),
                              "abbe/v1/ModelState", durable, &listener) &&
                   read_topic(participant, subscriber,

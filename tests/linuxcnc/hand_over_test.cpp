@@ -189,7 +189,7 @@ TEST(ToolWatch, PinsThatAreNotLinkedGiveNoTool) {
 
 std::shared_ptr<const Usable> decision(int number) {
   return std::make_shared<const Usable>(
-      Usable{std::nullopt, std::string(100, 'r'), std::to_string(number), {}});
+      Usable{.field = {}, .reason = std::string(100, 'r'), .model_id = std::to_string(number)});
 }
 
 TEST(LatestUsable, TheLoopReadsWhatItMayWhileItIsReplaced) {

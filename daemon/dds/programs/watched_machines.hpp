@@ -80,6 +80,7 @@ class WatchedMachines {
     bool shown_apply = false;
     WallClock::time_point last_live{};
     std::optional<WallClock::time_point> ignored_reported;
+    bool without_identity_reported = false;
     /// Why no publisher is pinned.
     std::string why_none = "no publisher has stated its identity (topic abbe/v1/Identity)";
 
@@ -99,7 +100,6 @@ class WatchedMachines {
   };
 
   [[nodiscard]] bool alive(const Publisher* publisher) const;
-  /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// Sum over the publishers of all machines: strangers may make up any.
   template <class Value>
   [[nodiscard]] std::size_t total(Value value) const {
@@ -108,6 +108,7 @@ class WatchedMachines {
       for (const auto& [id, publisher] : machine.publishers) sum += value(publisher);
     return sum;
   }
+  /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
   /// Shows a sample of the pinned publisher, after keep().
@@ -125,6 +126,8 @@ class WatchedMachines {
   /// Shows what arrived before the publisher was pinned.
   void show_kept(const std::string& name, Machine& machine, Publisher& publisher);
   [[nodiscard]] static PublisherPin::Verdict judge(const Arrival& arrival, PublisherPin& pin);
+  /// Reports once that the publisher is pinned by its name alone.
+  void report_without_identity(const std::string& name, Machine& machine, const ParticipantId& id);
   /// Reports, every 10 s, why the samples of `id` are not used.
   void report_ignored_publisher(const std::string& name, Machine& machine, const ParticipantId& id,
                                 PublisherPin::Verdict verdict);

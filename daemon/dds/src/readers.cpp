@@ -159,15 +159,28 @@ void Readers::wait(std::chrono::milliseconds at_most) {
 }
 
 void Readers::take(const OnArrival& on_arrival) {
-  for (const State::Reader& r : state_->readers) {
+  // Before each sample the identities that have arrived by then: it is judged for the machine that
+  // its publisher is at that moment.
+  const auto take_next = [&](const State::Reader& r) {
     fast::SampleInfo info;
-    while (r.reader->take_next_sample(&state_->payload, &info) == kOk) {
-      if (!info.valid_data) continue;
-      const WriterId writer = writer_id(info.publication_handle);
-      if (r.topic == daemon::Topic::ModelState)
-        state_->alive.heard(writer, info.reception_timestamp);
-      on_arrival({r.topic, state_->payload.bytes, writer});
+    if (r.reader->take_next_sample(&state_->payload, &info) != kOk) return false;
+    if (!info.valid_data) return true;
+    const WriterId writer = writer_id(info.publication_handle);
+    if (r.topic == daemon::Topic::ModelState) state_->alive.heard(writer, info.reception_timestamp);
+    on_arrival({r.topic, state_->payload.bytes, writer});
+    return true;
+  };
+  const auto identity =
+      std::ranges::find(state_->readers, daemon::Topic::Identity, &State::Reader::topic);
+  const auto take_identities = [&] {
+    while (identity != state_->readers.end() && take_next(*identity)) {
     }
+  };
+
+  for (const State::Reader& r : state_->readers) {
+    do {
+      take_identities();
+    } while (take_next(r));
   }
 }
 

@@ -173,8 +173,8 @@ static bool has_copy(const struct machine* m, const struct publisher* p, int64_t
   return false;
 }
 
-/* True if `p` has sent for 5 s without stating an identity, as an abbe-dds of an earlier version does,
-   and neither an identity was given nor another publisher states one. */
+/* True if `p` has sent for 5 s without stating an identity, as an abbe-dds of an earlier version
+   does, and neither an identity was given nor another publisher states one. */
 static bool has_no_identity(const struct machine* m, const struct publisher* p, int64_t now_ns) {
   bool others_have = false;
   for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)

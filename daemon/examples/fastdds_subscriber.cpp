@@ -366,8 +366,8 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
 /// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
 /// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
-/// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines with
-/// the same one the later sample replaces one that was not taken yet.
+/// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines
+/// with the same one the later sample replaces one that was not taken yet.
 template <class GeneratedType>
 class Checked final : public GeneratedType {
   bool getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) override {

@@ -22,8 +22,8 @@ using daemon::Topic;
 
 /// A subscriber of all machines keeps no more; a stranger may make up names.
 constexpr std::size_t kMostMachines = 256;
-/// Of all publishers together, for the same reason: grid nodes of 0.1 kB, samples not shown yet, and
-/// streams whose state is known.
+/// Of all publishers together, for the same reason: grid nodes of 0.1 kB, samples not shown yet,
+/// and streams whose state is known.
 constexpr std::size_t kMostNodes = 1'000'000, kMostBytesNotShown = 64'000'000, kMostStreams = 4096;
 
 /// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher

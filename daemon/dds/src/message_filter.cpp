@@ -96,7 +96,7 @@ struct Submessage {
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };
 
-/// The number that a reader waits for from the writer whose entity id is at `at`; nullopt: not known.
+/// The number that a reader waits for from the writer whose entity id is at `at`; nullopt: unknown.
 std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t at) {
   SequenceWindow::WriterGuid writer{};
   std::ranges::copy(submessage.source, writer.begin());

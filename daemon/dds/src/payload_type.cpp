@@ -62,8 +62,8 @@ InstanceHandle_t md5_of(const std::string& bytes) {
   return handle;
 }
 
-/// Numbers of one machine, up to kReceivedInstances, give different instances. The first octet makes
-/// the handle valid: zeros alone mean "none".
+/// Numbers of one machine, up to kReceivedInstances, give different instances. The first octet
+/// makes the handle valid: zeros alone mean "none".
 InstanceHandle_t received_instance(std::string_view machine, std::uint32_t number,
                                    std::string_view text) {
   const auto hash = md5_of(std::string(machine) + '\0' + std::string(text));

@@ -1,5 +1,5 @@
 #pragma once
-/// Reads and changes the fields of RTPS submessages [DDSI-RTPS 2.5, 9.4]. The caller checks lengths.
+/// Reads and changes fields of RTPS submessages [DDSI-RTPS 2.5, 9.4]. The caller checks lengths.
 
 #include <cstddef>
 #include <cstdint>

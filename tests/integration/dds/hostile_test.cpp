@@ -29,8 +29,8 @@ std::string seed() {
   return asked != nullptr ? asked : "20261128";
 }
 
-/// A subscriber that keeps to its limits needs less, however long it runs. AddressSanitizer keeps 256
-/// MB that were freed, and needs memory of its own.
+/// A subscriber that keeps to its limits needs less, however long it runs. AddressSanitizer keeps
+/// 256 MB that were freed, and needs memory of its own.
 #if defined(__SANITIZE_ADDRESS__)
 #define ABBE_ADDRESS_SANITIZER
 #elif defined(__has_feature)

@@ -16,16 +16,16 @@
 ///   So are samples of another encapsulation than plain CDR.
 /// - Fragments of samples, which Fast DDS checks insufficiently. A message of abbe fits into one
 ///   datagram, so the filter skips those of users' writers.
-/// - A GAP of more numbers than any history covers, which Fast DDS marks one by one; GAPs and samples
-///   of numbers that no reader can use yet, which it keeps (sequence_window.hpp). A heartbeat that
-///   skips millions of numbers, which it counts one by one, is changed to skip fewer.
+/// - A GAP of more numbers than any history covers, which Fast DDS marks one by one; GAPs and
+///   samples of numbers that no reader can use yet, which it keeps (sequence_window.hpp). A heartbeat
+///   that skips millions of numbers, which it counts one by one, is changed to skip fewer.
 /// - Sequence numbers that Fast DDS cannot add to without an assertion.
 /// - Time stamps: a sample dated in the future would keep later ones out of the history. The filter
 ///   takes all of them away; the readers have the time of reception.
 /// - A message of liveliness that is too short.
 ///
-/// Participant leases above 100 s are shortened: a stranger that announced an endless one, and left,
-/// would stay in memory. Announcements of more than 8 kB are skipped.
+/// Participant leases above 100 s are shortened: a stranger that announced an endless one, and
+/// left, would stay in memory. Announcements of more than 8 kB are skipped.
 ///
 /// The filter also drops messages with wrong lengths: a message passes only if its submessages
 /// follow each other as the standard requires, and its announcements have their parameters

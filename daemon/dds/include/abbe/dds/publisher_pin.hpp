@@ -66,8 +66,8 @@ class PublisherPin {
   using Instant = std::chrono::steady_clock::time_point;
 
   /// Another participant can be pinned once the pinned one has sent nothing for this time: 15 or
-  /// more samples are then missing, because abbe sends at 50 to 100 Hz. A subscriber that reads only
-  /// topics that are repeated every second needs kSilenceOfSlowTopics.
+  /// more samples are then missing, because abbe sends at 50 to 100 Hz. A subscriber that reads
+  /// only topics that are repeated every second needs kSilenceOfSlowTopics.
   static constexpr std::chrono::milliseconds kSilence{300}, kSilenceOfSlowTopics{1500};
   /// Another participant is pinned only if it has sent for kAlone while the pinned one sent
   /// nothing. Of each interval between two of its samples at most kLongestPause is counted: a

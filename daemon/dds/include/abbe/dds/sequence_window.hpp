@@ -19,8 +19,8 @@ class SequenceWindow {
  public:
   using WriterGuid = std::array<std::uint8_t, 16>;
 
-  /// A reader asks for 256 numbers at a time, and abbe-dds has 128 samples a topic. Numbers that lie
-  /// further ahead are not lost: the writer repeats them when they are asked for.
+  /// A reader asks for 256 numbers at a time, and abbe-dds has 128 samples a topic. Numbers that
+  /// lie further ahead are not lost: the writer repeats them when they are asked for.
   static constexpr std::uint64_t kAhead = 1024;
   /// Most numbers that one heartbeat may skip, some 20 ms of counting. Further ones follow with the
   /// next heartbeats: abbe-dds needs more than a week for so many.
@@ -32,8 +32,8 @@ class SequenceWindow {
   /// Reads the ACKNACKs of a message that this participant sends.
   void sent(std::span<const std::uint8_t> message);
 
-  /// The number that a reader waits for; nullopt: none has asked this writer yet, for example because
-  /// it is a best-effort writer.
+  /// The number that a reader waits for; nullopt: none has asked this writer yet, for example
+  /// because it is a best-effort writer.
   [[nodiscard]] std::optional<std::uint64_t> next_of(const WriterGuid& writer) const;
 
  private:

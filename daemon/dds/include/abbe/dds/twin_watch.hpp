@@ -30,8 +30,8 @@ class TwinWatch {
   [[nodiscard]] bool looks() const noexcept { return readers_.has_value(); }
 
   /// Reads what has arrived, at most every kPeriod. `own`: the payload of the last Identity that
-  /// this participant published; empty: none yet. Returns in words the twin that was seen first, one
-  /// of the same identity before one of the same name, and how many there are; empty: none.
+  /// this participant published; empty: none yet. Returns in words the twin that was seen first,
+  /// one of the same identity before one of the same name, and how many there are; empty: none.
   [[nodiscard]] std::string cycle(std::span<const std::byte> own, Instant now);
 
  private:

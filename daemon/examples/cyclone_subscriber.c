@@ -20,7 +20,8 @@
 #include "abbe_v1.h"
 #include "dds/dds.h"
 
-enum { MOST_MACHINES = 16, MOST_PUBLISHERS = 8, MOST_WRITERS = 32 };
+/* Strangers may make up machines and writers; they cannot take the place of a given machine. */
+enum { MOST_MACHINES = 256, MOST_PUBLISHERS = 8, MOST_WRITERS = 4096 };
 
 static const int64_t second_ns = INT64_C(1000000000), millisecond_ns = INT64_C(1000000);
 
@@ -55,6 +56,7 @@ struct machine {
   char name[sizeof(((abbe_v1_ModelState*)0)->machine)];
   struct publisher publishers[MOST_PUBLISHERS];
   struct publisher* pinned;
+  int64_t pinned_ns; /* since when */
   int64_t ignored_reported_ns;
   abbe_v1_Compensation applied; /* the last vector, while it may be applied */
   int64_t applied_age_ns;       /* when it arrived */
@@ -98,10 +100,10 @@ static int64_t now_in_ns(void) {
   return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
-/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already, or another
-   machine was given. */
+/* The entry of a machine, added if new; NULL if there are MOST_MACHINES others already, another
+   machine was given, or it has no name. */
 static struct machine* find_machine(const char* name) {
-  if (given_name != NULL && strcmp(given_name, name) != 0) return NULL;
+  if (name[0] == '\0' || (given_name != NULL && strcmp(given_name, name) != 0)) return NULL;
   for (int i = 0; i < MOST_MACHINES; ++i) {
     struct machine* m = &machines[i];
     if (m->name[0] == '\0') {
@@ -152,16 +154,50 @@ static void print_state(const abbe_v1_ModelState* state) {
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
+/* True if the machine has seen another publisher of its machine_id, not only of its name. */
+static bool is_copied(const abbe_v1_Identity* identity) {
+  static const char same_id[] = "the same machine_id";
+  return identity->twin && strncmp(identity->twin_seen, same_id, sizeof same_id - 1) == 0;
+}
+
+/* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or
+   like `p` none. */
+static bool has_copy(const struct machine* m, const struct publisher* p, int64_t now_ns) {
+  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o) {
+    if (o == p || o == m->pinned || o->foreign || now_ns - o->last_ns >= 1500 * millisecond_ns)
+      continue;
+    if (o->last_ns != 0 && o->identified == p->identified &&
+        strcmp(o->identity.machine_id, p->identity.machine_id) == 0)
+      return true;
+  }
+  return false;
+}
+
+/* True if `p` has sent for 5 s without stating an identity, as an abbe-dds of an earlier version
+   does, and neither an identity was given nor another publisher states one. */
+static bool has_no_identity(const struct machine* m, const struct publisher* p, int64_t now_ns) {
+  bool others_have = false;
+  for (const struct publisher* o = m->publishers; o < m->publishers + MOST_PUBLISHERS; ++o)
+    others_have |= o->last_ns != 0 && o->identified;
+  return !p->identified && !m->has_machine_id && !others_have &&
+         now_ns - p->first_ns >= 5 * second_ns;
+}
+
 /* True if `p`, which is not pinned, may be pinned now. It must be the same machine as before, not
    only have the same name: a publisher of another machine_id is never pinned. Of two machines that
-   know of each other (`twin`) none is the first. A publisher that sent beside the pinned one is
-   foreign, and never pinned. Another one replaces the pinned one if that has been silent for 300 ms
-   and the other has sent for 30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
+   know of each other (`twin`) none is the first, and of two publishers with one identity (a copied
+   disk) none is chosen. A publisher that sent beside the pinned one is foreign, and never pinned.
+   Another one replaces the pinned one if that has been silent for 300 ms and the other has sent for
+   30 ms since then. Reasons and limits: publisher_pin.hpp and dds.md. */
 static bool may_be_pinned(struct machine* m, struct publisher* p, int64_t now_ns) {
   p->ignored_because = NULL;
-  if (!p->identified) return false;
-  if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
+  if (!p->identified && !has_no_identity(m, p, now_ns)) return false;
+  if (p->identified && p->identity.machine_id[0] == '\0')
+    p->ignored_because = "%s: without a machine_id, publisher %s is ignored\n";
+  else if (m->has_machine_id && strcmp(m->machine_id, p->identity.machine_id) != 0)
     p->ignored_because = "%s: another machine of this name, publisher %s is ignored\n";
+  else if (is_copied(&p->identity) || (!p->foreign && has_copy(m, p, now_ns)))
+    p->ignored_because = "%s: one of several with one identity, publisher %s is ignored\n";
   else if (!m->has_machine_id && p->identity.twin)
     p->ignored_because = "%s: one of several machines of this name, publisher %s is ignored\n";
   else if (p->foreign)
@@ -181,9 +217,13 @@ static bool is_pinned(struct machine* m, struct publisher* p) {
     if (!may_be_pinned(m, p, now_ns)) return false;
     if (m->pinned != NULL) m->pinned->last_ns = 0; /* frees the entry */
     m->pinned = p;
-    m->has_machine_id = true;
-    strcpy(m->machine_id, p->identity.machine_id);
-    print_participant("%s: publisher is %s\n", m->name, &p->participant);
+    m->pinned_ns = now_ns;
+    m->has_machine_id |= p->identified;
+    if (p->identified) strcpy(m->machine_id, p->identity.machine_id);
+    print_participant(p->identified ? "%s: publisher is %s\n"
+                                    : "%s: publisher is %s, an abbe-dds of an earlier version "
+                                      "without identity\n",
+                      m->name, &p->participant);
     if (p->state_from != 0) print_state(&p->state);
   }
 
@@ -284,7 +324,8 @@ static void keep(const abbe_v1_ModelState* state, dds_entity_t reader,
 }
 
 /* Which machine a publisher is. The pinned publisher is released if abbed behind it has become
-   another machine. */
+   another machine, or if another publisher of its identity was beside it when it was chosen: its
+   first Identity may have been a second old. */
 static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
                      dds_instance_handle_t writer) {
   struct machine* m = find_machine(identity->machine);
@@ -292,7 +333,10 @@ static void identify(const abbe_v1_Identity* identity, dds_entity_t reader,
   if (p == NULL) return;
   p->identity = *identity;
   p->identified = true;
-  if (m->pinned == p && strcmp(m->machine_id, identity->machine_id) != 0) m->pinned = NULL;
+  if (m->pinned == p &&
+      (!m->has_machine_id || strcmp(m->machine_id, identity->machine_id) != 0 ||
+       (is_copied(identity) && now_in_ns() - m->pinned_ns < 1500 * millisecond_ns)))
+    m->pinned = NULL;
   if (!is_pinned(m, p)) report_ignored_publisher(m, p);
 }
 
@@ -451,14 +495,19 @@ int main(int argc, char** argv) {
   for (;;) {
     dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(5));
     discard_dead_states();
-    while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
-      if (info.valid_data) identify(identity, identities, info.publication_handle);
-    }
-    while (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
-      if (info.valid_data) keep(state, states, info.publication_handle);
-    }
-    while (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
-      if (info.valid_data) decide(vector, vectors, info.publication_handle);
+    /* The identities that have arrived by then come before each other sample. */
+    for (bool any = true; any;) {
+      any = false;
+      while (dds_take(identities, (void**)&identity, &info, 1, 1) > 0) {
+        if (info.valid_data) identify(identity, identities, info.publication_handle);
+      }
+      if (dds_take(states, (void**)&state, &info, 1, 1) > 0) {
+        any = true;
+        if (info.valid_data) keep(state, states, info.publication_handle);
+      } else if (dds_take(vectors, (void**)&vector, &info, 1, 1) > 0) {
+        any = true;
+        if (info.valid_data) decide(vector, vectors, info.publication_handle);
+      }
     }
     withdraw();
   }

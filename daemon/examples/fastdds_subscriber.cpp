@@ -8,8 +8,9 @@
 // of one subscriber made by `abbe dds keys`; it is needed if abbed uses keys. MACHINE_ID is the
 // identity of the machine NAME, from `abbe machine identity`; without it the first machine of each
 // name is used, and no other one while the program runs. Fast DDS calls the
-// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp and
-// message_filter (daemon/dds).
+// listener from its own threads. To reuse this file, also copy abbe/dds/publisher_pin.hpp,
+// message_filter and sequence_window (daemon/dds). As a last defence against strangers limit the
+// memory of the process, for example with MemoryMax= of its systemd unit.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <algorithm>
 #include <chrono>
@@ -39,6 +40,7 @@ using namespace eprosima::fastdds::dds;
 using abbe::dds::ParticipantId;
 using abbe::dds::PublisherPin;
 using abbe::dds::text_of;
+using abbe::dds::twin_of;
 using abbe::v1::Compensation;
 using abbe::v1::Identity;
 using abbe::v1::ModelState;
@@ -165,6 +167,7 @@ class Listener : public DataReaderListener {
   void on_liveliness_changed(DataReader*, const LivelinessChangedStatus& status) override {
     const std::lock_guard lock(mutex_);
     const Writer writer = status.last_publication_handle;
+    if (alive_.size() > 4096) alive_.clear();  // each is in again with its next state, in a second
     if (status.alive_count_change > 0) alive_.insert(writer);
     if (status.alive_count_change >= 0) return;
     alive_.erase(writer);
@@ -210,14 +213,18 @@ class Listener : public DataReaderListener {
             .first->second;
     const auto former = machine.pin.pinned();
     const auto now = SteadyClock::now();
-    const Verdict verdict = identity == nullptr ? machine.pin.heard(id, now)
-                                                : machine.pin.identified(id, identity->machine_id(),
-                                                                         identity->twin(), now);
+    const Verdict verdict =
+        identity == nullptr
+            ? machine.pin.heard(id, now)
+            : machine.pin.identified(id, identity->machine_id(),
+                                     twin_of(identity->twin(), identity->twin_seen()), now);
     const auto [found, is_new] = machine.publishers.try_emplace(id);
     if (is_new && former)
       found->second.delay = machine.publishers[*former].delay.for_next_publisher();
     if (verdict == Verdict::NewlyPinned) {
-      std::printf("%s: publisher is %s\n", name.c_str(), text_of(id).c_str());
+      std::printf(
+          "%s: publisher is %s%s\n", name.c_str(), text_of(id).c_str(),
+          machine.pin.machine_id() ? "" : ", an abbe-dds of an earlier version without identity");
       if (found->second.state_from != Writer()) print_state(found->second.state);
     }
     if (verdict == Verdict::Foreign)
@@ -227,14 +234,19 @@ class Listener : public DataReaderListener {
     if (verdict == Verdict::Ambiguous)
       report_ignored_publisher(name, machine, id,
                                "one of several machines of this name, publisher");
+    if (verdict == Verdict::Copied)
+      report_ignored_publisher(name, machine, id, "one of several with one identity, publisher");
+    if (verdict == Verdict::Unidentified)
+      report_ignored_publisher(name, machine, id, "without a machine_id, publisher");
     std::erase_if(machine.publishers,
                   [&](const auto& p) { return !machine.pin.remembers(p.first); });
 
     return {found->second, machine.pin.pinned() == id};
   }
 
-  /// No more than 256 machines: any participant may make up names.
+  /// The given machines; if none is, no more than 256: any participant may make up names.
   [[nodiscard]] bool has_place(const std::string& name) const {
+    if (!machine_ids_.empty()) return machine_ids_.contains(name);
     return machines_.size() < 256 || machines_.contains(name);
   }
 
@@ -324,6 +336,17 @@ void use_keys(const std::string& folder, DomainParticipantQos& qos) {
   properties.emplace_back("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
+/// Readers divide what they receive into so many instances.
+constexpr int kInstances = 1024;
+/// Most participants, and writers of a topic, that are kept, and most endpoints of each on average.
+constexpr std::size_t kMostParticipants = 512, kMostEndpointsEach = 16;
+
+/// Without limits a stranger that announces ever new participants and writers takes all memory.
+void limit_memory(DomainParticipantQos& qos) {
+  qos.allocation().participants.maximum = kMostParticipants;
+  qos.allocation().readers.maximum = qos.allocation().writers.maximum = kMostEndpointsEach;
+}
+
 /// Some messages that any participant of the domain can send crash Fast DDS 2.9. The filter removes
 /// them (abbe/dds/message_filter.hpp).
 void filter_messages(DomainParticipantQos& qos, bool secured) {
@@ -333,16 +356,30 @@ void filter_messages(DomainParticipantQos& qos, bool secured) {
     transports.user_transports.push_back(
         std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
   }
+  const auto window = secured ? nullptr : std::make_shared<abbe::dds::SequenceWindow>();
   for (auto& transport : transports.user_transports)
-    transport = abbe::dds::with_message_filter(transport, secured);
+    transport = abbe::dds::with_message_filter(transport, secured, window);
 }
 
 /// A generated type whose deserialize() does not throw: any participant of the domain may send bytes
 /// that are no valid message, and an exception in a thread of Fast DDS ends the process. Such a
 /// sample becomes an empty one, without machine. (With `false` instead Fast DDS would keep it as
 /// the next sample.)
+/// It has no more than kInstances keys, by a hash of the generated one: strangers may make up any
+/// number of keys, and Fast DDS 2.9 aborts where the table of instances is full. Of two machines
+/// with the same one the later sample replaces one that was not taken yet.
 template <class GeneratedType>
 class Checked final : public GeneratedType {
+  bool getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) override {
+    InstanceHandle_t key;
+    if (!GeneratedType::getKey(data, &key, true)) return false;
+    const int index = (key.value[0] << 8 | key.value[1]) % kInstances;
+    *handle = InstanceHandle_t();
+    handle->value[0] = 1;  // zeros alone mean "none"
+    handle->value[14] = static_cast<std::uint8_t>(index >> 8);
+    handle->value[15] = static_cast<std::uint8_t>(index & 0xff);
+    return true;
+  }
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     try {
       if (GeneratedType::deserialize(payload, data)) return true;
@@ -391,6 +428,7 @@ int main(int argc, char** argv) {
   // Fast DDS tries so many ports. With its default of 100 the participants beyond the first hundred
   // of a computer receive nothing, and no error is reported.
   participant_qos.wire_protocol().builtin.mutation_tries = 400;
+  limit_memory(participant_qos);
   if (argc > 3) use_keys(argv[3], participant_qos);
   filter_messages(participant_qos, argc > 3);
   auto* participant = factory->create_participant(
@@ -400,10 +438,9 @@ int main(int argc, char** argv) {
   auto* subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
 
   DataReaderQos live;  // best effort, volatile, keep last 1
-  // One instance per machine, and those that strangers make up: where the table is full (10 by
-  // default), Fast DDS 2.9 may abort.
-  live.resource_limits().max_samples = live.resource_limits().max_instances = 1024;
+  live.resource_limits().max_samples = live.resource_limits().max_instances = kInstances;
   live.resource_limits().max_samples_per_instance = 1;
+  live.reader_resource_limits().matched_publisher_allocation.maximum = kMostParticipants;
   DataReaderQos durable = live;
   durable.reliability().kind = RELIABLE_RELIABILITY_QOS;
   durable.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;

@@ -105,7 +105,10 @@ void decide(const std::stop_token& stop, linuxcnc::Subscription& subscription, L
   while (!stop.stop_requested()) {
     const auto usable = subscription.poll(kDecisionPeriod);
     latest.set(usable, Clock::now());
-    reporter.decided(usable->model_id);
+    reporter.decided(usable->identified ? usable->model_id
+                                        : usable->model_id +
+                                              ", whose publisher states no identity "
+                                              "(an abbe-dds of an earlier version)");
   }
 }
 

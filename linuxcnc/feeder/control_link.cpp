@@ -16,8 +16,8 @@ namespace {
 /// A feeder whose process exists, but which does not write for this time, is replaced: it hangs, or
 /// another program has its process id.
 constexpr std::chrono::milliseconds kLongestPause{300};
-/// Without a servo cycle for this time LinuxCNC counts as ended. A program that it starts at its
-/// end, or a debugger, may stop it for a moment.
+/// Without a servo cycle for this time LinuxCNC counts as ended if no process of it is attached to
+/// the memory any more. One that stands, for example in a debugger, goes on.
 constexpr std::chrono::seconds kLongestStandstill{5};
 
 std::uint32_t wanted_number(const abbe_hand_over& memory) {
@@ -40,6 +40,12 @@ bool become_feeder(abbe_hand_over& memory, std::int32_t& other) {
                                      __ATOMIC_ACQUIRE);
 }
 
+/// Of a memory whose state cannot be read: false.
+bool is_attached_elsewhere(int segment) {
+  shmid_ds state{};
+  return ::shmctl(segment, IPC_STAT, &state) == 0 && state.shm_nattch > 1;
+}
+
 }  // namespace
 
 std::optional<ControlLink> ControlLink::attach(int key, std::string& error) {
@@ -51,7 +57,7 @@ std::optional<ControlLink> ControlLink::attach(int key, std::string& error) {
     return std::nullopt;
   }
 
-  ControlLink link(static_cast<abbe_hand_over*>(mapped));
+  ControlLink link(static_cast<abbe_hand_over*>(mapped), segment);
   if (__atomic_load_n(&link.memory_->version, __ATOMIC_ACQUIRE) != ABBE_HAND_OVER_VERSION ||
       link.closed()) {
     error = "LinuxCNC does not run with abbe_correction of this version";
@@ -71,6 +77,7 @@ std::optional<ControlLink> ControlLink::attach(int key, std::string& error) {
 
 ControlLink::ControlLink(ControlLink&& other) noexcept
     : memory_(std::exchange(other.memory_, nullptr)),
+      segment_(other.segment_),
       control_(other.control_),
       seen_cycle_(other.seen_cycle_),
       cycled_at_(other.cycled_at_) {}
@@ -114,7 +121,8 @@ std::string ControlLink::ended(Clock::time_point now) {
     seen_cycle_ = control_.cycle;
     cycled_at_ = now;
   }
-  return now - cycled_at_ > kLongestStandstill ? "LinuxCNC no longer cycles" : "";
+  if (now - cycled_at_ <= kLongestStandstill || is_attached_elsewhere(segment_)) return {};
+  return "LinuxCNC no longer cycles";
 }
 
 std::optional<abbe_wanted> ControlLink::sent() const {

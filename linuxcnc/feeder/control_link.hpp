@@ -27,8 +27,8 @@ class ControlLink {
   [[nodiscard]] const abbe_control& read();
   void write(const abbe_wanted& wanted);
 
-  /// Why the feeder has to end: LinuxCNC has ended or no longer cycles, or another feeder has
-  /// replaced this one. Empty: it has not. For the thread that calls read().
+  /// Why the feeder has to end: LinuxCNC has ended (also without unloading abbe_correction), or
+  /// another feeder has replaced this one. Empty: it has not. For the thread that calls read().
   [[nodiscard]] std::string ended(Clock::time_point now);
   /// True: LinuxCNC has unloaded abbe_correction.
   [[nodiscard]] bool closed() const;
@@ -37,8 +37,9 @@ class ControlLink {
   [[nodiscard]] std::optional<abbe_wanted> sent() const;
 
  private:
-  explicit ControlLink(abbe_hand_over* memory) : memory_(memory) {}
+  ControlLink(abbe_hand_over* memory, int segment) : memory_(memory), segment_(segment) {}
   abbe_hand_over* memory_;
+  int segment_;  ///< id of memory_
   abbe_control control_{};
   std::uint64_t seen_cycle_ = 0;
   Clock::time_point cycled_at_ = Clock::now();

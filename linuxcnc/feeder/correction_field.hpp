@@ -21,9 +21,11 @@ namespace abbe::linuxcnc {
 /// What the subscription passes to the loop of the feeder.
 struct Usable {
   std::optional<calib::ErrorLattice> field;  ///< nullopt: nothing may be applied, see reason
-  std::string reason;
-  std::string model_id;
+  std::string reason = {};
+  std::string model_id = {};
   calib::Vector3 tool_offset_m = calib::Vector3::Zero();  ///< for which V of the field holds
+  /// False: the publisher, an abbe-dds of an earlier version, is used by the name of the machine.
+  bool identified = true;
 };
 
 struct FeedOptions {

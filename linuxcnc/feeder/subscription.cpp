@@ -30,7 +30,7 @@ std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_mo
   const bool was_usable = usable_->field.has_value();
   if (!reason.empty()) {
     if (was_usable || usable_->reason != reason)
-      usable_ = std::make_shared<const Usable>(Usable{std::nullopt, std::move(reason), {}, {}});
+      usable_ = std::make_shared<const Usable>(Usable{.field = {}, .reason = std::move(reason)});
     return usable_;
   }
 
@@ -43,8 +43,11 @@ std::shared_ptr<const Usable> Subscription::poll(std::chrono::milliseconds at_mo
   auto lattice = dds::lattice_of(*nodes);
   const auto& t = model.model()->tool_offset_m();
   usable_ = std::make_shared<const Usable>(
-      lattice ? Usable{std::move(*lattice), {}, id, calib::Vector3(t[0], t[1], t[2])}
-              : Usable{std::nullopt, lattice.error().text, {}, {}});
+      lattice ? Usable{.field = std::move(*lattice),
+                       .model_id = id,
+                       .tool_offset_m = calib::Vector3(t[0], t[1], t[2]),
+                       .identified = pin_.machine_id().has_value()}
+              : Usable{.field = {}, .reason = lattice.error().text});
   return usable_;
 }
 
@@ -63,7 +66,8 @@ void Subscription::judge(const dds::Arrival& arrival, const dds::ParticipantId& 
   auto verdict = Verdict::Waiting;
   if (arrival.topic == Topic::Identity) {
     with<v1::Identity>(arrival, [&](v1::Identity&& identity) {
-      verdict = pin_.identified(from, identity.machine_id(), identity.twin(), Clock::now());
+      verdict = pin_.identified(from, identity.machine_id(),
+                                dds::twin_of(identity.twin(), identity.twin_seen()), Clock::now());
     });
   } else {
     verdict = pin_.heard(from, Clock::now());
@@ -72,6 +76,11 @@ void Subscription::judge(const dds::Arrival& arrival, const dds::ParticipantId& 
     why_none_ = "machine_id " + pin_.stated_by(from).value_or("") + " is another machine";
   if (verdict == Verdict::Ambiguous)
     why_none_ = "several machines have this name: give --machine-id";
+  if (verdict == Verdict::Copied)
+    why_none_ = "several publishers have machine_id " + pin_.stated_by(from).value_or("(none)") +
+                ": give the copy an identity of its own";
+  if (verdict == Verdict::Unidentified)
+    why_none_ = "the publisher has no machine_id: see Health of stream identity";
 }
 
 void Subscription::keep(const dds::Arrival& arrival, Publisher& publisher) {

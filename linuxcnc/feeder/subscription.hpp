@@ -32,7 +32,7 @@ class Subscription {
   Subscription(SubscriptionOptions options, dds::Readers& readers)
       : machine_(std::move(options.machine)),
         readers_(readers),
-        pin_(std::move(options.machine_id)) {}
+        pin_(std::move(options.machine_id), dds::PublisherPin::kSilenceOfSlowTopics) {}
 
   /// Waits for samples, at most `at_most`, and returns what may be applied now. The object is
   /// replaced only when the decision changes. Never null.

@@ -121,6 +121,19 @@ TEST_F(IdentityWatchTest, ADamagedFileLetsNoModelBecomeActive) {
   EXPECT_THAT(damaged.health("").status.last_fault, HasSubstr("identity.json"));
 }
 
+TEST_F(IdentityWatchTest, WhileTheFileCannotBeReadTheDoubtStays) {
+  const auto machine_id = open(kHere).known().machine_id;
+  auto copied = open(kElsewhere);
+  const auto doubt = copied.known().doubt;
+  const auto file = identity_file(folder_);
+  std::filesystem::remove(file);
+  std::filesystem::create_symlink(file, file);
+  ASSERT_TRUE(follows(copied, [&] { return !copied.known().fault.empty(); }));
+  EXPECT_EQ(copied.known().doubt, doubt);
+  EXPECT_EQ(copied.known().machine_id, machine_id);
+  EXPECT_EQ(restricted(copied).status, ModelStatus::MODEL_STALE);
+}
+
 TEST_F(IdentityWatchTest, TheCommandShowsTheIdentityAndRecordsADecision) {
   const std::string machine_id = open(kElsewhere).known().machine_id;
   const auto identity = [this](const std::string& more) {

@@ -177,7 +177,9 @@ Result<void> take_from_config(Options& options) {
 
 int watch(const Options& options, dds::Readers& readers, const dds::ParticipantAddresses& addresses,
           const std::optional<daemon::KnownErrorsFile>& known) {
-  dds::WatchedMachines machines(options.show, readers, addresses);
+  auto show = options.show;
+  show.keep_grids = options.ends_with_model();
+  dds::WatchedMachines machines(show, readers, addresses);
   const auto start = WallClock::now();
   bool silence_reported = false;
   while (stop_requested == 0 &&

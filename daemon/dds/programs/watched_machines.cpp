@@ -22,6 +22,9 @@ using daemon::Topic;
 
 /// A subscriber of all machines keeps no more; a stranger may make up names.
 constexpr std::size_t kMostMachines = 256;
+/// Of all publishers together, for the same reason: grid nodes of 0.1 kB, samples not shown yet,
+/// and streams whose state is known.
+constexpr std::size_t kMostNodes = 1'000'000, kMostBytesNotShown = 64'000'000, kMostStreams = 4096;
 
 /// A publisher is regarded as not alive if its last ModelState is older than this. Every publisher
 /// repeats ModelState once a second, even if nothing changes.
@@ -87,6 +90,8 @@ void WatchedMachines::take(const Arrival& arrival) {
   }
 
   if (former && former != from) show_successor(name, from, *former);
+  if (verdict == Verdict::NewlyPinned && !machine.pin.machine_id())
+    report_without_identity(name, machine, from);
   show_kept(name, machine, publisher);
   show(arrival, name, machine, publisher);
 }
@@ -96,7 +101,8 @@ PublisherPin::Verdict WatchedMachines::judge(const Arrival& arrival, PublisherPi
   const auto now = WallClock::now();
   if (arrival.topic != Topic::Identity) return pin.heard(from, now);
   const auto identity = daemon::decode<v1::Identity>(arrival.payload);
-  return identity ? pin.identified(from, identity->machine_id(), identity->twin(), now)
+  return identity ? pin.identified(from, identity->machine_id(),
+                                   twin_of(identity->twin(), identity->twin_seen()), now)
                   : pin.heard(from, now);
 }
 
@@ -108,13 +114,17 @@ void WatchedMachines::keep_for_later(const Arrival& arrival, Publisher& publishe
   const auto* begin = reinterpret_cast<const char*>(key->bytes.data());
   std::string bytes(begin, key->bytes.size());
   if (publisher.not_shown.size() >= kMost) return;
-  publisher.not_shown[{arrival.topic, std::move(bytes)}] = {arrival.payload.begin(),
-                                                            arrival.payload.end()};
+  const auto sum = total([](const Publisher& p) { return p.not_shown_bytes; });
+  if (sum + arrival.payload.size() > kMostBytesNotShown) return;
+  auto& kept = publisher.not_shown[{arrival.topic, std::move(bytes)}];
+  publisher.not_shown_bytes += arrival.payload.size() - kept.size();
+  kept = {arrival.payload.begin(), arrival.payload.end()};
 }
 
 void WatchedMachines::show_kept(const std::string& name, Machine& machine, Publisher& publisher) {
   for (const auto& [key, payload] : std::exchange(publisher.not_shown, {}))
     print_sample(key.first, payload);
+  publisher.not_shown_bytes = 0;
   show_liveness(name, machine);
   show_state(name, machine, publisher);
   show_model(machine, publisher);
@@ -208,6 +218,9 @@ void WatchedMachines::keep(const Arrival& arrival, Publisher& publisher) {
     case Topic::ErrorModel:
       return with<v1::ErrorModel>(arrival.payload, [&](auto& m) { publisher.model.model(m); });
     case Topic::ErrorGrid:
+      if (!options_.keep_grids ||
+          total([](const Publisher& p) { return p.model.kept_nodes(); }) >= kMostNodes)
+        return;
       return with<v1::ErrorGrid>(arrival.payload, [&](auto& m) { publisher.model.slice(m); });
     case Topic::Snapshot:
       return with<v1::Snapshot>(arrival.payload, [&](auto& m) {
@@ -270,6 +283,16 @@ void WatchedMachines::show_successor(const std::string& name, const ParticipantI
                     text_of(former)));
 }
 
+void WatchedMachines::report_without_identity(const std::string& name, Machine& machine,
+                                              const ParticipantId& id) {
+  if (std::exchange(machine.without_identity_reported, true)) return;
+  const auto why = fmt::format(
+      "publisher {} states no identity (an abbe-dds of an earlier version): used by its name alone",
+      described(id));
+  if (options_.json) print_object({{"machine", name}, {"publisher", text_of(id)}, {"reason", why}});
+  print(name + "  " + why);
+}
+
 void WatchedMachines::report_ignored_publisher(const std::string& name, Machine& machine,
                                                const ParticipantId& id,
                                                PublisherPin::Verdict verdict) {
@@ -287,6 +310,14 @@ void WatchedMachines::report_ignored_publisher(const std::string& name, Machine&
         "several machines have this name: nothing is used without --machine-id; publisher {} has "
         "machine_id {}",
         described(id), stated);
+  if (verdict == Verdict::Copied)
+    why = fmt::format(
+        "several publishers have machine_id {}: nothing is used; give the copy an identity of its "
+        "own (abbe machine identity new); publisher {}",
+        stated.empty() ? "none" : stated, described(id));
+  if (verdict == Verdict::Unidentified)
+    why = fmt::format("publisher {} has no machine_id: ignored; see Health of stream identity",
+                      described(id));
   machine.why_none = why;
 
   const auto now = WallClock::now();
@@ -322,6 +353,7 @@ void WatchedMachines::show_model(Machine& machine, const Publisher& publisher) {
 void WatchedMachines::show_health(const v1::Health& h) {
   const std::string line = fmt::format("{}  {} {}{}{}", h.machine(), h.stream(), h.state(),
                                        h.fault().empty() ? "" : ": ", h.fault());
+  if (health_.size() >= kMostStreams) health_.clear();  // each state is then printed once more
   if (std::exchange(health_[{h.machine(), h.stream()}], line) != line) print(line);
 }
 

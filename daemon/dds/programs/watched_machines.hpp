@@ -19,9 +19,10 @@
 namespace abbe::dds {
 
 struct WatchOptions {
-  std::string machine;     ///< empty: all machines
-  std::string machine_id;  ///< of this machine; empty: the first one is pinned
-  bool json = false;       ///< one line with a JSON object per sample, instead of text
+  std::string machine;      ///< empty: all machines
+  std::string machine_id;   ///< of this machine; empty: the first one is pinned
+  bool json = false;        ///< one line with a JSON object per sample, instead of text
+  bool keep_grids = false;  ///< for applicable()
 };
 
 /// Keeps the received data of every machine, and prints what has changed.
@@ -56,6 +57,7 @@ class WatchedMachines {
     std::string position;
     /// The last samples of the durable topics, until the publisher is pinned, for --json.
     std::map<std::pair<daemon::Topic, std::string>, std::vector<std::byte>> not_shown;
+    std::size_t not_shown_bytes = 0;
     Delay delay;
     std::optional<std::chrono::nanoseconds> last_delay;  ///< of the last vector
   };
@@ -78,6 +80,7 @@ class WatchedMachines {
     bool shown_apply = false;
     WallClock::time_point last_live{};
     std::optional<WallClock::time_point> ignored_reported;
+    bool without_identity_reported = false;
     /// Why no publisher is pinned.
     std::string why_none = "no publisher has stated its identity (topic abbe/v1/Identity)";
 
@@ -97,6 +100,14 @@ class WatchedMachines {
   };
 
   [[nodiscard]] bool alive(const Publisher* publisher) const;
+  /// Sum over the publishers of all machines: strangers may make up any.
+  template <class Value>
+  [[nodiscard]] std::size_t total(Value value) const {
+    std::size_t sum = 0;
+    for (const auto& [name, machine] : machines_)
+      for (const auto& [id, publisher] : machine.publishers) sum += value(publisher);
+    return sum;
+  }
   /// Keeps the data of a sample. Called also for publishers that are not pinned, because one of
   /// them may be pinned next.
   void keep(const Arrival& arrival, Publisher& publisher);
@@ -115,6 +126,8 @@ class WatchedMachines {
   /// Shows what arrived before the publisher was pinned.
   void show_kept(const std::string& name, Machine& machine, Publisher& publisher);
   [[nodiscard]] static PublisherPin::Verdict judge(const Arrival& arrival, PublisherPin& pin);
+  /// Reports once that the publisher is pinned by its name alone.
+  void report_without_identity(const std::string& name, Machine& machine, const ParticipantId& id);
   /// Reports, every 10 s, why the samples of `id` are not used.
   void report_ignored_publisher(const std::string& name, Machine& machine, const ParticipantId& id,
                                 PublisherPin::Verdict verdict);

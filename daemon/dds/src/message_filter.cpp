@@ -8,36 +8,43 @@
 #include <utility>
 #include <vector>
 
+#include "rtps_fields.hpp"
+
 namespace abbe::dds {
 namespace {
 
 namespace rtps = eprosima::fastdds::rtps;
+using namespace rtps_message;
 using Bytes = std::span<std::uint8_t>;
 
-constexpr std::size_t kHeaderBytes = 20, kSubmessageHeaderBytes = 4;
 constexpr std::size_t kLongestMessage = 65536;  // a UDP datagram
-constexpr std::uint8_t kData = 0x15, kDataFrag = 0x16, kPad = 0x01, kInfoTimestamp = 0x09,
-                       kAckNack = 0x06, kHeartbeat = 0x07, kGap = 0x08, kNackFrag = 0x12,
-                       kHeartbeatFrag = 0x13, kSecurePrefix = 0x31, kSecureMessagePrefix = 0x33,
-                       kSecureMessagePostfix = 0x34, kStatistics = 0x80;
-constexpr std::uint8_t kLittleEndian = 0x01, kInlineQos = 0x02, kWithData = 0x04, kWithKey = 0x08,
-                       kNoTimestamp = 0x02;
 /// Replaces the kind of a submessage that must not be read. The kind is not assigned, so a receiver
 /// skips the submessage [DDSI-RTPS 2.5, 9.4.5.1.1].
 constexpr std::uint8_t kSkipped = 0x7f;
+constexpr std::size_t kInfoSourcePrefixAt = 8, kInfoSourceBytes = 20;
 constexpr std::size_t kToInlineQos = 4;  // octetsToInlineQos counts from the end of its own field
 /// Limits of octetsToInlineQos. Reader id, writer id and sequence number take 16 bytes; Fast DDS
 /// replaces a smaller value by 16. Fast DDS reads a signed 16-bit number, hence the upper limit.
 constexpr std::size_t kShortestToInlineQos = 16, kLongestToInlineQos = 0x7fff;
 
-/// Entity ids of the writers that announce writers and readers: kind c2, ids 0003 and 0004.
-constexpr std::uint32_t kPublicationsWriter = 0x000003c2, kSubscriptionsWriter = 0x000004c2;
+/// Entity ids of the writers that announce participants, writers and readers: kind c2, ids 0001,
+/// 0003 and 0004.
+constexpr std::uint32_t kParticipantsWriter = 0x000100c2, kPublicationsWriter = 0x000003c2,
+                        kSubscriptionsWriter = 0x000004c2;
 /// Entity ids of the writer of participant messages (liveliness), and of the writers of DDS
 /// Security, whose messages may be fragments.
 constexpr std::uint32_t kLivelinessWriter = 0x000200c2, kAuthenticationWriter = 0x000201c3,
                         kKeysWriter = 0xff0202c3;
 /// Key hash and status info (disposed, unregistered) of a sample.
 constexpr std::uint16_t kKeyHash = 0x0070, kStatusInfo = 0x0071;
+/// Longest announcement: those of abbe have less than 1 kB, the keys of DDS Security some more. A
+/// stranger may announce thousands, with user data that is kept.
+constexpr std::size_t kLongestAnnouncement = 8192;
+/// Parameter of a participant: how long it counts as alive without a message. Three times the
+/// longest interval of announcements that is usual (30 s): a participant that announced an endless
+/// lease, and left, would stay in memory.
+constexpr std::uint16_t kParticipantLease = 0x0002;
+constexpr std::uint32_t kLongestLease_s = 100;
 /// Parameters that announce a type: TypeInformation, TypeObject, TypeIdentifier.
 constexpr std::array<std::uint16_t, 3> kTypeParameters{0x0075, 0x0072, 0x0069};
 constexpr std::uint16_t kSentinel = 0x0001;
@@ -45,33 +52,7 @@ constexpr std::uint16_t kSentinel = 0x0001;
 /// understand", so a receiver skips a parameter with it.
 constexpr std::uint16_t kUnusedParameterId = 0xbfff;
 
-class Reader {
- public:
-  Reader(Bytes bytes, bool little_endian) : bytes_(bytes), little_endian_(little_endian) {}
-  [[nodiscard]] std::uint16_t u16(std::size_t at) const {
-    const unsigned a = bytes_[at], b = bytes_[at + 1];
-    return static_cast<std::uint16_t>(little_endian_ ? a | b << 8 : a << 8 | b);
-  }
-  [[nodiscard]] std::uint32_t u32(std::size_t at) const {
-    const std::uint32_t a = u16(at), b = u16(at + 2);
-    return little_endian_ ? a | b << 16 : a << 16 | b;
-  }
-  /// High word first, in either byte order.
-  [[nodiscard]] std::uint64_t sequence_number(std::size_t at) const {
-    return std::uint64_t{u32(at)} << 32 | u32(at + 4);
-  }
-  void put_u16(std::size_t at, std::uint16_t value) {
-    const auto low = static_cast<std::uint8_t>(value & 0xff),
-               high = static_cast<std::uint8_t>(value >> 8);
-    bytes_[at] = little_endian_ ? low : high;
-    bytes_[at + 1] = little_endian_ ? high : low;
-  }
-  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
-
- private:
-  Bytes bytes_;
-  bool little_endian_;
-};
+using Reader = FieldReader<std::uint8_t>;
 
 /// An entity id is four bytes in big-endian order, whatever the byte order of the submessage.
 std::uint32_t entity_id(Bytes bytes, std::size_t at) {
@@ -109,9 +90,26 @@ struct Submessage {
   Bytes body;
   /// Signed by DDS Security: a change would make the receiver drop it. Its sender is trusted.
   bool is_signed = false;
+  std::span<const std::uint8_t, kPrefixBytes> source;  ///< GUID prefix of the sender
+  const SequenceWindow* window = nullptr;              ///< nullptr: numbers are not limited
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
   [[nodiscard]] Reader reader() const { return {body, has(kLittleEndian)}; }
 };
+
+/// The number that a reader waits for from the writer whose entity id is at `at`; nullopt: unknown.
+std::optional<std::uint64_t> next_of(const Submessage& submessage, std::size_t at) {
+  SequenceWindow::WriterGuid writer{};
+  std::ranges::copy(submessage.source, writer.begin());
+  std::copy_n(submessage.body.begin() + static_cast<std::ptrdiff_t>(at), 4,
+              writer.begin() + kPrefixBytes);
+  return submessage.window->next_of(writer);
+}
+
+/// Whether a reliable reader may keep `number` of the writer whose entity id is at `at`.
+bool is_near(const Submessage& submessage, std::size_t at, std::uint64_t number) {
+  if (submessage.window == nullptr) return true;
+  return number < next_of(submessage, at).value_or(1) + SequenceWindow::kAhead;
+}
 
 bool announces_endpoint(std::uint32_t writer) {
   return writer == kPublicationsWriter || writer == kSubscriptionsWriter;
@@ -172,6 +170,29 @@ bool blank_types(const Submessage& data) {
   return end.has_value();
 }
 
+/// Shortens leases. False if the announcement does not conform to the standard: the message must be
+/// dropped.
+bool limit_lease(const Submessage& data) {
+  constexpr std::size_t kToValue = 4, kLeaseBytes = 8;  // seconds, fraction
+  const Bytes body = data.body;
+  const auto layout = read_data(data, false);
+  if (!layout) return false;
+  const std::size_t at = layout->payload;
+  if (!data.has(kWithData | kWithKey)) return true;
+  if (at + 4 > body.size()) return false;
+  Reader list(body, (body[at + 1] & 1) != 0);
+
+  const auto end = walk_parameters(list, at + 4, [&list](std::uint16_t id, std::size_t offset) {
+    if (id != kParticipantLease || list.u16(offset + 2) < kLeaseBytes) return;
+    // Unsigned: negative numbers, which stand for an endless lease, are large.
+    if (list.u32(offset + kToValue) < kLongestLease_s) return;
+    list.put_u32(offset + kToValue, kLongestLease_s);
+    list.put_u32(offset + kToValue + 4, 0);
+  });
+
+  return end.has_value();
+}
+
 /// Replaces a DATA submessage by a GAP of its sequence number: a reliable reader counts the sample
 /// as received, and its history does not change. Too short for a GAP: the submessage is skipped.
 void replace_by_gap(const Submessage& data) {
@@ -212,16 +233,30 @@ bool check_data(const Submessage& data) {
   constexpr std::size_t kShortestLivelinessPayload = 20;  // encapsulation, GUID prefix, kind
   if (data.body.size() < kShortest || !is_countable(data, kNumberAt)) return false;
   const std::uint32_t writer = entity_id(data.body, kWriterAt);
+  const bool announces = writer == kParticipantsWriter || announces_endpoint(writer);
+  if (announces && data.body.size() > kLongestAnnouncement) {
+    data.kind = kSkipped;
+    return true;
+  }
+  if (writer == kParticipantsWriter) return limit_lease(data);
+  const bool users = is_users(writer);
+  if (data.window != nullptr && (!users || next_of(data, kWriterAt)) &&
+      !is_near(data, kWriterAt, data.reader().sequence_number(kNumberAt))) {
+    data.kind = kSkipped;
+    return true;
+  }
   if (announces_endpoint(writer)) return blank_types(data);
 
-  const bool users = is_users(writer);
   const auto layout = read_data(data, users && !data.is_signed);
   if (!layout) return false;
   const std::size_t payload = data.body.size() - std::min(layout->payload, data.body.size());
   const bool sample = data.has(kWithData) && !data.has(kWithKey) && !layout->not_alive &&
                       payload >= 4 && is_plain_cdr(data.body.subspan(layout->payload));
   if (users && !sample && !data.is_signed) {
-    replace_by_gap(data);
+    if (is_near(data, kWriterAt, data.reader().sequence_number(kNumberAt)))
+      replace_by_gap(data);
+    else
+      data.kind = kSkipped;
   } else if (data.has(kWithData | kWithKey)) {
     const bool short_liveliness =
         writer == kLivelinessWriter && payload < kShortestLivelinessPayload;
@@ -256,15 +291,33 @@ void check_fragment(const Submessage& fragment) {
 }
 
 /// Fast DDS marks each number of a gap: a long one would stop it for ever, and need all memory. A
-/// history of abbe covers fewer numbers than kLongestGap.
+/// history of abbe covers fewer numbers than kLongestGap. It keeps the numbers that lie ahead of
+/// the one that the reader waits for.
 bool is_short_gap(const Submessage& gap) {
-  constexpr std::size_t kStartAt = 8, kBaseAt = 16, kShortest = 28;
-  constexpr std::uint64_t kLongestGap = 1024;
+  constexpr std::size_t kWriterAt = 4, kStartAt = 8, kBaseAt = 16, kBitsAt = 24, kShortest = 28;
+  constexpr std::uint64_t kLongestGap = 1024, kMostBits = 256;
   if (gap.body.size() < kShortest) return false;
   const Reader reader = gap.reader();
   const std::uint64_t start = reader.sequence_number(kStartAt),
-                      base = reader.sequence_number(kBaseAt);
-  return start < base && base - start <= kLongestGap && is_countable(gap, kBaseAt);
+                      base = reader.sequence_number(kBaseAt),
+                      bits = std::min<std::uint64_t>(reader.u32(kBitsAt), kMostBits);
+  return start < base && base - start <= kLongestGap && is_countable(gap, kBaseAt) &&
+         is_near(gap, kWriterAt, base + bits - 1);
+}
+
+/// Fast DDS counts one by one to the first number of a heartbeat. A far one is brought nearer: the
+/// writer repeats its heartbeat, and the reader comes nearer each time.
+void limit_heartbeat(const Submessage& heartbeat) {
+  constexpr std::size_t kWriterAt = 4, kFirstAt = 8, kLastAt = 16;
+  if (!is_countable(heartbeat, kFirstAt) || !is_countable(heartbeat, kLastAt)) {
+    heartbeat.kind = kSkipped;
+    return;
+  }
+  if (heartbeat.window == nullptr || heartbeat.is_signed) return;
+  const std::uint64_t farthest =
+      next_of(heartbeat, kWriterAt).value_or(1) + SequenceWindow::kLongestSkip;
+  Reader reader = heartbeat.reader();
+  if (reader.sequence_number(kFirstAt) > farthest) reader.put_sequence_number(kFirstAt, farthest);
 }
 
 /// Changes one submessage so that Fast DDS can read it. False: the message must be dropped.
@@ -275,8 +328,8 @@ bool check(const Submessage& submessage) {
     case kDataFrag:
       check_fragment(submessage);
       return true;
-    case kHeartbeat:  // first and last number
-      if (!is_countable(submessage, 8) || !is_countable(submessage, 16)) submessage.kind = kSkipped;
+    case kHeartbeat:
+      limit_heartbeat(submessage);
       return true;
     case kAckNack:  // base of the list
       if (!is_countable(submessage, 8)) submessage.kind = kSkipped;
@@ -303,10 +356,12 @@ bool check(const Submessage& submessage) {
 /// Passes the bytes of the low-level transport through the filter to Fast DDS.
 class MessageFilter final : public rtps::ChainingTransport {
  public:
-  MessageFilter(const rtps::ChainingTransportDescriptor& descriptor, bool secured)
+  MessageFilter(const rtps::ChainingTransportDescriptor& descriptor, bool secured,
+                std::shared_ptr<SequenceWindow> window)
       : ChainingTransport(descriptor),
         descriptor_(descriptor.low_level_descriptor),
-        secured_(secured) {}
+        secured_(secured),
+        window_(std::move(window)) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override { return descriptor_.get(); }
 
@@ -315,6 +370,7 @@ class MessageFilter final : public rtps::ChainingTransport {
             eprosima::fastrtps::rtps::LocatorsIterator* begin,
             eprosima::fastrtps::rtps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
+    if (window_ != nullptr) window_->sent({bytes, size});
     return sender->send(bytes, size, begin, end, timeout);
   }
 
@@ -326,7 +382,8 @@ class MessageFilter final : public rtps::ChainingTransport {
     thread_local std::vector<std::uint8_t> buffer(2 * kLongestMessage);
     if (size > kLongestMessage) return;
     std::copy_n(bytes, size, buffer.begin());
-    const std::size_t passed = filter_message(std::span(buffer).first(size), secured_);
+    const std::size_t passed =
+        filter_message(std::span(buffer).first(size), secured_, window_.get());
     if (passed > 0)
       next->OnDataReceived(buffer.data(), static_cast<std::uint32_t>(passed), local, remote);
   }
@@ -334,24 +391,33 @@ class MessageFilter final : public rtps::ChainingTransport {
  private:
   std::shared_ptr<rtps::TransportDescriptorInterface> descriptor_;
   bool secured_;
+  std::shared_ptr<SequenceWindow> window_;
 };
 
 struct FilterDescriptor final : rtps::ChainingTransportDescriptor {
-  FilterDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool is_secured)
-      : ChainingTransportDescriptor(std::move(low_level)), secured(is_secured) {}
+  FilterDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool is_secured,
+                   std::shared_ptr<SequenceWindow> numbers)
+      : ChainingTransportDescriptor(std::move(low_level)),
+        secured(is_secured),
+        window(std::move(numbers)) {}
   [[nodiscard]] rtps::TransportInterface* create_transport() const override {
-    return new MessageFilter(*this, secured);
+    return new MessageFilter(*this, secured, window);
   }
   bool secured;
+  std::shared_ptr<SequenceWindow> window;
 };
 
 }  // namespace
 
-std::size_t filter_message(std::span<std::uint8_t> message, bool secured) noexcept {
+std::size_t filter_message(std::span<std::uint8_t> message, bool secured,
+                           const SequenceWindow* window) noexcept {
   if (message.size() < kHeaderBytes) return 0;
   // A signature covers the one submessage behind its prefix, or all between the prefix and the
   // postfix of a message. What follows has none.
   bool in_signed_message = false, next_is_signed = false;
+  std::array<std::uint8_t, kPrefixBytes> source{};
+  std::copy_n(message.begin() + kPrefixAt, kPrefixBytes, source.begin());
+
   for (std::size_t at = kHeaderBytes; at + kSubmessageHeaderBytes <= message.size();) {
     std::uint8_t &kind = message[at], &flags = message[at + 1];
     std::size_t length = Reader(message, (flags & kLittleEndian) != 0).u16(at + 2);
@@ -365,19 +431,23 @@ std::size_t filter_message(std::span<std::uint8_t> message, bool secured) noexce
     if (!last && length % 4 != 0) return 0;
 
     if (kind == kStatistics) return last ? at - kSubmessageHeaderBytes : 0;
+    const Bytes body = message.subspan(at, length);
+    if (kind == kInfoSource && length >= kInfoSourceBytes)
+      std::copy_n(body.begin() + kInfoSourcePrefixAt, kPrefixBytes, source.begin());
     const bool is_signed = in_signed_message || next_is_signed;
     next_is_signed = secured && kind == kSecurePrefix;
     if (kind == kSecureMessagePrefix) in_signed_message = secured;
     if (kind == kSecureMessagePostfix) in_signed_message = false;
-    if (!check({kind, flags, message.subspan(at, length), is_signed})) return 0;
+    if (!check({kind, flags, body, is_signed, source, window})) return 0;
     at += length;
   }
   return message.size();
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_message_filter(
-    std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool secured) {
-  return std::make_shared<FilterDescriptor>(std::move(low_level), secured);
+    std::shared_ptr<rtps::TransportDescriptorInterface> low_level, bool secured,
+    std::shared_ptr<SequenceWindow> window) {
+  return std::make_shared<FilterDescriptor>(std::move(low_level), secured, std::move(window));
 }
 
 }  // namespace abbe::dds

@@ -29,6 +29,20 @@ const auto kSuccess = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
 /// beyond the first hundred of a computer receive nothing, and no error is reported.
 constexpr std::uint32_t kMostParticipantsOfAHost = 400;
 
+/// Most participants of the domain, and endpoints of all of them, that are kept: without a limit a
+/// stranger that announces ever new ones takes all memory.
+constexpr std::size_t kMostParticipants = 512, kMostEndpointsEach = 16;
+
+void limit_memory(fast::DomainParticipantQos& qos) {
+  auto& allocation = qos.allocation();
+  const auto limit = [](auto& collection, std::size_t most) {
+    collection.maximum = std::min(collection.maximum, most);
+  };
+  limit(allocation.participants, kMostParticipants);
+  for (auto* endpoints : {&allocation.readers, &allocation.writers})
+    limit(*endpoints, kMostEndpointsEach);
+}
+
 /// Directs the log of Fast DDS to stderr. By default its errors go to stdout, which is reserved for
 /// the output of the program.
 void log_to_stderr() {
@@ -118,9 +132,13 @@ Result<Participant> Participant::create(const ParticipantOptions& options) {
   auto& tries = qos->wire_protocol().builtin.mutation_tries;
   tries = std::max(tries, kMostParticipantsOfAHost);
 
+  limit_memory(*qos);
+
   auto allowed = white_list(*qos);
+  const bool secured = has_security(*qos);
+  const auto window = secured ? nullptr : std::make_shared<SequenceWindow>();
   for (auto& transport : qos->transport().user_transports)
-    transport = with_message_filter(transport, has_security(*qos));
+    transport = with_message_filter(transport, secured, window);
   auto* participant =
       fast::DomainParticipantFactory::get_instance()->create_participant(options.domain, *qos);
 

@@ -14,6 +14,8 @@
 namespace abbe::dds {
 namespace {
 
+using eprosima::fastrtps::rtps::InstanceHandle_t;
+
 constexpr std::size_t kPayloadHeaderBytes = 4;
 
 std::size_t largest_body_bytes(daemon::Topic topic) {
@@ -50,6 +52,30 @@ void append_big_endian(std::string& key, std::string_view text) {
   key.append(text).push_back('\0');
 }
 
+InstanceHandle_t md5_of(const std::string& bytes) {
+  InstanceHandle_t handle;
+  MD5 md5;
+  md5.init();
+  md5.update(bytes.data(), static_cast<MD5::size_type>(bytes.size()));
+  md5.finalize();
+  std::copy(std::begin(md5.digest), std::end(md5.digest), &handle.value[0]);
+  return handle;
+}
+
+/// Numbers of one machine, up to kReceivedInstances, give different instances. The first octet
+/// makes the handle valid: zeros alone mean "none".
+InstanceHandle_t received_instance(std::string_view machine, std::uint32_t number,
+                                   std::string_view text) {
+  const auto hash = md5_of(std::string(machine) + '\0' + std::string(text));
+  const std::uint32_t index =
+      ((std::uint32_t{hash.value[0]} << 8 | hash.value[1]) + number) % kReceivedInstances;
+  InstanceHandle_t handle;
+  handle.value[0] = 1;
+  handle.value[14] = static_cast<std::uint8_t>(index >> 8);
+  handle.value[15] = static_cast<std::uint8_t>(index & 0xff);
+  return handle;
+}
+
 }  // namespace
 
 PayloadType::PayloadType(daemon::Topic topic) : topic_(topic) {
@@ -70,7 +96,9 @@ bool PayloadType::serialize(void* data, eprosima::fastrtps::rtps::SerializedPayl
 
 bool PayloadType::deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) {
   const auto* begin = reinterpret_cast<const std::byte*>(payload->data);
-  static_cast<Payload*>(data)->bytes.assign(begin, begin + payload->length);
+  auto& received = *static_cast<Payload*>(data);
+  received.bytes.assign(begin, begin + payload->length);
+  received.received = true;
   return true;
 }
 
@@ -78,21 +106,22 @@ std::function<uint32_t()> PayloadType::getSerializedSizeProvider(void* data) {
   return [data] { return static_cast<uint32_t>(static_cast<const Payload*>(data)->bytes.size()); };
 }
 
-bool PayloadType::getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
-                         bool /*force_md5*/) {
-  const auto key = daemon::payload_key(topic_, static_cast<const Payload*>(data)->bytes);
+bool PayloadType::getKey(void* data, InstanceHandle_t* handle, bool /*force_md5*/) {
+  const auto& payload = *static_cast<const Payload*>(data);
+  const auto key = daemon::payload_key(topic_, payload.bytes);
   // Fast DDS 2.9 aborts in a reader that gets a sample without key hash whose key cannot be read.
   // All malformed payloads are one instance; whoever decodes them refuses them.
+  if (payload.received) {
+    *handle = key ? received_instance(key->machine, key->number.value_or(0), key->text.value_or(""))
+                  : received_instance("", 0, "");
+    return true;
+  }
+
   std::string big_endian;
   if (key) append_big_endian(big_endian, key->machine);
   if (key && key->number) append_big_endian(big_endian, *key->number);
   if (key && key->text) append_big_endian(big_endian, *key->text);
-
-  MD5 md5;
-  md5.init();
-  md5.update(big_endian.data(), static_cast<MD5::size_type>(big_endian.size()));
-  md5.finalize();
-  std::copy(std::begin(md5.digest), std::end(md5.digest), &handle->value[0]);
+  *handle = md5_of(big_endian);
   return true;
 }
 

@@ -1,5 +1,7 @@
 #include "abbe/dds/qos.hpp"
 
+#include "abbe/dds/payload_type.hpp"
+
 namespace abbe::dds {
 namespace {
 
@@ -16,9 +18,9 @@ const Duration_t kHeartbeatPeriod(0, 100'000'000);
 /// Most instances of a topic. Fast DDS's default is 10, but a grid may have more slices and a
 /// machine more streams.
 constexpr int kMostInstances = 128;
-/// A reader also gets the instances of strangers. Where its table is full, Fast DDS 2.9 removes an
-/// instance of a writer that has left, and aborts if a sample of it was not delivered yet.
-constexpr int kMostInstancesOfReader = 1024;
+/// Writers and readers of other participants that an endpoint is matched with. A stranger that
+/// announces ever more of them would take all memory.
+constexpr std::size_t kMostMatches = 512;
 constexpr int kInstancesAtStart = 4;
 
 bool is_durable(daemon::Topic topic) {
@@ -56,14 +58,20 @@ DataWriterQos writer_qos(daemon::Topic topic) {
   qos.representation().m_value = {XCDR_DATA_REPRESENTATION};
   qos.reliable_writer_qos().times.heartbeatPeriod = kHeartbeatPeriod;
   qos.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+  qos.writer_resource_limits().matched_subscriber_allocation.maximum = kMostMatches;
   return qos;
 }
 
 DataReaderQos reader_qos(daemon::Topic topic) {
   DataReaderQos qos;
   set_common(topic, qos);
-  qos.resource_limits().max_samples = kMostInstancesOfReader;
-  qos.resource_limits().max_instances = kMostInstancesOfReader;
+  // Never full: a received sample has one of kReceivedInstances instances, whoever sends it.
+  qos.resource_limits().max_samples = kReceivedInstances;
+  qos.resource_limits().max_instances = kReceivedInstances;
+  // Each sample takes the memory that it needs: strangers may fill all places.
+  qos.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  qos.reader_resource_limits().matched_publisher_allocation.maximum = kMostMatches;
   qos.type_consistency().representation.m_value = {XCDR_DATA_REPRESENTATION};
   return qos;
 }

@@ -69,8 +69,19 @@ class AliveWriters final : public fast::DataReaderListener {
     if (status.alive_count_change < 0) {
       alive_.erase(writer);
       Time::now(lost_at_[writer]);
+      forget_oldest_loss();
     }
     changed.set_trigger_value(true);
+  }
+
+  /// Strangers come and go without end.
+  void forget_oldest_loss() {
+    constexpr std::size_t kMostLosses = 1024;
+    if (lost_at_.size() <= kMostLosses) return;
+    const auto earlier = [](const auto& a, const auto& b) { return a.second < b.second; };
+    const auto oldest = std::ranges::min_element(lost_at_, earlier);
+    alive_.erase(oldest->first);  // if heard() added it: that sample had arrived before
+    lost_at_.erase(oldest);
   }
 
   mutable std::mutex mutex_;
@@ -148,15 +159,28 @@ void Readers::wait(std::chrono::milliseconds at_most) {
 }
 
 void Readers::take(const OnArrival& on_arrival) {
-  for (const State::Reader& r : state_->readers) {
+  // Before each sample the identities that have arrived by then: it is judged for the machine that
+  // its publisher is at that moment.
+  const auto take_next = [&](const State::Reader& r) {
     fast::SampleInfo info;
-    while (r.reader->take_next_sample(&state_->payload, &info) == kOk) {
-      if (!info.valid_data) continue;
-      const WriterId writer = writer_id(info.publication_handle);
-      if (r.topic == daemon::Topic::ModelState)
-        state_->alive.heard(writer, info.reception_timestamp);
-      on_arrival({r.topic, state_->payload.bytes, writer});
+    if (r.reader->take_next_sample(&state_->payload, &info) != kOk) return false;
+    if (!info.valid_data) return true;
+    const WriterId writer = writer_id(info.publication_handle);
+    if (r.topic == daemon::Topic::ModelState) state_->alive.heard(writer, info.reception_timestamp);
+    on_arrival({r.topic, state_->payload.bytes, writer});
+    return true;
+  };
+  const auto identity =
+      std::ranges::find(state_->readers, daemon::Topic::Identity, &State::Reader::topic);
+  const auto take_identities = [&] {
+    while (identity != state_->readers.end() && take_next(*identity)) {
     }
+  };
+
+  for (const State::Reader& r : state_->readers) {
+    do {
+      take_identities();
+    } while (take_next(r));
   }
 }
 

@@ -40,14 +40,22 @@ void ReceivedModel::slice(v1::ErrorGrid slice) {
   // Enough for the model that ModelState names, the next one, and remaining slices of old models.
   constexpr std::size_t kMostModels = 4;
   // Several times what abbe-dds sends for the largest grid: a stranger must not fill the memory.
-  constexpr std::uint32_t kMostSlices = 64;
-  if (slice.slices() == 0 || slice.slices() > kMostSlices || slice.slice() >= slice.slices()) return;
+  constexpr std::uint32_t kMostSlices = 32;
+  if (slice.slices() == 0 || slice.slices() > kMostSlices || slice.slice() >= slice.slices())
+    return;
   if (slices_.size() >= kMostModels && !slices_.contains(slice.model_id()))
     std::erase_if(slices_,
                   [this](const auto& of) { return !state_ || of.first != state_->model_id(); });
   Slices& of_model = slices_[slice.model_id()];
   std::erase_if(of_model, [&](const auto& s) { return s.second.slices() != slice.slices(); });
   of_model[slice.slice()] = std::move(slice);
+}
+
+std::size_t ReceivedModel::kept_nodes() const {
+  std::size_t nodes = 0;
+  for (const auto& [model, slices] : slices_)
+    for (const auto& [number, slice] : slices) nodes += slice.nodes().size();
+  return nodes;
 }
 
 std::optional<std::vector<v1::GridNode>> ReceivedModel::grid() const {

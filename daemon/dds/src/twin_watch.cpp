@@ -12,8 +12,10 @@
 namespace abbe::dds {
 namespace {
 
-/// Other publishers that are remembered; a stranger may make up more.
+/// Other publishers of this name or identity that are remembered; a stranger may make up more.
 constexpr std::size_t kMostClaims = 64;
+/// A publisher repeats its Identity every second.
+constexpr std::chrono::milliseconds kRepeated{1500};
 
 /// For people: without what would change a terminal or a log.
 std::string printable(std::string text) {
@@ -34,30 +36,67 @@ TwinWatch::TwinWatch(Participant& participant) {
 std::string TwinWatch::cycle(std::span<const std::byte> own, Instant now) {
   if (!readers_ || now < next_) return seen_;
   next_ = now + kPeriod;
-  readers_->take([&](const Arrival& arrival) { take(arrival, now); });
-  std::erase_if(claims_, [now](const auto& c) { return now - c.second.last > kGone; });
-
-  seen_.clear();
   const auto identity = daemon::decode<v1::Identity>(own);
-  if (!identity) return seen_;
-  for (const auto& [id, claim] : claims_) {
-    const bool same_name = claim.machine == identity->machine();
-    const bool same_id = !claim.machine_id.empty() && claim.machine_id == identity->machine_id();
-    if (!same_name && !same_id) continue;
-    seen_ = same_id ? fmt::format("the same machine_id, as machine {},", printable(claim.machine))
-                    : fmt::format("the same name, machine_id {},", printable(claim.machine_id));
-    seen_ += " from DDS participant " + text_of(id);
-    break;
-  }
+  readers_->take([&](const Arrival& arrival) {
+    if (identity) take(arrival, *identity, now);
+  });
+  std::erase_if(claims_, [now](const auto& c) { return now - c.second.last > kGone; });
+  seen_ = identity ? in_words(*identity) : std::string{};
   return seen_;
 }
 
-void TwinWatch::take(const Arrival& arrival, Instant now) {
+void TwinWatch::take(const Arrival& arrival, const v1::Identity& own, Instant now) {
   const auto from = participant_of(arrival.writer);
   const auto identity = daemon::decode<v1::Identity>(arrival.payload);
   if (!identity || from == self_) return;
-  if (claims_.size() >= kMostClaims && !claims_.contains(from)) return;
-  claims_[from] = {identity->machine(), identity->machine_id(), now};
+  const Claim claim{.machine = identity->machine(),
+                    .machine_id = identity->machine_id(),
+                    .first = now,
+                    .last = now};
+  if (!is_twin(claim, own)) return;
+  if (const auto known = claims_.find(from); known != claims_.end()) {
+    const auto first = known->second.first;
+    known->second = claim;
+    known->second.first = first;
+    return;
+  }
+  if (claims_.size() >= kMostClaims) {
+    // A publisher that repeats its Identity keeps its place.
+    const auto quietest =
+        std::ranges::min_element(claims_, {}, [](const auto& c) { return c.second.last; });
+    if (now - quietest->second.last < kRepeated) return;
+    claims_.erase(quietest);
+  }
+  claims_.emplace(from, claim);
+}
+
+bool TwinWatch::is_twin(const Claim& claim, const v1::Identity& own) {
+  return claim.machine == own.machine() || has_id_of(claim, own);
+}
+
+bool TwinWatch::has_id_of(const Claim& claim, const v1::Identity& own) {
+  return !claim.machine_id.empty() && claim.machine_id == own.machine_id();
+}
+
+/// A copied identity before a copied name, then the one that was seen first: a stranger that comes
+/// later does not hide it.
+std::string TwinWatch::in_words(const v1::Identity& own) const {
+  const std::pair<const ParticipantId, Claim>* shown = nullptr;
+  std::size_t twins = 0;
+  const auto rank = [&own](const Claim& c) { return std::pair(!has_id_of(c, own), c.first); };
+  for (const auto& claim : claims_) {
+    if (!is_twin(claim.second, own)) continue;
+    ++twins;
+    if (shown == nullptr || rank(claim.second) < rank(shown->second)) shown = &claim;
+  }
+  if (shown == nullptr) return {};
+  const auto& [id, claim] = *shown;
+  auto text = has_id_of(claim, own)
+                  ? fmt::format("{}, as machine {},", kTwinOfSameId, printable(claim.machine))
+                  : fmt::format("the same name, machine_id {},", printable(claim.machine_id));
+  text += " from DDS participant " + text_of(id);
+  if (twins > 1) text += fmt::format(" and {} more", twins - 1);
+  return text;
 }
 
 }  // namespace abbe::dds

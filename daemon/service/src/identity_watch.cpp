@@ -58,12 +58,12 @@ void IdentityWatch::follow(WallTime now) {
     if (reading_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return;
     try {
       auto read = reading_.get();
-      // The identity that is published stays while the disk does not answer.
-      if (read.machine_id.empty() && read.doubt.empty()) {
-        read.machine_id = known_.machine_id;
-        read.others = known_.others;
-      }
-      known_ = std::move(read);
+      // What is known stays while the disk does not answer: the identity that is published, and why
+      // no model, or not that of the other machine, may be ACTIVE.
+      if (read.machine_id.empty() && read.doubt.empty())
+        known_.fault = std::move(read.fault);
+      else
+        known_ = std::move(read);
     } catch (const std::exception& error) {
       known_.fault = error.what();
     }

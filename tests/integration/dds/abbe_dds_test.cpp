@@ -22,7 +22,7 @@ namespace {
 struct AbbeDds : ShopFloor {
   int exit_code(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), ABBE_DDS_PROGRAM);
-    return Process(std::move(arguments)).wait_for_end();
+    return Process(std::move(arguments)).wait_for_end(std::chrono::seconds{60});
   }
   /// An abbed.toml whose sockets are in the folder of the test.
   void write_config(const std::string& supervise) {

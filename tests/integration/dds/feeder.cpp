@@ -5,7 +5,7 @@
 // reports one. The first component of its vectors is the time at
 // which they were made: CLOCK_MONOTONIC modulo 1000 s, in units of 1e-6. With ABBE_FEEDER_STALE in
 // its environment the state is STALE until SIGUSR1. ABBE_FEEDER_MACHINE_ID: its identity instead of
-// that of the sample messages.
+// that of the sample messages; "none": no Identity is published, as by an earlier version.
 #include <signal.h>
 
 #include <cstdio>
@@ -54,7 +54,7 @@ class Feeder {
       auto which = identity(++sequence_);
       which.twin(!link_.twin().empty());
       which.twin_seen(link_.twin());
-      send(Topic::Identity, which);
+      if (which.machine_id() != "none") send(Topic::Identity, which);
       send(Topic::ModelState, state(++sequence_));
       next_state_ = now + std::chrono::seconds{1};
     }

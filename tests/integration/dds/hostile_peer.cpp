@@ -3,6 +3,8 @@
 //   dds_hostile_peer DOMAIN SEED            everything
 //   dds_hostile_peer DOMAIN SEED dispose    only samples that dispose or unregister an instance,
 //                                           with and without key
+//   dds_hostile_peer DOMAIN SEED claims     80 participants, each with the Identity of a machine of
+//                                           its own, every second
 // It announces writers and readers of all topics of abbe under changing GUIDs, and sends DATA,
 // DATA_FRAG, HEARTBEAT, GAP, ACKNACK and all other submessages of the standard with random content
 // to the participants 0 to 15 of the domain on this computer. It uses no GUID of another
@@ -70,6 +72,31 @@ class HostilePeer {
     withdraw();
   }
 
+  void claim_identities() {
+    constexpr std::uint8_t kClaims = 80;
+    constexpr auto kTopic = static_cast<std::size_t>(daemon::Topic::Identity);
+    const auto& traits = daemon::traits(daemon::Topic::Identity);
+    ++claimed_;
+    for (std::uint8_t i = 1; i <= kClaims; ++i) {
+      prefix_.fill(i);
+      RtpsMessage participant(prefix_), writer(prefix_), sample(prefix_);
+      participant.participant(claimed_, port_);
+      to_every_port(participant.bytes(), 0);
+      writer.endpoint(true, 1, entity(kTopic, true), std::string(traits.name),
+                      std::string(traits.type_name), true, false);
+      writer.heartbeat(test::kPublicationsWriter, 1, 1, ++count_);
+      to_every_port(writer.bytes(), 0);
+      auto identity = test::identity(static_cast<std::uint64_t>(claimed_));
+      identity.machine("claimed-" + std::to_string(i));
+      identity.machine_id("claimed-" + std::to_string(i));
+      sample.data(entity(kTopic, true), claimed_).append(bytes_of(identity)).end();
+      sample.heartbeat(entity(kTopic, true), claimed_, claimed_, ++count_);
+      to_every_port(sample.bytes(), 1);
+    }
+    std::printf("claimed %lld\n", static_cast<long long>(claimed_));
+    std::this_thread::sleep_for(std::chrono::milliseconds{500});
+  }
+
  private:
   // ---- random numbers ----
   std::uint32_t any() { return static_cast<std::uint32_t>(random_()); }
@@ -131,6 +158,10 @@ class HostilePeer {
   template <class T>
   Bytes encoded(T value) {
     value.machine(machine());
+    return bytes_of(value);
+  }
+  template <class T>
+  static Bytes bytes_of(const T& value) {
     std::vector<std::byte> payload;
     if (!daemon::encode(value, payload)) return {};
     const auto* begin = reinterpret_cast<const std::uint8_t*>(payload.data());
@@ -430,6 +461,7 @@ class HostilePeer {
   std::int64_t spdp_number_ = 0, sedp_number_ = 0;
   std::array<std::int64_t, daemon::kTopicCount> numbers_{};
   std::uint32_t count_ = 0;
+  std::int64_t claimed_ = 0;
   std::set<Prefix> prefixes_;
   std::uint64_t sent_ = 0;
 };
@@ -442,5 +474,11 @@ int main(int argc, char** argv) {
   std::printf("seed %s\nstarted\n", argv[2]);
   HostilePeer peer(std::atoi(argv[1]), static_cast<unsigned>(std::atol(argv[2])),
                    argc > 3 && std::string(argv[3]) == "dispose");
-  for (;;) peer.live_once();
+  const bool claims = argc > 3 && std::string(argv[3]) == "claims";
+  for (;;) {
+    if (claims)
+      peer.claim_identities();
+    else
+      peer.live_once();
+  }
 }

@@ -263,6 +263,134 @@ TEST(MessageFilterOfSamples, SkipsAGapThatIsLongerThanAnyHistory) {
   }
 }
 
+/// What a participant sends to the writer of gap_message(): "I wait for number `next`".
+Bytes acknack(std::uint64_t next) {
+  Bytes message{'R', 'T', 'P', 'S', 2, 3, 1, 15};
+  message.resize(20);
+  message.insert(message.end(), {0x0e, 1, 12, 0});
+  message.resize(message.size() + 12);
+  message.insert(message.end(), {0x06, 1, 24, 0, 0, 0, 1, 7, 0, 0, 1, 2});
+  for (const auto number : {next >> 32, next & 0xffff'ffff, std::uint64_t{0}, std::uint64_t{1}})
+    for (int i = 0; i < 4; ++i) message.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
+  return message;
+}
+
+std::uint64_t first_of(const Bytes& heartbeat) {
+  std::uint64_t first = 0;
+  for (const std::size_t at : {3, 2, 1, 0, 7, 6, 5, 4})
+    first = first << 8 | heartbeat[kBodyAt + 8 + at];
+  return first;
+}
+Bytes heartbeat_message(std::uint32_t first) {
+  Bytes message = gap_message(first, first + 5);
+  message[kKindAt] = 0x07;
+  return message;
+}
+
+/// Fast DDS keeps each number of a gap, and each sample number, until the ones before have come.
+TEST(MessageFilterOfNumbers, SkipsAGapAheadOfWhatTheReaderWaitsFor) {
+  SequenceWindow window;
+  const auto passes = [&window](std::uint32_t start) {
+    Bytes message = gap_message(start, start + 1);
+    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    return message[kKindAt] == 0x08;
+  };
+  EXPECT_TRUE(passes(1024));
+  EXPECT_FALSE(passes(1025)) << "it has not asked yet: it waits for number 1";
+  window.sent(acknack(1'000'000));
+  EXPECT_TRUE(passes(1'001'023));
+  EXPECT_FALSE(passes(1'001'024));
+}
+
+TEST(MessageFilterOfNumbers, SkipsASampleAheadOfWhatAReliableReaderWaitsFor) {
+  SequenceWindow window;
+  Bytes sample = users_data(5, {0, 1, 0, 0, 1, 2, 3, 4});
+  sample[kBodyAt + 18] = 1;  // number 65537
+  const auto kind = [&] {
+    Bytes message = sample;
+    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    return message[kKindAt];
+  };
+  EXPECT_EQ(kind(), 0x15) << "never asked: of a best-effort writer";
+  window.sent(acknack(7));
+  EXPECT_EQ(kind(), 0x7f);
+  window.sent(acknack(65000));
+  EXPECT_EQ(kind(), 0x15);
+}
+
+/// Fast DDS counts to the first number one by one: a far one would stop it for hours.
+TEST(MessageFilterOfNumbers, AHeartbeatSkipsNoMoreThanAFewMillionNumbers) {
+  SequenceWindow window;
+  window.sent(acknack(100));
+  for (const auto& [first, expected] :
+       {std::pair{200u, 200u}, {4'000'000'000u, 100u + (1u << 22)}}) {
+    Bytes message = heartbeat_message(first);
+    EXPECT_EQ(filter_message(message, false, &window), message.size());
+    EXPECT_EQ(first_of(message), expected);
+  }
+  window.sent(acknack(3'999'000'000));
+  Bytes next = heartbeat_message(4'000'000'000);
+  EXPECT_EQ(filter_message(next, false, &window), next.size());
+  EXPECT_EQ(first_of(next), 4'000'000'000);
+}
+
+TEST(MessageFilterOfNumbers, AWriterBehindAnotherSourceIsAnother) {
+  SequenceWindow window;
+  window.sent(acknack(1'000'000));
+  Bytes message = gap_message(1'000'000, 1'000'001);
+  Bytes source{0x0c, 1, 20, 0, 0, 0, 0, 0, 2, 3, 1, 15};
+  source.resize(24, 9);
+  message.insert(message.begin() + kKindAt, source.begin(), source.end());
+  EXPECT_EQ(filter_message(message, false, &window), message.size());
+  EXPECT_EQ(message[kKindAt + source.size()], 0x7f);
+}
+
+TEST(SequenceWindow, ForgetsTheWriterThatWasAskedFirst) {
+  SequenceWindow window;
+  const auto writer = [](std::size_t i) {
+    SequenceWindow::WriterGuid guid{};
+    guid[0] = static_cast<std::uint8_t>(i >> 8), guid[1] = static_cast<std::uint8_t>(i);
+    guid[14] = 1, guid[15] = 2;
+    return guid;
+  };
+  for (std::size_t i = 0; i <= SequenceWindow::kMostWriters; ++i) {
+    Bytes message = acknack(i + 1);
+    std::copy_n(writer(i).begin(), 12, message.begin() + 24);
+    window.sent(message);
+  }
+  EXPECT_FALSE(window.next_of(writer(0)));
+  EXPECT_EQ(window.next_of(writer(1)), 2);
+  Bytes cut = acknack(1);
+  for (; !cut.empty(); cut.pop_back()) window.sent(cut);
+}
+
+/// A participant that announces an endless lease and leaves would stay in memory.
+TEST(MessageFilterInput, ShortensTheLeaseOfAParticipant) {
+  for (const auto& [seconds, expected] : {std::pair{40u, 40u},
+                                          {100u, 100u},
+                                          {101u, 100u},
+                                          {0x7fffffffu, 100u},
+                                          {0xffffffffu, 100u}}) {
+    Bytes list{0, 3, 0, 0, 2, 0, 8, 0};
+    for (int i = 0; i < 4; ++i) list.push_back(static_cast<std::uint8_t>(seconds >> (8 * i)));
+    list.insert(list.end(), {9, 9, 9, 9, 1, 0, 0, 0});
+    Bytes message = data_message(0x01, 5, 16, list);
+    message[33] = 1, message[34] = 0;  // entity 000100c2
+    EXPECT_EQ(filter_message(message), message.size());
+    EXPECT_EQ(message[kBodyAt + 28], expected) << seconds;
+    EXPECT_EQ(message[kBodyAt + 31], 0) << seconds;
+  }
+}
+
+TEST(MessageFilterInput, SkipsALongAnnouncement) {
+  Bytes list{0, 3, 0, 0, 0x2c, 0, 0x20, 0x20};
+  list.resize(list.size() + 0x2020);
+  list.insert(list.end(), {1, 0, 0, 0});
+  Bytes message = data_message(kPublications, 5, 16, list);
+  EXPECT_EQ(filter_message(message), message.size());
+  EXPECT_EQ(message[20], 0x7f);
+}
+
 /// Fast DDS asserts that it can add to a sequence number.
 TEST(MessageFilterOfSamples, SkipsSequenceNumbersNearTheLargest) {
   Bytes data = users_data(5, {0, 1, 0, 0, 1, 2, 3, 4});

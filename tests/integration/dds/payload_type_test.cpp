@@ -5,6 +5,9 @@
 #include <fastdds/rtps/common/SerializedPayload.h>
 #include <gtest/gtest.h>
 
+#include <set>
+#include <string>
+
 #include "abbe/messages/cdr.hpp"
 #include "abbe_v1PubSubTypes.h"
 #include "sample_messages.hpp"
@@ -67,6 +70,43 @@ TEST(PayloadType, BytesAreThoseOfTheGeneratedType) {
   ASSERT_TRUE(generated.serialize(&model, &serialized));
   const auto* begin = reinterpret_cast<const std::byte*>(serialized.data);
   EXPECT_EQ(payload.bytes, std::vector<std::byte>(begin, begin + serialized.length));
+}
+
+/// As a reader of Fast DDS asks for it.
+template <class T>
+InstanceHandle_t received_key(daemon::Topic topic, const T& value) {
+  PayloadType type(topic);
+  const auto payload = payload_of(value);
+  SerializedPayload_t serialized(type.m_typeSize);
+  Payload sent = payload, received;
+  InstanceHandle_t key;
+  EXPECT_TRUE(type.serialize(&sent, &serialized));
+  EXPECT_TRUE(type.deserialize(&serialized, &received));
+  EXPECT_TRUE(type.getKey(&received, &key, false));
+  EXPECT_TRUE(key.isDefined());
+  return key;
+}
+
+/// Fast DDS 2.9 aborts in a reader whose table of instances is full.
+TEST(PayloadType, AReaderHasNoMoreThanItsInstancesWhateverStrangersMakeUp) {
+  std::set<InstanceHandle_t> instances;
+  auto state = test::active_state(1);
+  for (int i = 0; i < 5000; ++i) {
+    state.machine("stranger-" + std::to_string(i));
+    instances.insert(received_key(daemon::Topic::ModelState, state));
+  }
+  EXPECT_LE(instances.size(), static_cast<std::size_t>(kReceivedInstances));
+  EXPECT_GT(instances.size(), 900u);
+}
+
+TEST(PayloadType, ReceivedSlicesOfAMachineAreDifferentInstances) {
+  std::set<InstanceHandle_t> instances;
+  auto slice = test::grid_slices()[0];
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    slice.slice(i);
+    instances.insert(received_key(daemon::Topic::ErrorGrid, slice));
+  }
+  EXPECT_EQ(instances.size(), 64u);
 }
 
 /// Fast DDS 2.9 aborts in a reader whose type finds no key.

@@ -26,7 +26,7 @@ struct PublisherPinTest : testing::Test {
   Verdict send(std::initializer_list<ParticipantId> who, std::chrono::milliseconds duration) {
     Verdict last{};
     for (const auto& id : who)
-      if (!pin.stated_by(id)) last = pin.identified(id, machine_of(id), false, now);
+      if (!pin.stated_by(id)) last = pin.identified(id, machine_of(id), Twin::None, now);
     for (const auto end = now + duration; now < end; now += 10ms)
       for (const auto& id : who) last = pin.heard(id, now);
     return last;
@@ -36,7 +36,7 @@ struct PublisherPinTest : testing::Test {
 TEST_F(PublisherPinTest, TheFirstPublisherThatStatesItsMachineIsPinned) {
   EXPECT_EQ(pin.heard(kSecond, now), Verdict::Waiting);
   EXPECT_EQ(pin.heard(kFirst, now), Verdict::Waiting);
-  EXPECT_EQ(pin.identified(kFirst, kMill, false, now), Verdict::NewlyPinned);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::None, now), Verdict::NewlyPinned);
   EXPECT_EQ(pin.heard(kFirst, now + 10ms), Verdict::Pinned);
   EXPECT_EQ(pin.pinned(), kFirst);
   EXPECT_EQ(pin.machine_id(), kMill);
@@ -77,22 +77,22 @@ TEST_F(PublisherPinTest, ASubscriberWithAMachineIdPinsThisMachineOnly) {
 }
 
 TEST_F(PublisherPinTest, OfTwinsNoneIsPinnedUnlessTheMachineIdIsGiven) {
-  EXPECT_EQ(pin.identified(kFirst, kMill, true, now), Verdict::Ambiguous);
-  EXPECT_EQ(pin.identified(kOther, kOtherMill, true, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameName, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::SameName, now), Verdict::Ambiguous);
   EXPECT_EQ(pin.pinned(), std::nullopt);
   PublisherPin given(kOtherMill);
-  EXPECT_EQ(given.identified(kFirst, kMill, true, now), Verdict::OtherMachine);
-  EXPECT_EQ(given.identified(kOther, kOtherMill, true, now), Verdict::NewlyPinned);
+  EXPECT_EQ(given.identified(kFirst, kMill, Twin::SameName, now), Verdict::OtherMachine);
+  EXPECT_EQ(given.identified(kOther, kOtherMill, Twin::SameName, now), Verdict::NewlyPinned);
 }
 
 TEST_F(PublisherPinTest, ATwinThatAppearsLaterDoesNotReleaseTheFirst) {
   send({kFirst}, 500ms);
-  EXPECT_EQ(pin.identified(kFirst, kMill, true, now), Verdict::Pinned);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameName, now), Verdict::Pinned);
 }
 
 TEST_F(PublisherPinTest, AParticipantThatStatesAnotherMachineIsNotUsedAnyMore) {
   send({kFirst}, 500ms);
-  EXPECT_EQ(pin.identified(kFirst, kOtherMill, false, now), Verdict::OtherMachine);
+  EXPECT_EQ(pin.identified(kFirst, kOtherMill, Twin::None, now), Verdict::OtherMachine);
   EXPECT_EQ(pin.heard(kFirst, now + 10s), Verdict::OtherMachine);
   EXPECT_EQ(pin.pinned(), std::nullopt);
 }
@@ -111,6 +111,80 @@ TEST_F(PublisherPinTest, AnIgnoredPublisherIsNotPinnedAfterTheEndOfTheFirst) {
   send({kFirst, kSecond}, 1s);
   EXPECT_EQ(send({kSecond}, 1h), Verdict::Foreign);
   EXPECT_EQ(pin.pinned(), kFirst);
+}
+
+/// A copied disk again: nothing shows which of the two is the machine of this subscriber.
+TEST_F(PublisherPinTest, OfTwoPublishersWithOneIdentityNoneIsChosen) {
+  pin = PublisherPin(kMill);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Copied);
+  EXPECT_EQ(pin.heard(kFirst, now + 10s), Verdict::Copied);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::None, now + 20s), Verdict::NewlyPinned);
+}
+
+TEST_F(PublisherPinTest, APublisherThatHadACopyBesideItWhenItWasChosenIsReleased) {
+  send({kFirst}, 500ms);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Copied);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+}
+
+TEST_F(PublisherPinTest, ACopyThatAppearsLaterDoesNotReleaseTheFirst) {
+  send({kFirst}, 2s);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::SameId, now), Verdict::Pinned);
+}
+
+TEST_F(PublisherPinTest, ACopyThatTheMachineHasNotSeenIsSeenHere) {
+  EXPECT_EQ(pin.identified(kFirst, "", Twin::None, now), Verdict::Unidentified);
+  EXPECT_EQ(pin.identified(kSecond, kMill, Twin::SameName, now), Verdict::Ambiguous);
+  EXPECT_EQ(pin.identified(kThird, kMill, Twin::None, now), Verdict::Copied);
+  EXPECT_EQ(pin.identified(kThird, kMill, Twin::None, now + 3s), Verdict::NewlyPinned);
+}
+
+TEST_F(PublisherPinTest, AnEmptyMachineIdIsNeverPinned) {
+  EXPECT_EQ(pin.identified(kFirst, "", Twin::None, now), Verdict::Unidentified);
+  EXPECT_EQ(pin.heard(kFirst, now + 1h), Verdict::Unidentified);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+  EXPECT_EQ(pin.identified(kSecond, kMill, Twin::None, now + 1h), Verdict::NewlyPinned);
+  EXPECT_EQ(pin.identified(kSecond, "", Twin::None, now + 1h), Verdict::Unidentified);
+  EXPECT_EQ(pin.pinned(), std::nullopt);
+}
+
+TEST_F(PublisherPinTest, AnEarlierVersionWithoutIdentityIsPinnedByItsNameAfterFiveSeconds) {
+  const auto start = now;
+  const auto hear = [&](const ParticipantId& id, std::chrono::milliseconds at) {
+    return pin.heard(id, start + at);
+  };
+  EXPECT_EQ(hear(kFirst, 0ms), Verdict::Waiting);
+  EXPECT_EQ(hear(kFirst, 4900ms), Verdict::Waiting);
+  EXPECT_EQ(hear(kFirst, 5000ms), Verdict::NewlyPinned);
+  EXPECT_EQ(hear(kFirst, 5010ms), Verdict::Pinned);
+  EXPECT_EQ(pin.machine_id(), std::nullopt);
+  EXPECT_EQ(pin.identified(kFirst, kMill, Twin::None, start + 6s), Verdict::NewlyPinned);
+  EXPECT_EQ(pin.machine_id(), kMill);
+}
+
+TEST_F(PublisherPinTest, WithoutIdentityNoneIsPinnedIfAMachineIdWasGivenOrIsStated) {
+  PublisherPin given(kMill);
+  EXPECT_EQ(given.heard(kFirst, now), Verdict::Waiting);
+  EXPECT_EQ(given.heard(kFirst, now + 60s), Verdict::Waiting);
+  pin.heard(kFirst, now);
+  EXPECT_EQ(pin.identified(kOther, kOtherMill, Twin::SameName, now + 5s), Verdict::Ambiguous);
+  EXPECT_EQ(pin.heard(kFirst, now + 6s), Verdict::Waiting);
+}
+
+TEST_F(PublisherPinTest, ASubscriberOfSlowTopicsAwaitsALongerSilence) {
+  pin = PublisherPin({}, PublisherPin::kSilenceOfSlowTopics);
+  send({kFirst}, 500ms);
+  send({kSecond}, 1400ms);
+  EXPECT_EQ(pin.pinned(), kFirst);
+  send({kSecond}, 200ms);
+  EXPECT_EQ(pin.pinned(), kSecond);
+}
+
+TEST(TwinOfIdentity, IsKnownByHowTwinSeenBegins) {
+  EXPECT_EQ(twin_of(false, ""), Twin::None);
+  EXPECT_EQ(twin_of(true, "the same name, machine_id 4711"), Twin::SameName);
+  EXPECT_EQ(twin_of(true, "the same machine_id, as machine mill"), Twin::SameId);
 }
 
 /// The subscriber was stopped: the time before its first sample is no silence of the publisher.

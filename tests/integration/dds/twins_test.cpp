@@ -43,6 +43,55 @@ TEST_F(Twins, ACopiedIdentityIsReportedUnderAnyName) {
   EXPECT_TRUE(copy->wait_for("twin the same machine_id, as machine vmc-3")) << copy->transcript();
 }
 
+/// An abbe-dds of before the topic Identity: it is used by its name unless an identity was given.
+TEST_F(Twins, APublisherOfAnEarlierVersionIsUsedByItsName) {
+  const auto earlier = twin("none");
+  Process fast(fast_subscriber()), cyclone(cyclone_subscriber());
+  Process linuxcnc({ABBE_LINUXCNC_SUBSCRIBER, domain_.text(), kMachine});
+  Process given({ABBE_LINUXCNC_SUBSCRIBER, domain_.text(), kMachine, kMachineId});
+  Process watcher(watch({"--machine", kMachine}));
+  for (Process* each : {&fast, &cyclone}) {
+    EXPECT_TRUE(each->wait_for("vmc-3: apply V")) << each->transcript();
+    EXPECT_NE(each->transcript().find("earlier version without identity"), std::string::npos);
+  }
+  EXPECT_TRUE(linuxcnc.wait_for("usable ")) << linuxcnc.transcript();
+  EXPECT_TRUE(watcher.wait_for("vmc-3  publisher")) << watcher.transcript();
+  EXPECT_FALSE(given.wait_for("usable ", {}, 1s)) << given.transcript();
+}
+
+/// A stranger that publishes ever new machines does not hide a twin.
+TEST_F(Twins, IsReportedBesideTheClaimsOfStrangers) {
+  start_feeder();
+  Process strangers({ABBE_HOSTILE_PEER, domain_.text(), "1", "claims"});
+  ASSERT_TRUE(strangers.wait_for("claimed 8"));
+  const auto other = twin(kTwinId);
+  EXPECT_TRUE(feeder_->wait_for("twin the same name, machine_id b6f4f9a0"))
+      << feeder_->transcript();
+}
+
+/// A copied disk: nothing shows which of the two is the machine.
+TEST_F(Twins, OfTwoWithOneIdentityALateSubscriberUsesNone) {
+  start_feeder();
+  const auto copy = twin(kMachineId);
+  for (Process* each : {feeder_.get(), copy.get()})
+    ASSERT_TRUE(each->wait_for("twin the same machine_id")) << each->transcript();
+  const auto given = [](std::vector<std::string> command) {
+    for (const char* word : {"--machine", kMachine, kMachineId}) command.emplace_back(word);
+    return command;
+  };
+  Process fast(given(fast_subscriber())), cyclone(given(cyclone_subscriber()));
+  Process linuxcnc({ABBE_LINUXCNC_SUBSCRIBER, domain_.text(), kMachine, kMachineId});
+  for (Process* each : {&fast, &cyclone}) {
+    EXPECT_TRUE(each->wait_for("vmc-3: one of several with one identity")) << each->transcript();
+    EXPECT_FALSE(each->wait_for("vmc-3: publisher is", {}, 0s)) << each->transcript();
+  }
+  EXPECT_TRUE(linuxcnc.wait_for("not usable: nothing received about machine \"vmc-3\": several"))
+      << linuxcnc.transcript();
+  Process watcher(watch(
+      {"--machine", kMachine, "--machine-id", kMachineId, "--until-model", "--timeout", "3"}));
+  EXPECT_EQ(watcher.wait_for_end(), 1) << watcher.transcript();
+}
+
 TEST_F(Twins, ASubscriberNeverChangesFromOneToTheOther) {
   start_feeder();
   Process fast(fast_subscriber()), cyclone(cyclone_subscriber());

@@ -3,7 +3,10 @@
 /// same machine name. Two things are pinned:
 /// - the identity of the machine (machine_id of the topic Identity): the one that was given, else
 ///   the first one, for the life of this object. Another machine of the same name is never used;
-/// - the participant: the first one of this identity, until it stops sending.
+/// - the participant: the first one of this identity, until it stops sending. While two publishers
+///   have the same identity (a copied disk), none of them is chosen.
+/// An abbe-dds of an earlier version has no topic Identity: it is used by its name alone if no
+/// machine_id was given and no publisher states one.
 /// The header uses the standard library only, so that subscribers can copy it; the Cyclone DDS
 /// example implements the same rule in C.
 ///
@@ -20,6 +23,7 @@
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,14 +45,30 @@ using ParticipantId = std::array<std::uint8_t, 12>;
   return text;
 }
 
+/// The other publisher that a machine has seen, from the members twin and twin_seen of Identity.
+enum class Twin {
+  None,
+  SameName,  ///< another machine of this name
+  SameId,    ///< another publisher of this machine_id
+};
+
+/// How twin_seen begins for Twin::SameId.
+inline constexpr std::string_view kTwinOfSameId = "the same machine_id";
+
+[[nodiscard]] inline Twin twin_of(bool twin, std::string_view twin_seen) {
+  if (!twin) return Twin::None;
+  return twin_seen.substr(0, kTwinOfSameId.size()) == kTwinOfSameId ? Twin::SameId : Twin::SameName;
+}
+
 /// Create one object per machine.
 class PublisherPin {
  public:
   using Instant = std::chrono::steady_clock::time_point;
 
   /// Another participant can be pinned once the pinned one has sent nothing for this time: 15 or
-  /// more samples are then missing, because abbe sends at 50 to 100 Hz.
-  static constexpr std::chrono::milliseconds kSilence{300};
+  /// more samples are then missing, because abbe sends at 50 to 100 Hz. A subscriber that reads
+  /// only topics that are repeated every second needs kSilenceOfSlowTopics.
+  static constexpr std::chrono::milliseconds kSilence{300}, kSilenceOfSlowTopics{1500};
   /// Another participant is pinned only if it has sent for kAlone while the pinned one sent
   /// nothing. Of each interval between two of its samples at most kLongestPause is counted: a
   /// subscriber that was suspended thereby receives again from the pinned participant before it
@@ -58,6 +78,12 @@ class PublisherPin {
   /// sample. The successor of a restarted publisher is never foreign, because the old process has
   /// ended before the new one sends.
   static constexpr std::chrono::milliseconds kOverlap{100};
+  /// Identity comes every second. A participant that has sent for kNoIdentity without one has none.
+  /// One that has stated its identity within kPresent is there.
+  static constexpr std::chrono::milliseconds kNoIdentity{5000}, kPresent{1500};
+  /// A pinned participant that sees another one of its identity within this time had it beside it
+  /// when it was chosen: its first Identity may have been a second old.
+  static constexpr std::chrono::milliseconds kChoice{1500};
   /// At most this many participants beside the pinned one are remembered. For a further one, that
   /// with the oldest last sample is forgotten.
   static constexpr std::size_t kMostOthers = 7;
@@ -75,17 +101,25 @@ class PublisherPin {
     /// Do not use the sample, and report it: two machines have this name, and the subscriber was
     /// not given the machine_id of one of them.
     Ambiguous,
+    /// Do not use the sample, and report it: two publishers have this machine_id, or two have the
+    /// name and none states an identity.
+    Copied,
+    /// Do not use the sample, and report it: its machine_id is empty, because abbed could neither
+    /// read nor make one.
+    Unidentified,
   };
 
   /// `machine_id`: of the machine that this subscriber is for. Empty: the first one is pinned.
-  explicit PublisherPin(std::string machine_id = {}) {
+  explicit PublisherPin(std::string machine_id = {}, std::chrono::milliseconds silence = kSilence)
+      : silence_(silence) {
     if (!machine_id.empty()) machine_id_ = std::move(machine_id);
   }
 
-  /// Call it for every sample of the topic Identity. `twin`: its member of this name.
-  Verdict identified(const ParticipantId& from, const std::string& machine_id, bool twin,
+  /// Call it for every sample of the topic Identity.
+  Verdict identified(const ParticipantId& from, const std::string& machine_id, Twin twin,
                      Instant now) {
-    if (pinned_ == from && machine_id != machine_id_) pinned_.reset();
+    const bool chosen_by_chance = twin == Twin::SameId && now - pinned_at_ < kChoice;
+    if (pinned_ == from && (machine_id != machine_id_ || chosen_by_chance)) pinned_.reset();
     if (pinned_ != from) find_or_add(from, now).states = Statement{machine_id, twin};
     return heard(from, now);
   }
@@ -105,17 +139,15 @@ class PublisherPin {
     Other& other = find_or_add(from, now);
     other.alone += std::min<std::chrono::nanoseconds>(now - other.last, kLongestPause);
     other.last = now;
-    if (!other.states) return Verdict::Waiting;
-    if (machine_id_ && other.states->machine_id != *machine_id_) return Verdict::OtherMachine;
-    if (!machine_id_ && other.states->twin) return Verdict::Ambiguous;
-    if (other.foreign) return Verdict::Foreign;
-    const bool silent = now - pinned_heard_ >= kSilence && other.alone >= kAlone;
+    if (const auto objection = objection_to(other, now)) return *objection;
+    const bool silent = now - pinned_heard_ >= silence_ && other.alone >= kAlone;
     return !pinned_ || silent ? pin(other, now) : Verdict::Waiting;
   }
 
   [[nodiscard]] const std::optional<ParticipantId>& pinned() const noexcept { return pinned_; }
 
-  /// The machine_id that was given or pinned first; nullopt: none yet.
+  /// The machine_id that was given or pinned first; nullopt: none yet, or the pinned participant
+  /// states none.
   [[nodiscard]] const std::optional<std::string>& machine_id() const noexcept {
     return machine_id_;
   }
@@ -137,7 +169,7 @@ class PublisherPin {
  private:
   struct Statement {
     std::string machine_id;
-    bool twin = false;
+    Twin twin = Twin::None;
   };
   struct Other {
     ParticipantId id;
@@ -147,12 +179,41 @@ class PublisherPin {
     std::optional<Statement> states;
   };
 
+  /// Why `other` must not be pinned now, whether or not the pinned one is silent.
+  [[nodiscard]] std::optional<Verdict> objection_to(const Other& other, Instant now) const {
+    if (!other.states) {
+      if (machine_id_ || now - other.first < kNoIdentity) return Verdict::Waiting;
+      if (std::ranges::any_of(others_, [](const Other& o) { return o.states.has_value(); }))
+        return Verdict::Waiting;
+    } else {
+      const auto& [machine_id, twin] = *other.states;
+      if (machine_id.empty()) return Verdict::Unidentified;
+      if (machine_id_ && machine_id != *machine_id_) return Verdict::OtherMachine;
+      if (twin == Twin::SameId) return Verdict::Copied;
+      if (!machine_id_ && twin == Twin::SameName) return Verdict::Ambiguous;
+    }
+    if (other.foreign) return Verdict::Foreign;
+    if (has_copy(other, now)) return Verdict::Copied;
+    return std::nullopt;
+  }
+
+  /// Whether another participant that is not pinned, nor foreign to the pinned one, has the same
+  /// identity.
+  [[nodiscard]] bool has_copy(const Other& of, Instant now) const {
+    const auto id = [](const Other& o) {
+      return o.states ? std::optional{o.states->machine_id} : std::nullopt;
+    };
+    return std::ranges::any_of(others_, [&](const Other& o) {
+      return o.id != of.id && !o.foreign && now - o.last < kPresent && id(o) == id(of);
+    });
+  }
+
   Verdict pin(const Other& next, Instant now) {
     const ParticipantId id = next.id;
-    machine_id_ = next.states->machine_id;
+    if (next.states) machine_id_ = next.states->machine_id;
     std::erase_if(others_, [&](const Other& other) { return other.id == id; });
     pinned_ = id;
-    pinned_heard_ = now;
+    pinned_at_ = pinned_heard_ = now;
     return Verdict::NewlyPinned;
   }
 
@@ -164,9 +225,10 @@ class PublisherPin {
     return others_.emplace_back(Other{.id = id, .first = now, .last = now});
   }
 
+  std::chrono::milliseconds silence_;
   std::optional<std::string> machine_id_;
   std::optional<ParticipantId> pinned_;
-  Instant pinned_heard_{};
+  Instant pinned_at_{}, pinned_heard_{};
   std::vector<Other> others_;
 };
 

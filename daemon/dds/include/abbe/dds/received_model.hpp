@@ -38,6 +38,9 @@ class ReceivedModel {
   /// slice is missing.
   [[nodiscard]] std::optional<std::vector<v1::GridNode>> grid() const;
 
+  /// Of all models whose slices are kept.
+  [[nodiscard]] std::size_t kept_nodes() const;
+
   /// Whether the received grid may be applied. `publisher_alive`: the writer of ModelState has not
   /// lost its liveliness.
   [[nodiscard]] Decision decide(bool publisher_alive) const;

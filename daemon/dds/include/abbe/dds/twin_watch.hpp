@@ -1,7 +1,8 @@
 #pragma once
 /// Looks for other publishers in the domain that claim to be this machine: the same name with
 /// another identity (a copied configuration), or the same identity (a copied disk). abbe-dds reads
-/// the topic Identity of all participants for this. Used by one thread.
+/// the topic Identity of all participants for this, and remembers the last claims of this name or
+/// identity: strangers that publish other ones do not hide a twin. Used by one thread.
 
 #include <chrono>
 #include <cstddef>
@@ -11,6 +12,7 @@
 #include <string>
 
 #include "abbe/dds/readers.hpp"
+#include "abbe_v1.h"
 
 namespace abbe::dds {
 
@@ -28,15 +30,19 @@ class TwinWatch {
   [[nodiscard]] bool looks() const noexcept { return readers_.has_value(); }
 
   /// Reads what has arrived, at most every kPeriod. `own`: the payload of the last Identity that
-  /// this participant published; empty: none yet. Returns the first twin in words; empty: none.
+  /// this participant published; empty: none yet. Returns in words the twin that was seen first,
+  /// one of the same identity before one of the same name, and how many there are; empty: none.
   [[nodiscard]] std::string cycle(std::span<const std::byte> own, Instant now);
 
  private:
   struct Claim {
     std::string machine, machine_id;
-    Instant last;
+    Instant first, last;
   };
-  void take(const Arrival& arrival, Instant now);
+  void take(const Arrival& arrival, const v1::Identity& own, Instant now);
+  [[nodiscard]] static bool is_twin(const Claim& claim, const v1::Identity& own);
+  [[nodiscard]] static bool has_id_of(const Claim& claim, const v1::Identity& own);
+  [[nodiscard]] std::string in_words(const v1::Identity& own) const;
 
   ParticipantId self_{};
   std::optional<Readers> readers_;

@@ -499,7 +499,7 @@ TEST_F(Cli, AReplayThatDoesNotGiveTheLiveModelFails) {
   const auto other =
       abbe(fmt::format("replay '{}' -c '{}'", recording.string(), files_.machine.string()));
   EXPECT_EQ(other.exit, 1) << other.err;
-  EXPECT_THAT(other.out, AllOf(Not(HasSubstr("as live")), HasSubstr("no snapshot in")));
+  EXPECT_THAT(other.out, HasSubstr("no snapshot in"));
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include "abbe/pipeline/sensor_state_file.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "abbe/base/bounded_json.hpp"
 #include "abbe/base/json_text.hpp"
@@ -17,10 +17,10 @@ namespace {
 using nlohmann::json;
 using std::chrono::nanoseconds;
 
-constexpr int kSchema = 1;
-constexpr std::size_t kMostBytes = std::size_t{1} << 16;
+constexpr int kSensorStateSchema = 1;
+constexpr std::size_t kMostStateBytes = std::size_t{1} << 16;
 
-json unchecked_json(const json& state, const json& host_ns, const json& utc_ns) {
+json state_json(const json& state, const json& host_ns, const json& utc_ns) {
   return {{"host_ns", host_ns}, {"utc_ns", utc_ns}, {"sensors", state}};
 }
 
@@ -39,9 +39,9 @@ std::filesystem::path sensor_state_file(const std::filesystem::path& data_dir) {
 }
 
 std::string sensor_state_text(const SensorChecks& checks, const SensorStateClock& now) {
-  const json content = unchecked_json(json::parse(checks.to_attachment().content),
+  const json content = state_json(json::parse(checks.to_attachment().content),
                                       now.host.time_since_epoch().count(), now.utc.count());
-  return indented_json_text(json{{"schema", kSchema},
+  return indented_json_text(json{{"schema", kSensorStateSchema},
                                  {"sha256", sha256_hex(json_text(content))},
                                  {"state", content}}) +
          "\n";
@@ -51,10 +51,10 @@ Result<RecordingAttachment> left_sensor_state(std::string_view text,
                                               const SensorCheckOptions& options,
                                               const SensorStateClock& now) {
   const auto parsed =
-      parse_json(text, kSensorStateName, {.bytes = kMostBytes, .depth = 8, .values = 2000});
+      parse_json(text, kSensorStateName, {.bytes = kMostStateBytes, .depth = 8, .values = 2000});
   if (!parsed) return tl::unexpected(parsed.error());
   try {
-    if (parsed->at("schema").get<int>() != kSchema)
+    if (parsed->at("schema").get<int>() != kSensorStateSchema)
       return fail(ErrorCode::BadInput, fmt::format("{}: another schema", kSensorStateName));
     const json& content = parsed->at("state");
     if (parsed->at("sha256").get<std::string>() != sha256_hex(json_text(content)))

@@ -80,7 +80,8 @@ class FurtherFiles : public ::testing::Test {
   std::optional<Recorder> recorder_;
 };
 
-TEST_F(FurtherFiles, BeginWithTheLastWeatherOfEveryDevice) {
+/// A point of the new file may describe an instant up to the watermark before it.
+TEST_F(FurtherFiles, BeginWithTheWeatherThatTheirInstantsNeed) {
   recorder_->record(example_environment(1), "tracker");
   recorder_->record(example_environment(2), "hall");
   auto last = example_environment(3);
@@ -91,11 +92,12 @@ TEST_F(FurtherFiles, BeginWithTheLastWeatherOfEveryDevice) {
   recorder_->record(example_point(9), "tracker");
   const auto reader = second();
   std::vector<std::string> seen;
+  std::vector<HostTime> times;
   RecordingSink sink;
 
   sink.environment = [&](const protocol::EnvironmentSample& e, std::string_view device) {
     seen.emplace_back(device);
-    EXPECT_EQ(e.head.time, device == "hall" ? example_time(2) : example_time(3));
+    times.push_back(e.head.time);
     EXPECT_EQ(e.head.lost_before, 0u) << "said where they were lost";
     EXPECT_FALSE(has(e.head.flags, protocol::SampleFlag::GapBefore));
   };
@@ -105,9 +107,22 @@ TEST_F(FurtherFiles, BeginWithTheLastWeatherOfEveryDevice) {
   };
 
   EXPECT_EQ(reader.read(sink), 0u);
-  EXPECT_THAT(seen, ElementsAre("hall", "tracker", "point"));
+  EXPECT_THAT(seen, ElementsAre("tracker", "hall", "tracker", "point"));
+  EXPECT_THAT(times, ElementsAre(example_time(1), example_time(2), example_time(3)));
   EXPECT_EQ(reader.time_range()->first, example_time(9)) << "the file is not as old as its weather";
   EXPECT_EQ(recorder_->status().lost, 0u);
+}
+
+TEST_F(FurtherFiles, DoNotRepeatWeatherThatNoInstantNeeds) {
+  for (const std::uint32_t ms : {1u, 2'000u, 5'000u})
+    recorder_->record(example_environment(ms), "hall");
+  recorder_->flush();
+  recorder_->record(example_point(5'001), "tracker");
+  std::vector<HostTime> times;
+  RecordingSink sink;
+  sink.environment = [&](const auto& e, std::string_view) { times.push_back(e.head.time); };
+  EXPECT_EQ(second().read(sink), 0u);
+  EXPECT_THAT(times, ElementsAre(example_time(2'000), example_time(5'000)));
 }
 
 TEST_F(FurtherFiles, GiveTheirWeatherToAReplayAlsoFromRawBytes) {

@@ -59,8 +59,9 @@ class DamagedRecording : public ::testing::Test {
 
 /// `whole` up to its second chunk, a chunk of 300 MiB (a hole: it needs no space on the disk), the
 /// rest of `whole` up to `end`.
-std::filesystem::path with_a_large_chunk(const std::filesystem::path& folder, const FileBytes& whole,
-                                         std::size_t second_chunk, std::size_t end) {
+std::filesystem::path with_a_large_chunk(const std::filesystem::path& folder,
+                                         const FileBytes& whole, std::size_t second_chunk,
+                                         std::size_t end) {
   constexpr std::uint64_t kLarge = std::uint64_t{300} << 20;
   const auto file = folder / "large.mcap";
   write_file(file, whole, second_chunk);

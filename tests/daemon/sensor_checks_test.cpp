@@ -57,6 +57,11 @@ class SensorChecksTest : public testing::Test {
     for (int i = 0; i < 3; ++i) (void)read(scale_x_C, beside_C);
   }
 
+  /// scale_x drifts to 22 C, by more than kTwin allows.
+  void drift_apart() {
+    for (int s = 1; s <= 50; ++s) (void)read(21.0 + 0.02 * s, 21.0);
+  }
+
   std::optional<SensorChecks> checks_;
   HostTime now_ = kChecksStart;
 };
@@ -157,22 +162,22 @@ TEST_F(SensorChecksTest, CompareTwinsAtTheFirstReadingToo) {
 TEST_F(SensorChecksTest, KeepTheDoubtOfATwinWhileTheOtherIsSilent) {
   start(kTwin);
   settle();
-  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  drift_apart();
   ASSERT_THAT(checks_->findings(), SizeIs(2));
-  for (int s = 0; s < 5; ++s) (void)read(21.9, std::nan(""));
+  for (int s = 0; s < 5; ++s) (void)read(22.0, std::nan(""));
   ASSERT_THAT(checks_->findings(), SizeIs(2));
   EXPECT_EQ(checks_->findings()[0].doubt, SensorDoubt::Twin);
   EXPECT_EQ(checks_->findings()[1].doubt, SensorDoubt::NoValue);
-  (void)read(21.9, 21.7);
+  (void)read(22.0, 21.4);
   EXPECT_THAT(checks_->findings(), IsEmpty()) << "they agree again";
 }
 
 TEST_F(SensorChecksTest, KeepTheDoubtOfATwinThatWasSilentItself) {
   start(kTwin);
   settle();
-  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  drift_apart();
   (void)read(std::nan(""), std::nan(""));
-  (void)read(21.9, std::nan(""));
+  (void)read(22.0, std::nan(""));
   EXPECT_EQ(checks_->findings().at(0).doubt, SensorDoubt::Twin);
 }
 
@@ -228,13 +233,13 @@ TEST_F(SensorChecksTest, BeginAnewWhenAPersonAcceptsASensor) {
 TEST_F(SensorChecksTest, AcceptOneOfATwinOnlyIfTheOtherIsSilent) {
   start(kTwin);
   settle();
-  for (const double C : {21.4, 21.8, 21.9, 21.9}) (void)read(C, 21.0);
+  drift_apart();
   EXPECT_THAT(checks_->check_acceptance("scale_x").error().text, HasSubstr("still differ"));
-  (void)read(21.9, std::nan(""));
+  (void)read(22.0, std::nan(""));
   ASSERT_TRUE(checks_->check_acceptance("scale_x"));
   checks_->accept("scale_x");
-  (void)read(21.9, std::nan(""));
-  EXPECT_NEAR(used_C(21.9, std::nan("")), 21.9, 1e-9);
+  (void)read(22.0, std::nan(""));
+  EXPECT_NEAR(used_C(22.0, std::nan("")), 22.0, 1e-9);
 }
 
 TEST_F(SensorChecksTest, KnowTheirDoubtsAfterARestart) {

@@ -45,8 +45,8 @@ TEST(SensorQueue, OrdersDevicesByInstantAndWeatherByItsCycle) {
 }
 
 Config queue_config() {
-  const auto config = parse_config(
-      to_toml(config_tables::half_metre_mill()) + test::kWarmScales, "abbed.toml");
+  const auto config =
+      parse_config(to_toml(config_tables::half_metre_mill()) + test::kWarmScales, "abbed.toml");
   EXPECT_TRUE(config) << config.error().details.front();
   return config ? *config : Config{};
 }

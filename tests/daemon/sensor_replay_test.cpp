@@ -67,7 +67,8 @@ Batch batch_of(int s) {
   batch.taken = HostTime{1000s} + s * 1s;
   batch.measured_environment = {
       {0, temperature_sample(batch.taken - 100ms, 0, reading_K(s))},
-      {1, temperature_sample(batch.taken - 400ms, 1, reading_K(s) + (s >= 85 && s < 95 ? 6.0 : 0.5))}};
+      {1,
+       temperature_sample(batch.taken - 400ms, 1, reading_K(s) + (s >= 85 && s < 95 ? 6.0 : 0.5))}};
   for (int i = 0; i < 10; ++i) {
     protocol::AxisSample axes;
     axes.head.time = batch.taken - 1s + i * 100ms;
@@ -81,7 +82,9 @@ Batch batch_of(int s) {
 }
 
 SensorAcceptance acceptance() {
-  return {.sensor = "scale_x", .from = HostTime{1000s} + kAccepted * 1s + 900ms, .who = "anna",
+  return {.sensor = "scale_x",
+          .from = HostTime{1000s} + kAccepted * 1s + 900ms,
+          .who = "anna",
           .why = "compared with a thermometer"};
 }
 

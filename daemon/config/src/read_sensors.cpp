@@ -93,12 +93,13 @@ void check_hold(Section& sensors, const Config& config) {
   if (!config.sensors.check || hold <= std::chrono::nanoseconds{0}) return;
   for (const EnvironmentSource& device : environment_sources(config))
     if (device.period > hold)
-      sensors.fault("hold_s",
-                    fmt::format("{} s is shorter than period_s = {} of \"{}\": a value would not be "
-                                "held until the next reading; give at least {}, or 0: no value is "
-                                "held",
-                                seconds(hold), seconds(device.period), device.device,
-                                seconds(device.period)));
+      sensors.fault(
+          "hold_s",
+          fmt::format("{} s is shorter than period_s = {} of \"{}\": a value would not be "
+                      "held until the next reading; give at least {}, or 0: no value is "
+                      "held",
+                      seconds(hold), seconds(device.period), device.device,
+                      seconds(device.period)));
 }
 
 }  // namespace

@@ -185,13 +185,13 @@ Result<void> SensorChecks::check_acceptance(std::string_view name) const {
     case SensorDoubt::Twin:
       break;
   }
-  const auto twin = std::ranges::find_if(sensors_, [&](const Sensor& other) {
-    return other.options.place == sensor->options.twin;
-  });
+  const auto twin = std::ranges::find_if(
+      sensors_, [&](const Sensor& other) { return other.options.place == sensor->options.twin; });
   if (twin == sensors_.end() || twin->doubt != SensorDoubt::Twin) return {};  // silent
-  return refused(fmt::format("it and its twin {} still differ: repair the wrong one, or remove "
-                             "`twin` from [[sensors.limit]]",
-                             twin->options.name));
+  return refused(
+      fmt::format("it and its twin {} still differ: repair the wrong one, or remove "
+                  "`twin` from [[sensors.limit]]",
+                  twin->options.name));
 }
 
 void SensorChecks::accept(std::string_view name) {

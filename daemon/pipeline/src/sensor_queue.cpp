@@ -36,8 +36,8 @@ void SensorQueue::add(std::size_t device, const EnvironmentSample& sample, Envir
 }
 
 void SensorQueue::accept(SensorAcceptance acceptance) {
-  const auto after = std::ranges::upper_bound(acceptances_, acceptance.from, {},
-                                              &SensorAcceptance::from);
+  const auto after =
+      std::ranges::upper_bound(acceptances_, acceptance.from, {}, &SensorAcceptance::from);
   acceptances_.insert(after, std::move(acceptance));
 }
 

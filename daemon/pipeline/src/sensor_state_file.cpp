@@ -40,7 +40,7 @@ std::filesystem::path sensor_state_file(const std::filesystem::path& data_dir) {
 
 std::string sensor_state_text(const SensorChecks& checks, const SensorStateClock& now) {
   const json content = state_json(json::parse(checks.to_attachment().content),
-                                      now.host.time_since_epoch().count(), now.utc.count());
+                                  now.host.time_since_epoch().count(), now.utc.count());
   return indented_json_text(json{{"schema", kSensorStateSchema},
                                  {"sha256", sha256_hex(json_text(content))},
                                  {"state", content}}) +

@@ -28,8 +28,7 @@ std::size_t CarriedEnvironment::number_of(std::string_view device) {
 
 void CarriedEnvironment::take(const EnvironmentSample& sample, std::string_view device,
                               HostTime taken) {
-  const auto mask =
-      static_cast<EnvironmentMask>(sample.measured & queue_.checks().mask_of(device));
+  const auto mask = static_cast<EnvironmentMask>(sample.measured & queue_.checks().mask_of(device));
   const std::size_t number = number_of(device);
   if (device == weather_station_)
     queue_.add_weather(number, without_gap(sample), mask, taken);

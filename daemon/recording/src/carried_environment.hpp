@@ -62,7 +62,7 @@ class CarriedEnvironment {
   bool checks_sensors_;
   std::string weather_station_;
   std::chrono::nanoseconds watermark_;
-  std::vector<std::string> names_;  ///< by SensorQueue::Waiting::device
+  std::vector<std::string> names_;                              ///< by SensorQueue::Waiting::device
   std::map<std::string, protocol::EnvironmentSample> checked_;  ///< the last one, by device
   protocol::HostTime state_at_{};
   protocol::HostTime state_until_{};

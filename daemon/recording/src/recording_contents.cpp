@@ -83,7 +83,8 @@ void collect_by_indexes(ByteWindow& file, const mcap::Summary& summary,
     if (const auto content = indexed(file, Opcode::Metadata, index.offset, index.length))
       collector.add_metadata(*content, index.offset);
     else
-      collector.lost(index.offset, index.length, fmt::format("metadata {} is damaged or too large", index.name));
+      collector.lost(index.offset, index.length,
+                     fmt::format("metadata {} is damaged or too large", index.name));
   }
 
   for (const auto& index : summary.attachments) {
@@ -170,8 +171,7 @@ bool collect_cut_chunk(ByteWindow& file, std::uint64_t offset, ContentsCollector
   const auto head = file.at(offset, mcap::kRecordHeadSize);
   const auto record = head ? mcap::read_head(*head) : std::nullopt;
   if (!record || record->opcode != Opcode::Chunk) return false;
-  const PlacedRecord cut{Opcode::Chunk, offset,
-                         file.file_size() - offset - mcap::kRecordHeadSize};
+  const PlacedRecord cut{Opcode::Chunk, offset, file.file_size() - offset - mcap::kRecordHeadSize};
   if (!can_be_read(cut, collector)) return true;
   const auto content = file.at(cut.content(), cut.length);
   const auto chunk = content ? mcap::decode_cut_chunk(*content) : mcap::Decoded<mcap::Chunk>{};

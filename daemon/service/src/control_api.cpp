@@ -230,10 +230,10 @@ Result<OnHub> reference(const HubParts&, const json&) {
 }
 
 Result<OnHub> accept_sensor(const HubParts&, const json& request) {
-  SensorAcceptance acceptance{.sensor = remark_of(request.at("sensor").get<std::string>()),
-                              .who = who(request),
-                              .why = remark_of(request.value("why", std::string{}),
-                                               kLongestReason)};
+  SensorAcceptance acceptance{
+      .sensor = remark_of(request.at("sensor").get<std::string>()),
+      .who = who(request),
+      .why = remark_of(request.value("why", std::string{}), kLongestReason)};
   return [acceptance = std::move(acceptance)](const Hub& hub) {
     const HubParts& on = hub.parts();
     if (on.sensors == nullptr)

@@ -95,11 +95,11 @@ class SensorChecks {
     calib::SensorTrack track = {};
     calib::HeldValue held = {};
     calib::FollowedValue applied = {};
-    double usable = kNone;          ///< the last reading, if nothing was wrong with it alone
-    double used = kNone;            ///< output
+    double usable = kNone;  ///< the last reading, if nothing was wrong with it alone
+    double used = kNone;    ///< output
     // Kept by the first sensor of a pair:
-    int twin_differs = 0;        ///< comparisons in a row
-    bool twins_doubted = false;  ///< since the last comparison
+    int twin_differs = 0;           ///< comparisons in a row
+    bool twins_doubted = false;     ///< since the last comparison
     std::chrono::nanoseconds at{};  ///< of the last sample
     bool judged = false;
     bool accepted = false;  ///< the first reading is not compared with other sensors

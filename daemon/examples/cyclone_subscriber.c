@@ -154,10 +154,11 @@ static void print_state(const abbe_v1_ModelState* state) {
   printf("%s: state %d %s\n", state->machine, (int)state->state, state->reason);
 }
 
-/* True if the machine has seen another publisher of its machine_id, not only of its name. */
+/* True if the machine has seen another publisher of its name and machine_id. */
 static bool is_copied(const abbe_v1_Identity* identity) {
-  static const char same_id[] = "the same machine_id";
-  return identity->twin && strncmp(identity->twin_seen, same_id, sizeof same_id - 1) == 0;
+  char copy[sizeof identity->machine + 40];
+  snprintf(copy, sizeof copy, "the same machine_id, as machine %s,", identity->machine);
+  return identity->twin && strncmp(identity->twin_seen, copy, strlen(copy)) == 0;
 }
 
 /* True if another publisher that is neither pinned nor foreign states the same identity as `p`, or

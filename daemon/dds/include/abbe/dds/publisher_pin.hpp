@@ -48,16 +48,19 @@ using ParticipantId = std::array<std::uint8_t, 12>;
 /// The other publisher that a machine has seen, from the members twin and twin_seen of Identity.
 enum class Twin {
   None,
-  SameName,  ///< another machine of this name
-  SameId,    ///< another publisher of this machine_id
+  Other,   ///< another machine of this name, or this machine_id under another name
+  SameId,  ///< another publisher of this name and machine_id
 };
 
-/// How twin_seen begins for Twin::SameId.
-inline constexpr std::string_view kTwinOfSameId = "the same machine_id";
+/// How twin_seen begins if the other one has the same machine_id; its name and a comma follow.
+inline constexpr std::string_view kTwinOfSameId = "the same machine_id, as machine ";
 
-[[nodiscard]] inline Twin twin_of(bool twin, std::string_view twin_seen) {
+/// `machine`: the name in this Identity.
+[[nodiscard]] inline Twin twin_of(bool twin, std::string_view twin_seen,
+                                  const std::string& machine) {
   if (!twin) return Twin::None;
-  return twin_seen.substr(0, kTwinOfSameId.size()) == kTwinOfSameId ? Twin::SameId : Twin::SameName;
+  const std::string copy = std::string(kTwinOfSameId) + machine + ",";
+  return twin_seen.substr(0, copy.size()) == copy ? Twin::SameId : Twin::Other;
 }
 
 /// Create one object per machine.
@@ -190,7 +193,7 @@ class PublisherPin {
       if (machine_id.empty()) return Verdict::Unidentified;
       if (machine_id_ && machine_id != *machine_id_) return Verdict::OtherMachine;
       if (twin == Twin::SameId) return Verdict::Copied;
-      if (!machine_id_ && twin == Twin::SameName) return Verdict::Ambiguous;
+      if (!machine_id_ && twin == Twin::Other) return Verdict::Ambiguous;
     }
     if (other.foreign) return Verdict::Foreign;
     if (has_copy(other, now)) return Verdict::Copied;
